@@ -1,0 +1,6 @@
+"""Sparse linear algebra behind one small interface."""
+
+from .factorisation import Factorisation, backend, factorisation
+from .upper import UpperTriangle, upper_from_edges
+
+__all__ = ["Factorisation", "UpperTriangle", "backend", "factorisation", "upper_from_edges"]

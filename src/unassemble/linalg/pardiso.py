@@ -1,0 +1,132 @@
+"""Intel MKL PARDISO, called through the library that ``pypardiso`` finds and loads.
+
+``pypardiso`` itself drives real matrices only; the conformal system is complex Hermitian, so the
+one C entry point is called here, with the phases separated: analysis once, factorisations many.
+Parameter numbers are those of the oneMKL reference, "Intel oneMKL PARDISO - Parallel Direct Sparse
+Solver Interface", counted from 1 there and from 0 in ``_iparm``.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .upper import UpperTriangle
+
+_REAL_DEFINITE, _REAL_INDEFINITE, _COMPLEX_HERMITIAN_INDEFINITE = 2, -2, -4
+_ANALYSE, _FACTORISE, _SOLVE, _RELEASE = 11, 22, 33, -1
+_ERRORS = {
+    -2: "not enough memory",
+    -3: "the reordering failed",
+    -4: "a pivot is zero",
+    -8: "a 32-bit index overflowed",
+}
+
+
+class PardisoError(ArithmeticError):
+    """PARDISO gave up; the message holds its reason."""
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    from pypardiso import PyPardisoSolver
+
+    # A handle of our own: ctypes keeps argument types per handle, and pypardiso's declares pointers to reals.
+    return ctypes.CDLL(PyPardisoSolver().libmkl._name)
+
+
+def available() -> bool:
+    """Whether the MKL library can be loaded."""
+    try:
+        _library()
+    except (ImportError, OSError):
+        return False
+    return True
+
+
+class PardisoFactorisation:
+    """Factorisation L D L* of a Hermitian matrix, real or complex.
+
+    Parameters
+    ----------
+    matrix : UpperTriangle
+        Its pattern is analysed (ordered) now and kept for every later ``factorise``.
+    definite : bool
+        Real matrices only: use Cholesky, which fails where a pivot is not positive.
+
+    Raises
+    ------
+    PardisoError
+    """
+
+    def __init__(self, matrix: UpperTriangle, *, definite: bool = False):
+        self._handle = np.zeros(64, dtype=np.int64)
+        self._iparm = np.zeros(64, dtype=np.int32)
+        self._iparm[0] = 1  # no defaults: all of iparm is set here
+        self._iparm[1] = 3  # nested dissection, in parallel
+        self._iparm[9] = 30  # never perturb a pivot: shifts next to an eigenvalue have small ones, rightly
+        self._iparm[20] = 1  # Bunch-Kaufman pivots; without them shifts next to an eigenvalue lose all digits
+        self._iparm[34] = 1  # indices count from 0
+        if matrix.block > 1:
+            self._iparm[36] = matrix.block  # rows of square blocks
+        complex_entries = np.iscomplexobj(matrix.data)
+        if complex_entries:
+            self._mtype = _COMPLEX_HERMITIAN_INDEFINITE
+        else:
+            self._mtype = _REAL_DEFINITE if definite else _REAL_INDEFINITE
+        self._dtype = np.dtype(np.complex128 if complex_entries else np.float64)
+        self._matrix = matrix
+        self._call(_ANALYSE)
+
+    def factorise(self, matrix: UpperTriangle) -> None:
+        """Factorise a matrix with the analysed pattern."""
+        self._matrix = matrix
+        self._call(_FACTORISE)
+
+    def solve(self, rhs: NDArray) -> NDArray:
+        """Solve for one right-hand side (n,) or several (n, k)."""
+        rhs = np.asfortranarray(rhs, dtype=self._dtype)
+        solution = np.empty_like(rhs, order="F")
+        self._call(_SOLVE, rhs, solution)
+        return solution
+
+    @property
+    def factor_entries(self) -> int:
+        """Entries of the factor, as PARDISO counts them."""
+        return int(self._iparm[17])
+
+    def release(self) -> None:
+        """Give the memory of the factor back."""
+        if self._handle.any():
+            self._call(_RELEASE)
+            self._handle[:] = 0
+
+    def __del__(self):
+        self.release()
+
+    def _call(self, phase: int, rhs: NDArray | None = None, solution: NDArray | None = None) -> None:
+        m = self._matrix
+        unused = np.zeros(1)
+        one = ctypes.byref(ctypes.c_int(1))
+        n_rhs = 1 if rhs is None or rhs.ndim == 1 else rhs.shape[1]
+        error = ctypes.c_int(0)
+        data = np.ascontiguousarray(m.data, dtype=self._dtype)
+        _library().pardiso(
+            _pointer(self._handle), one, one,
+            ctypes.byref(ctypes.c_int(self._mtype)), ctypes.byref(ctypes.c_int(phase)),
+            ctypes.byref(ctypes.c_int(m.n)), _pointer(data), _pointer(m.indptr), _pointer(m.indices),
+            _pointer(unused), ctypes.byref(ctypes.c_int(n_rhs)), _pointer(self._iparm),
+            ctypes.byref(ctypes.c_int(0)),
+            _pointer(unused if rhs is None else rhs), _pointer(unused if solution is None else solution),
+            ctypes.byref(error),
+        )  # fmt: skip
+        if error.value:
+            reason = _ERRORS.get(error.value, f"error {error.value}")
+            raise PardisoError(f"PARDISO could not go on with a matrix of order {m.n}: {reason}")
+
+
+def _pointer(array: NDArray) -> ctypes.c_void_p:
+    return array.ctypes.data_as(ctypes.c_void_p)

@@ -1,0 +1,46 @@
+"""A checked symmetric matrix, stored as the weighted graph that it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class OperatorMatrix:
+    """A real symmetric matrix that passed every check at the door.
+
+    Attributes
+    ----------
+    n : int
+        Order.
+    edges : (e, 2) int64
+        Pairs i < j with a stored off-diagonal entry, in lexicographic order. Explicit zeros count: they
+        are structure.
+    entries : (e,) float64
+        A_ij of each pair, the mean of both triangles.
+    diagonal : (n,) float64
+        Absent entries are zero.
+    asymmetry : float
+        Largest difference between an entry and its transpose, relative to the largest off-diagonal entry
+        of the two rows; at rounding level.
+    warnings : tuple of str
+        What was changed on the way, in sentences.
+    """
+
+    n: int
+    edges: NDArray[np.int64]
+    entries: NDArray[np.float64]
+    diagonal: NDArray[np.float64]
+    asymmetry: float = 0.0
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def row_size(self) -> NDArray[np.float64]:
+        """(n,) largest absolute off-diagonal entry of each row."""
+        size = np.zeros(self.n)
+        np.maximum.at(size, self.edges[:, 0], np.abs(self.entries))
+        np.maximum.at(size, self.edges[:, 1], np.abs(self.entries))
+        return size

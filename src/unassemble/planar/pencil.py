@@ -1,0 +1,72 @@
+"""The conformal pencil of a piece: half the Dirichlet energy against the signed area.
+
+For a map z = x + iy of the mesh into the plane, E(z) = z* L z / 2 is its Dirichlet energy and
+a(z) = z* T z its signed area, with T_ab = 1/(4i), T_ba = -1/(4i) for each boundary edge a -> b that
+has the mesh on its left. For A = c L + D the matrix c L is known (its rows sum to zero), and
+
+    M(s) = c L / 2 - s T
+
+is positive semidefinite for 0 <= s <= c; M(c) z = 0 exactly for similarities of the true mesh.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..linalg import UpperTriangle, upper_from_edges
+from ..topology import Piece
+
+
+class ConformalPencil:
+    """M(s) with the last vertex pinned at zero, which removes the constants from its null space.
+
+    Parameters
+    ----------
+    piece : Piece
+    weights : (e,) float64
+        c w = -A_ij of each edge.
+    """
+
+    def __init__(self, piece: Piece, weights: NDArray):
+        self.n = piece.n_vertices
+        self.tail, self.head = piece.boundary.T
+        diagonal = np.bincount(piece.edges.ravel(), np.repeat(weights, 2), self.n)
+        kept = piece.edges[:, 1] < self.n - 1  # the pinned vertex is the higher end of all its edges
+        edges = piece.edges[kept]
+        self._energy = upper_from_edges(self.n - 1, edges, -weights[kept] / 2, diagonal[:-1] / 2)
+        self._place, self._sign = self._boundary_entries(edges)
+
+    def _boundary_entries(self, edges: NDArray) -> tuple[NDArray, NDArray]:
+        """Places of the boundary edges in the upper triangle, and the sign of T there (times -i/4)."""
+        inside = (self.tail < self.n - 1) & (self.head < self.n - 1)
+        low = np.minimum(self.tail, self.head)[inside]
+        high = np.maximum(self.tail, self.head)[inside]
+        key = edges[:, 0] * self.n + edges[:, 1]
+        # Row i of the triangle starts with its diagonal: i + 1 of those come before an entry of row i.
+        place = np.searchsorted(key, low * self.n + high) + low + 1
+        return place, np.where(self.tail[inside] < self.head[inside], 1.0, -1.0)
+
+    def matrix(self, shift: float) -> UpperTriangle:
+        """M(shift) without the pinned row and column."""
+        data = self._energy.data.astype(np.complex128)
+        data[self._place] += 0.25j * shift * self._sign
+        return self._energy.with_data(data)
+
+    def energy_form(self, z: NDArray) -> NDArray:
+        """c L z / 2 for z (n,) complex with z[-1] = 0; the last entry, which nobody needs, is left at zero."""
+        upper = self._energy
+        half = sp.csr_array((upper.data, upper.indices, upper.indptr), shape=(self.n - 1, self.n - 1))
+        # Real and imaginary parts as two columns: scipy would turn the matrix complex otherwise.
+        columns = z[:-1].view(np.float64).reshape(-1, 2)
+        product = half @ columns + half.T @ columns - upper.data[upper.indptr[:-1], None] * columns
+        return np.append(product.view(np.complex128).ravel(), 0)
+
+    def area_form(self, z: NDArray) -> NDArray:
+        """T z for z (n,) complex."""
+        forward = np.zeros(self.n, dtype=np.complex128)
+        # Each vertex of a boundary that touches itself occurs more than once: accumulate.
+        np.add.at(forward, self.tail, -0.25j * z[self.head])
+        np.add.at(forward, self.head, 0.25j * z[self.tail])
+        return forward

@@ -1,0 +1,73 @@
+"""The 3-cycles of a sparse graph, by array code."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+
+def three_cycles(n: int, edges: NDArray) -> tuple[NDArray, NDArray]:
+    """All 3-cycles of a simple graph.
+
+    Each edge is directed towards its end of higher degree, so that few edges leave a vertex even
+    where hubs exist, and every pair of edges leaving a vertex is tested for the closing edge: the
+    "forward" algorithm, linear in the number of edges on planar graphs (Chiba and Nishizeki, SIAM
+    J. Comput. 14, 1985).
+
+    Parameters
+    ----------
+    n : int
+        Number of vertices.
+    edges : (e, 2) int
+        Pairs i < j in lexicographic order.
+
+    Returns
+    -------
+    triangles : (m, 3) int64
+        Vertices, in no particular orientation.
+    opposite : (m, 3) int64
+        The edge (row of `edges`) that faces each corner.
+    """
+    e = len(edges)
+    degree = np.bincount(edges.ravel(), minlength=n)
+    swap = degree[edges[:, 0]] > degree[edges[:, 1]]
+    tail = np.where(swap, edges[:, 1], edges[:, 0])
+    order = np.argsort(tail, kind="stable")
+    tail = tail[order]
+    head = np.where(swap, edges[:, 0], edges[:, 1])[order]
+    edge_id = _edge_lookup(n, edges)
+    found: list[tuple[NDArray, NDArray, NDArray]] = []
+    first = np.arange(e)
+    step = 1
+    while True:
+        first = first[first + step < e]
+        first = first[tail[first] == tail[first + step]]
+        if not len(first):
+            break
+        second = first + step
+        closing = edge_id(head[first], head[second])
+        hit = closing >= 0
+        found.append((first[hit], second[hit], closing[hit]))
+        step += 1
+    if not found:
+        return np.empty((0, 3), np.int64), np.empty((0, 3), np.int64)
+    first, second, closing = (np.concatenate(part) for part in zip(*found, strict=True))
+    triangles = np.column_stack([tail[first], head[first], head[second]]).astype(np.int64)
+    opposite = np.column_stack([closing, order[second], order[first]]).astype(np.int64)
+    return triangles, opposite
+
+
+def _edge_lookup(n: int, edges: NDArray):
+    """A function from pairs of vertices to rows of `edges`, -1 where there is no edge."""
+    indptr = np.zeros(n + 1, dtype=np.int32)
+    np.cumsum(np.bincount(edges[:, 0], minlength=n), out=indptr[1:])
+    numbered = sp.csr_array(
+        (np.arange(1, len(edges) + 1, dtype=np.int32), edges[:, 1].astype(np.int32), indptr), shape=(n, n)
+    )
+    numbered.has_canonical_format = True  # lets scipy search rows by bisection
+
+    def lookup(a: NDArray, b: NDArray) -> NDArray:
+        return np.asarray(numbered[np.minimum(a, b), np.maximum(a, b)]).ravel().astype(np.int64) - 1
+
+    return lookup

@@ -1,0 +1,103 @@
+"""Consistent orientation of triangles glued along edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse import csgraph
+
+
+@dataclass(frozen=True, eq=False)
+class Gluing:
+    """Which corners face each edge.
+
+    Attributes
+    ----------
+    count : (e,) int64
+        Number of triangles at each edge.
+    first, second : (e,) int64
+        Corners (3 * triangle + position) that face the edge, -1 where there is none.
+    """
+
+    count: NDArray[np.int64]
+    first: NDArray[np.int64]
+    second: NDArray[np.int64]
+
+
+def glue(n_edges: int, opposite: NDArray) -> Gluing:
+    """Invert `opposite` (m, 3), the edge that faces each corner."""
+    corners = opposite.size
+    by_corner = sp.csr_array(
+        (np.ones(corners, np.int8), opposite.ravel().astype(np.int32), np.arange(corners + 1, dtype=np.int32)),
+        shape=(corners, n_edges),
+    )
+    by_edge = by_corner.tocsc()
+    start = by_edge.indptr[:-1].astype(np.int64)
+    count = np.diff(by_edge.indptr).astype(np.int64)
+    padded = np.append(by_edge.indices, [-1, -1]).astype(np.int64)
+    first = np.where(count > 0, padded[start], -1)
+    second = np.where(count > 1, padded[start + 1], -1)
+    return Gluing(count, first, second)
+
+
+def orient(triangles: NDArray, gluing: Gluing) -> tuple[NDArray, NDArray, NDArray]:
+    """Turn triangles so that neighbours run along their common edge in opposite directions.
+
+    Returns
+    -------
+    flip : (m,) bool
+        Triangles to be reversed; the first triangle of each piece is kept.
+    piece : (m,) int64
+        Label of the edge-connected piece, in order of the pieces' first triangles.
+    orientable : (number of pieces,) bool
+    """
+    m = len(triangles)
+    inner = gluing.second >= 0
+    one, two = gluing.first[inner], gluing.second[inner]
+    clash = _runs_upwards(triangles, one) == _runs_upwards(triangles, two)
+    one, two = one // 3, two // 3
+    dual = sp.csr_array(
+        (np.tile(np.where(clash, 2, 1).astype(np.int8), 2), (np.r_[one, two], np.r_[two, one])), shape=(m, m)
+    )
+    n_pieces, piece = csgraph.connected_components(dual, directed=False)
+    parent = _spanning_tree(dual, n_pieces, piece)
+    rows = np.arange(m)
+    root = parent < 0
+    parent = np.where(root, rows, parent)
+    flip = np.asarray(dual[rows, parent]).ravel() == 2
+    flip[root] = False
+    # Parity of the path to the root, by doubling: after k rounds each pointer spans 2^k tree edges.
+    while not root[parent].all():
+        flip ^= flip[parent]
+        parent = parent[parent]
+    orientable = np.ones(n_pieces, dtype=bool)
+    orientable[piece[one[(flip[one] ^ flip[two]) != clash]]] = False
+    return flip, piece.astype(np.int64), orientable
+
+
+def _runs_upwards(triangles: NDArray, corner: NDArray) -> NDArray:
+    """Whether the edge facing a corner runs from the lower to the higher vertex."""
+    flat = triangles.ravel()
+    base, position = 3 * (corner // 3), corner % 3
+    return flat[base + (position + 1) % 3] < flat[base + (position + 2) % 3]
+
+
+def _spanning_tree(dual: sp.csr_array, n_pieces: int, piece: NDArray) -> NDArray:
+    """Breadth-first parents; -1 at the first triangle of each piece."""
+    m = dual.shape[0]
+    if n_pieces == 1:
+        _, parent = csgraph.breadth_first_order(dual, 0, directed=True)
+        return np.where(parent < 0, -1, parent)
+    # One search from an extra node that is joined to every piece, however many there are.
+    _, first = np.unique(piece, return_index=True)
+    indptr = np.append(dual.indptr, dual.indptr[-1] + n_pieces)
+    graph = sp.csr_array(
+        (np.ones(indptr[-1], np.int8), np.append(dual.indices, first.astype(dual.indices.dtype)), indptr),
+        shape=(m + 1, m + 1),
+    )
+    _, parent = csgraph.breadth_first_order(graph, m, directed=True)
+    parent = parent[:m]
+    return np.where((parent < 0) | (parent == m), -1, parent)

@@ -1,0 +1,183 @@
+"""Faces, orientation, boundary loops and pieces from the sparsity graph alone (paper, section 2.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import NotPlanarError, TopologyError
+from . import planarity
+from .boundary import boundary_corners, following, loops
+from .cycles import three_cycles
+from .orientation import Gluing, glue, orient
+from .surface import Piece, Topology
+
+
+def recognise(n: int, edges: NDArray) -> Topology:
+    """Find the triangles of a planar mesh in its graph.
+
+    If every edge lies on at most two 3-cycles and these glue together to orientable surfaces with
+    the Euler number of a sphere with as many holes as there are boundary loops, then the surfaces
+    are planar and the 3-cycles are faces: no planarity test is needed, and no tri-connectivity.
+    Otherwise a planar embedding is computed, and its triangular faces are the elements.
+
+    Parameters
+    ----------
+    n : int
+        Number of vertices.
+    edges : (e, 2) int64
+        Pairs i < j in lexicographic order.
+
+    Raises
+    ------
+    NotPlanarError
+        With a Kuratowski subgraph as witness.
+    TopologyError
+        If there are no triangles, or they do not fit together.
+    """
+    if n >= 3 and len(edges) > 3 * n - 6:
+        raise _not_planar(n, edges, f"it has {len(edges)} edges, and a planar graph has at most 3 n - 6 = {3 * n - 6}")
+    triangles, opposite = three_cycles(n, edges)
+    pieces = _planar_pieces(n, edges, triangles, opposite)
+    covered = np.zeros(len(edges), dtype=bool)
+    covered[opposite] = True
+    if pieces is not None and covered.all():
+        return Topology(n, edges, pieces, "3-cycles")
+    if not planarity.is_planar(n, edges):
+        raise _not_planar(n, edges, "it contains the subdivision of K5 or K3,3 on these edges")
+    if not len(triangles):
+        raise TopologyError(
+            f"the graph of the matrix ({n} vertices, {len(edges)} edges) is planar but has no triangle: "
+            "no element can be recognised (if zero entries were dropped, keep them stored)"
+        )
+    if pieces is not None:  # edges without a triangle do not hinder the rest
+        return Topology(n, edges, pieces, "3-cycles")
+    triangles, opposite = planarity.triangular_faces(n, edges)
+    pieces = _planar_pieces(n, edges, triangles, opposite)
+    if pieces is None:
+        raise TopologyError(
+            "the triangular faces of the planar graph do not glue together to surfaces with a boundary; "
+            "a hole or an outer boundary of three edges may have been taken for an element"
+        )
+    return Topology(n, edges, pieces, "embedding")
+
+
+def _not_planar(n: int, edges: NDArray, why: str) -> NotPlanarError:
+    witness = planarity.kuratowski_edges(n, edges)
+    shown = ", ".join(f"{a}-{b}" for a, b in witness[:12]) + (", ..." if len(witness) > 12 else "")
+    return NotPlanarError(
+        f"the graph of the matrix is not planar: {why} (rows joined by nonzero entries: {shown})", witness
+    )
+
+
+def _planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> tuple[Piece, ...] | None:
+    """Cut triangles into oriented pieces; None where one of them is not a sphere with holes."""
+    if not len(triangles):
+        return ()
+    gluing = glue(len(edges), opposite)
+    if (gluing.count > 2).any():
+        return None
+    flip, piece, orientable = orient(triangles, gluing)
+    if not orientable.all():
+        return None
+    triangles = np.where(flip[:, None], triangles[:, [0, 2, 1]], triangles)
+    opposite = np.where(flip[:, None], opposite[:, [0, 2, 1]], opposite)
+    gluing = glue(len(edges), opposite)
+    corners = boundary_corners(gluing)
+    loop, order = loops(following(triangles, opposite, gluing, corners))
+    if not _spheres_with_holes(n, edges, triangles, gluing, piece, corners, loop):
+        return None
+    return _cut(n, edges, triangles, opposite, gluing, piece, corners[order], loop[order])
+
+
+def _spheres_with_holes(
+    n: int, edges: NDArray, triangles: NDArray, gluing: Gluing, piece: NDArray, corners: NDArray, loop: NDArray
+) -> bool:
+    """Euler's formula for every piece, with a vertex counted once for each fan of triangles about it.
+
+    A vertex with p boundary edges leaving it in a piece has p fans, one if p = 0. A second closed
+    fan would be missed here, but counting it could only raise v - e + m, which is at most 2 - loops.
+    """
+    n_pieces = int(piece.max()) + 1
+    n_loops = np.zeros(n_pieces, dtype=np.int64)
+    n_edges = np.bincount(piece[gluing.first[gluing.count > 0] // 3], minlength=n_pieces)
+    n_triangles = np.bincount(piece, minlength=n_pieces)
+    at = _vertices_of_pieces(n, triangles, piece)
+    n_vertices = np.bincount(at // n, minlength=n_pieces)
+    if len(corners):
+        _, one_of_each = np.unique(loop, return_index=True)
+        n_loops = np.bincount(piece[corners[one_of_each] // 3], minlength=n_pieces)
+        tails = triangles.ravel()[3 * (corners // 3) + (corners + 1) % 3]
+        fans = piece[corners // 3] * n + tails
+        n_vertices = n_vertices + np.bincount(fans // n, minlength=n_pieces)
+        n_vertices -= np.bincount(np.unique(fans) // n, minlength=n_pieces)
+    return bool(((n_vertices - n_edges + n_triangles == 2 - n_loops) & (n_loops > 0)).all())
+
+
+def _vertices_of_pieces(n: int, triangles: NDArray, piece: NDArray) -> NDArray:
+    """Sorted keys piece * n + vertex of all pairs that occur."""
+    if not piece.any():
+        seen = np.zeros(n, dtype=bool)
+        seen[triangles] = True
+        return np.flatnonzero(seen)
+    return np.unique(piece[:, None] * n + triangles)
+
+
+def _cut(
+    n: int,
+    edges: NDArray,
+    triangles: NDArray,
+    opposite: NDArray,
+    gluing: Gluing,
+    piece: NDArray,
+    corners: NDArray,
+    loop: NDArray,
+) -> tuple[Piece, ...]:
+    """Number each piece by itself."""
+    base = 3 * (corners // 3)
+    flat = triangles.ravel()
+    boundary = np.column_stack([flat[base + (corners + 1) % 3], flat[base + (corners + 2) % 3]])
+    n_pieces = int(piece.max()) + 1
+    edge_piece = np.where(gluing.count > 0, piece[gluing.first // 3], -1)
+    if n_pieces == 1 and len(edges) == (edge_piece == 0).sum() and len(_vertices_of_pieces(n, triangles, piece)) == n:
+        offsets = np.append(np.flatnonzero(np.diff(loop, prepend=-1)), len(loop))
+        return (Piece(np.arange(n), np.arange(len(edges)), edges, triangles, opposite, boundary, offsets),)
+    return tuple(
+        _local_piece(n, edges, triangles, opposite, boundary, loop, rows)
+        for rows in zip(
+            _groups(piece, n_pieces),
+            _groups(edge_piece, n_pieces),
+            _groups(piece[corners // 3], n_pieces),
+            strict=True,
+        )
+    )
+
+
+def _groups(label: NDArray, n_labels: int) -> list[NDArray]:
+    """Rows with label 0, 1, ..., each in increasing order; negative labels are left out."""
+    order = np.argsort(label, kind="stable")
+    start = np.searchsorted(label[order], np.arange(n_labels + 1))
+    return [order[start[k] : start[k + 1]] for k in range(n_labels)]
+
+
+def _local_piece(
+    n: int,
+    edges: NDArray,
+    triangles: NDArray,
+    opposite: NDArray,
+    boundary: NDArray,
+    loop: NDArray,
+    rows: tuple[NDArray, NDArray, NDArray],
+) -> Piece:
+    of_triangles, of_edges, of_boundary = rows
+    vertices, corner_vertices = np.unique(triangles[of_triangles], return_inverse=True)
+    ring = loop[of_boundary]
+    return Piece(
+        vertices=vertices,
+        edge_rows=of_edges,
+        edges=np.searchsorted(vertices, edges[of_edges]),
+        triangles=corner_vertices.reshape(-1, 3),
+        opposite=np.searchsorted(of_edges, opposite[of_triangles]),
+        boundary=np.searchsorted(vertices, boundary[of_boundary]),
+        loop_offsets=np.append(np.flatnonzero(np.diff(ring, prepend=-1)), len(ring)),
+    )

@@ -1,0 +1,116 @@
+"""What a graph becomes once its faces are known: connectivity without coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .orientation import glue
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One edge-connected, oriented planar surface of triangles, in a numbering of its own.
+
+    Attributes
+    ----------
+    vertices : (k,) int64
+        Rows of the matrix.
+    edge_rows : (e,) int64
+        Rows of the whole graph's edge list.
+    edges : (e, 2) int64
+        Local vertices i < j.
+    triangles : (m, 3) int64
+        Local vertices; neighbours run along a common edge in opposite directions.
+    opposite : (m, 3) int64
+        The local edge that faces each corner.
+    boundary : (b, 2) int64
+        Local directed edges with the surface on the left, loop by loop in running order.
+    loop_offsets : (loops + 1,) int64
+        Loop k is ``boundary[loop_offsets[k]:loop_offsets[k + 1]]``.
+    """
+
+    vertices: NDArray[np.int64]
+    edge_rows: NDArray[np.int64]
+    edges: NDArray[np.int64]
+    triangles: NDArray[np.int64]
+    opposite: NDArray[np.int64]
+    boundary: NDArray[np.int64]
+    loop_offsets: NDArray[np.int64]
+
+    @cached_property
+    def facing(self) -> NDArray[np.int64]:
+        """(e, 2) corners (3 * triangle + position) that face each edge; -1 in the second place on the boundary."""
+        gluing = glue(len(self.edges), self.opposite)
+        return np.column_stack([gluing.first, gluing.second])
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices."""
+        return len(self.vertices)
+
+    @property
+    def n_loops(self) -> int:
+        """Number of boundary loops, the outer one included."""
+        return len(self.loop_offsets) - 1
+
+    @property
+    def longest_loop(self) -> NDArray[np.int64]:
+        """Vertices of the loop with the most edges, in running order."""
+        k = int(np.argmax(np.diff(self.loop_offsets)))
+        return self.boundary[self.loop_offsets[k] : self.loop_offsets[k + 1], 0]
+
+
+@dataclass(frozen=True, eq=False)
+class Topology:
+    """All pieces of a graph, and what belongs to none.
+
+    Attributes
+    ----------
+    n_vertices : int
+    edges : (e, 2) int64
+        Pairs i < j in lexicographic order.
+    pieces : tuple of Piece
+        In order of their lowest vertex.
+    method : str
+        How the faces were found: ``"3-cycles"`` or ``"embedding"``.
+    """
+
+    n_vertices: int
+    edges: NDArray[np.int64]
+    pieces: tuple[Piece, ...]
+    method: str
+
+    @cached_property
+    def multiplicity(self) -> NDArray[np.int64]:
+        """(n,) number of pieces that each vertex belongs to."""
+        count = np.zeros(self.n_vertices, dtype=np.int64)
+        for piece in self.pieces:
+            count[piece.vertices] += 1
+        return count
+
+    @property
+    def hinges(self) -> NDArray[np.int64]:
+        """Vertices shared by several pieces."""
+        return np.flatnonzero(self.multiplicity > 1)
+
+    @property
+    def undetermined(self) -> NDArray[np.int64]:
+        """Vertices of no triangle."""
+        return np.flatnonzero(self.multiplicity == 0)
+
+    @cached_property
+    def bare_edges(self) -> NDArray[np.int64]:
+        """Rows of `edges` that belong to no triangle."""
+        bare = np.ones(len(self.edges), dtype=bool)
+        for piece in self.pieces:
+            bare[piece.edge_rows] = False
+        return np.flatnonzero(bare)
+
+    @property
+    def n_holes(self) -> int:
+        """Bounded boundary loops over all pieces."""
+        return sum(piece.n_loops - 1 for piece in self.pieces)
