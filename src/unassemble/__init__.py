@@ -1,0 +1,78 @@
+"""unassemble: from a sparse matrix back to the mesh it was assembled on."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from ._version import __version__
+
+if TYPE_CHECKING:
+    from .errors import (
+        FormatError,
+        GeometryError,
+        InputError,
+        MatrixError,
+        MatrixFileError,
+        NotPlanarError,
+        OutputError,
+        RecoveryError,
+        SolverError,
+        TopologyError,
+        UnassembleError,
+    )
+    from .inspection import inspect_matrix
+    from .pipeline import recover
+    from .recovery import Recovery
+
+# Imported on first use: the command line answers --help without loading scipy.
+_HOMES = {
+    "inspect_matrix": "inspection",
+    "recover": "pipeline",
+    "Recovery": "recovery",
+    **dict.fromkeys(
+        (
+            "FormatError",
+            "GeometryError",
+            "InputError",
+            "MatrixError",
+            "MatrixFileError",
+            "NotPlanarError",
+            "OutputError",
+            "RecoveryError",
+            "SolverError",
+            "TopologyError",
+            "UnassembleError",
+        ),
+        "errors",
+    ),
+}
+
+__all__ = [
+    "FormatError",
+    "GeometryError",
+    "InputError",
+    "MatrixError",
+    "MatrixFileError",
+    "NotPlanarError",
+    "OutputError",
+    "Recovery",
+    "RecoveryError",
+    "SolverError",
+    "TopologyError",
+    "UnassembleError",
+    "__version__",
+    "inspect_matrix",
+    "recover",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

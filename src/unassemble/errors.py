@@ -49,5 +49,9 @@ class GeometryError(RecoveryError):
     """The numbers of the matrix fit no planar mesh on its graph."""
 
 
+class SolverError(RecoveryError):
+    """A sparse factorisation broke down."""
+
+
 class FormatError(RecoveryError):
     """A file format cannot hold the result."""

@@ -14,20 +14,17 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SolverError
 from .upper import UpperTriangle
 
 _REAL_DEFINITE, _REAL_INDEFINITE, _COMPLEX_HERMITIAN_INDEFINITE = 2, -2, -4
 _ANALYSE, _FACTORISE, _SOLVE, _RELEASE = 11, 22, 33, -1
+_OUT_OF_MEMORY = -2
 _ERRORS = {
-    -2: "not enough memory",
     -3: "the reordering failed",
     -4: "a pivot is zero",
     -8: "a 32-bit index overflowed",
 }
-
-
-class PardisoError(ArithmeticError):
-    """PARDISO gave up; the message holds its reason."""
 
 
 @cache
@@ -59,7 +56,9 @@ class PardisoFactorisation:
 
     Raises
     ------
-    PardisoError
+    SolverError
+        If a pivot is zero, or PARDISO gives up for another reason.
+    MemoryError
     """
 
     def __init__(self, matrix: UpperTriangle, *, definite: bool = False):
@@ -124,8 +123,10 @@ class PardisoFactorisation:
             ctypes.byref(error),
         )  # fmt: skip
         if error.value:
+            if error.value == _OUT_OF_MEMORY:
+                raise MemoryError(f"PARDISO found too little memory to factorise a matrix of order {m.n * m.block}")
             reason = _ERRORS.get(error.value, f"error {error.value}")
-            raise PardisoError(f"PARDISO could not go on with a matrix of order {m.n}: {reason}")
+            raise SolverError(f"PARDISO could not go on with a matrix of order {m.n * m.block}: {reason}")
 
 
 def _pointer(array: NDArray) -> ctypes.c_void_p:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
+from ..errors import SolverError
 from .upper import UpperTriangle
 
 
@@ -21,12 +22,15 @@ class SuperLUFactorisation:
     def factorise(self, matrix: UpperTriangle) -> None:
         """Factorise."""
         # Minimum degree on A + A' with diagonal pivots preferred: SuperLU users' guide, "symmetric mode".
-        self._lu = splu(
-            matrix.full(),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.001,
-            options={"SymmetricMode": True},
-        )
+        try:
+            self._lu = splu(
+                matrix.full(),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.001,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError as error:
+            raise SolverError(f"SuperLU could not go on with a matrix of order {matrix.n}: {error}") from error
 
     def solve(self, rhs: NDArray) -> NDArray:
         """Solve for one right-hand side (n,) or several (n, k)."""

@@ -1,0 +1,135 @@
+"""The certificate: the operator re-assembled on the mesh as written, held against the matrix.
+
+Knows nothing of how the mesh was found, and imports no solver.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+CERTIFIED = 1e-9
+"""Largest backward error of a certified mesh."""
+
+CONFIDENCE = 1e-3
+"""Least p-value of a mesh certified in the presence of noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """How well a mesh explains a matrix.
+
+    Attributes
+    ----------
+    backward_error : float
+        Largest difference between an off-diagonal entry and the re-assembled one, relative to the largest
+        off-diagonal entry of its row.
+    pairs : (k, 2) int64
+        Rows and columns of all entries of either, upper triangle.
+    misfits : (k,) float64
+        Their differences, relative in the same way.
+    differences : (k,) float64
+        Their differences, re-assembled minus given.
+    """
+
+    backward_error: float
+    pairs: NDArray[np.int64]
+    misfits: NDArray[np.float64]
+    differences: NDArray[np.float64]
+
+    def worst(self, count: int = 10) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """The entries above the bound that fit worst, worst first."""
+        order = np.argsort(-self.misfits, kind="stable")[:count]
+        order = order[self.misfits[order] > CERTIFIED]
+        return self.pairs[order], self.misfits[order]
+
+
+def certify(
+    edges: NDArray,
+    entries: NDArray,
+    points: NDArray,
+    triangles: NDArray,
+    factor: NDArray,
+    tensor: tuple[float, float, float] | None = None,
+) -> Certificate:
+    """Re-assemble factor * div(K grad) with P1 elements and compare off-diagonal entries.
+
+    Parameters
+    ----------
+    edges : (e, 2) int64
+        Pairs i < j of the matrix.
+    entries : (e,) float64
+        A_ij.
+    points : (n, 2) float64
+    triangles : (m, 3) int64
+    factor : (m,) float64
+        The factor c of each triangle's piece.
+    tensor : (kxx, kxy, kyy), optional
+        K; the identity by default.
+    """
+    n = len(points)
+    key, value = _assemble(points, triangles, factor, tensor)
+    given = edges[:, 0] * n + edges[:, 1]
+    if np.array_equal(key, given):
+        pairs, difference = edges, value - entries
+    else:
+        union = np.union1d(key, given)
+        difference = np.zeros(len(union))
+        difference[np.searchsorted(union, key)] += value
+        difference[np.searchsorted(union, given)] -= entries
+        pairs = np.column_stack([union // n, union % n])
+    size = np.zeros(n)
+    for end in edges.T:
+        np.maximum.at(size, end, np.abs(entries))
+    reference = np.minimum(size[pairs[:, 0]], size[pairs[:, 1]])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        misfits = np.where(difference == 0, 0.0, np.abs(difference) / reference)
+    misfits = np.where(np.isnan(misfits), np.inf, misfits)
+    return Certificate(float(misfits.max(initial=0.0)), pairs, misfits, difference)
+
+
+def _assemble(
+    points: NDArray, triangles: NDArray, factor: NDArray, tensor: tuple[float, float, float] | None
+) -> tuple[NDArray, NDArray]:
+    """Off-diagonal entries: int K grad(phi_i) . grad(phi_j) over triangles, areas taken positive.
+
+    With side s_i facing corner i turned by a right angle, grad(phi_i) = s_i / (2 area), and the
+    turned tensor is the adjugate of K: the entry is s_i' adj(K) s_j / (4 area).
+    """
+    n = len(points)
+    kxx, kxy, kyy = tensor or (1.0, 0.0, 1.0)
+    corner = points[triangles]
+    side = np.roll(corner, -2, axis=1) - np.roll(corner, -1, axis=1)
+    turned = np.stack([kyy * side[..., 0] - kxy * side[..., 1], kxx * side[..., 1] - kxy * side[..., 0]], axis=-1)
+    twice_area = np.abs(side[:, 0, 0] * side[:, 1, 1] - side[:, 0, 1] * side[:, 1, 0])
+    ends, values = [], []
+    with np.errstate(divide="ignore", invalid="ignore"):  # a flat triangle certifies nothing
+        for i, j in ((0, 1), (1, 2), (2, 0)):
+            low, high = np.minimum(triangles[:, i], triangles[:, j]), np.maximum(triangles[:, i], triangles[:, j])
+            ends.append((low, high))
+            values.append(factor * (side[:, i] * turned[:, j]).sum(axis=1) / (2 * twice_area))
+    rows, columns = (np.concatenate(part) for part in zip(*ends, strict=True))
+    summed = sp.coo_array((np.concatenate(values), (rows, columns)), shape=(n, n)).tocsr()
+    summed.sort_indices()
+    return np.repeat(np.arange(n), np.diff(summed.indptr)) * n + summed.indices, summed.data
+
+
+def chi_square_verdict(differences: NDArray, sigma: float, freedom: int) -> dict[str, float]:
+    """Test of the misfit against independent Gaussian noise of standard deviation sigma in every entry.
+
+    Parameters
+    ----------
+    differences : (k,) float64
+        Re-assembled minus given entries.
+    sigma : float
+    freedom : int
+        Entries less fitted unknowns.
+    """
+    from scipy.stats import chi2
+
+    statistic = float(np.sum((differences / sigma) ** 2))
+    p_value = float(chi2.sf(statistic, freedom)) if freedom > 0 else 1.0
+    return {"statistic": statistic, "degrees_of_freedom": float(freedom), "p_value": p_value, "sigma": sigma}

@@ -1,0 +1,160 @@
+"""Where each piece is put: by known positions, by a direction, or in the canonical frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError
+from .planar.frame import Similarity, canonical_frame, collinear, fit_similarity
+from .reductions import ConstantTensor
+from .topology import Piece
+
+Anchor = tuple[int, float, float]
+Direction = tuple[int, int, float]
+
+
+@dataclass(frozen=True)
+class Placement:
+    """What is known of the true frame.
+
+    Attributes
+    ----------
+    anchors : tuple of (row, x, y)
+    tensor : ConstantTensor or None
+    direction : (row, row, degrees) or None
+        Angle, from the x axis, of the line from the first row's point to the second's.
+    handed : {"left", "right"} or None
+        On which side of that line (with two anchors: of the line from the first to the second) the centroid of
+        the piece lies.
+
+    Raises
+    ------
+    InputError
+        For values that contradict each other or themselves.
+    """
+
+    anchors: tuple[Anchor, ...] = ()
+    tensor: ConstantTensor | None = None
+    direction: Direction | None = None
+    handed: str | None = None
+
+    @classmethod
+    def checked(
+        cls,
+        n: int,
+        anchors: Sequence[Anchor] | None,
+        tensor: tuple[float, float, float] | None,
+        direction: Direction | None,
+        handed: str | None,
+    ) -> Placement:
+        """Validate what a caller gives for a matrix of order n."""
+        placed = tuple((int(row), float(x), float(y)) for row, x, y in anchors or ())
+        rows = [row for row, _, _ in placed]
+        for row in rows + list(map(int, direction[:2] if direction else ())):
+            if not 0 <= row < n:
+                raise InputError(f"row {row} is not in the matrix: its rows count from 0 to {n - 1}")
+        if len(set(rows)) < len(rows):
+            raise InputError(f"row {next(r for r in rows if rows.count(r) > 1)} is anchored twice")
+        if not np.isfinite([t[1:] for t in placed]).all():
+            raise InputError("an anchor's coordinates are not finite numbers")
+        if direction and (direction[0] == direction[1] or not np.isfinite(direction[2])):
+            raise InputError(f"the direction {direction} needs two different rows and a finite angle")
+        if handed not in (None, "left", "right"):
+            raise InputError(f"handedness is 'left' or 'right', not {handed!r}")
+        if direction and len(placed) > 1:
+            raise InputError("a direction and two or more anchors fix the same freedom: give one of them")
+        if handed and not direction and len(placed) < 2:
+            raise InputError("handedness needs a line to refer to: give a direction or two anchors as well")
+        return cls(placed, ConstantTensor(*tensor) if tensor else None, direction, handed)
+
+    def apply(self, piece: Piece, z: NDArray) -> tuple[NDArray, list[str]]:
+        """True positions of a piece from its positions z (n,) in any frame of the Laplacian's.
+
+        Returns
+        -------
+        positions : (n,) complex128
+        notes : list of str
+            What is arbitrary, or does not fit.
+
+        Raises
+        ------
+        InputError
+            If a tensor is to be undone and the orientation is not known.
+        """
+        rows, targets = self._anchors_of(piece)
+        if len(rows) >= 2:
+            return self._by_anchors(z, rows, targets)
+        if self.direction and np.isin(self.direction[:2], piece.vertices).all():
+            ends = np.searchsorted(piece.vertices, self.direction[:2])
+            positions = self._by_direction(piece, z, ends)
+            notes: list[str] = []
+        elif self.tensor:
+            raise InputError(
+                f"the tensor cannot be undone for the piece of row {piece.vertices[0]} without its orientation: give "
+                "three anchors that are not in line, or --direction ROW,ROW,DEGREES with --handed left|right"
+            )
+        else:
+            frame, note = canonical_frame(z, piece.edges)
+            positions, notes = frame(z), [note] if note else []
+        if len(rows) == 1:
+            positions = positions + (targets[0] - positions[rows[0]])
+        return positions, notes
+
+    def _anchors_of(self, piece: Piece) -> tuple[NDArray, NDArray]:
+        """Local rows and complex targets of the anchors in a piece."""
+        rows = np.array([row for row, _, _ in self.anchors], dtype=np.int64)
+        targets = np.array([complex(x, y) for _, x, y in self.anchors], dtype=np.complex128)
+        here = np.isin(rows, piece.vertices)
+        return np.searchsorted(piece.vertices, rows[here]), targets[here]
+
+    def _by_anchors(self, z: NDArray, rows: NDArray, targets: NDArray) -> tuple[NDArray, list[str]]:
+        known = self.tensor.to_laplacian(targets) if self.tensor else targets
+        fits = [fit_similarity(z[rows], known, mirror=mirror) for mirror in (False, True)]
+        notes = []
+        if len(rows) > 2 and not collinear(known):
+            frame, misfit = min(fits, key=lambda fit: fit[1])
+            if misfit > 1e-6 * np.abs(known - known.mean()).max():
+                notes.append(f"the anchors do not fit the mesh: root mean square misfit {misfit:.3g}")
+        elif self.handed:
+            frame = self._handed([fit[0] for fit in fits], z, rows[:2])
+        elif self.tensor:
+            raise InputError("two anchors leave the mirror image open: give a third, not in line, or --handed left|right")
+        else:
+            frame = fits[0][0]
+            notes.append("the anchors are in line, so the choice between the two mirror images is arbitrary")
+        placed = frame(z)
+        return (self.tensor.from_laplacian(placed) if self.tensor else placed), notes
+
+    def _by_direction(self, piece: Piece, z: NDArray, ends: NDArray) -> NDArray:
+        assert self.direction is not None
+        aim = np.exp(1j * np.deg2rad(self.direction[2]))
+        aim = self.tensor.to_laplacian(aim) if self.tensor else aim
+        frames = []
+        for mirror in (False, True):
+            line = z[ends[1]] - z[ends[0]]
+            frames.append(Similarity(complex(aim / (np.conj(line) if mirror else line)), 0j, mirror))
+        if self.handed:
+            frame = self._handed(frames, z, ends)
+        elif self.tensor:
+            raise InputError("a direction leaves the mirror image open: add --handed left|right")
+        else:
+            frame = frames[canonical_frame(z, piece.edges)[0].mirror]
+        placed = frame(z)
+        placed = self.tensor.from_laplacian(placed) if self.tensor else placed
+        length = np.abs(placed[piece.edges[:, 0]] - placed[piece.edges[:, 1]]).mean()
+        return (placed - placed.mean()) / length
+
+    def _handed(self, frames: list[Similarity], z: NDArray, ends: NDArray) -> Similarity:
+        """The frame that puts the centroid on the wanted side of the line between two vertices."""
+        line, offset = z[ends[1]] - z[ends[0]], z.mean() - z[ends[0]]
+        side = (np.conj(line) * offset).imag
+        if abs(side) < 1e-9 * abs(line) * np.abs(z - z.mean()).max():
+            raise InputError(
+                "the piece's centroid lies on the line that the handedness refers to: "
+                "choose other rows, or give three anchors that are not in line"
+            )
+        return frames[0] if (side > 0) == (self.handed == "left") else frames[1]

@@ -1,0 +1,90 @@
+"""Similarity frames: the gauge of a mesh that is known up to similarity and reflection."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+_TIE = 1e-7  # moments nearer to a tie than this choose no axis that rounding would not change
+
+
+@dataclass(frozen=True)
+class Similarity:
+    """z -> turn * z + shift, or turn * conj(z) + shift."""
+
+    turn: complex
+    shift: complex
+    mirror: bool = False
+
+    def __call__(self, z: NDArray) -> NDArray:
+        """Image of complex positions."""
+        return self.turn * (np.conj(z) if self.mirror else z) + self.shift
+
+
+def canonical_frame(z: NDArray, edges: NDArray) -> tuple[Similarity, str | None]:
+    """The frame that positions have where nothing else is known.
+
+    Centroid at the origin, mean edge length 1, first principal axis along x, and the mirror image and half
+    turn for which the third moments of x and y are positive.
+
+    Parameters
+    ----------
+    z : (n,) complex128
+    edges : (e, 2) int
+
+    Returns
+    -------
+    Similarity
+    str or None
+        Which part of the choice is arbitrary because moments tie or vanish.
+    """
+    centre = z.mean()
+    size = float(np.abs(z[edges[:, 0]] - z[edges[:, 1]]).mean())
+    d = (z - centre) / size
+    second = (d * d).sum()  # of argument twice the principal axis', and modulus the difference of the moments
+    spread = float((np.abs(d) ** 2).sum())
+    axis = np.exp(-0.5j * np.angle(second)) if abs(second) > 0 else 1.0
+    x, y = (axis * d).real, (axis * d).imag
+    third = [float((t**3).sum()) for t in (x, y)]
+    sure = [abs(m) > _TIE * float((np.abs(t) ** 3).sum()) for m, t in zip(third, (x, y), strict=True)]
+    flip_x, flip_y = third[0] < 0, third[1] < 0
+    turn = axis / size * (-1 if flip_x else 1)
+    mirror = flip_x != flip_y
+    if mirror:  # conjugation turns y over after the half turn has set x
+        turn = np.conj(turn)
+    shift = -turn * (np.conj(centre) if mirror else centre)
+    return Similarity(complex(turn), complex(shift), mirror), _ambiguity(abs(second) > _TIE * spread, *sure)
+
+
+def _ambiguity(axis: bool, x: bool, y: bool) -> str | None:
+    if not axis:
+        return "the second moments are equal in all directions, so the principal axis is arbitrary"
+    if x and y:
+        return None
+    vanishing = " and ".join(name for name, known in (("x", x), ("y", y)) if not known)
+    return f"the third moment of {vanishing} vanishes, so the choice among mirror images is arbitrary"
+
+
+def fit_similarity(z: NDArray, target: NDArray, *, mirror: bool = False) -> tuple[Similarity, float]:
+    """Least-squares similarity from positions to targets, both (k,) complex with k >= 2.
+
+    Returns
+    -------
+    Similarity
+    float
+        Root mean square misfit.
+    """
+    source = np.conj(z) if mirror else z
+    a, b = source - source.mean(), target - target.mean()
+    turn = complex(np.vdot(a, b) / np.vdot(a, a))
+    shift = complex(target.mean() - turn * source.mean())
+    misfit = float(np.sqrt(np.mean(np.abs(turn * source + shift - target) ** 2)))
+    return Similarity(turn, shift, mirror), misfit
+
+
+def collinear(z: NDArray) -> bool:
+    """Whether points (k,) lie on a line to about six digits."""
+    d = z - z.mean()
+    return abs((d * d).sum()) > (1 - 1e-12) * (np.abs(d) ** 2).sum()

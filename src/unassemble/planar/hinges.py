@@ -1,0 +1,71 @@
+"""Pieces that meet in single vertices: join them there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import lsqr
+
+from ..topology import Topology
+
+
+def join(topology: Topology, positions: list[NDArray]) -> list[NDArray]:
+    """Move pieces by similarities close to translations so that shared vertices coincide.
+
+    With turn t_p and shift s_p of piece p, t_p z_p + s_p = t_q z_q + s_q at every shared vertex; of all
+    solutions the one nearest to t = 1. Where the pieces form a tree that is t = 1 exactly, and each keeps its own
+    frame; where they close rings the matrix itself fixes, or restricts, their relative turns.
+
+    Parameters
+    ----------
+    topology : Topology
+    positions : list of (n_p,) complex128
+        Each piece in its own frame.
+    """
+    if not len(topology.hinges):
+        return positions
+    group = _groups(topology)
+    if (np.bincount(group) == 1).all():
+        return positions
+    rows, columns, values, rhs = _equations(topology, positions)
+    n = len(positions)
+    system = coo_array((values, (rows, columns)), shape=(len(rhs), 2 * n)).tocsr()
+    # Unknowns are t - 1 and s; the least-norm solution keeps turns near 1. Shifts are scaled to matter little.
+    extent = max(float(np.abs(z).max()) for z in positions)
+    weight = np.r_[np.ones(n), np.full(n, 1e3 * extent)]
+    solution = weight * lsqr(system * weight[None, :], rhs, atol=1e-15, btol=1e-15, iter_lim=20 * n + 1000)[0]
+    turn, shift = 1 + solution[:n], solution[n:]
+    # Each group keeps its first piece in place.
+    first = np.unique(group, return_index=True)[1][group]
+    return [(turn[p] * z + shift[p] - shift[first[p]]) / turn[first[p]] for p, z in enumerate(positions)]
+
+
+def _groups(topology: Topology) -> NDArray:
+    """Label of each piece: those joined by hinges share one."""
+    n = len(topology.pieces)
+    piece = np.repeat(np.arange(n), [p.n_vertices for p in topology.pieces])
+    vertex = np.concatenate([p.vertices for p in topology.pieces])
+    graph = coo_array((np.ones(len(piece)), (piece, n + vertex)), shape=(n + topology.n_vertices,) * 2)
+    return np.asarray(connected_components(graph, directed=False)[1][:n])
+
+
+def _equations(
+    topology: Topology, positions: list[NDArray]
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """One equation for each piece at a hinge after the first: (t_p - 1) z_p + s_p - ... = z_q - z_p."""
+    n = len(positions)
+    shared = [np.flatnonzero(topology.multiplicity[p.vertices] > 1) for p in topology.pieces]
+    piece = np.repeat(np.arange(n), [len(s) for s in shared])
+    vertex = np.concatenate([p.vertices[s] for p, s in zip(topology.pieces, shared, strict=True)])
+    at = np.concatenate([z[s] for z, s in zip(positions, shared, strict=True)])
+    order = np.lexsort((piece, vertex))
+    piece, vertex, at = piece[order], vertex[order], at[order]
+    p = np.flatnonzero(vertex[1:] == vertex[:-1])
+    q = p + 1
+    row = np.arange(len(p))
+    one = np.ones(len(p), dtype=np.complex128)
+    rows = np.tile(row, 4)
+    columns = np.r_[piece[p], piece[q], n + piece[p], n + piece[q]]
+    return rows, columns, np.r_[at[p], -at[q], one, -one], at[q] - at[p]

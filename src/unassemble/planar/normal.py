@@ -1,0 +1,82 @@
+"""Normal equations of the cotangent weights, with the similarities pinned."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..linalg import UpperTriangle, factorisation
+from ..topology import Piece
+from .cotangent import weight_gradient
+
+
+class WeightJacobian:
+    """J = dw / d(x, y) at given positions; displacements are complex (n,)."""
+
+    def __init__(self, piece: Piece, z: NDArray):
+        self.n = piece.n_vertices
+        vertices, g = weight_gradient(piece, z)
+        e = len(vertices)
+        blocks = np.stack([g.real, -g.imag], axis=-1).reshape(-1, 1, 2)
+        self.matrix = sp.bsr_array(
+            (blocks, vertices.ravel().astype(np.int32), np.arange(0, 4 * e + 1, 4, dtype=np.int32)),
+            shape=(e, 2 * self.n),
+        )
+
+    def forward(self, displacement: NDArray) -> NDArray:
+        """J d for d (n,) complex: (e,) real."""
+        return self.matrix @ displacement.view(np.float64)
+
+    def transpose(self, change: NDArray) -> NDArray:
+        """J' r for r (e,) real: (n,) complex, x in the real part and y in the imaginary one."""
+        return (self.matrix.T @ change).view(np.complex128)
+
+
+class NormalEquations:
+    """Factorised J'J with two vertices held fixed, which pins the four freedoms of a similarity.
+
+    Parameters
+    ----------
+    jacobian : WeightJacobian
+    pins : (2,) int
+        Vertices that stay where they are; the farther apart the better.
+    """
+
+    def __init__(self, jacobian: WeightJacobian, pins: NDArray):
+        self._free = np.ones(jacobian.n, dtype=bool)
+        self._free[pins] = False
+        matrix = _upper_blocks(jacobian.matrix, self._free)
+        self._factor = factorisation(matrix)
+        self._factor.factorise(matrix)
+
+    def solve(self, rhs: NDArray) -> NDArray:
+        """Least displacement equation J'J d = rhs, both (n,) or (n, k) complex."""
+        free = np.ascontiguousarray(rhs[self._free].T)  # each right-hand side x0, y0, x1, y1, ...
+        solution = self._factor.solve(free.view(np.float64).T)
+        result = np.zeros(rhs.shape, dtype=np.complex128)
+        result[self._free] = np.ascontiguousarray(solution.T).view(np.complex128).T
+        return result
+
+    def release(self) -> None:
+        """Give the memory of the factor back."""
+        self._factor.release()
+
+
+def _upper_blocks(jacobian: sp.bsr_array, free: NDArray) -> UpperTriangle:
+    """Upper triangle of J'J in 2 x 2 blocks, without the pinned vertices."""
+    product = jacobian.T.tobsr() @ jacobian
+    product.sort_indices()
+    number = np.cumsum(free) - 1
+    row = np.repeat(np.arange(len(free)), np.diff(product.indptr))
+    kept = (product.indices >= row) & free[row] & free[product.indices]
+    n = int(free.sum())
+    indptr = np.zeros(n + 1, dtype=np.int32)
+    np.cumsum(np.bincount(number[row[kept]], minlength=n), out=indptr[1:])
+    return UpperTriangle(product.data[kept], number[product.indices[kept]].astype(np.int32), indptr)
+
+
+def distant_pair(z: NDArray) -> NDArray:
+    """Two vertices far apart: the farthest from the centroid, and the farthest from that one."""
+    first = int(np.argmax(np.abs(z - z.mean())))
+    return np.array([first, int(np.argmax(np.abs(z - z[first])))])

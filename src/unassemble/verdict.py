@@ -1,0 +1,43 @@
+"""From a certificate to a status and a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from .certify import CERTIFIED, CONFIDENCE, Certificate
+from .matrix import OperatorMatrix
+from .topology import Topology
+
+
+def verdict(
+    topology: Topology, certificate: Certificate, chi_square: Mapping[str, float] | None, matrix: OperatorMatrix
+) -> tuple[str, str]:
+    """``"certified"`` or ``"uncertified"``, and why."""
+    if chi_square:
+        return _with_noise(chi_square)
+    error = certificate.backward_error
+    if error <= CERTIFIED:
+        return "certified", f"the operator re-assembled on this mesh gives the matrix back to {error:.1e}"
+    bare = topology.bare_edges[matrix.entries[topology.bare_edges] != 0]
+    if len(bare):
+        i, j = topology.edges[bare[0]]
+        return (
+            "uncertified",
+            f"{len(bare)} nonzero entries belong to no triangle, the first between rows {i} and {j}",
+        )
+    (i, j), misfit = certificate.pairs[certificate.misfits.argmax()], certificate.misfits.max()
+    return (
+        "uncertified",
+        f"the re-assembled matrix differs, most in the entry of rows {i} and {j} (by {misfit:.1e} of the row's "
+        f"largest; {CERTIFIED:g} is allowed)",
+    )
+
+
+def _with_noise(test: Mapping[str, float]) -> tuple[str, str]:
+    figures = (
+        f"(chi-square {test['statistic']:.4g} with {test['degrees_of_freedom']:.0f} degrees of freedom, "
+        f"p = {test['p_value']:.3g})"
+    )
+    if test["p_value"] >= CONFIDENCE:
+        return "certified", f"noise of standard deviation {test['sigma']:.3g} explains the misfit {figures}"
+    return "uncertified", f"the misfit is more than noise of standard deviation {test['sigma']:.3g} explains {figures}"
