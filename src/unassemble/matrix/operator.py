@@ -40,7 +40,12 @@ class OperatorMatrix:
     @property
     def row_size(self) -> NDArray[np.float64]:
         """(n,) largest absolute off-diagonal entry of each row."""
-        size = np.zeros(self.n)
-        np.maximum.at(size, self.edges[:, 0], np.abs(self.entries))
-        np.maximum.at(size, self.edges[:, 1], np.abs(self.entries))
-        return size
+        return row_sizes(self.n, self.edges, np.abs(self.entries))
+
+
+def row_sizes(n: int, edges: NDArray[np.int64], magnitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) largest magnitude on the edges at each vertex, zero where there is none."""
+    size = np.zeros(n)
+    np.maximum.at(size, edges[:, 0], magnitudes)
+    np.maximum.at(size, edges[:, 1], magnitudes)
+    return size

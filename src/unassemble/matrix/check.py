@@ -1,0 +1,160 @@
+"""The checks at the door: any matrix in, a clean symmetric operator or one clear sentence out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..errors import InputError, MatrixError
+from .canonical import canonical, place
+from .operator import OperatorMatrix, row_sizes
+from .symmetry import symmetric_entries, triangles
+
+
+def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None = None) -> OperatorMatrix:
+    """Check that a matrix has what every supported operator has, and store it as a weighted graph.
+
+    Parameters
+    ----------
+    A : (n, n) scipy sparse matrix or array, or array_like
+        Explicit zeros are structure, except in the diagonal storage (``dia``), whose zeros cannot be told
+        from padding; zeros of a dense array are absent entries. Duplicates are summed. A is not changed.
+    drop_zeros : float, optional
+        Forget stored off-diagonal entries of at most this times the largest off-diagonal entry of their row
+        and of their transpose's; at least 0 and below 1.
+    noise : float, optional
+        Standard deviation of independent errors in the entries: both triangles may then differ by ten
+        times as much.
+
+    Returns
+    -------
+    OperatorMatrix
+        The mean of both triangles; what was changed on the way is in its ``warnings``.
+
+    Raises
+    ------
+    InputError
+        If `drop_zeros` or `noise` is out of range.
+    MatrixError
+        If the matrix is not square, empty, without numbers, complex, not finite, diagonal, not symmetric, or
+        has far more rows than entries. Both triangles may differ by 1e-10 of the largest off-diagonal entry
+        of the two rows.
+
+    Examples
+    --------
+    >>> matrix = check_matrix([[2.0, -1.0], [-1.0, 2.0]])
+    >>> matrix.n, matrix.edges.tolist(), matrix.entries.tolist()
+    (2, [[0, 1]], [-1.0])
+    """
+    _check_options(drop_zeros, noise)
+    A = _as_sparse(A)
+    _check_shape(A.shape)
+    csr = canonical(_with_numbers(A))
+    _check_entries(csr)
+    pairs = triangles(csr)
+    if not len(pairs.edges):
+        raise MatrixError("the matrix is diagonal: it has no off-diagonal entry, and so no mesh edge")
+    entries, asymmetry, warnings = symmetric_entries(csr, pairs, noise)
+    if not entries.any():
+        raise MatrixError("every stored off-diagonal entry is zero: the matrix says nothing about the shape of a mesh")
+    edges = pairs.edges
+    if drop_zeros is not None:
+        edges, entries, dropped = _without_zeros(csr.shape[0], edges, entries, drop_zeros)
+        warnings += dropped
+    return OperatorMatrix(csr.shape[0], edges, entries, csr.diagonal(), asymmetry, warnings)
+
+
+def _check_options(drop_zeros: float | None, noise: float | None) -> None:
+    if drop_zeros is not None and (isinstance(drop_zeros, bool) or not 0 <= drop_zeros < 1):
+        raise InputError(f"drop_zeros is a relative tolerance, at least 0 and below 1 (say 1e-12), not {drop_zeros}")
+    if noise is not None and not (noise >= 0 and np.isfinite(noise)):
+        raise InputError(f"the noise is a standard deviation, finite and not negative, not {noise}")
+
+
+def _as_sparse(A: Any) -> Any:
+    """A as a scipy sparse matrix of whatever format and type; zeros of a dense one are left out."""
+    if sp.issparse(A):
+        _check_dimensions(A.ndim)
+        return A
+    try:
+        dense = np.asarray(A)
+    except Exception as error:  # foreign types convert with any exception they like
+        raise MatrixError(f"an object of type {type(A).__name__} cannot be taken for a matrix ({error})") from error
+    if dense.dtype.kind not in "biufc":
+        raise MatrixError(
+            f"an object of type {type(A).__name__} (as an array: {dense.dtype}) is not a matrix of numbers: "
+            "pass a scipy sparse matrix, a numpy array or a path"
+        )
+    _check_dimensions(dense.ndim)
+    rows, columns = np.nonzero(dense)
+    return sp.coo_array((dense[rows, columns], (rows, columns)), shape=dense.shape)
+
+
+def _check_dimensions(ndim: int) -> None:
+    if ndim != 2:
+        raise MatrixError(f"a matrix has two dimensions, not {ndim}")
+
+
+def _check_shape(shape: tuple[int, int]) -> None:
+    rows, columns = shape
+    if rows != columns:
+        raise MatrixError(f"the matrix is not square: it has {rows} rows and {columns} columns")
+    if rows == 0:
+        raise MatrixError("the matrix is empty: it has 0 rows")
+
+
+def _with_numbers(A: Any) -> Any:
+    if A.dtype.kind == "b":
+        raise MatrixError(
+            "the matrix has a pattern only (its type is bool) and no numbers: the shape of the mesh is in the "
+            "numbers, so pass the matrix with its values"
+        )
+    if A.dtype.kind not in "iufc":
+        raise MatrixError(f"the entries of the matrix are of type {A.dtype}, not numbers: convert them to float64")
+    return A
+
+
+def _check_entries(csr: sp.csr_array) -> None:
+    if csr.dtype.kind == "c":
+        raise _complex(csr)
+    finite = np.isfinite(csr.data)
+    if not finite.all():
+        k = int(np.argmin(finite))
+        i, j = place(csr, k)
+        more = len(finite) - np.count_nonzero(finite) - 1
+        others = f" (and {more} more entries are not finite)" if more else ""
+        raise MatrixError(
+            f"the entry at row {i}, column {j} is {csr.data[k]}{others}: every entry must be a finite number"
+        )
+
+
+def _complex(csr: sp.csr_array) -> MatrixError:
+    imaginary = csr.data.imag != 0
+    if not imaginary.any():
+        return MatrixError("the matrix is complex, though every imaginary part is zero: take its real part, A.real")
+    k = int(np.argmax(imaginary))
+    i, j = place(csr, k)
+    return MatrixError(
+        f"the matrix is complex: the entry at row {i}, column {j} is {csr.data[k]}, and the operators are real; "
+        "take the real part, A.real, if the imaginary parts mean nothing"
+    )
+
+
+def _without_zeros(
+    n: int, edges: NDArray, entries: NDArray, tolerance: float
+) -> tuple[NDArray, NDArray, tuple[str, ...]]:
+    """Forget the pairs that are small for both of their rows."""
+    size = row_sizes(n, edges, np.abs(entries))
+    with np.errstate(under="ignore"):
+        keep = np.abs(entries) > tolerance * np.minimum(size[edges[:, 0]], size[edges[:, 1]])
+    dropped = len(edges) - np.count_nonzero(keep)
+    if not dropped:
+        return edges, entries, ()
+    sentence = (
+        f"{dropped} of {len(edges)} stored pairs of off-diagonal entries were forgotten: they are at most "
+        f"{tolerance:g} times the largest off-diagonal entry of their row and of their transpose's"
+    )
+    return edges[keep], entries[keep], (sentence,)

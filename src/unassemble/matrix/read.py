@@ -1,0 +1,155 @@
+"""Files with a sparse matrix: open, see what they are, hand them to their reader."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import os
+import re
+import sys
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any, BinaryIO
+
+import scipy.sparse as sp
+
+from ..errors import InputError, MatrixFileError, UnassembleError
+from .canonical import canonical, inconsistency
+from .market import read_market
+from .mat import read_mat
+from .npz import read_npz
+from .signatures import HEAD, foreign, kind_of
+
+_FORMATS = {"market": "Matrix Market", "npz": ".npz", "mat": ".mat"}
+
+
+def read_matrix(source: str | os.PathLike[str] | IO[Any], *, variable: str | None = None) -> sp.csr_array:
+    """Read a sparse matrix from Matrix Market, scipy's ``.npz`` or ``.mat``, as its first bytes tell.
+
+    Explicit zeros of the file are kept as structure, except in scipy's diagonal storage; zeros of a dense
+    Matrix Market array are not structure. Duplicates are summed. Pickles are never loaded.
+
+    Parameters
+    ----------
+    source : path, "-" or file
+        ``"-"`` is standard input. Matrix Market may be compressed by gzip, also on standard input.
+    variable : str, optional
+        Name of the variable in a ``.mat`` file, such as ``"A"`` or ``"Problem.A"``.
+
+    Returns
+    -------
+    csr_array
+        Of dtype float64, or complex128 or bool where the file says so, columns increasing within each row.
+        Neither square nor finite of necessity: see :func:`unassemble.matrix.check_matrix`.
+
+    Raises
+    ------
+    MatrixFileError
+        If the file cannot be read as a matrix.
+    MatrixError
+        If it holds a pattern without numbers, or far more rows than entries.
+    """
+    with _opened(source) as (stream, name):
+        try:
+            A = _read(stream, name, variable)
+            problem = inconsistency(A)
+            if problem:
+                raise MatrixFileError(f"{name} holds a damaged matrix: {problem}")
+            return canonical(A)
+        except UnassembleError:
+            raise
+        except MemoryError as error:
+            raise MatrixFileError(f"{name} asks for more memory than there is: it is too large, or damaged") from error
+        except Exception as error:  # readers of binary formats fail in any way on damaged bytes
+            if isinstance(error, OSError) and error.strerror:
+                raise MatrixFileError(f"{name} cannot be read ({error.strerror})") from error
+            why = re.split(r"[;\n]", str(error))[0][:120] or type(error).__name__
+            raise MatrixFileError(f"{name} is truncated or damaged ({why}): write or download it again") from error
+
+
+def _read(stream: Any, name: str, variable: str | None) -> Any:
+    kind = kind_of(_head(stream))
+    if kind == "gzip":
+        return _read_gzip(stream, name, variable)
+    if kind is None:
+        raise MatrixFileError(f"{name} {foreign(_head(stream))}")
+    if variable is not None and kind != "mat":
+        raise InputError(f"{name} is {_FORMATS[kind]}, and only .mat files have variables to choose from")
+    if kind == "mat":
+        return read_mat(stream, name, variable)
+    return read_npz(stream, name) if kind == "npz" else read_market(stream, name)
+
+
+def _read_gzip(stream: BinaryIO, name: str, variable: str | None) -> Any:
+    try:
+        with gzip.GzipFile(fileobj=stream) as unpacked:
+            kind = kind_of(_head(unpacked))
+            if kind == "gzip":
+                raise MatrixFileError(f"{name} is compressed twice: unpack it once")
+            if kind in ("market", None):  # read, or refused, as it is unpacked
+                return _read(unpacked, name, variable)
+            return _read(io.BytesIO(unpacked.read()), name, variable)
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        raise MatrixFileError(f"{name} is a truncated or damaged gzip file: write or download it again") from error
+
+
+def _head(stream: Any) -> bytes:
+    """The first bytes of a stream that can be rewound."""
+    head: bytes = stream.read(HEAD)
+    stream.seek(0)
+    return head
+
+
+@contextmanager
+def _opened(source: Any) -> Iterator[tuple[BinaryIO, str]]:
+    """A binary stream that can be rewound, and its name for messages."""
+    if isinstance(source, str) and source == "-":
+        yield _rewindable(_standard_input(), "standard input"), "standard input"
+    elif hasattr(source, "read"):
+        name = str(getattr(source, "name", "the file"))
+        yield _rewindable(source, name), name
+    else:
+        with _open_path(source) as stream:
+            name = os.fsdecode(source)
+            yield _rewindable(stream, name), name
+
+
+def _open_path(path: Any) -> BinaryIO:
+    if not isinstance(path, (str, bytes, os.PathLike)):
+        raise InputError(f"a matrix file is given by its path, '-' or an open file, not by {type(path).__name__}")
+    name = os.fsdecode(path)
+    try:
+        if Path(name).is_dir():
+            raise MatrixFileError(f"{name!r} is a directory: name the matrix file in it")
+        return Path(name).open("rb")
+    except FileNotFoundError as error:
+        raise MatrixFileError(f"{name!r} does not exist: check the path") from error
+    except PermissionError as error:
+        raise MatrixFileError(f"{name!r} may not be read: check its permissions") from error
+    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
+        raise MatrixFileError(f"{name!r} cannot be opened ({getattr(error, 'strerror', None) or error})") from error
+
+
+def _standard_input() -> Any:
+    if sys.stdin is None or sys.stdin.closed:
+        raise MatrixFileError("standard input is closed: pipe a Matrix Market file into it")
+    return getattr(sys.stdin, "buffer", sys.stdin)
+
+
+def _rewindable(stream: Any, name: str) -> BinaryIO:
+    """The stream itself, or a copy in memory of a pipe, of text, or of a file that was read from before."""
+    try:
+        if not isinstance(stream, io.TextIOBase) and stream.seekable() and stream.tell() == 0:
+            return stream
+        head = _as_bytes(stream.read(HEAD))
+        if kind_of(head) is None and len(head) == HEAD:  # refuse an endless device before reading on
+            raise MatrixFileError(f"{name} {foreign(head)}")
+        return io.BytesIO(head + _as_bytes(stream.read()))
+    except (OSError, ValueError) as error:
+        raise MatrixFileError(f"{name} cannot be read ({getattr(error, 'strerror', None) or error})") from error
+
+
+def _as_bytes(content: str | bytes | None) -> bytes:
+    return content.encode("utf-8", "replace") if isinstance(content, str) else content or b""

@@ -1,0 +1,139 @@
+"""Both triangles of a matrix become one weighted graph, or the pair that forbids it is named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..errors import MatrixError
+from .canonical import entry_rows
+from .operator import row_sizes
+
+# Assembly in floating point sums the contributions to A_ij and A_ji in different orders.
+ROUNDING = 1e-10
+# Ten standard deviations: independent noise in both triangles stays below for any size of matrix.
+NOISE = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """Both triangles of a matrix on one pattern.
+
+    Attributes
+    ----------
+    edges : (e, 2) int64
+        Pairs i < j with A_ij or A_ji stored, in lexicographic order.
+    upper, lower : (e,) float64
+        A_ij and A_ji; zero where only the other one is stored.
+    one_sided : int
+        Number of pairs of which only one entry is stored.
+    """
+
+    edges: NDArray[np.int64]
+    upper: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    one_sided: int
+
+
+def triangles(A: sp.csr_array) -> Triangles:
+    """Pair every stored entry with its transpose."""
+    T = A.T.tocsr()
+    n_stored = A.nnz
+    if not (np.array_equal(A.indptr, T.indptr) and np.array_equal(A.indices, T.indices)):
+        A = _with_transposed_pattern(A)
+        T = A.T.tocsr()
+    rows = entry_rows(A)
+    above = A.indices > rows
+    edges = np.empty((np.count_nonzero(above), 2), dtype=np.int64)
+    edges[:, 0] = rows[above]
+    edges[:, 1] = A.indices[above]
+    return Triangles(edges, A.data[above], T.data[above], A.nnz - n_stored)
+
+
+def symmetric_entries(
+    A: sp.csr_array, pairs: Triangles, noise: float | None
+) -> tuple[NDArray[np.float64], float, tuple[str, ...]]:
+    """Average both triangles where they differ at rounding level.
+
+    Returns
+    -------
+    entries : (e,) float64
+    asymmetry : float
+        Largest difference relative to the largest off-diagonal entry of the two rows.
+    warnings : tuple of str
+
+    Raises
+    ------
+    MatrixError
+        Naming the pair that differs most.
+    """
+    differing = np.flatnonzero(pairs.upper != pairs.lower)
+    warnings = _one_sided_warning(pairs)
+    if not len(differing):
+        return pairs.upper, 0.0, warnings
+    i, j = pairs.edges[differing].T
+    upper, lower = pairs.upper[differing], pairs.lower[differing]
+    row = row_sizes(A.shape[0], pairs.edges, np.maximum(np.abs(pairs.upper), np.abs(pairs.lower)))
+    size = np.maximum(row[i], row[j])
+    with np.errstate(over="ignore", under="ignore"):  # an infinite difference is one too large
+        difference = np.abs(upper - lower)
+        tolerance = np.maximum(ROUNDING * size, NOISE * (noise or 0.0))
+        relative = difference / size
+    if (difference > tolerance).any():
+        worst = int(np.argmax(np.where(difference > tolerance, difference, -1.0)))
+        raise _not_symmetric(A, pairs, int(i[worst]), int(j[worst]), noise)
+    entries = pairs.upper.copy()
+    entries[differing] += 0.5 * (lower - upper)
+    worst = int(np.argmax(relative))
+    average = (
+        f"{len(differing)} pairs of entries differ from their transposes, by at most {relative[worst]:.1e} of the "
+        f"largest off-diagonal entry of their rows (rows {i[worst]} and {j[worst]}), and were averaged"
+    )
+    return entries, float(relative[worst]), (*warnings, average)
+
+
+def _with_transposed_pattern(A: sp.csr_array) -> sp.csr_array:
+    """A with an explicit zero wherever only the transposed entry is stored."""
+    # Addition of sparse matrices would drop the zeros: summing duplicate coordinates does not.
+    rows = entry_rows(A)
+    data = np.concatenate([A.data, np.zeros(A.nnz)])
+    places = np.concatenate([rows, A.indices]), np.concatenate([A.indices, rows])
+    return sp.coo_array((data, places), shape=A.shape).tocsr()
+
+
+def _one_sided_warning(pairs: Triangles) -> tuple[str, ...]:
+    if not pairs.one_sided:
+        return ()
+    count, its = ("1 entry is", "its") if pairs.one_sided == 1 else (f"{pairs.one_sided} entries are", "their")
+    return (f"{count} stored on one side of the diagonal only; {its} place on the other was added to the structure",)
+
+
+def _not_symmetric(A: sp.csr_array, pairs: Triangles, i: int, j: int, noise: float | None) -> MatrixError:
+    if pairs.one_sided == len(pairs.edges):
+        rows = entry_rows(A)
+        for which, held in (("upper", (A.indices >= rows).all()), ("lower", (A.indices <= rows).all())):
+            if held:
+                return _one_triangle(A, which, *((i, j) if which == "upper" else (j, i)))
+    remedy = "" if noise is not None else ", or give the noise if the entries are measured"
+    return MatrixError(
+        f"the matrix is not symmetric, most at row {i}, column {j}: that entry is {_shown(A, i, j)} and its transpose, "
+        f"row {j}, column {i}, is {_shown(A, j, i)}; pass (A + A.T) / 2 if they should agree{remedy}"
+    )
+
+
+def _one_triangle(A: sp.csr_array, which: str, i: int, j: int) -> MatrixError:
+    take = "triu(A, 1)" if which == "upper" else "tril(A, -1)"
+    return MatrixError(
+        f"the matrix is not symmetric because only its {which} triangle is stored (row {i}, column {j} is "
+        f"{_shown(A, i, j)}, its transpose is not stored): pass A + {take}.T, or write 'symmetric' in the header of "
+        "a Matrix Market file"
+    )
+
+
+def _shown(A: sp.csr_array, i: int, j: int) -> str:
+    start, end = A.indptr[i], A.indptr[i + 1]
+    k = start + np.searchsorted(A.indices[start:end], j)
+    return repr(float(A.data[k])) if k < end and A.indices[k] == j else "not stored"
