@@ -1,8 +1,11 @@
-"""MATLAB files up to version 7, SuiteSparse's ``Problem.A`` included."""
+"""MATLAB files up to version 7, SuiteSparse's ``Problem.A`` included.
+
+The reader of scipy (1.17) ends the process by a segmentation fault on some damaged files; this one looks at every
+length before it believes it, and unpacks nothing but what may hold a sparse matrix.
+"""
 
 from __future__ import annotations
 
-import warnings
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -10,6 +13,9 @@ import scipy.sparse as sp
 
 from ..errors import MatrixFileError
 from .canonical import canonical, entry_rows
+from .mat4 import read_mat4
+from .mat5 import is_mat5, read_mat5
+from .variable import Variable
 
 
 def read_mat(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
@@ -21,7 +27,6 @@ def read_mat(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
     Parameters
     ----------
     stream : binary file
-        Seekable, at its beginning.
     name : str
         What to call it in messages.
     variable : str, optional
@@ -29,16 +34,20 @@ def read_mat(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
 
     Returns
     -------
-    scipy sparse matrix
+    scipy sparse array
+        Its index arrays are still to be checked.
 
     Raises
     ------
     MatrixFileError
         If there is no sparse variable, or the choice is open.
+    ValueError
+        If the file is truncated or damaged, in a few words.
     """
-    contents, sizes = _load(stream, name)
-    found = dict(_sparse_variables(contents))
-    held = _listed({key: A.shape for key, A in found.items()} or sizes)
+    content = stream.read()
+    variables = read_mat5(content) if is_mat5(content) else read_mat4(content)
+    found = dict(_sparse_variables(variables))
+    held = _listed({key: A.shape for key, A in found.items()} or {v.name: v.shape for v in variables})
     if variable is not None:
         if variable not in found:
             raise MatrixFileError(f"{name} has no sparse variable {variable!r}: it holds {held}")
@@ -52,37 +61,16 @@ def read_mat(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
     return candidates[0]
 
 
-def _load(stream: BinaryIO, name: str) -> tuple[dict[str, Any], dict[str, tuple[int, ...]]]:
-    """What may hold a sparse matrix, by name, and the shapes of all variables."""
-    from scipy.io import loadmat, whosmat  # not needed for the other formats
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # scipy warns of duplicate and unreadable variables; the latter are found below
-        variables = whosmat(stream)
-        stream.seek(0)
-        wanted = [key for key, _, kind in variables if kind in ("sparse", "logical", "struct")]
-        contents = loadmat(stream, variable_names=wanted) if wanted else {}
-    for key, value in contents.items():
-        if isinstance(value, str) and value.startswith("Read error"):
-            raise MatrixFileError(f"{name} is truncated or damaged: its variable {key!r} cannot be read")
-    for key, _, kind in variables:  # scipy forgets that a sparse variable is logical
-        if kind == "logical" and sp.issparse(contents.get(key)):
-            contents[key] = contents[key].astype(bool)
-    return contents, {key: shape for key, shape, _ in variables}
-
-
-def _sparse_variables(contents: dict[str, Any]) -> list[tuple[str, Any]]:
+def _sparse_variables(variables: list[Variable]) -> list[tuple[str, Any]]:
     found = []
-    for key, value in contents.items():
-        if sp.issparse(value):
-            found.append((key, value))
-        elif isinstance(value, np.ndarray) and value.dtype.names and value.size == 1:
-            fields = {field: value[field].item() for field in value.dtype.names}
-            sparse = {field: A for field, A in fields.items() if sp.issparse(A)}
-            zeros = sparse.pop("Zeros", None) if "A" in sparse else None
-            if zeros is not None and zeros.shape == sparse["A"].shape:
-                sparse["A"] = _with_zeros(sparse["A"], zeros)
-            found += [(f"{key}.{field}", A) for field, A in sparse.items()]
+    for v in variables:
+        if v.sparse is not None:
+            found.append((v.name, v.sparse))
+        sparse = {f.name: f.sparse for f in v.fields if f.sparse is not None}
+        zeros = sparse.pop("Zeros", None) if "A" in sparse else None
+        if zeros is not None and zeros.shape == sparse["A"].shape:
+            sparse["A"] = _with_zeros(sparse["A"], zeros)
+        found += [(f"{v.name}.{key}", A) for key, A in sparse.items()]
     return found
 
 
@@ -95,5 +83,5 @@ def _with_zeros(A: Any, zeros: Any) -> Any:
 
 
 def _listed(sizes: dict[str, tuple[int, ...]]) -> str:
-    shown = [f"{key!r} of size {' x '.join(map(str, shape))}" for key, shape in list(sizes.items())[:6]]
+    shown = [f"{key[:40]!r} of size {' x '.join(map(str, shape[:4]))}" for key, shape in list(sizes.items())[:6]]
     return (", ".join(shown) + (", ..." if len(sizes) > 6 else "")) or "nothing"
