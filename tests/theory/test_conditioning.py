@@ -1,4 +1,4 @@
-"""docs/theory.md, sections 5 to 7: conditioning, the polish, the bound behind the certificate."""
+"""docs/theory.md, sections 6 to 8: conditioning, the polish, the bound behind the certificate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""docs/theory.md, sections 1 to 4: the identities, the theorem of uniqueness, the scale as an extreme quotient.
+"""docs/theory.md, sections 1 to 5: identities, uniqueness, the scale as an extreme quotient, the sign law.
 
 Nothing of the library is used: the theory stands by itself, and the code is tested elsewhere.
 """

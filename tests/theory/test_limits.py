@@ -1,4 +1,4 @@
-"""docs/theory.md, sections 8 and 9: anisotropic operators, and what no method can tell."""
+"""docs/theory.md, sections 9 to 11: anisotropic operators, what no method can tell, counting equations."""
 
 from __future__ import annotations
 
