@@ -1,0 +1,178 @@
+"""Write a recovered mesh: ``.npz`` for programs, or any format of meshio that holds planar triangles."""
+
+from __future__ import annotations
+
+import io
+import logging
+import os
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import FormatError
+from .files import check_target, whole_file
+from .formats import MeshFormat, format_of
+
+if TYPE_CHECKING:
+    import meshio
+
+    from .recovery import Recovery
+
+_log = logging.getLogger(__name__)
+
+
+def check_output(path: str | os.PathLike[str]) -> None:
+    """Find out, before long work, whether a mesh can be saved as `path`.
+
+    Raises
+    ------
+    OutputError
+        If the extension is unknown or the file cannot be written.
+    FormatError
+        If the format cannot hold a planar mesh.
+    """
+    format_of(path)
+    check_target(path)
+
+
+def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
+    """Write a recovered mesh, whole or not at all; the extension names the format.
+
+    ``.npz`` holds ``points``, ``triangles``, ``component``, ``hinges``, ``scale`` and, where some point is not
+    determined, ``node_status``. Other formats are those of meshio (:mod:`unassemble.formats`).
+
+    Parameters
+    ----------
+    recovery : Recovery
+    path : path
+        An old file is replaced.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written; an old one is then as it was.
+    FormatError
+        If the format cannot hold this mesh.
+    """
+    suffix, mesh_format = format_of(path)
+    _check_content(recovery, suffix, mesh_format)
+    with whole_file(path, suffix) as draft:
+        if mesh_format.name:
+            _write_by_meshio(_mesh_for(recovery, mesh_format), draft, suffix, mesh_format)
+        else:
+            np.savez(draft, **arrays(recovery))
+
+
+def arrays(recovery: Recovery) -> dict[str, Any]:
+    """What the ``.npz`` holds, by key; what there is nothing of has no key."""
+    content: dict[str, Any] = {"points": recovery.points}
+    if recovery.n_cells:
+        content["triangles"] = recovery.triangles
+    content |= {"component": recovery.component, "hinges": recovery.hinges, "scale": recovery.scale}
+    if recovery.node_status.any():
+        content["node_status"] = recovery.node_status
+    return content
+
+
+def to_meshio(recovery: Recovery) -> meshio.Mesh:
+    """The mesh for meshio, in space (z = 0), since most formats know no other points.
+
+    Point data, all scalar: ``row`` of the matrix, ``component``, ``boundary`` (1 on boundary edges, else 0), and
+    where present ``node_status``, ``standard_deviation_x`` and ``standard_deviation_y``.
+    """
+    return _mesh(recovery, 3, _point_data(recovery))
+
+
+def _mesh(recovery: Recovery, dimension: int, point_data: dict[str, NDArray]) -> meshio.Mesh:
+    import meshio
+
+    points = np.zeros((recovery.n_points, dimension))
+    points[:, : recovery.points.shape[1]] = recovery.points
+    return meshio.Mesh(points, [("triangle", recovery.triangles)], point_data=point_data)
+
+
+def _point_data(recovery: Recovery) -> dict[str, NDArray]:
+    data: dict[str, NDArray] = {
+        "row": np.arange(recovery.n_points),
+        "component": recovery.component,
+        "boundary": _boundary_flag(recovery),
+    }
+    if recovery.node_status.any():
+        data["node_status"] = recovery.node_status.astype(np.int64)
+    if recovery.standard_deviations is not None:
+        for name, column in zip("xyz", recovery.standard_deviations.T, strict=False):
+            data[f"standard_deviation_{name}"] = np.ascontiguousarray(column)
+    return data
+
+
+def _boundary_flag(recovery: Recovery) -> NDArray[np.int64]:
+    flag = np.zeros(recovery.n_points, dtype=np.int64)
+    flag[recovery.boundary] = 1
+    return flag
+
+
+def _check_content(recovery: Recovery, suffix: str, mesh_format: MeshFormat) -> None:
+    missing = int(np.count_nonzero(recovery.node_status))
+    if missing and mesh_format.keeps_rows and not mesh_format.undetermined:
+        raise FormatError(
+            f"the format {suffix} cannot hold points without coordinates, and the matrix determines none for "
+            f"{missing} rows, the first being row {int(np.argmax(recovery.node_status))}: write .npz or .vtu"
+        )
+    if not (recovery.n_cells or mesh_format.keeps_rows):
+        raise FormatError(f"the format {suffix} holds triangles only, and there are none")
+
+
+def _mesh_for(recovery: Recovery, mesh_format: MeshFormat) -> meshio.Mesh:
+    """The mesh with exactly what the format can hold, so that meshio has nothing to drop."""
+    data: dict[str, NDArray] = {}
+    if mesh_format.data == "all":
+        data = _point_data(recovery)
+    elif mesh_format.data == "boundary":
+        data = {f"{mesh_format.name}:ref": _boundary_flag(recovery)}
+    mesh = _mesh(recovery, mesh_format.dimension, data)
+    if not mesh_format.keeps_rows:  # points of no triangle have no place, and NaN would spoil bounding boxes
+        mesh.points[np.isnan(mesh.points)] = 0
+    if mesh_format.name == "nastran":
+        mesh.points = _rounded(mesh.points, mesh_format.digits or 16)
+    if mesh_format.name == "ply":  # readers other than meshio's know integers of at most 32 bits
+        mesh.point_data = {name: _short(values) for name, values in mesh.point_data.items()}
+        mesh.cells[0].data = _short(mesh.cells[0].data)
+    return mesh
+
+
+def _short(values: NDArray) -> NDArray:
+    return values.astype(np.int32) if values.dtype.kind == "i" else values
+
+
+def _rounded(points: NDArray, digits: int) -> NDArray:
+    """To significant digits, fewer where the exponent takes up two or three columns."""
+    with np.errstate(divide="ignore"):
+        exponent = np.abs(np.floor(np.log10(np.abs(points))))
+    fraction = digits - 1 - (exponent >= 10) - ((exponent >= 100) & np.isfinite(exponent))
+    formats = np.array([f"%.{k}e" for k in range(digits)])[fraction]
+    return np.char.mod(formats, points).astype(np.float64)
+
+
+def _write_by_meshio(mesh: meshio.Mesh, draft: Path, suffix: str, mesh_format: MeshFormat) -> None:
+    import meshio
+
+    said = io.StringIO()
+    # Some of its writers print, and some print numbers as Python does: in the way that numpy 1 had.
+    silenced = redirect_stdout(said), redirect_stderr(said)
+    try:
+        with silenced[0], silenced[1], np.printoptions(legacy="1.21"):
+            meshio.write(draft, mesh, file_format=mesh_format.name, **mesh_format.options)
+    except (OSError, MemoryError):
+        raise
+    except Exception as error:  # its writers raise whatever they like
+        raise FormatError(f"the format {suffix} cannot hold this mesh, says meshio: {_sentence(error)}") from error
+    finally:
+        if said.getvalue():
+            _log.debug("meshio: %s", " ".join(said.getvalue().split()))
+
+
+def _sentence(error: Any) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())[:300]

@@ -1,0 +1,65 @@
+"""A recovered mesh as a picture."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..report import scale_text
+from . import style
+from .canvas import check_plot, footer, header, panels, write_figure
+from .layout import laid_out
+from .mesh import draw_hinges, draw_mesh, draw_worst, extent, outer_loops
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..recovery import Recovery
+
+
+def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None) -> Figure:
+    """Draw a recovered mesh: cells, outer boundary, holes, hinges, and what fits worst if uncertified.
+
+    Pieces whose frames overlap are drawn side by side. Points without coordinates are left out.
+
+    Parameters
+    ----------
+    recovery : Recovery
+    path : path, optional
+        Write the picture there, whole or not at all: ``.png``, ``.svg`` or ``.pdf``.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    if path is not None:
+        check_plot(path)
+    triangles = recovery.triangles[np.isfinite(recovery.points[recovery.triangles, 0]).all(axis=1)]
+    mesh = triangles, recovery.boundary, recovery.boundary_offsets
+    points = laid_out(recovery.points, *mesh)
+    figure, (ax,) = panels([extent(points, triangles)])
+    handles = draw_mesh(ax, points, *mesh, outer_loops(points, *mesh[1:]))
+    handles += draw_hinges(ax, points, recovery.hinges)
+    if not recovery.certified:
+        handles += draw_worst(ax, points, recovery.worst_entries)
+    header(figure, recovery.status, details(recovery), style.STATUS.get(recovery.status, style.TEXT))
+    footer(figure, handles)
+    if path is not None:
+        write_figure(figure, path)
+    return figure
+
+
+def details(recovery: Recovery) -> str:
+    """Sizes, factor and certificate in one line."""
+    parts = [f"{recovery.n_points:,} points", f"{recovery.n_cells:,} triangles"]
+    if recovery.n_components > 1:
+        parts.append(f"{recovery.n_components:,} pieces")
+    missing = int(np.count_nonzero(recovery.node_status))
+    if missing:
+        parts.append(f"{missing:,} not determined")
+    parts.append(f"c = {scale_text(recovery, 6)}")
+    parts.append(f"backward error {recovery.backward_error:.1e}")
+    return "  ·  ".join(parts)

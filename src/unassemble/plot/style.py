@@ -1,0 +1,17 @@
+"""Colours and sizes of the pictures."""
+
+FILL = "#edf3fa"
+EDGE = "#4f7cac"
+OUTER = "#12304f"
+HOLE = "#e4572e"
+HINGE = "#f2b134"
+WORST = "#b5179e"
+TEXT = "#3c4856"
+STATUS = {"certified": "#2a7f4f", "uncertified": "#b3441e"}
+
+DPI = 160
+LARGEST = (9.0, 7.2)  # inches: the box that a mesh is fitted into
+NARROWEST = 5.2  # inches: what a line of text needs
+MARGIN = 0.25
+HEADER = 0.76
+FOOTER = 0.42

@@ -1,0 +1,175 @@
+"""What there is to say about a recovery: for programs as JSON, for people as a few lines."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ._version import __version__
+from .errors import OutputError, UnassembleError
+from .files import check_target, whole_file
+
+if TYPE_CHECKING:
+    from .recovery import Recovery
+
+_SHOWN = 3
+
+
+def build_report(recovery: Recovery) -> dict[str, Any]:
+    """Everything but the mesh, made of what JSON knows; numbers that are not finite become None.
+
+    Keys: ``status``, ``reason``, ``operator``, ``n_points``, ``n_cells``, ``n_components``, ``n_holes``, ``scale`` (one
+    for each piece), ``backward_error``, ``timings`` (seconds by stage), ``warnings``; further ``n_hinges``,
+    ``n_undetermined``, ``n_boundary_edges``, ``worst_entries`` (``row``, ``column``, ``misfit``, worst first),
+    ``chi_square``, ``largest_standard_deviation`` and ``version``.
+    """
+    return _plain(
+        {
+            "status": recovery.status,
+            "reason": recovery.reason,
+            "operator": recovery.operator,
+            "n_points": recovery.n_points,
+            "n_cells": recovery.n_cells,
+            "n_components": recovery.n_components,
+            "n_holes": recovery.n_holes,
+            "n_hinges": len(recovery.hinges),
+            "n_undetermined": np.count_nonzero(recovery.node_status),
+            "n_boundary_edges": len(recovery.boundary),
+            "scale": recovery.scale,
+            "backward_error": recovery.backward_error,
+            "chi_square": recovery.chi_square,
+            "largest_standard_deviation": _largest_deviation(recovery),
+            "worst_entries": [
+                {"row": i, "column": j, "misfit": misfit}
+                for (i, j), misfit in zip(recovery.worst_entries, recovery.worst_misfits, strict=True)
+            ],
+            "timings": recovery.timings,
+            "warnings": recovery.warnings,
+            "version": __version__,
+        }
+    )
+
+
+def failure_report(error: UnassembleError) -> dict[str, Any]:
+    """The report of a matrix from which nothing could be recovered: the same keys, mostly empty."""
+    empty = dict.fromkeys(("operator", "n_points", "n_cells", "n_components", "n_holes", "scale", "backward_error"))
+    return {"status": "failed", "reason": str(error), **empty, "timings": {}, "warnings": [], "version": __version__}
+
+
+def check_report(path: str | os.PathLike[str]) -> None:
+    """Find out, before long work, whether a report can be written.
+
+    Raises
+    ------
+    OutputError
+        If the extension is not ``.json``, or the file cannot be written.
+    """
+    suffix = PurePath(path).suffix.lower()
+    if suffix == ".html":
+        raise OutputError("reports in HTML are not available in this version: name a .json file")
+    if suffix != ".json":
+        raise OutputError(f"a report is a .json file, not {os.fspath(path)!r}")
+    check_target(path)
+
+
+def write_report(recovery: Recovery | Mapping[str, Any], path: str | os.PathLike[str]) -> None:
+    """Write a report as ``.json``, whole or not at all.
+
+    Parameters
+    ----------
+    recovery : Recovery or mapping
+        A mapping is a report that is already built.
+    path : path
+
+    Raises
+    ------
+    OutputError
+        See :func:`check_report`.
+    """
+    check_report(path)
+    report = recovery if isinstance(recovery, Mapping) else build_report(recovery)
+    text = json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False)
+    with whole_file(path, ".json") as draft:
+        draft.write_text(text + "\n", encoding="utf-8")
+
+
+def summary(recovery: Recovery) -> str:
+    """A few aligned lines for a person."""
+    lines = [f"{recovery.status}: {recovery.reason}"]
+    lines += [f"  {name:<15} {value}" for name, value in _rows(recovery)]
+    return "\n".join(lines)
+
+
+def _rows(recovery: Recovery) -> list[tuple[str, str]]:
+    rows = [
+        ("operator", recovery.operator),
+        ("points", _points(recovery)),
+        ("triangles", f"{recovery.n_cells:,}"),
+        ("pieces", _pieces(recovery)),
+    ]
+    if recovery.n_holes is not None:
+        rows.append(("holes", f"{recovery.n_holes:,}"))
+    rows += [("scale c", scale_text(recovery)), ("backward error", f"{recovery.backward_error:.1e}")]
+    deviation = _largest_deviation(recovery)
+    if deviation is not None:
+        rows.append(("std deviation", f"at most {deviation:.1e} in a coordinate"))
+    if recovery.status == "uncertified":
+        rows += [("worst fit", line) for line in _worst(recovery)]
+    if recovery.timings:
+        rows.append(("time", _timings(recovery.timings)))
+    return rows + [("note", warning) for warning in recovery.warnings]
+
+
+def _points(recovery: Recovery) -> str:
+    missing = int(np.count_nonzero(recovery.node_status))
+    return f"{recovery.n_points:,}" + (f", of which {missing:,} not determined" if missing else "")
+
+
+def _pieces(recovery: Recovery) -> str:
+    hinges = len(recovery.hinges)
+    return f"{recovery.n_components:,}" + (f", meeting in {hinges:,} hinge{'s' * (hinges > 1)}" if hinges else "")
+
+
+def scale_text(recovery: Recovery, digits: int = 10) -> str:
+    """The factor c, or the range of those of all pieces."""
+    low, high = (float(f(recovery.scale)) if len(recovery.scale) else math.nan for f in (np.min, np.max))
+    # Pieces of one matrix mostly share c, up to rounding.
+    return f"{low:.{digits}g}" if high - low <= 1e-9 * abs(low) else f"{low:.{digits}g} to {high:.{digits}g}"
+
+
+def _worst(recovery: Recovery) -> list[str]:
+    pairs = zip(recovery.worst_entries[:_SHOWN], recovery.worst_misfits[:_SHOWN], strict=True)
+    return [f"rows {i} and {j}, off by {misfit:.1e} of the row's largest entry" for (i, j), misfit in pairs]
+
+
+def _timings(timings: Mapping[str, float]) -> str:
+    stages = ", ".join(f"{stage} {seconds:.2g}" for stage, seconds in timings.items() if seconds >= 0.005)
+    return f"{sum(timings.values()):.2f} s" + (f" ({stages})" if stages else "")
+
+
+def _largest_deviation(recovery: Recovery) -> float | None:
+    deviations = recovery.standard_deviations
+    if deviations is None or not np.isfinite(deviations).any():
+        return None
+    return float(np.nanmax(deviations))
+
+
+def _plain(value: Any) -> Any:
+    """Nothing but dict, list, str, bool, int, finite float and None."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
