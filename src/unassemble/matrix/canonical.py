@@ -17,8 +17,9 @@ _ROWS_PER_ENTRY = 100
 def canonical(A: Any) -> sp.csr_array:
     """Bring a sparse matrix into compressed rows without losing its structure.
 
-    Explicit zeros stay, except in the diagonal storage (``dia``), whose zeros cannot be told from padding.
-    Duplicates are summed, in floating point. The argument is not changed; arrays may be shared with it.
+    Explicit zeros stay, those in the blocks of ``bsr`` included; only in the diagonal storage (``dia``) are
+    they left out, where they cannot be told from padding. Duplicates are summed, in floating point. The
+    argument is not changed; arrays may be shared with it.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def canonical(A: Any) -> sp.csr_array:
         raise MatrixError(f"the sparse matrix is damaged: {problem}; build it anew from rows, columns and values")
     refuse_mostly_empty(A.shape[0], A.nnz)
     with np.errstate(over="ignore"):  # a long double beyond the range becomes infinite, and is found as such
-        csr = sp.csr_array(A.astype(_working_dtype(A.dtype), copy=False))
+        csr = sp.csr_array(A.astype(working_dtype(A.dtype), copy=False))
     csr.prune()
     if not csr.has_canonical_format:
         csr = csr.copy()
@@ -112,7 +113,8 @@ def _range(index: NDArray, bound: int, what: str) -> str | None:
     return None
 
 
-def _working_dtype(dtype: np.dtype) -> type:
+def working_dtype(dtype: np.dtype) -> type:
+    """The type that entries of another one are converted to: bool, float64 or complex128."""
     if dtype.kind == "b":
         return np.bool_
     return np.complex128 if dtype.kind == "c" else np.float64

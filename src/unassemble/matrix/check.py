@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError, MatrixError
-from .canonical import canonical, place
+from .canonical import canonical, place, working_dtype
 from .operator import OperatorMatrix, row_sizes
 from .symmetry import symmetric_entries, triangles
 
@@ -20,8 +20,9 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
     Parameters
     ----------
     A : (n, n) scipy sparse matrix or array, or array_like
-        Explicit zeros are structure, except in the diagonal storage (``dia``), whose zeros cannot be told
-        from padding; zeros of a dense array are absent entries. Duplicates are summed. A is not changed.
+        Explicit zeros are structure, those in the blocks of ``bsr`` included (``drop_zeros=0`` forgets them);
+        only zeros of the diagonal storage (``dia``), which cannot be told from padding, and of dense arrays
+        are absent entries. Duplicates are summed. A is not changed.
     drop_zeros : float, optional
         Forget stored off-diagonal entries of at most this times the largest off-diagonal entry of their row
         and of their transpose's; at least 0 and below 1.
@@ -90,7 +91,9 @@ def _as_sparse(A: Any) -> Any:
         )
     _check_dimensions(dense.ndim)
     rows, columns = np.nonzero(dense)
-    return sp.coo_array((dense[rows, columns], (rows, columns)), shape=dense.shape)
+    with np.errstate(over="ignore"):  # a long double beyond the range becomes infinite, and is found as such
+        entries: NDArray = dense[rows, columns].astype(working_dtype(dense.dtype), copy=False)
+    return sp.coo_array((entries, (rows, columns)), shape=dense.shape)
 
 
 def _check_dimensions(ndim: int) -> None:

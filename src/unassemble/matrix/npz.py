@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import MatrixFileError
-from .canonical import refuse_mostly_empty
+from .canonical import refuse_mostly_empty, working_dtype
 
 _INTEGERS, _NUMBERS = "iu", "biufc"
 
@@ -51,8 +51,8 @@ class _Arrays:
         storage = self._storage()
         shape = self._shape()
         if storage == "dia":
-            return sp.dia_array((self._take("data", _NUMBERS, 2), self._take("offsets", _INTEGERS, 1)), shape=shape)
-        data = self._take("data", _NUMBERS, 3 if storage == "bsr" else 1)
+            return sp.dia_array((self._data(2), self._take("offsets", _INTEGERS, 1)), shape=shape)
+        data = self._data(3 if storage == "bsr" else 1)
         refuse_mostly_empty(shape[0], data.size)  # before an index pointer of that length is unpacked
         if storage == "coo":
             return sp.coo_array((data, self._coordinates()), shape=shape)
@@ -74,6 +74,10 @@ class _Arrays:
         if len(shape) != 2 or shape.min() < 0:
             raise self._error(f"gives the shape of its matrix as {shape[:5].tolist()} instead of rows and columns")
         return int(shape[0]), int(shape[1])
+
+    def _data(self, ndim: int) -> NDArray:
+        data = self._take("data", _NUMBERS, ndim)
+        return data.astype(working_dtype(data.dtype), copy=False)  # scipy lacks half precision and foreign byte orders
 
     def _coordinates(self) -> tuple[NDArray, NDArray]:
         if "coords" in self._archive.files:

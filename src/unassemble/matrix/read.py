@@ -28,8 +28,9 @@ _FORMATS = {"market": "Matrix Market", "npz": ".npz", "mat": ".mat"}
 def read_matrix(source: str | os.PathLike[str] | IO[Any], *, variable: str | None = None) -> sp.csr_array:
     """Read a sparse matrix from Matrix Market, scipy's ``.npz`` or ``.mat``, as its first bytes tell.
 
-    Explicit zeros of the file are kept as structure, except in scipy's diagonal storage; zeros of a dense
-    Matrix Market array are not structure. Duplicates are summed. Pickles are never loaded.
+    Explicit zeros of the file are kept as structure; zeros of a dense Matrix Market array and of scipy's
+    diagonal storage, which cannot be told from padding, are not. Duplicates are summed. Pickles are never
+    loaded.
 
     Parameters
     ----------
@@ -108,7 +109,8 @@ def _opened(source: Any) -> Iterator[tuple[BinaryIO, str]]:
     if isinstance(source, str) and source == "-":
         yield _rewindable(_standard_input(), "standard input"), "standard input"
     elif hasattr(source, "read"):
-        name = str(getattr(source, "name", "the file"))
+        name = getattr(source, "name", None)
+        name = name if isinstance(name, str) else "the file"  # a pipe has a number
         yield _rewindable(source, name), name
     else:
         with _open_path(source) as stream:

@@ -117,19 +117,18 @@ def _not_symmetric(A: sp.csr_array, pairs: Triangles, i: int, j: int, noise: flo
         for which, held in (("upper", (A.indices >= rows).all()), ("lower", (A.indices <= rows).all())):
             if held:
                 return _one_triangle(A, which, *((i, j) if which == "upper" else (j, i)))
-    remedy = "" if noise is not None else ", or give the noise if the entries are measured"
+    remedy = "" if noise is not None else " (give the noise if the entries are measured)"
     return MatrixError(
         f"the matrix is not symmetric, most at row {i}, column {j}: that entry is {_shown(A, i, j)} and its transpose, "
-        f"row {j}, column {i}, is {_shown(A, j, i)}; pass (A + A.T) / 2 if they should agree{remedy}"
+        f"row {j}, column {i}, is {_shown(A, j, i)}; both must be the same number{remedy}"
     )
 
 
 def _one_triangle(A: sp.csr_array, which: str, i: int, j: int) -> MatrixError:
-    take = "triu(A, 1)" if which == "upper" else "tril(A, -1)"
     return MatrixError(
         f"the matrix is not symmetric because only its {which} triangle is stored (row {i}, column {j} is "
-        f"{_shown(A, i, j)}, its transpose is not stored): pass A + {take}.T, or write 'symmetric' in the header of "
-        "a Matrix Market file"
+        f"{_shown(A, i, j)}, its transpose is not stored): store the other one as well, or write 'symmetric' in the "
+        "first line of a Matrix Market file"
     )
 
 
