@@ -164,7 +164,7 @@ def _recover(
     if refine:
         with clock("polish"):
             meshes = [
-                refined(piece, w, mesh, scale=known)
+                refined(piece, w, mesh, scale=known, rounding=noise is None)
                 for piece, w, mesh in zip(topology.pieces, weights, meshes, strict=True)
             ]
     with clock("place"):
@@ -180,12 +180,13 @@ def _recover(
             (placement.tensor.kxx, placement.tensor.kxy, placement.tensor.kyy) if placement.tensor else None,
         )
     freedom = _freedom(topology, scale)
-    sigma = noise or float(np.sqrt(np.sum(certificate.differences**2) / max(freedom, 1)))
     deviations = None
     if standard_deviations:
         with clock("deviations"):
+            # The norm, unlike a sum of squares, does not overflow.
+            sigma = noise or float(np.linalg.norm(certificate.differences)) / np.sqrt(max(freedom, 1))
             deviations = _deviations(topology, placement, placed, meshes, sigma, scale is None)
-    chi_square = certificates.chi_squareverdict(certificate.differences, noise, freedom) if noise else None
+    chi_square = certificates.chi_square_verdict(certificate.differences, noise, freedom) if noise else None
     status, reason = verdict(topology, certificate, chi_square, matrix)
     worst, misfits = certificate.worst() if status == "uncertified" else certificate.worst(0)
     return Recovery(

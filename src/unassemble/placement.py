@@ -87,7 +87,7 @@ class Placement:
         """
         rows, targets = self._anchors_of(piece)
         if len(rows) >= 2:
-            return self._by_anchors(z, rows, targets)
+            return self._by_anchors(piece, z, rows, targets)
         if self.direction and np.isin(self.direction[:2], piece.vertices).all():
             ends = np.searchsorted(piece.vertices, self.direction[:2])
             positions = self._by_direction(piece, z, ends)
@@ -111,7 +111,7 @@ class Placement:
         here = np.isin(rows, piece.vertices)
         return np.searchsorted(piece.vertices, rows[here]), targets[here]
 
-    def _by_anchors(self, z: NDArray, rows: NDArray, targets: NDArray) -> tuple[NDArray, list[str]]:
+    def _by_anchors(self, piece: Piece, z: NDArray, rows: NDArray, targets: NDArray) -> tuple[NDArray, list[str]]:
         known = self.tensor.to_laplacian(targets) if self.tensor else targets
         fits = [fit_similarity(z[rows], known, mirror=mirror) for mirror in (False, True)]
         notes = []
@@ -124,8 +124,8 @@ class Placement:
         elif self.tensor:
             raise InputError("two anchors leave the mirror image open: give a third, not in line, or --handed left|right")
         else:
-            frame = fits[0][0]
-            notes.append("the anchors are in line, so the choice between the two mirror images is arbitrary")
+            frame = fits[canonical_frame(z, piece.edges)[0].mirror][0]
+            notes.append("the anchors leave two mirror images; the choice between them is by convention")
         placed = frame(z)
         return (self.tensor.from_laplacian(placed) if self.tensor else placed), notes
 

@@ -9,6 +9,7 @@ Solver Interface", counted from 1 there and from 0 in ``_iparm``.
 from __future__ import annotations
 
 import ctypes
+import os
 from functools import cache
 
 import numpy as np
@@ -19,6 +20,7 @@ from .upper import UpperTriangle
 
 _REAL_DEFINITE, _REAL_INDEFINITE, _COMPLEX_HERMITIAN_INDEFINITE = 2, -2, -4
 _ANALYSE, _FACTORISE, _SOLVE, _RELEASE = 11, 22, 33, -1
+_REPRODUCIBLE = 2  # MKL_CBWR_AUTO: the fastest code for this processor, reproducible between runs
 _OUT_OF_MEMORY = -2
 _ERRORS = {
     -3: "the reordering failed",
@@ -32,7 +34,11 @@ def _library() -> ctypes.CDLL:
     from pypardiso import PyPardisoSolver
 
     # A handle of our own: ctypes keeps argument types per handle, and pypardiso's declares pointers to reals.
-    return ctypes.CDLL(PyPardisoSolver().libmkl._name)
+    library = ctypes.CDLL(PyPardisoSolver().libmkl._name)
+    if "MKL_CBWR" not in os.environ:
+        # The same bits on every run: sums of several threads are otherwise added in the order in which they come in.
+        library.MKL_CBWR_Set(_REPRODUCIBLE)
+    return library
 
 
 def available() -> bool:
@@ -67,6 +73,7 @@ class PardisoFactorisation:
         self._iparm[0] = 1  # no defaults: all of iparm is set here
         self._iparm[1] = 3  # nested dissection, in parallel
         self._iparm[9] = 30  # never perturb a pivot: shifts next to an eigenvalue have small ones, rightly
+        self._iparm[17] = -1  # count the entries of the factor
         self._iparm[20] = 1  # Bunch-Kaufman pivots; without them shifts next to an eigenvalue lose all digits
         self._iparm[34] = 1  # indices count from 0
         if matrix.block > 1:

@@ -89,12 +89,13 @@ def estimate_scale(piece: Piece, weights: NDArray) -> float:
     sign = np.sign(weights.sum())
     if not sign:
         raise GeometryError("the off-diagonal entries add up to zero, those of a Laplacian cannot")
-    share = weights / np.where(piece.facing[:, 1] >= 0, 2, 1)
+    largest = float(np.abs(weights).max())  # taken out, so that no square overflows
+    share = weights / largest / np.where(piece.facing[:, 1] >= 0, 2, 1)
     a, b, c = share[piece.opposite].T
     form = a * b + b * c + c * a
     form = form[form > 0]
-    size = 2 * np.sqrt(np.median(form)) if len(form) else np.sqrt(3) * np.abs(weights).mean()
-    return float(sign * size)
+    size = 2 * np.sqrt(np.median(form)) if len(form) else np.sqrt(3) * np.abs(weights / largest).mean()
+    return float(sign * size * largest)
 
 
 def conformal_map(

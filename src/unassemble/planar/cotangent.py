@@ -23,6 +23,18 @@ def edge_weights(piece: Piece, z: NDArray) -> NDArray[np.float64]:
     return (cotangent[first] + np.where(second >= 0, cotangent[second], 0.0)) / 2
 
 
+def weight_roundings(piece: Piece, z: NDArray) -> NDArray[np.float64]:
+    """Size of the rounding errors of assembled weights (e,), in units of the machine precision.
+
+    A cotangent is a quotient of products of sides, so its error is about 1 / sin(gamma), far from
+    uniform where there are slivers.
+    """
+    u, w = _legs(piece, z)
+    inverse_sine = (np.abs(u) * np.abs(w) / np.abs((np.conj(u) * w).imag)).ravel()
+    first, second = piece.facing.T
+    return (inverse_sine[first] + np.where(second >= 0, inverse_sine[second], 0.0)) / 2
+
+
 def weight_gradient(piece: Piece, z: NDArray) -> tuple[NDArray[np.int64], NDArray[np.complex128]]:
     """Derivative of the weights: dw_e = Re sum_k g_ek dz_(v_ek).
 

@@ -6,17 +6,28 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..linalg import UpperTriangle, factorisation
+from ..errors import SolverError
+from ..linalg import Factorisation, UpperTriangle, factorisation
 from ..topology import Piece
 from .cotangent import weight_gradient
 
 
 class WeightJacobian:
-    """J = dw / d(x, y) at given positions; displacements are complex (n,)."""
+    """J = dw / d(x, y) at given positions; displacements are complex (n,).
 
-    def __init__(self, piece: Piece, z: NDArray):
+    Parameters
+    ----------
+    piece : Piece
+    z : (n,) complex128
+    spread : (e,) float64, optional
+        Standard deviation of each weight, by which its row is divided.
+    """
+
+    def __init__(self, piece: Piece, z: NDArray, spread: NDArray | None = None):
         self.n = piece.n_vertices
         vertices, g = weight_gradient(piece, z)
+        if spread is not None:
+            g /= spread[:, None]
         e = len(vertices)
         blocks = np.stack([g.real, -g.imag], axis=-1).reshape(-1, 1, 2)
         self.matrix = sp.bsr_array(
@@ -47,8 +58,7 @@ class NormalEquations:
         self._free = np.ones(jacobian.n, dtype=bool)
         self._free[pins] = False
         matrix = _upper_blocks(jacobian.matrix, self._free)
-        self._factor = factorisation(matrix)
-        self._factor.factorise(matrix)
+        self._factor = _factorised(matrix)
 
     def solve(self, rhs: NDArray) -> NDArray:
         """Least displacement equation J'J d = rhs, both (n,) or (n, k) complex."""
@@ -61,6 +71,17 @@ class NormalEquations:
     def release(self) -> None:
         """Give the memory of the factor back."""
         self._factor.release()
+
+
+def _factorised(matrix: UpperTriangle) -> Factorisation:
+    """Cholesky; where slivers spread the entries so far that a pivot comes out negative, with pivoting."""
+    try:
+        factor = factorisation(matrix, definite=True)
+        factor.factorise(matrix)
+    except SolverError:
+        factor = factorisation(matrix)
+        factor.factorise(matrix)
+    return factor
 
 
 def _upper_blocks(jacobian: sp.bsr_array, free: NDArray) -> UpperTriangle:

@@ -37,10 +37,10 @@ def positions(piece: Piece, weights: NDArray, *, scale: float | None, sharp: boo
     return PieceMesh(found.z, found.scale, notes)
 
 
-def refined(piece: Piece, weights: NDArray, mesh: PieceMesh, *, scale: float | None) -> PieceMesh:
+def refined(piece: Piece, weights: NDArray, mesh: PieceMesh, *, scale: float | None, rounding: bool) -> PieceMesh:
     """Gauss-Newton polish; where it cannot be done the mesh stays as it is, with a note."""
     try:
-        found = polish(piece, weights, mesh.z, scale=scale)
+        found = polish(piece, weights, mesh.z, scale=scale, rounding=rounding)
     except SolverError as error:
         return PieceMesh(mesh.z, mesh.scale, (*mesh.notes, f"no polish: {error}"))
     if not (np.isfinite(found.z).all() and np.isfinite(found.scale)):

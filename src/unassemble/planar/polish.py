@@ -1,6 +1,7 @@
 """Gauss-Newton on the coordinates: the maximum-likelihood mesh for noise in the matrix entries.
 
-Minimises sum_e (c w_e(z) - a_e)^2 over positions z and, where it is unknown, the scale c; a_e = -A_ij.
+Minimises sum_e ((c w_e(z) - a_e) / s_e)^2 over positions z and, where it is unknown, the scale c; a_e = -A_ij, and
+s_e is the standard deviation of its error up to a common factor.
 The conformal null vector starts inside the basin, so one factorisation of J'J at the start
 serves all steps (a chord iteration) as long as they contract.
 """
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..topology import Piece
-from .cotangent import edge_weights
+from .cotangent import edge_weights, weight_roundings
 from .normal import NormalEquations, WeightJacobian, distant_pair
 
 _log = logging.getLogger(__name__)
@@ -28,7 +29,7 @@ class PolishOptions:
     ----------
     max_steps, max_factorisations : int
     tolerance : float
-        A step below this ends the iteration.
+        The iteration ends when the next step is expected to be below this.
     rounding : float
         Below this a step that does not contract is taken for rounding.
     contraction : float
@@ -51,7 +52,7 @@ class PolishedMesh:
     z : (n,) complex128
     scale : float
     residual : float
-        Root of the sum of squares of c w - a.
+        Root of the sum of squares of (c w - a) / s.
     steps, factorisations : int
     converged : bool
         Whether steps fell to rounding level.
@@ -71,6 +72,7 @@ def polish(
     z: NDArray,
     *,
     scale: float | None = None,
+    rounding: bool = True,
     options: PolishOptions | None = None,
 ) -> PolishedMesh:
     """Improve positions to the level that the entries allow.
@@ -84,17 +86,22 @@ def polish(
         Start, for instance of :func:`~unassemble.planar.conformal.conformal_map`.
     scale : float, optional
         c, where it is known; otherwise it is fitted.
+    rounding : bool
+        Whether errors are those of assembly in floating-point arithmetic, larger where there are slivers; otherwise
+        they are taken to be of one size.
     options : PolishOptions, optional
     """
     options = options or PolishOptions()
     extent = np.abs(z - z.mean()).max()
     z = (z - z.mean()) / extent
     pins = distant_pair(z)
-    fit = _Fit.at(piece, weights, z, scale)
+    spread = weight_roundings(piece, z) if rounding else np.ones(len(weights))
+    problem = _Problem(piece, weights, spread, scale)
+    fit = problem.at(z)
     system: _GaussNewton | None = None
     factorisations, steps, length, converged = 0, 0, np.inf, False
     while steps < options.max_steps and not converged:
-        jacobian = WeightJacobian(piece, fit.z)
+        jacobian = WeightJacobian(piece, fit.z, spread)
         fresh = system is None
         if system is None:
             system = _GaussNewton(jacobian, pins, fit.weights, free_scale=scale is None)
@@ -108,11 +115,13 @@ def polish(
             system.release()
             system, length = None, np.inf
             continue
-        better = _downhill(piece, weights, fit, move, scale)
+        better = _downhill(problem, fit, move)
         steps += 1
         _log.debug("polish step %d: length %.1e, misfit %.3e", steps, length, fit.norm)
-        # A step that no longer lowers the misfit is rounding, or an end that is not the mesh.
-        converged = length <= options.tolerance or ((slow or better is None) and length <= options.rounding)
+        # Expect the next step to shrink by the root of the last ratio: a chord iteration's first gain is its best. A
+        # step that does not shrink, or does not lower the misfit, is rounding, or the end is not the mesh.
+        coming = length * (np.sqrt(min(length / previous, 1.0)) if np.isfinite(previous) else 1.0)
+        converged = coming <= options.tolerance or ((slow or better is None) and length <= options.rounding)
         if better is None and not converged:
             break
         fit = better or fit
@@ -123,20 +132,12 @@ def polish(
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """A mesh held against the matrix."""
+    """A mesh held against the matrix; weights and misfit a / c - w are divided by their standard deviations."""
 
     z: NDArray[np.complex128]
     scale: float
     weights: NDArray[np.float64]
     misfit: NDArray[np.float64]
-
-    @classmethod
-    def at(cls, piece: Piece, weights: NDArray, z: NDArray, scale: float | None) -> _Fit:
-        """Weights of positions z, the best c where none is given, and a / c - w."""
-        with np.errstate(divide="ignore", invalid="ignore"):  # a flat triangle makes the misfit infinite
-            w = edge_weights(piece, z)
-            c = float(w @ weights / (w @ w)) if scale is None else scale
-            return cls(z, c, w, weights / c - w)
 
     @property
     def norm(self) -> float:
@@ -144,11 +145,28 @@ class _Fit:
         return float(np.linalg.norm(self.misfit))
 
 
-def _downhill(piece: Piece, weights: NDArray, fit: _Fit, move: NDArray, scale: float | None) -> _Fit | None:
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """What is to be fitted."""
+
+    piece: Piece
+    weights: NDArray[np.float64]
+    spread: NDArray[np.float64]
+    scale: float | None
+
+    def at(self, z: NDArray) -> _Fit:
+        """The fit of positions z, with the best c where none is given."""
+        with np.errstate(divide="ignore", invalid="ignore"):  # a flat triangle makes the misfit infinite
+            w, a = edge_weights(self.piece, z) / self.spread, self.weights / self.spread
+            c = float(w @ a / (w @ w)) if self.scale is None else self.scale
+            return _Fit(z, c, w, a / c - w)
+
+
+def _downhill(problem: _Problem, fit: _Fit, move: NDArray) -> _Fit | None:
     """The longest of the step, its half, its quarter, ... that does not raise the misfit."""
     rounding = 1e-14 * float(np.linalg.norm(fit.weights))
     for halvings in range(12):
-        trial = _Fit.at(piece, weights, fit.z + move * 0.5**halvings, scale)
+        trial = problem.at(fit.z + move * 0.5**halvings)
         if trial.norm <= fit.norm + rounding:
             return trial
     return None

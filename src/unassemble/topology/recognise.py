@@ -10,16 +10,17 @@ from . import planarity
 from .boundary import boundary_corners, following, loops
 from .cycles import three_cycles
 from .orientation import Gluing, glue, orient
+from .separating import not_faces
 from .surface import Piece, Topology
 
 
 def recognise(n: int, edges: NDArray) -> Topology:
     """Find the triangles of a planar mesh in its graph.
 
-    If every edge lies on at most two 3-cycles and these glue together to orientable surfaces with
-    the Euler number of a sphere with as many holes as there are boundary loops, then the surfaces
-    are planar and the 3-cycles are faces: no planarity test is needed, and no tri-connectivity.
-    Otherwise a planar embedding is computed, and its triangular faces are the elements.
+    3-cycles with something on both sides are no faces. If every edge lies on at most two of the others, and these
+    glue together to orientable surfaces with the Euler number of a sphere with as many holes as there are
+    boundary loops, then the surfaces are planar and those 3-cycles are faces: no planarity test is needed, and no
+    tri-connectivity. Otherwise a planar embedding is computed, and its triangular faces are the elements.
 
     Parameters
     ----------
@@ -38,6 +39,9 @@ def recognise(n: int, edges: NDArray) -> Topology:
     if n >= 3 and len(edges) > 3 * n - 6:
         raise _not_planar(n, edges, f"it has {len(edges)} edges, and a planar graph has at most 3 n - 6 = {3 * n - 6}")
     triangles, opposite = three_cycles(n, edges)
+    if (np.bincount(opposite.ravel(), minlength=1) > 2).any():
+        face = ~not_faces(n, edges, triangles, opposite)
+        triangles, opposite = triangles[face], opposite[face]
     pieces = _planar_pieces(n, edges, triangles, opposite)
     covered = np.zeros(len(edges), dtype=bool)
     covered[opposite] = True

@@ -54,8 +54,13 @@ class Piece:
 
     @property
     def n_loops(self) -> int:
-        """Number of boundary loops, the outer one included."""
+        """Number of boundary loops, the outer one included; loops that touch in a vertex may count as one."""
         return len(self.loop_offsets) - 1
+
+    @property
+    def n_holes(self) -> int:
+        """Bounded components of the complement in the plane: one less than the loops unless these touch."""
+        return 1 - (self.n_vertices - len(self.edges) + len(self.triangles))
 
     @property
     def longest_loop(self) -> NDArray[np.int64]:
@@ -112,5 +117,5 @@ class Topology:
 
     @property
     def n_holes(self) -> int:
-        """Bounded boundary loops over all pieces."""
-        return sum(piece.n_loops - 1 for piece in self.pieces)
+        """Bounded components of the complement, summed over pieces."""
+        return sum(piece.n_holes for piece in self.pieces)
