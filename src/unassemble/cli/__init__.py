@@ -1,0 +1,33 @@
+"""The command line. Only click is imported at start; the rest when a command needs it."""
+
+from __future__ import annotations
+
+import click
+
+from .._version import __version__
+from .demonstrate import demo
+from .inspecting import inspect
+from .recovering import recover
+from .status import CommandLine
+
+__all__ = ["main"]
+
+
+@click.group(cls=CommandLine, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="unassemble")
+def main() -> None:
+    r"""Turn a sparse matrix back into the mesh it was assembled on.
+
+    \b
+    Exit status:
+      0  recovered and certified
+      1  internal error
+      2  bad usage, or a file that cannot be read as a matrix
+      3  a mesh was written, but is not certified
+      4  no mesh can be recovered, or the format cannot hold it; nothing written
+    """
+
+
+main.add_command(recover)
+main.add_command(inspect)
+main.add_command(demo)

@@ -1,0 +1,159 @@
+"""``unassemble recover``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .options import matrix_options
+from .status import CERTIFIED, UNCERTIFIED, say
+from .values import Number, Numbers, OptionalTolerance, check_anchors, check_orientation, check_tensor
+
+if TYPE_CHECKING:
+    from ..progress import StageDisplay
+    from ..recovery import Recovery
+
+_LATER_OPERATORS = ("elasticity", "surface")
+_LATER_METHODS = ("metric", "angles")
+
+
+@dataclass(frozen=True)
+class _Files:
+    """What is read and written; standard input is "-"."""
+
+    matrix: str
+    out: str
+    report: str | None = None
+    plot: str | None = None
+    written: list[str] = field(default_factory=list)
+
+
+@click.command(cls=OptionalTolerance)
+@matrix_options
+@click.option("-o", "--output", "out", metavar="OUT", required=True, help="The mesh: .npz, or any format of meshio.")
+@click.option(
+    "--operator", type=click.Choice(["auto", "laplacian", *_LATER_OPERATORS]), default="auto", show_default=True
+)
+@click.option("--method", type=click.Choice(["conformal", *_LATER_METHODS]), help="The default picks the best.")
+@click.option("--no-refine", is_flag=True, help="Leave out the polish.")
+@click.option("--scale", type=Number("a nonzero number", bool), metavar="C", help="The factor c is known.")
+@click.option(
+    "--noise",
+    type=Number("a standard deviation above 0", lambda sigma: sigma > 0),
+    metavar="SIGMA",
+    help="Standard deviation of the entries; the certificate becomes a chi-square test.",
+)
+@click.option(
+    "--anchor",
+    "anchors",
+    type=Numbers("ROW,X,Y"),
+    multiple=True,
+    callback=check_anchors,
+    help="A known position, repeatable: two fix a similarity, a third, not in line, the mirror image.",
+)
+@click.option(
+    "--tensor",
+    type=Numbers("KXX,KXY,KYY"),
+    callback=check_tensor,
+    help="Constant anisotropy to undo; needs an orientation: three anchors, or --direction with --handed.",
+)
+@click.option(
+    "--direction", type=Numbers("ROW,ROW,DEGREES"), help="Angle from the x axis of the line between two rows."
+)
+@click.option("--handed", type=click.Choice(["left", "right"]), help="Side of that line on which the centroid lies.")
+@click.option("--realise", is_flag=True, help="Surfaces: coordinates in space (not available in this version).")
+@click.option("--standard-deviations", is_flag=True, help="Error bars of the coordinates.")
+@click.option("--report", metavar="FILE", help="Write a report: .json.")
+@click.option("--plot", metavar="FILE", help="Write a picture: .png, .svg or .pdf.")
+@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads of the linear algebra libraries.")
+@click.option("--quiet", is_flag=True, help="Print nothing but errors.")
+def recover(matrix: str, out: str, report: str | None, plot: str | None, quiet: bool, **options: Any) -> int:
+    """Recover the planar mesh of MATRIX = c L + D and write it to OUT.
+
+    MATRIX is Matrix Market (also .gz), scipy's .npz or MATLAB's .mat; - reads Matrix Market from standard input.
+    Rows count from 0.
+    """
+    _check_available(options.pop("realise"), options["operator"], options["method"])
+    check_orientation(options["tensor"], options["anchors"], options["direction"], options["handed"])
+    files = _Files(matrix, out, report, plot)
+    _check_files(files)
+    options["refine"] = not options.pop("no_refine")
+
+    from ..progress import StageDisplay
+
+    with StageDisplay(enabled=not quiet) as display:
+        recovery = _recovered(files, display, options)
+        _write(recovery, files, display)
+    if not quiet:
+        from ..report import summary
+
+        say(summary(recovery) + f"\n  {'written':<15} {', '.join(map(click.format_filename, files.written))}")
+    elif not recovery.certified:
+        click.echo(f"unassemble: not certified: {recovery.reason}", err=True)
+    return CERTIFIED if recovery.certified else UNCERTIFIED
+
+
+def _check_available(realise: bool, operator: str, method: str | None) -> None:
+    later = [
+        ("--realise", realise),
+        (f"--operator {operator}", operator in _LATER_OPERATORS),
+        (f"--method {method}", method in _LATER_METHODS),
+    ]
+    for name, wanted in later:
+        if wanted:
+            raise click.UsageError(f"{name} is not available in this version")
+
+
+def _check_files(files: _Files) -> None:
+    """Everything that can be known to fail, before the long work."""
+    from ..export import check_output
+
+    check_output(files.out)
+    if files.report is not None:
+        from ..report import check_report
+
+        check_report(files.report)
+    if files.plot is not None:
+        from ..plot.canvas import check_plot
+
+        check_plot(files.plot)
+    names = [("MATRIX", files.matrix), ("OUT", files.out), ("--report", files.report), ("--plot", files.plot)]
+    seen: dict[Path, str] = {}
+    for role, name in names:
+        if name is None or (role == "MATRIX" and name == "-"):
+            continue
+        path = Path(name).resolve()
+        if path in seen:
+            raise click.UsageError(f"{seen[path]} and {role} are the same file, {click.format_filename(name)!r}")
+        seen[path] = role
+
+
+def _recovered(files: _Files, display: StageDisplay, options: dict[str, Any]) -> Recovery:
+    import unassemble
+
+    try:
+        return unassemble.recover(files.matrix, progress=display, **options)
+    except unassemble.RecoveryError as error:
+        if files.report is not None:
+            from ..report import failure_report, write_report
+
+            write_report(failure_report(error), files.report)
+        raise
+
+
+def _write(recovery: Recovery, files: _Files, display: StageDisplay) -> None:
+    display("write")
+    recovery.save(files.out)
+    files.written.append(files.out)
+    if files.report is not None:
+        from ..report import write_report
+
+        write_report(recovery, files.report)
+        files.written.append(files.report)
+    if files.plot is not None:
+        display("plot")
+        recovery.plot(files.plot)
+        files.written.append(files.plot)

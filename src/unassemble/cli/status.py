@@ -1,0 +1,103 @@
+"""How commands end: every exception becomes a sentence on standard error and an exit status."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+import click
+
+from ..errors import InputError, OutputError, RecoveryError, UnassembleError
+
+CERTIFIED, BUG, USAGE, UNCERTIFIED, NOTHING, INTERRUPTED = 0, 1, 2, 3, 4, 130
+
+# From click 8.2 on, a command without arguments raises the help text.
+_HELP = getattr(click.exceptions, "NoArgsIsHelpError", ())
+
+
+class CommandLine(click.Group):
+    """A group of commands that return their exit status."""
+
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        windows_expand_args: bool = True,
+        **extra: Any,
+    ) -> NoReturn:
+        """Run a command and leave with its status."""
+        given = list(sys.argv[1:] if args is None else args)
+        debug = "--debug" in given
+        if debug:
+            logging.basicConfig(level=logging.DEBUG, format="%(name)s: %(message)s")
+        try:
+            with warnings.catch_warnings():
+                if not debug:  # what matters to a user is in the report
+                    warnings.simplefilter("ignore")
+                status = super().main(given, prog_name, complete_var, standalone_mode=False, **extra)
+        except BaseException as error:
+            status, sentence = verdict(error)
+            if debug and not isinstance(error, (SystemExit, click.exceptions.ClickException)):
+                traceback.print_exception(error)
+            if sentence:
+                click.echo(f"unassemble: {sentence}", err=True)
+        sys.exit(status or CERTIFIED)
+
+
+def verdict(error: BaseException) -> tuple[int, str]:
+    """Exit status and sentence for whatever ended a command."""
+    match error:
+        case SystemExit():
+            return (error.code if isinstance(error.code, int) else BUG), ""
+        case click.exceptions.Abort() if not isinstance(error.__cause__, EOFError):
+            return INTERRUPTED, "interrupted"
+        case KeyboardInterrupt():
+            return INTERRUPTED, "interrupted"
+        case click.exceptions.ClickException() if isinstance(error, _HELP):
+            return USAGE, error.format_message()
+        case click.exceptions.ClickException():
+            return USAGE, _one_line(error.format_message())
+        case InputError():
+            return USAGE, _one_line(str(error))
+        case RecoveryError():
+            return NOTHING, _one_line(str(error))
+        case UnassembleError():
+            return BUG, _one_line(str(error))
+        case OSError():
+            return USAGE, _one_line(str(error))
+        case MemoryError():
+            return BUG, "there is not enough memory for a matrix of this size"
+        case _:
+            cause = error.__cause__ if isinstance(error, click.exceptions.Abort) and error.__cause__ else error
+            return BUG, f"internal error, please report it ({_one_line(f'{type(cause).__name__}: {cause}')}); " + (
+                "--debug shows where"
+            )
+
+
+def say(text: str) -> None:
+    """Print a result; a reader that has gone away is no failure of ours.
+
+    Raises
+    ------
+    OutputError
+        If standard output cannot take it, a full disk for one.
+    """
+    try:
+        click.echo(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Python would complain once more when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        raise OutputError(f"cannot write to standard output: {(error.strerror or str(error)).lower()}") from error
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

@@ -1,0 +1,277 @@
+"""What a matrix is, and what can be recovered from it, without recovering it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse import csgraph
+
+from .errors import GeometryError, NotPlanarError, TopologyError
+from .matrix import OperatorMatrix, load
+from .planar.conformal import estimate_scale
+from .topology import Piece, Topology, recognise
+
+VANISHED = 1e-12  # an entry this small, relative to both of its rows, is zero up to rounding
+ZERO_SUM = 1e-10  # likewise the sum of a row, to which every entry adds its own rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """Facts about a matrix that passed the checks at the door.
+
+    Attributes
+    ----------
+    n_rows, n_edges : int
+        Order; stored off-diagonal entries, each with its transpose counted once.
+    asymmetry : float
+        Largest difference between an entry and its transpose, relative to the largest off-diagonal entry of the rows.
+    n_connected : int
+        Connected pieces of the graph, isolated rows not counted.
+    n_isolated : int
+        Rows without an off-diagonal entry.
+    n_vanished : int
+        Off-diagonal entries stored as zero, or of at most 1e-12 relative to their rows.
+    n_zero_sums : int
+        Rows that sum to zero, relative to their largest off-diagonal entry; isolated ones not counted.
+    planar : bool
+        Whether the graph is that of a planar mesh, as far as that is known.
+    witness : tuple of (int, int)
+        If not: edges of a subdivision of K5 or K3,3.
+    obstacle : str
+        Why no mesh is recognised; empty where one is.
+    n_triangles, n_faces, n_holes, n_boundary_edges : int
+        Triangles; these and the regions between boundary loops; bounded ones of those; edges on the boundary.
+    n_pieces, n_hinges : int
+        Edge-connected pieces, and vertices that join them.
+    n_bare_edges, n_undetermined : int
+        Edges and rows of no triangle.
+    scale : (n_pieces,) float64
+        Estimates of c, right to some ten per cent.
+    mixed_signs : tuple of int
+        Rows, the first in each piece, in which c would have the other sign than in most of the piece.
+    warnings : tuple of str
+    """
+
+    n_rows: int
+    n_edges: int
+    asymmetry: float
+    n_connected: int
+    n_isolated: int
+    n_vanished: int
+    n_zero_sums: int
+    planar: bool
+    witness: tuple[tuple[int, int], ...]
+    obstacle: str
+    n_triangles: int
+    n_faces: int
+    n_holes: int
+    n_boundary_edges: int
+    n_pieces: int
+    n_hinges: int
+    n_bare_edges: int
+    n_undetermined: int
+    scale: NDArray[np.float64]
+    mixed_signs: tuple[int, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def operator(self) -> str:
+        """The operator that the matrix likely belongs to, or why none."""
+        if self.obstacle:
+            return "none that this version knows"
+        if self.mixed_signs:
+            return "not a Laplacian: its diagonal has one sign, and the off-diagonal sums here have both"
+        return "laplacian, linear triangles" + ("" if self.n_zero_sums == self._n_rows_used else ", plus a diagonal")
+
+    @property
+    def recoverable(self) -> str:
+        """What :func:`unassemble.recover` can make of the matrix."""
+        if not self.planar:
+            return "nothing: the graph is not that of a mesh in the plane"
+        if self.obstacle:
+            return f"nothing: {self.obstacle}"
+        mesh = f"{_count(self.n_triangles, 'triangle')} on {self.n_rows - self.n_undetermined:,} points"
+        if self.mixed_signs:
+            return f"{mesh}, but no positions that could be certified: look at row {self.mixed_signs[0]}"
+        each = f", each of the {self.n_pieces:,} pieces by itself" if self.n_pieces > 1 else ""
+        return f"{mesh}, up to position, rotation, size and mirror image{each}"
+
+    @property
+    def _n_rows_used(self) -> int:
+        return self.n_rows - self.n_isolated
+
+    def to_dict(self) -> dict[str, Any]:
+        """All attributes, ready for JSON."""
+        content: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
+        content["scale"] = [c if np.isfinite(c) else None for c in self.scale.tolist()]
+        return content | {"operator": self.operator, "recoverable": self.recoverable}
+
+    def __str__(self) -> str:
+        return "\n".join(f"{name:<13} {value}" for name, value in _lines(self))
+
+
+def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | None = None) -> Inspection:
+    """Describe a matrix; quick, since nothing is solved.
+
+    Parameters
+    ----------
+    A : OperatorMatrix, sparse matrix or array, ndarray, path, or "-"
+    variable : str, optional
+        Name of the variable in a ``.mat`` file.
+    drop_zeros : float, optional
+        Forget stored entries of at most this, as in :func:`unassemble.recover`.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read as a matrix.
+    MatrixError
+        If the matrix lacks what every operator has: square, symmetric, finite, ...
+
+    Examples
+    --------
+    >>> inspection = inspect_matrix([[1.0, -0.5, -0.5], [-0.5, 1.0, -0.5], [-0.5, -0.5, 1.0]])
+    >>> inspection.n_triangles, inspection.n_holes, inspection.operator
+    (1, 0, 'laplacian, linear triangles')
+    """
+    matrix = A if isinstance(A, OperatorMatrix) else load(A, variable=variable, drop_zeros=drop_zeros)
+    facts = _matrix_facts(matrix)
+    try:
+        topology = recognise(matrix.n, matrix.edges)
+    except (NotPlanarError, TopologyError) as error:
+        planar = not isinstance(error, NotPlanarError)
+        return Inspection(**facts, **_no_mesh(str(error), planar, getattr(error, "witness", ())))
+    return Inspection(**facts, **_mesh_facts(matrix, topology))
+
+
+def _matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
+    degree = np.bincount(matrix.edges.ravel(), minlength=matrix.n)
+    size = matrix.row_size
+    sums = matrix.diagonal + np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n)
+    graph = sp.csr_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
+    n_isolated = int(np.count_nonzero(degree == 0))
+    smaller = np.minimum(size[matrix.edges[:, 0]], size[matrix.edges[:, 1]])
+    return {
+        "n_rows": matrix.n,
+        "n_edges": len(matrix.edges),
+        "asymmetry": float(matrix.asymmetry),
+        "n_connected": int(csgraph.connected_components(graph, directed=False)[0]) - n_isolated,
+        "n_isolated": n_isolated,
+        "n_vanished": int(np.count_nonzero(np.abs(matrix.entries) <= VANISHED * smaller)),
+        "n_zero_sums": int(np.count_nonzero((np.abs(sums) <= ZERO_SUM * size) & (degree > 0))),
+        "warnings": matrix.warnings,
+    }
+
+
+def _no_mesh(obstacle: str, planar: bool, witness: tuple[tuple[int, int], ...]) -> dict[str, Any]:
+    counts = ("triangles", "faces", "holes", "boundary_edges", "pieces", "hinges", "bare_edges", "undetermined")
+    return {
+        **{f"n_{name}": 0 for name in counts},
+        "planar": planar,
+        "witness": witness,
+        "obstacle": obstacle,
+        "scale": np.empty(0),
+        "mixed_signs": (),
+    }
+
+
+def _mesh_facts(matrix: OperatorMatrix, topology: Topology) -> dict[str, Any]:
+    pieces = topology.pieces
+    n_triangles = sum(len(piece.triangles) for piece in pieces)
+    estimates = [_scale_of(piece, -matrix.entries[piece.edge_rows]) for piece in pieces]
+    return {
+        "planar": True,
+        "witness": (),
+        "obstacle": "",
+        "n_triangles": n_triangles,
+        "n_faces": n_triangles + sum(piece.n_loops for piece in pieces),
+        "n_holes": topology.n_holes,
+        "n_boundary_edges": sum(len(piece.boundary) for piece in pieces),
+        "n_pieces": len(pieces),
+        "n_hinges": len(topology.hinges),
+        "n_bare_edges": len(topology.bare_edges),
+        "n_undetermined": len(topology.undetermined),
+        "scale": np.array([scale for scale, _ in estimates]),
+        "mixed_signs": tuple(row for _, row in estimates if row is not None),
+    }
+
+
+def _scale_of(piece: Piece, weights: NDArray) -> tuple[float, int | None]:
+    """An estimate of c; a row of the other sign, if there is one: c L_ii is the sum of a row's weights, L_ii > 0."""
+    try:
+        scale = estimate_scale(piece, weights)
+    except GeometryError:
+        scale = np.nan
+    sums = np.bincount(piece.edges.ravel(), np.repeat(weights, 2), piece.n_vertices)
+    positive = np.count_nonzero(sums > 0) * 2 >= len(sums)
+    other = np.flatnonzero(sums <= 0 if positive else sums >= 0)
+    return scale, int(piece.vertices[other[0]]) if len(other) else None
+
+
+def _lines(facts: Inspection) -> list[tuple[str, str]]:
+    lines = [
+        ("matrix", f"{facts.n_rows:,} rows, {facts.n_edges:,} off-diagonal entries above the diagonal"),
+        ("symmetry", f"symmetric up to {facts.asymmetry:.1e}" if facts.asymmetry else "symmetric"),
+        ("graph", _graph(facts)),
+        ("vanished", f"{facts.n_vanished:,} of these are zero up to rounding" if facts.n_vanished else "none of these"),
+        ("row sums", _row_sums(facts)),
+        ("planar", _planar(facts)),
+    ]
+    if not facts.obstacle:
+        lines += [("mesh", _mesh(facts)), ("holes", f"{facts.n_holes:,}"), ("pieces", _pieces(facts))]
+        lines.append(("scale c", _scale(facts)))
+    lines += [("operator", facts.operator), ("recoverable", facts.recoverable)]
+    return lines + [("note", warning) for warning in facts.warnings]
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number:,} {noun}" + ("" if number == 1 else "s")
+
+
+def _graph(facts: Inspection) -> str:
+    isolated = f", and {_count(facts.n_isolated, 'isolated row')}" if facts.n_isolated else ""
+    return f"{_count(facts.n_connected, 'connected piece')}{isolated}"
+
+
+def _row_sums(facts: Inspection) -> str:
+    used = facts.n_rows - facts.n_isolated
+    if facts.n_zero_sums == used:
+        return "zero"
+    where = f"zero in {facts.n_zero_sums:,} of {used:,} rows only" if facts.n_zero_sums else "not zero"
+    return f"{where}, so a diagonal was added"
+
+
+def _planar(facts: Inspection) -> str:
+    if facts.planar:
+        return "yes"
+    shown = ", ".join(f"{i}-{j}" for i, j in facts.witness[:12]) + (", ..." if len(facts.witness) > 12 else "")
+    return f"no: the edges {shown} form a subdivision of K5 or K3,3"
+
+
+def _mesh(facts: Inspection) -> str:
+    text = (
+        f"{_count(facts.n_triangles, 'triangle')}, {_count(facts.n_faces, 'face')} with the outside and the holes, "
+        f"{_count(facts.n_boundary_edges, 'boundary edge')}"
+    )
+    if facts.n_bare_edges:
+        text += f"; {_count(facts.n_bare_edges, 'edge')} of no triangle"
+    return text + (f"; {_count(facts.n_undetermined, 'row')} of no triangle" if facts.n_undetermined else "")
+
+
+def _pieces(facts: Inspection) -> str:
+    return f"{facts.n_pieces:,}" + (f", joined by {_count(facts.n_hinges, 'hinge')}" if facts.n_hinges else "")
+
+
+def _scale(facts: Inspection) -> str:
+    known = facts.scale[np.isfinite(facts.scale)]
+    if not len(known):
+        return "cannot be estimated: the entries add up to zero"
+    low, high = float(known.min()), float(known.max())
+    about = f"about {low:.2g}" if high - low <= 0.1 * abs(low) else f"about {low:.2g} to {high:.2g}"
+    if facts.mixed_signs:
+        return f"{about}, but of the other sign in row {facts.mixed_signs[0]}"
+    return f"{about}, of one sign in every row" + (" of a piece" if facts.n_pieces > 1 else "")

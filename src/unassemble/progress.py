@@ -1,0 +1,78 @@
+"""The stage that long work is in, on a terminal."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from types import TracebackType
+from typing import IO, Self
+
+_SENTENCES = {
+    "read": "reading the matrix",
+    "check": "checking the matrix",
+    "topology": "recognising triangles",
+    "conformal": "solving for positions",
+    "polish": "polishing",
+    "place": "placing pieces",
+    "certify": "assembling the matrix again",
+    "deviations": "computing standard deviations",
+    "write": "writing",
+    "plot": "drawing",
+}
+
+
+class StageDisplay:
+    """One line with the present stage and the time elapsed; a context manager, called with each stage.
+
+    It appears only if the stream is a terminal and the work takes longer than a moment, and vanishes at the end.
+
+    Parameters
+    ----------
+    stream : text stream, optional
+        Standard error by default.
+    enabled : bool
+    delay, interval : float
+        Seconds before the line appears, and between its updates.
+    """
+
+    def __init__(
+        self, stream: IO[str] | None = None, *, enabled: bool = True, delay: float = 1.0, interval: float = 0.2
+    ):
+        self._stream = stream or sys.stderr
+        self._delay = delay
+        self._interval = interval
+        self._stage = ""
+        self._start = time.time()
+        self._done = threading.Event()
+        # A thread, because stages may spend minutes in compiled code that calls nobody.
+        self._thread = threading.Thread(target=self._show, daemon=True) if enabled and self._stream.isatty() else None
+
+    def __call__(self, stage: str) -> None:
+        """Tell that a stage begins."""
+        self._stage = _SENTENCES.get(stage, stage)
+
+    def __enter__(self) -> Self:
+        if self._thread:
+            self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._done.set()
+        if self._thread:
+            self._thread.join()
+
+    def _show(self) -> None:
+        if self._done.wait(self._delay):
+            return
+        from tqdm import tqdm
+
+        tqdm.monitor_interval = 0  # its own thread would wake up for nothing
+        with tqdm(file=self._stream, bar_format="{desc}, {elapsed}", leave=False, dynamic_ncols=True) as line:
+            line.start_t = self._start
+            while True:
+                line.set_description_str(self._stage or "working")
+                if self._done.wait(self._interval):
+                    return

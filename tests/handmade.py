@@ -1,0 +1,70 @@
+"""Recoveries made by hand, for tests of what happens to a result."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from meshes import edge_list, random_mesh
+from unassemble.recovery import Recovery
+from unassemble.topology import recognise
+
+
+def recovery_of(points: np.ndarray, triangles: np.ndarray) -> Recovery:
+    """A certified result with this mesh, whose triangles may have any orientation and one piece only."""
+    piece = recognise(len(points), edge_list(triangles)).pieces[0]
+    a, b, c = (points[piece.vertices[corner]] @ [1, 1j] for corner in piece.triangles.T)
+    mirrored = np.sum(np.imag(np.conj(b - a) * (c - a))) < 0
+    boundary, offsets = piece.vertices[piece.boundary], piece.loop_offsets
+    if mirrored:
+        boundary, offsets = boundary[::-1, ::-1], offsets[-1] - offsets[::-1]
+    return Recovery(
+        points=np.asarray(points, dtype=np.float64),
+        triangles=piece.vertices[piece.triangles[:, [0, 2, 1]] if mirrored else piece.triangles],
+        component=np.zeros(len(points), dtype=np.int64),
+        hinges=np.empty(0, dtype=np.int64),
+        scale=np.array([2.5]),
+        boundary=boundary,
+        boundary_offsets=offsets,
+        node_status=np.zeros(len(points), dtype=np.int8),
+        status="certified",
+        reason="the operator re-assembled on this mesh gives the matrix back to 1.0e-15",
+        operator="laplacian",
+        backward_error=1e-15,
+        n_holes=piece.n_loops - 1,
+        timings={"topology": 0.25, "polish": 1.0},
+    )
+
+
+def lake(n: int = 250, **changes: Any) -> Recovery:
+    """A mesh with two holes."""
+    return replace(recovery_of(*random_mesh(n, seed=3)), **changes)
+
+
+def with_loose_row(recovery: Recovery) -> Recovery:
+    """The same with one more row, of which the matrix determines nothing."""
+    return replace(
+        recovery,
+        points=np.vstack([recovery.points, [[np.nan, np.nan]]]),
+        component=np.append(recovery.component, -1),
+        node_status=np.append(recovery.node_status, 1).astype(np.int8),
+    )
+
+
+def two_pieces(apart: float = 0.0) -> Recovery:
+    """The lake twice, the second shifted along x."""
+    one = lake()
+    n = one.n_points
+    return replace(
+        one,
+        points=np.vstack([one.points, one.points + [apart, 0]]),
+        triangles=np.vstack([one.triangles, one.triangles + n]),
+        component=np.repeat([0, 1], n),
+        scale=np.array([2.5, -1.0]),
+        boundary=np.vstack([one.boundary, one.boundary + n]),
+        boundary_offsets=np.append(one.boundary_offsets, one.boundary_offsets[1:] + len(one.boundary)),
+        node_status=np.zeros(2 * n, dtype=np.int8),
+        n_holes=4,
+    )

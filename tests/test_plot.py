@@ -1,0 +1,230 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+from matplotlib.image import imread
+
+from handmade import lake, recovery_of, two_pieces, with_loose_row
+from meshes import random_mesh
+from unassemble.errors import InputError, OutputError
+from unassemble.plot import check_plot, plot_comparison, plot_recovery, style
+from unassemble.plot.comparison import align, largest_error
+from unassemble.plot.ink import ink
+from unassemble.plot.layout import laid_out
+from unassemble.plot.mesh import outer_loops
+
+
+def words(figure) -> str:
+    legend = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    return " | ".join([text.get_text() for text in figure.texts] + legend)
+
+
+def colours(ax) -> set[str]:
+    from matplotlib.colors import to_hex
+
+    return {to_hex(c) for lines in ax.collections if isinstance(lines, LineCollection) for c in lines.get_colors()}
+
+
+def test_title_and_legend_tell_what_is_there():
+    figure = plot_recovery(lake())
+    text = words(figure)
+    for part in ("certified", "points", "triangles", "c = 2.5", "backward error 1.0e-15", "outer boundary", "2 holes"):
+        assert part in text
+    assert "hinge" not in text
+    assert colours(figure.axes[0]) == {style.EDGE, style.OUTER, style.HOLE}
+
+
+def test_the_mesh_is_inside_and_round_things_stay_round():
+    recovery = lake()
+    (ax,) = plot_recovery(recovery).axes
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    assert left <= recovery.points[:, 0].min()
+    assert recovery.points[:, 0].max() <= right
+    assert bottom <= recovery.points[:, 1].min()
+    assert recovery.points[:, 1].max() <= top
+    assert ax.get_aspect() == 1
+
+
+def test_misfits_and_hinges_are_marked():
+    pairs = lake().triangles[:3, :2]
+    recovery = lake(status="uncertified", worst_entries=pairs, worst_misfits=np.ones(3), hinges=np.array([5, 9]))
+    figure = plot_recovery(recovery)
+    assert "uncertified" in words(figure)
+    assert "entries that fit worst" in words(figure)
+    assert "2 hinges" in words(figure)
+    assert style.WORST in colours(figure.axes[0])
+    assert style.WORST not in colours(plot_recovery(lake(worst_entries=pairs, worst_misfits=np.ones(3))).axes[0])
+
+
+def test_points_without_coordinates_are_left_out(tmp_path):
+    recovery = with_loose_row(lake(status="uncertified"))
+    n = recovery.n_points
+    worst = np.array([[0, n - 1], [n - 1, 1]])
+    figure = plot_recovery(
+        with_loose_row(lake(status="uncertified", worst_entries=worst, worst_misfits=np.ones(2))), tmp_path / "a.png"
+    )
+    assert np.isfinite(figure.axes[0].get_xlim()).all()
+    assert "1 not determined" in words(figure)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf", ".PNG"])
+def test_files_are_whole_and_the_same_each_time(suffix, tmp_path):
+    for name in ("a", "b"):
+        plot_recovery(lake(), tmp_path / f"{name}{suffix}")
+    content = [(tmp_path / f"{name}{suffix}").read_bytes() for name in ("a", "b")]
+    assert content[0] == content[1]
+    assert {p.name for p in tmp_path.iterdir()} == {f"a{suffix}", f"b{suffix}"}
+    if suffix == ".svg":
+        assert ElementTree.fromstring(content[0]).tag.endswith("svg")
+    elif suffix == ".pdf":
+        assert content[0].startswith(b"%PDF")
+    else:
+        picture = imread(tmp_path / f"a{suffix}")
+        assert min(picture.shape[:2]) > 500
+        assert (picture[..., :3].min(axis=2) < 0.5).mean() > 0.002  # there is ink
+        assert (picture[..., :3] == 1).all(axis=2).mean() > 0.1  # and paper
+
+
+@pytest.mark.parametrize(("name", "why"), [("a.jpg", r"\.png"), ("a", r"\.png"), ("no/a.png", "no folder")])
+def test_what_is_no_picture_file(name, why, tmp_path):
+    for attempt in (check_plot, lambda path: plot_recovery(lake(), path)):
+        with pytest.raises(OutputError, match=why):
+            attempt(tmp_path / name)
+
+
+def test_an_accident_leaves_the_old_picture(tmp_path, monkeypatch):
+    from matplotlib.figure import Figure
+
+    def interrupted(self, path, **kwargs):
+        path.write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Figure, "savefig", interrupted)
+    path = tmp_path / "a.png"
+    path.write_text("old")
+    with pytest.raises(KeyboardInterrupt):
+        plot_recovery(lake(), path)
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_no_display_and_no_pyplot_are_needed():
+    code = "import sys, unassemble.plot.picture, unassemble.plot; assert 'matplotlib' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "from handmade import lake\n"
+        "lake().plot()\n"
+        "assert 'matplotlib.pyplot' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code, str(__file__).rsplit("test_plot", 1)[0]], check=True)
+
+
+def test_overlapping_pieces_are_drawn_side_by_side():
+    recovery = two_pieces(apart=0.1)
+    mesh = recovery.triangles, recovery.boundary, recovery.boundary_offsets
+    n = recovery.n_points // 2
+    placed = laid_out(recovery.points, *mesh)
+    boxes = [(part.min(axis=0), part.max(axis=0)) for part in (placed[:n], placed[n:])]
+    (low_a, high_a), (low_b, high_b) = boxes
+    assert (high_a < low_b).any() or (high_b < low_a).any()
+    for part in (slice(None, n), slice(n, None)):  # shifted, and nothing else
+        shift = placed[part] - recovery.points[part]
+        np.testing.assert_allclose(shift, np.broadcast_to(shift[0], shift.shape), atol=1e-12)
+
+
+def test_pieces_that_do_not_overlap_stay():
+    recovery = two_pieces(apart=1.5)
+    assert (
+        laid_out(recovery.points, recovery.triangles, recovery.boundary, recovery.boundary_offsets) is recovery.points
+    )
+
+
+def test_a_piece_in_the_hole_of_another_stays():
+    outer = lake(900)
+    small = random_mesh(30, seed=1, holes=False)
+    ring = outer.points[outer.boundary[slice(*outer.boundary_offsets[1:3]), 0]]
+    if outer_loops(outer.points, outer.boundary, outer.boundary_offsets)[1]:
+        ring = outer.points[outer.boundary[slice(*outer.boundary_offsets[:2]), 0]]
+    inner = recovery_of(ring.mean(axis=0) + 0.02 * (small[0] - small[0].mean(axis=0)), small[1])
+    n = outer.n_points
+    points = np.vstack([outer.points, inner.points])
+    placed = laid_out(
+        points,
+        np.vstack([outer.triangles, inner.triangles + n]),
+        np.vstack([outer.boundary, inner.boundary + n]),
+        np.append(outer.boundary_offsets, inner.boundary_offsets[1:] + len(outer.boundary)),
+    )
+    assert placed is points
+
+
+def test_very_many_pieces():
+    one = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    k = 150
+    points = np.tile(one, (k, 1))
+    triangles = np.arange(3 * k).reshape(-1, 3)
+    boundary = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    placed = laid_out(points, triangles, boundary, np.arange(0, 3 * k + 1, 3))
+    centres = placed.reshape(k, 3, 2).mean(axis=1)
+    assert len(np.unique(np.round(centres, 6), axis=0)) == k
+
+
+def test_outer_loop_is_the_one_around_everything():
+    recovery = lake()
+    outer = outer_loops(recovery.points, recovery.boundary, recovery.boundary_offsets)
+    sizes = [
+        np.ptp(recovery.points[recovery.boundary[a:b, 0]], axis=0).max()
+        for a, b in zip(recovery.boundary_offsets, recovery.boundary_offsets[1:], strict=False)
+    ]
+    assert outer.tolist() == [size == max(sizes) for size in sizes]
+
+
+def test_ink_keeps_the_length_of_every_line():
+    rng = np.random.default_rng(5)
+    start, stop = rng.uniform(0.1, 0.9, (2, 1000, 2))
+    image = ink(start, stop, np.zeros(2), np.ones(2), (100, 100))
+    assert image.shape == (100, 100)
+    np.testing.assert_allclose(image.sum(), 100 * np.linalg.norm(stop - start, axis=1).sum())
+    line = ink(np.array([[0.0, 0.255]]), np.array([[1.0, 0.255]]), np.zeros(2), np.ones(2), (100, 200))
+    assert np.flatnonzero(line.sum(axis=1)).tolist() == [25]
+
+
+def test_large_meshes_become_an_image(tmp_path):
+    recovery = recovery_of(*random_mesh(30_000, seed=2))
+    (ax,) = plot_recovery(recovery, tmp_path / "large.svg").axes
+    assert len(ax.images) == 1
+    assert colours(ax) == {style.OUTER, style.HOLE}
+    assert (tmp_path / "large.svg").stat().st_size < 5e6
+
+
+@pytest.mark.parametrize("mirror", [1, -1])
+def test_comparison_finds_the_similarity(mirror, tmp_path):
+    recovery = lake()
+    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
+    truth = 3 * recovery.points * [1, mirror] @ turn + [10, -4]
+    aligned = align(recovery.points, truth, recovery.component)
+    np.testing.assert_allclose(aligned, truth, atol=1e-13)
+    truth[7, 0] += 0.01
+    figure = plot_comparison(truth, recovery, tmp_path / "both.png")
+    error = largest_error(align(recovery.points, truth, recovery.component), truth)
+    assert f"largest error {error:.1e} of the diameter" in words(figure)
+    assert [ax.get_title() for ax in figure.axes] == ["true", "recovered"]
+    assert all(colours(ax) == {style.EDGE, style.OUTER, style.HOLE} for ax in figure.axes)
+    assert 0.9 * 0.01 < error * np.linalg.norm(np.ptp(truth, axis=0)) < 1.1 * 0.01
+
+
+def test_comparison_moves_each_piece_by_itself():
+    recovery = two_pieces()
+    truth = recovery.points.copy()
+    truth[recovery.component == 1] = truth[recovery.component == 1] @ [[0, 2], [-2, 0]] + 5
+    assert largest_error(align(recovery.points, truth, recovery.component), truth) < 1e-14
+
+
+def test_comparison_needs_one_point_for_each_row():
+    with pytest.raises(InputError, match="shape"):
+        plot_comparison(np.zeros((3, 2)), lake())
