@@ -74,6 +74,14 @@ def test_blocks(solver):
     assert np.abs(full @ factor.solve(rhs) - rhs).max() < 1e-12
 
 
+def test_any_integers_serve_as_indices(solver):
+    small = random_hermitian(50, float)
+    matrix = UpperTriangle(small.data, small.indices.astype(np.int64), small.indptr.astype(np.int64))
+    factor = factorisation(matrix)
+    factor.factorise(matrix)
+    assert np.abs(matrix.full() @ factor.solve(np.ones(50)) - 1).max() < 1e-12
+
+
 def test_triangle_from_edges_matches_scipy():
     edges = np.array([[0, 1], [0, 3], [2, 3]])
     matrix = upper_from_edges(4, edges, np.array([1.0, 2.0, 3.0]), np.array([9.0, 8.0, 7.0, 6.0]))

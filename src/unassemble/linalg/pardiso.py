@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import sys
 from functools import cache
 
 import numpy as np
@@ -110,8 +111,9 @@ class PardisoFactorisation:
             self._call(_RELEASE)
             self._handle[:] = 0
 
-    def __del__(self):
-        self.release()
+    def __del__(self) -> None:
+        if not sys.is_finalizing():
+            self.release()
 
     def _call(self, phase: int, rhs: NDArray | None = None, solution: NDArray | None = None) -> None:
         m = self._matrix

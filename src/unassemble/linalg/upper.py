@@ -26,6 +26,11 @@ class UpperTriangle:
     indices: NDArray[np.int32]
     indptr: NDArray[np.int32]
 
+    def __post_init__(self) -> None:
+        # PARDISO reads these arrays as they lie in memory: anything but 32-bit integers would crash it.
+        for name in ("indices", "indptr"):
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=np.int32))
+
     @property
     def n(self) -> int:
         """Order of the matrix, counted in entries or in blocks."""

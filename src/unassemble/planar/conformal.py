@@ -49,7 +49,7 @@ class ConformalOptions:
     krylov_steps: int = 8
     max_factorisations: int = 8
     first_shift: float = 0.7
-    margin: float = 1e-9
+    margin: float = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +143,7 @@ def conformal_map(
     while search.factorisations < options.max_factorisations:
         distance = min(max(4 * spread, options.margin), 0.3)
         z, c, spread = search.at(c * (1 - distance), z)
-        converged = distance <= (options.margin if sharp else 1e-5) and spread < 1e-12
+        converged = distance <= (1e-9 if sharp else 1e-5) and spread < 1e-12
         if converged:
             break
     _log.debug("scale %.16g after %d factorisations, %d solves", c * unit, search.factorisations, search.solves)
@@ -162,7 +162,7 @@ class _Search:
 
     def near(self, scale: float, z: NDArray) -> tuple[NDArray, float, float]:
         """From a shift just below a value that may be c itself."""
-        return self.at(scale * (1 - self._options.margin), z, steps=3)
+        return self.at(scale * (1 - self._options.margin), z, steps=2)
 
     def at(self, shift: float, z: NDArray, steps: int | None = None) -> tuple[NDArray, float, float]:
         """Rayleigh-Ritz over the Krylov space of M(shift)^-1 T from z.

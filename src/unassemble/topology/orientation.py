@@ -26,6 +26,11 @@ class Gluing:
     first: NDArray[np.int64]
     second: NDArray[np.int64]
 
+    @property
+    def faces(self) -> NDArray[np.int64]:
+        """(e, 2) both corners."""
+        return np.column_stack([self.first, self.second])
+
 
 def glue(n_edges: int, opposite: NDArray) -> Gluing:
     """Invert `opposite` (m, 3), the edge that faces each corner."""
@@ -41,6 +46,14 @@ def glue(n_edges: int, opposite: NDArray) -> Gluing:
     first = np.where(count > 0, padded[start], -1)
     second = np.where(count > 1, padded[start + 1], -1)
     return Gluing(count, first, second)
+
+
+def reglue(gluing: Gluing, flip: NDArray) -> Gluing:
+    """The gluing after the triangles marked in `flip` (m,) have had their last two corners exchanged."""
+    corner = np.arange(3 * len(flip)).reshape(-1, 3)
+    corner[flip] = corner[flip][:, [0, 2, 1]]
+    moved = np.append(corner.ravel(), -1)  # -1 stays -1
+    return Gluing(gluing.count, moved[gluing.first], moved[gluing.second])
 
 
 def orient(triangles: NDArray, gluing: Gluing) -> tuple[NDArray, NDArray, NDArray]:
@@ -63,16 +76,13 @@ def orient(triangles: NDArray, gluing: Gluing) -> tuple[NDArray, NDArray, NDArra
         (np.tile(np.where(clash, 2, 1).astype(np.int8), 2), (np.r_[one, two], np.r_[two, one])), shape=(m, m)
     )
     n_pieces, piece = csgraph.connected_components(dual, directed=False)
-    parent = _spanning_tree(dual, n_pieces, piece)
+    order, parent = _spanning_tree(dual, n_pieces, piece)
     rows = np.arange(m)
-    root = parent < 0
-    parent = np.where(root, rows, parent)
-    flip = np.asarray(dual[rows, parent]).ravel() == 2
-    flip[root] = False
-    # Parity of the path to the root, by doubling: after k rounds each pointer spans 2^k tree edges.
-    while not root[parent].all():
-        flip ^= flip[parent]
-        parent = parent[parent]
+    above = np.where(parent < 0, rows, parent)
+    turned = np.asarray(dual[rows, above]).ravel() == 2
+    turned[parent < 0] = False
+    flip = np.empty(m, dtype=bool)
+    flip[order] = _parity_to_root(order, above, turned)
     orientable = np.ones(n_pieces, dtype=bool)
     orientable[piece[one[(flip[one] ^ flip[two]) != clash]]] = False
     return flip, piece.astype(np.int64), orientable
@@ -85,12 +95,12 @@ def _runs_upwards(triangles: NDArray, corner: NDArray) -> NDArray:
     return flat[base + (position + 1) % 3] < flat[base + (position + 2) % 3]
 
 
-def _spanning_tree(dual: sp.csr_array, n_pieces: int, piece: NDArray) -> NDArray:
-    """Breadth-first parents; -1 at the first triangle of each piece."""
+def _spanning_tree(dual: sp.csr_array, n_pieces: int, piece: NDArray) -> tuple[NDArray, NDArray]:
+    """Breadth-first order and parents, -1 at the first triangle of each piece."""
     m = dual.shape[0]
     if n_pieces == 1:
-        _, parent = csgraph.breadth_first_order(dual, 0, directed=True)
-        return np.where(parent < 0, -1, parent)
+        order, parent = csgraph.breadth_first_order(dual, 0, directed=True)
+        return order, np.where(parent < 0, -1, parent)
     # One search from an extra node that is joined to every piece, however many there are.
     _, first = np.unique(piece, return_index=True)
     indptr = np.append(dual.indptr, dual.indptr[-1] + n_pieces)
@@ -98,6 +108,23 @@ def _spanning_tree(dual: sp.csr_array, n_pieces: int, piece: NDArray) -> NDArray
         (np.ones(indptr[-1], np.int8), np.append(dual.indices, first.astype(dual.indices.dtype)), indptr),
         shape=(m + 1, m + 1),
     )
-    _, parent = csgraph.breadth_first_order(graph, m, directed=True)
+    order, parent = csgraph.breadth_first_order(graph, m, directed=True)
     parent = parent[:m]
-    return np.where((parent < 0) | (parent == m), -1, parent)
+    return order[1:], np.where((parent < 0) | (parent == m), -1, parent)
+
+
+def _parity_to_root(order: NDArray, parent: NDArray, turned: NDArray) -> NDArray[np.bool_]:
+    """Number of turned tree edges between each triangle and its root, modulo 2, in breadth-first order.
+
+    By doubling: after k rounds each pointer spans 2^k tree edges. In breadth-first order pointers increase, so
+    that memory is read nearly in sequence.
+    """
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order), dtype=order.dtype)
+    pointer, parity = rank[parent[order]], turned[order]
+    while True:
+        parity = parity ^ parity[pointer]
+        further = pointer[pointer]
+        if np.array_equal(further, pointer):
+            return parity
+        pointer = further

@@ -9,7 +9,7 @@ from ..errors import NotPlanarError, TopologyError
 from . import planarity
 from .boundary import boundary_corners, following, loops
 from .cycles import three_cycles
-from .orientation import Gluing, glue, orient
+from .orientation import Gluing, glue, orient, reglue
 from .separating import not_faces
 from .surface import Piece, Topology
 
@@ -86,7 +86,7 @@ def _planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray
         return None
     triangles = np.where(flip[:, None], triangles[:, [0, 2, 1]], triangles)
     opposite = np.where(flip[:, None], opposite[:, [0, 2, 1]], opposite)
-    gluing = glue(len(edges), opposite)
+    gluing = reglue(gluing, flip)
     corners = boundary_corners(gluing)
     loop, order = loops(following(triangles, opposite, gluing, corners))
     if not _spheres_with_holes(n, edges, triangles, gluing, piece, corners, loop):
@@ -145,7 +145,7 @@ def _cut(
     edge_piece = np.where(gluing.count > 0, piece[gluing.first // 3], -1)
     if n_pieces == 1 and len(edges) == (edge_piece == 0).sum() and len(_vertices_of_pieces(n, triangles, piece)) == n:
         offsets = np.append(np.flatnonzero(np.diff(loop, prepend=-1)), len(loop))
-        return (Piece(np.arange(n), np.arange(len(edges)), edges, triangles, opposite, boundary, offsets),)
+        return (Piece(np.arange(n), np.arange(len(edges)), edges, triangles, opposite, gluing.faces, boundary, offsets),)
     return tuple(
         _local_piece(n, edges, triangles, opposite, boundary, loop, rows)
         for rows in zip(
@@ -175,13 +175,15 @@ def _local_piece(
 ) -> Piece:
     of_triangles, of_edges, of_boundary = rows
     vertices, corner_vertices = np.unique(triangles[of_triangles], return_inverse=True)
+    local_opposite = np.searchsorted(of_edges, opposite[of_triangles])
     ring = loop[of_boundary]
     return Piece(
         vertices=vertices,
         edge_rows=of_edges,
         edges=np.searchsorted(vertices, edges[of_edges]),
         triangles=corner_vertices.reshape(-1, 3),
-        opposite=np.searchsorted(of_edges, opposite[of_triangles]),
+        opposite=local_opposite,
+        facing=glue(len(of_edges), local_opposite).faces,
         boundary=np.searchsorted(vertices, boundary[of_boundary]),
         loop_offsets=np.append(np.flatnonzero(np.diff(ring, prepend=-1)), len(ring)),
     )

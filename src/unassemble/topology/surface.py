@@ -8,8 +8,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .orientation import glue
-
 
 @dataclass(frozen=True, eq=False)
 class Piece:
@@ -27,6 +25,8 @@ class Piece:
         Local vertices; neighbours run along a common edge in opposite directions.
     opposite : (m, 3) int64
         The local edge that faces each corner.
+    facing : (e, 2) int64
+        The corners (3 * triangle + position) that face each edge; -1 in the second place on the boundary.
     boundary : (b, 2) int64
         Local directed edges with the surface on the left, loop by loop in running order.
     loop_offsets : (loops + 1,) int64
@@ -38,14 +38,9 @@ class Piece:
     edges: NDArray[np.int64]
     triangles: NDArray[np.int64]
     opposite: NDArray[np.int64]
+    facing: NDArray[np.int64]
     boundary: NDArray[np.int64]
     loop_offsets: NDArray[np.int64]
-
-    @cached_property
-    def facing(self) -> NDArray[np.int64]:
-        """(e, 2) corners (3 * triangle + position) that face each edge; -1 in the second place on the boundary."""
-        gluing = glue(len(self.edges), self.opposite)
-        return np.column_stack([gluing.first, gluing.second])
 
     @property
     def n_vertices(self) -> int:
