@@ -53,7 +53,8 @@ _NO_TRIANGLES = "meshio writes only {} to it, and the mesh is made of triangles"
 _NOT_COMPRESSED = "meshio writes it without compressing: write {} and compress that"
 
 # XML inside the one file: heavy data in a side file could not be renamed into place together with it.
-_XDMF = MeshFormat("xdmf", undetermined=True, options={"data_format": "XML"})
+# (meshio imports h5py even then.)
+_XDMF = MeshFormat("xdmf", undetermined=True, options={"data_format": "XML"}, needs="h5py")
 _EXODUS = MeshFormat("exodus", dimension=2, undetermined=True, needs="netCDF4")
 # Eleven significant digits are what the sixteen columns of a field hold at any sign and exponent.
 _NASTRAN = MeshFormat("nastran", data="none", digits=11)

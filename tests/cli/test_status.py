@@ -1,0 +1,219 @@
+"""The exit status of every way in which a run can end."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from meshes import random_mesh, specimen
+from unassemble.errors import (
+    FormatError,
+    GeometryError,
+    MatrixError,
+    MatrixFileError,
+    NotPlanarError,
+    OutputError,
+    TopologyError,
+    UnassembleError,
+)
+
+
+def spoilt(matrix: sp.csr_array) -> sp.coo_array:
+    """One entry, with its transpose, half as large again."""
+    entries = matrix.tocoo()
+    k = np.flatnonzero((entries.row < entries.col) & (np.abs(entries.data) > 0.1))[0]
+    i, j = entries.row[k], entries.col[k]
+    entries.data[((entries.row == i) & (entries.col == j)) | ((entries.row == j) & (entries.col == i))] *= 1.5
+    return entries
+
+
+def test_3_written_but_not_certified(work):
+    work.write("B.mtx", spoilt(work.true.matrix))
+    result = work.recover("--report", "r.json", "--plot", "p.png", matrix="B.mtx")
+    assert result.exit_code == 3, result.stderr
+    assert result.stdout.startswith("uncertified: ")
+    assert "worst fit" in result.stdout
+    assert work.files() == {"A.mtx", "B.mtx", "mesh.npz", "r.json", "p.png"}
+    report = json.loads((work.folder / "r.json").read_text())
+    assert report["status"] == "uncertified"
+    assert report["backward_error"] > 1e-9
+    assert report["worst_entries"][0]["misfit"] > 1e-3
+
+
+def test_3_is_not_silent_even_if_quiet(work, one_sentence):
+    work.write("B.mtx", spoilt(work.true.matrix))
+    result = work.recover("--quiet", matrix="B.mtx")
+    assert result.exit_code == 3
+    assert result.stdout == ""
+    assert one_sentence(result).startswith("not certified: ")
+
+
+BROKEN = {
+    "not square": sp.coo_array(np.ones((3, 4))),
+    "not symmetric": sp.coo_array(np.array([[2.0, -1, -1], [-3, 2, -1], [-1, -1, 2]])),
+    "nan": sp.coo_array(np.array([[2.0, np.nan, -1], [np.nan, 2, -1], [-1, -1, 2]])),
+    "diagonal": sp.coo_array(np.eye(4)),
+    "not planar": sp.coo_array(np.full((6, 6), -1.0)),
+    "no triangle": sp.coo_array(np.array([[0, 1.0, 0], [1, 0, 1], [0, 1, 0]])),
+}
+
+
+@pytest.mark.parametrize("what", BROKEN)
+def test_4_nothing_to_recover(work, one_sentence, what):
+    work.write("B.mtx", BROKEN[what])
+    (work.folder / "mesh.npz").write_bytes(b"old")
+    result = work.recover("--plot", "p.png", matrix="B.mtx")
+    assert result.exit_code == 4, result.stderr
+    assert what in one_sentence(result)
+    assert result.stdout == ""
+    assert (work.folder / "mesh.npz").read_bytes() == b"old"
+    assert work.files() == {"A.mtx", "B.mtx", "mesh.npz"}
+
+
+def test_4_leaves_a_report_where_one_is_wanted(work):
+    work.write("B.mtx", BROKEN["not planar"])
+    assert work.recover("--report", "r.json", matrix="B.mtx").exit_code == 4
+    report = json.loads((work.folder / "r.json").read_text())
+    assert report["status"] == "failed"
+    assert "not planar" in report["reason"]
+    assert work.files() == {"A.mtx", "B.mtx", "r.json"}
+
+
+def test_4_the_format_cannot_hold_any_mesh(work, one_sentence):
+    result = work.recover(out="mesh.node")
+    assert result.exit_code == 4
+    assert "tetrahedra" in one_sentence(result)
+    assert work.files() == {"A.mtx"}
+
+
+def test_4_the_format_cannot_hold_this_mesh(work, one_sentence):
+    true = specimen(*random_mesh(100, seed=4))
+    n = len(true.points)
+    loose = sp.block_diag([true.matrix, sp.coo_array([[1.0]])]).tocoo()
+    work.write("L.mtx", loose)
+    assert work.recover(matrix="L.mtx").exit_code == 0
+    mesh = work.mesh()
+    assert mesh["node_status"].tolist() == [0] * n + [1]
+    assert np.isnan(mesh["points"][n]).all()
+    result = work.recover("--plot", "p.png", "--report", "r.json", matrix="L.mtx", out="mesh.obj")
+    assert result.exit_code == 4
+    assert f"row {n}" in one_sentence(result)
+    assert work.files() == {"A.mtx", "L.mtx", "mesh.npz"}
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("missing.mtx", None),
+        ("empty.mtx", b""),
+        ("cut.mtx", b"%%MatrixMarket matrix coordinate real general\n3 3 9\n1 1 1.0\n"),
+        ("text.mtx", b"to be or not to be\n"),
+        ("foreign.npz", b"PK\x03\x04 not a zip file"),
+        ("image.png", b"\x89PNG\r\n\x1a\n"),
+    ],
+)
+def test_2_not_a_matrix_file(work, one_sentence, name, content):
+    if content is not None:
+        (work.folder / name).write_bytes(content)
+    result = work.recover(matrix=name)
+    assert result.exit_code == 2, result.stderr
+    assert name in one_sentence(result)
+    assert "mesh.npz" not in work.files()
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "words"),
+    [
+        (MatrixFileError("x is not a matrix"), 2, "x is not a matrix"),
+        (OutputError("no such place"), 2, "no such place"),
+        (MatrixError("not square"), 4, "not square"),
+        (NotPlanarError("not planar"), 4, "not planar"),
+        (TopologyError("no triangle"), 4, "no triangle"),
+        (GeometryError("two\n  lines"), 4, "two lines"),
+        (FormatError("too small"), 4, "too small"),
+        (UnassembleError("odd"), 1, "odd"),
+        (MemoryError(), 1, "not enough memory"),
+        (PermissionError(13, "Permission denied", "A.mtx"), 2, "Permission denied"),
+        (ZeroDivisionError("by zero"), 1, "internal error, please report it (ZeroDivisionError: by zero)"),
+        (EOFError("end"), 1, "internal error, please report it (EOFError: end)"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (SystemExit(7), 7, None),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else None,
+)
+@pytest.mark.parametrize("debug", [False, True])
+def test_every_exception_has_its_status(work, monkeypatch, capfd, error, status, words, debug):
+    def recover(*args, **kwargs):
+        raise error
+
+    monkeypatch.setattr("unassemble.recover", recover)
+    result = work.recover(*(["--debug"] if debug else []))
+    assert result.exit_code == status
+    assert ("Traceback" in result.stderr) == (debug and words is not None)
+    if words:
+        assert result.stderr.strip().splitlines()[-1] == f"unassemble: {words}" or words in result.stderr
+    assert work.files() == {"A.mtx"}
+
+
+def test_a_disk_that_fills_up(work, one_sentence, monkeypatch):
+    def full(*args, **kwargs):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("numpy.savez", full)
+    result = work.recover()
+    assert result.exit_code == 2
+    assert "no space left on device" in one_sentence(result)
+    assert work.files() == {"A.mtx"}
+
+
+def test_standard_output_that_cannot_be_written(monkeypatch):
+    import io
+
+    from unassemble.cli import status
+
+    class Full(io.StringIO):
+        def flush(self):
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("sys.stdout", Full())
+    with pytest.raises(OutputError, match="standard output: no space left"):
+        status.say("text")
+
+
+def test_warnings_of_libraries_are_not_shown(work, monkeypatch):
+    import warnings
+
+    import unassemble
+
+    genuine = unassemble.recover
+
+    def recover(*args, **kwargs):
+        warnings.warn("noise", RuntimeWarning, stacklevel=1)
+        return genuine(*args, **kwargs)
+
+    monkeypatch.setattr("unassemble.recover", recover)
+    result = work.recover()
+    assert result.exit_code == 0
+    assert result.stderr == ""
+
+
+def test_demo_runs_where_it_is_told(work, monkeypatch):
+    from types import SimpleNamespace
+
+    seen = {}
+
+    def run(folder, *, echo):
+        seen["folder"] = folder
+        echo("some text")
+        return [SimpleNamespace(certified=certified) for certified in seen["certified"]]
+
+    monkeypatch.setattr("unassemble.demo.run", run)
+    for certified, status in [([True, True], 0), ([True, False], 3)]:
+        seen["certified"] = certified
+        result = work.run("demo", "-o", "there")
+        assert result.exit_code == status
+        assert result.stdout == "some text\n"
+        assert seen["folder"] == "there"

@@ -1,0 +1,171 @@
+"""Values and combinations that are refused at the door, with status 2 and one sentence."""
+
+from __future__ import annotations
+
+import pytest
+from click.testing import CliRunner
+
+from unassemble.cli import main
+from unassemble.cli.values import spans_plane, spelled_out
+
+BAD = [
+    (["--scale", "0"], "not a nonzero number"),
+    (["--scale", "nan"], "not a nonzero number"),
+    (["--scale", "two"], "not a nonzero number"),
+    (["--noise", "0"], "above 0"),
+    (["--noise", "-1e-3"], "above 0"),
+    (["--noise", "inf"], "above 0"),
+    (["--drop-zeros", "-1"], "at least 0 and below 1"),
+    (["--drop-zeros", "nan"], "at least 0 and below 1"),
+    (["--drop-zeros=few"], "at least 0 and below 1"),
+    (["--anchor", "3,1"], "not of the form ROW,X,Y"),
+    (["--anchor", "3,1,2,3,4"], "not of the form ROW,X,Y"),
+    (["--anchor", "3,1,2,3"], "not available in this version"),
+    (["--anchor", "-3,1,2"], "rows count from 0"),
+    (["--anchor", "3.5,1,2"], "rows count from 0"),
+    (["--anchor", "3,1,inf"], "not a finite number"),
+    (["--anchor", "3,1,x"], "not a finite number"),
+    (["--anchor", "3,1,2", "--anchor", "3,4,5"], "row 3 is anchored twice"),
+    (["--anchor", "99999,1,2"], "row 99999"),
+    (["--tensor", "1,2,1", "--direction", "0,1,0", "--handed", "left"], "not positive definite"),
+    (["--tensor", "-1,0,-1", "--direction", "0,1,0", "--handed", "left"], "not positive definite"),
+    (["--tensor", "1,0", "--direction", "0,1,0", "--handed", "left"], "KXX,KXY,KYY"),
+    (["--tensor", "2,0,1"], "three --anchor that are not in line, or --direction ROW,ROW,DEGREES with --handed"),
+    (["--tensor", "2,0,1", "--direction", "0,1,30"], "--handed left|right"),
+    (["--tensor", "2,0,1", "--anchor", "0,0,0", "--anchor", "1,1,1"], "--handed left|right"),
+    (
+        ["--tensor", "2,0,1", "--anchor", "0,0,0", "--anchor", "1,1,1", "--anchor", "2,3,3"],
+        "three --anchor that are not in line",
+    ),
+    (["--handed", "left"], "needs a line"),
+    (["--handed", "up", "--direction", "0,1,30"], "'up'"),
+    (["--direction", "0,1"], "ROW,ROW,DEGREES"),
+    (["--direction", "0,0,30"], "two different rows"),
+    (["--direction", "0,1,30", "--anchor", "0,0,0", "--anchor", "1,1,1"], "fix the same freedom"),
+    (["--operator", "elasticity"], "--operator elasticity is not available in this version"),
+    (["--operator", "surface"], "--operator surface is not available in this version"),
+    (["--operator", "heat"], "'heat'"),
+    (["--method", "metric"], "--method metric is not available in this version"),
+    (["--method", "angles"], "--method angles is not available in this version"),
+    (["--realise"], "--realise is not available in this version"),
+    (["--threads", "0"], "x>=1"),
+    (["--report", "r.html"], "not available in this version"),
+    (["--report", "r.txt"], ".json"),
+    (["--report", "no/r.json"], "no folder"),
+    (["--plot", "p.jpg"], ".png"),
+    (["--plot", "no/p.png"], "no folder"),
+    (["--plot", "mesh.svg", "--report", "mesh.json", "--bogus"], "--bogus"),
+    (["extra"], "extra"),
+]
+
+
+@pytest.mark.parametrize(("words", "why"), BAD, ids=lambda value: " ".join(value) if isinstance(value, list) else "")
+def test_refused(work, one_sentence, words, why):
+    result = work.recover(*words)
+    assert result.exit_code == 2, (result.stdout, result.stderr)
+    assert why in one_sentence(result)
+    assert result.stdout == ""
+    assert work.files() == {"A.mtx"}
+
+
+@pytest.mark.parametrize(
+    ("out", "why"),
+    [
+        ("mesh", "extension"),
+        ("mesh.xyz", "extension"),
+        ("no/mesh.vtu", "no folder"),
+        (".", "extension"),
+        ("-", "extension"),
+    ],
+)
+def test_no_such_output(work, one_sentence, out, why):
+    result = work.recover(out=out)
+    assert result.exit_code == 2
+    assert why in one_sentence(result)
+
+
+def test_output_is_missing(work, one_sentence):
+    result = work.run("recover", "A.mtx")
+    assert result.exit_code == 2
+    assert "'-o' / '--output'" in one_sentence(result)
+
+
+def test_matrix_is_missing(work, one_sentence):
+    result = work.run("recover", "-o", "mesh.npz")
+    assert result.exit_code == 2
+    assert "MATRIX" in one_sentence(result)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["recover", "A.npz", "-o", "A.npz"],
+        ["recover", "A.npz", "-o", "./A.npz"],
+        ["recover", "A.mtx", "-o", "mesh.svg", "--plot", "mesh.svg"],
+    ],
+)
+def test_one_file_in_two_roles(work, one_sentence, words):
+    (work.folder / "A.npz").write_bytes(b"old")
+    result = work.run(*words)
+    assert result.exit_code == 2
+    assert "the same file" in one_sentence(result)
+    assert (work.folder / "A.npz").read_bytes() == b"old"
+
+
+def test_refusals_come_before_the_work(work, monkeypatch):
+    def recover(*args, **kwargs):
+        raise AssertionError("the work has begun")
+
+    monkeypatch.setattr("unassemble.recover", recover)
+    for words in (["--plot", "p.jpg"], ["--report", "no/r.json"], ["--tensor", "2,0,1"]):
+        assert work.recover(*words).exit_code == 2
+    assert work.recover(out="no/mesh.npz").exit_code == 2
+    assert work.recover(out="mesh.node").exit_code == 4
+
+
+def test_bare_drop_zeros_gets_its_value():
+    for words, expected in [
+        ("--drop-zeros A.mtx", "--drop-zeros=1e-12 A.mtx"),
+        ("A.mtx --drop-zeros", "A.mtx --drop-zeros=1e-12"),
+        ("--drop-zeros -o out", "--drop-zeros=1e-12 -o out"),
+        ("--drop-zeros 1e-3 A.mtx", "--drop-zeros 1e-3 A.mtx"),
+        ("--drop-zeros -1 A.mtx", "--drop-zeros -1 A.mtx"),
+        ("--drop-zeros=0 A.mtx", "--drop-zeros=0 A.mtx"),
+        ("--drop-zeros -- 5", "--drop-zeros=1e-12 -- 5"),
+        ("-- --drop-zeros", "-- --drop-zeros"),
+    ]:
+        assert spelled_out(words.split()) == expected.split()
+
+
+def test_points_that_span_the_plane():
+    assert spans_plane(((0, 0.0, 0.0), (1, 1.0, 0.0), (2, 0.0, 1e-3)))
+    assert not spans_plane(((0, 0.0, 0.0), (1, 1.0, 2.0), (2, -2.0, -4.0)))
+    assert not spans_plane(((0, 1.0, 1.0), (1, 1.0, 1.0), (2, 1.0, 1.0)))
+    assert not spans_plane(((0, 0.0, 0.0), (1, 1.0, 0.0)))
+
+
+@pytest.mark.parametrize("words", [["--help"], ["-h"], ["recover", "--help"], ["inspect", "-h"], ["demo", "--help"]])
+def test_help(words):
+    result = CliRunner().invoke(main, words, prog_name="unassemble")
+    assert result.exit_code == 0
+    assert result.stdout.startswith("Usage: unassemble")
+
+
+def test_version():
+    from unassemble import __version__
+
+    result = CliRunner().invoke(main, ["--version"])
+    assert result.exit_code == 0
+    assert __version__ in result.stdout
+
+
+def test_no_command_shows_help():
+    result = CliRunner().invoke(main, [], prog_name="unassemble")
+    assert "Commands:" in result.output
+    assert "Traceback" not in result.output
+
+
+def test_unknown_command(one_sentence):
+    result = CliRunner().invoke(main, ["unravel"])
+    assert result.exit_code == 2
+    assert "unravel" in one_sentence(result)
