@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -15,7 +16,7 @@ from unassemble.errors import InputError, OutputError
 from unassemble.plot import check_plot, plot_comparison, plot_recovery, style
 from unassemble.plot.comparison import align, largest_error
 from unassemble.plot.ink import ink
-from unassemble.plot.layout import laid_out
+from unassemble.plot.layout import drawing_of
 from unassemble.plot.mesh import outer_loops
 
 
@@ -127,50 +128,102 @@ def test_no_display_and_no_pyplot_are_needed():
 
 def test_overlapping_pieces_are_drawn_side_by_side():
     recovery = two_pieces(apart=0.1)
-    mesh = recovery.triangles, recovery.boundary, recovery.boundary_offsets
     n = recovery.n_points // 2
-    placed = laid_out(recovery.points, *mesh)
-    boxes = [(part.min(axis=0), part.max(axis=0)) for part in (placed[:n], placed[n:])]
-    (low_a, high_a), (low_b, high_b) = boxes
-    assert (high_a < low_b).any() or (high_b < low_a).any()
+    placed = drawing_of(recovery).points
+    assert boxes_are_apart(placed[:n], placed[n:])
     for part in (slice(None, n), slice(n, None)):  # shifted, and nothing else
         shift = placed[part] - recovery.points[part]
         np.testing.assert_allclose(shift, np.broadcast_to(shift[0], shift.shape), atol=1e-12)
 
 
+def boxes_are_apart(one: np.ndarray, other: np.ndarray) -> bool:
+    return bool((one.max(axis=0) < other.min(axis=0)).any() or (other.max(axis=0) < one.min(axis=0)).any())
+
+
 def test_pieces_that_do_not_overlap_stay():
     recovery = two_pieces(apart=1.5)
-    assert (
-        laid_out(recovery.points, recovery.triangles, recovery.boundary, recovery.boundary_offsets) is recovery.points
+    assert drawing_of(recovery).points is recovery.points
+
+
+def test_loose_rows_beside_overlapping_pieces():
+    recovery = with_loose_row(two_pieces())
+    placed = drawing_of(recovery).points
+    assert np.isnan(placed[-1]).all()
+    assert np.isfinite(placed[:-1]).all()
+    assert "not determined" in words(plot_recovery(recovery))
+
+
+def hinged(angle: float):
+    """Two triangles that share vertex 0, the second turned about it; and a third by itself, far away."""
+    one = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    triangles = np.array([[0, 1, 2], [0, 3, 4], [5, 6, 7]])
+    return lake(
+        points=np.vstack([one, one[1:] @ turn, one + 10]),
+        triangles=triangles,
+        component=np.array([0, 0, 0, 1, 1, 2, 2, 2]),
+        hinges=np.array([0]),
+        scale=np.ones(3),
+        boundary=np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2),
+        boundary_offsets=np.array([0, 3, 6, 9]),
+        node_status=np.zeros(8, np.int8),
+        status="uncertified",
+        worst_entries=np.array([[0, 4], [6, 5], [1, 5]]),
+        worst_misfits=np.ones(3),
     )
+
+
+def test_pieces_at_a_hinge_stay_joined_unless_they_overlap():
+    joined = hinged(np.pi)
+    assert drawing_of(joined).points is joined.points
+    split = drawing_of(hinged(0.1))
+    assert len(split.points) == 9
+    assert len(split.hinges) == 2
+    first, second, third = (split.points[t] for t in split.triangles)
+    assert boxes_are_apart(first, second)
+    assert boxes_are_apart(first, third)
+    sides = split.points[split.triangles] - split.points[split.triangles[:, :1]]
+    np.testing.assert_allclose(sides, hinged(0.1).points[joined.triangles] - hinged(0.1).points[[[0], [0], [5]]])
+    ring = split.boundary[3:6, 0].tolist()
+    assert set(ring) == set(split.triangles[1].tolist())
+    # The entries that are edges are marked where the edges are drawn.
+    expected = [split.triangles[1, [0, 2]], split.triangles[2, [1, 0]]]
+    assert split.pairs.tolist() == [pair.tolist() for pair in expected]
+    assert "1 hinge" in words(plot_recovery(hinged(0.1)))
 
 
 def test_a_piece_in_the_hole_of_another_stays():
     outer = lake(900)
     small = random_mesh(30, seed=1, holes=False)
-    ring = outer.points[outer.boundary[slice(*outer.boundary_offsets[1:3]), 0]]
-    if outer_loops(outer.points, outer.boundary, outer.boundary_offsets)[1]:
-        ring = outer.points[outer.boundary[slice(*outer.boundary_offsets[:2]), 0]]
+    hole = int(np.flatnonzero(~outer_loops(outer.points, outer.boundary, outer.boundary_offsets))[0])
+    ring = outer.points[outer.boundary[slice(*outer.boundary_offsets[hole : hole + 2]), 0]]
     inner = recovery_of(ring.mean(axis=0) + 0.02 * (small[0] - small[0].mean(axis=0)), small[1])
     n = outer.n_points
-    points = np.vstack([outer.points, inner.points])
-    placed = laid_out(
-        points,
-        np.vstack([outer.triangles, inner.triangles + n]),
-        np.vstack([outer.boundary, inner.boundary + n]),
-        np.append(outer.boundary_offsets, inner.boundary_offsets[1:] + len(outer.boundary)),
+    both = replace(
+        outer,
+        points=np.vstack([outer.points, inner.points]),
+        triangles=np.vstack([outer.triangles, inner.triangles + n]),
+        component=np.append(outer.component, inner.component + 1),
+        scale=np.ones(2),
+        boundary=np.vstack([outer.boundary, inner.boundary + n]),
+        boundary_offsets=np.append(outer.boundary_offsets, inner.boundary_offsets[1:] + len(outer.boundary)),
     )
-    assert placed is points
+    assert drawing_of(both).points is both.points
 
 
 def test_very_many_pieces():
     one = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     k = 150
-    points = np.tile(one, (k, 1))
     triangles = np.arange(3 * k).reshape(-1, 3)
-    boundary = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
-    placed = laid_out(points, triangles, boundary, np.arange(0, 3 * k + 1, 3))
-    centres = placed.reshape(k, 3, 2).mean(axis=1)
+    recovery = lake(
+        points=np.tile(one, (k, 1)),
+        triangles=triangles,
+        component=np.repeat(np.arange(k), 3),
+        scale=np.ones(k),
+        boundary=np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2),
+        boundary_offsets=np.arange(0, 3 * k + 1, 3),
+    )
+    centres = drawing_of(recovery).points.reshape(k, 3, 2).mean(axis=1)
     assert len(np.unique(np.round(centres, 6), axis=0)) == k
 
 

@@ -2,90 +2,123 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
+
+from .pieces import Pieces, apart, together
+
+if TYPE_CHECKING:
+    from ..recovery import Recovery
 
 _MOST_COMPARED = 64
 _SAMPLE = 400
 
 
-def laid_out(points: NDArray, triangles: NDArray, boundary: NDArray, offsets: NDArray) -> NDArray[np.float64]:
-    """Positions for a drawing.
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """A mesh for the eye: its points are numbered anew where pieces that meet in a vertex are drawn apart.
 
-    Parts of the mesh that share no vertex are shifted side by side if any two of them overlap; otherwise, as with
-    known positions, all stay where they are.
-
-    Parameters
+    Attributes
     ----------
-    points : (n, 2) float64
+    points : (k, 2) float64
     triangles : (m, 3) int64
-    boundary, offsets
-        As in :class:`unassemble.Recovery`.
+    boundary : (b, 2) int64
+    offsets : (loops + 1,) int64
+    hinges : (h,) int64
+    pairs : (p, 2) int64
+        Ends of the worst entries.
     """
-    part = _parts(len(points), triangles)
-    used = np.flatnonzero(part >= 0)
-    n_parts = int(part.max(initial=-1)) + 1
-    if n_parts < 2:
-        return points
-    low, high = np.full((n_parts, 2), np.inf), np.full((n_parts, 2), -np.inf)
-    np.minimum.at(low, part[used], points[used])
-    np.maximum.at(high, part[used], points[used])
-    if not _overlap(points, triangles, boundary, offsets, part, low, high):
-        return points
-    placed = np.array(points)
-    placed[used] += (_shelves(high - low) - low)[part[used]]
-    return placed
+
+    points: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+    boundary: NDArray[np.int64]
+    offsets: NDArray[np.int64]
+    hinges: NDArray[np.int64]
+    pairs: NDArray[np.int64]
 
 
-def _parts(n: int, triangles: NDArray) -> NDArray:
-    """Label of the vertex-connected part of each point, -1 for points of no triangle."""
-    ones = np.ones(2 * len(triangles), np.int8)
-    pairs = np.concatenate([triangles[:, :2], triangles[:, 1:]])
-    graph = sp.csr_array((ones, pairs.T), shape=(n, n))
-    label = csgraph.connected_components(graph, directed=False)[1]
-    used = np.zeros(n, dtype=bool)
-    used[triangles] = True
-    part = np.full(n, -1, dtype=np.int64)
-    part[used] = np.unique(label[used], return_inverse=True)[1]
-    return part
+def drawing_of(recovery: Recovery) -> Drawing:
+    """Lay out the pieces of a mesh.
+
+    Pieces of which any two overlap are shifted side by side; pieces that meet in hinges are kept together unless
+    they overlap each other. Where nothing overlaps, as with known positions, all stay where they are.
+    """
+    drawing = Drawing(
+        recovery.points,
+        recovery.triangles,
+        recovery.boundary,
+        recovery.boundary_offsets,
+        recovery.hinges,
+        recovery.worst_entries,
+    )
+    if recovery.n_components < 2:
+        return drawing
+    pieces = apart(recovery) if len(recovery.hinges) else together(recovery)
+    renumbered = Drawing(
+        recovery.points[pieces.vertices],
+        pieces.triangles,
+        pieces.boundary,
+        recovery.boundary_offsets,
+        pieces.hinges,
+        pieces.pairs,
+    )
+    low, high = _boxes(renumbered.points, pieces.piece, pieces.count)
+    overlap = _overlaps(renumbered, pieces, low, high)
+    if not overlap.any():
+        return drawing
+    unit = _units(pieces.group, overlap)
+    low, high = _boxes(renumbered.points, np.where(pieces.piece >= 0, unit[pieces.piece], -1), int(unit.max()) + 1)
+    shift = (_shelves(high - low) - low)[unit[pieces.piece]]
+    return replace(renumbered, points=renumbered.points + np.where(pieces.piece[:, None] >= 0, shift, 0))
 
 
-def _overlap(
-    points: NDArray,
-    triangles: NDArray,
-    boundary: NDArray,
-    offsets: NDArray,
-    part: NDArray,
-    low: NDArray,
-    high: NDArray,
-) -> bool:
-    """Whether some triangle of one part lies in another part, judged by centroids."""
-    if len(low) > _MOST_COMPARED:
-        return True  # so many parts are rarely placed by anchors, and comparing all pairs would take long
+def _boxes(points: NDArray, label: NDArray, count: int) -> tuple[NDArray, NDArray]:
+    """Lower left and upper right corners (count, 2) of the points with each label; negative labels are left out."""
+    used = label >= 0
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(low, label[used], points[used])
+    np.maximum.at(high, label[used], points[used])
+    return low, high
+
+
+def _overlaps(drawing: Drawing, pieces: Pieces, low: NDArray, high: NDArray) -> NDArray[np.bool_]:
+    """(count, count) whether some triangle of one piece lies in the other, judged by centroids."""
+    overlap = np.zeros((pieces.count, pieces.count), dtype=bool)
+    if pieces.count > _MOST_COMPARED:  # so many are rarely placed by anchors, and comparing all pairs takes long
+        return ~overlap
     meet: NDArray = np.all((low[:, None] < high[None]) & (high[:, None] > low[None]), axis=2)
     np.fill_diagonal(meet, False)
-    owner = part[triangles[:, 0]]
-    for a in range(len(low)):
+    owner = pieces.of_triangle
+    for a in range(pieces.count):
         mine = np.flatnonzero(owner == a)
-        sample = points[triangles[mine[:: max(len(mine) // _SAMPLE, 1)]]].mean(axis=1)
-        if any(_inside(sample, points, boundary, offsets, part, b).any() for b in np.flatnonzero(meet[a]).tolist()):
-            return True
-    return False
+        sample = drawing.points[drawing.triangles[mine[:: max(len(mine) // _SAMPLE, 1)]]].mean(axis=1)
+        for b in np.flatnonzero(meet[a]).tolist():
+            overlap[a, b] = _inside(sample, drawing, pieces.piece, b).any()
+    return overlap | overlap.T
 
 
-def _inside(sample: NDArray, points: NDArray, boundary: NDArray, offsets: NDArray, part: NDArray, b: int) -> NDArray:
-    """Which points lie in part b: within an odd number of its loops."""
+def _inside(sample: NDArray, drawing: Drawing, piece: NDArray, b: int) -> NDArray:
+    """Which points lie in piece b: within an odd number of its loops."""
     from matplotlib.path import Path
 
     inside = np.zeros(len(sample), dtype=bool)
-    for start, stop in pairwise(offsets):
-        if part[boundary[start, 0]] == b:
-            inside ^= Path(points[boundary[start:stop, 0]]).contains_points(sample)
+    for start, stop in pairwise(drawing.offsets):
+        if piece[drawing.boundary[start, 0]] == b:
+            inside ^= Path(drawing.points[drawing.boundary[start:stop, 0]]).contains_points(sample)
     return inside
+
+
+def _units(group: NDArray, overlap: NDArray) -> NDArray[np.int64]:
+    """Label of what moves as one: a group of joined pieces, or each of its pieces if they overlap."""
+    a, b = np.nonzero(overlap)
+    split = np.zeros(int(group.max()) + 1, dtype=bool)
+    split[group[a[group[a] == group[b]]]] = True
+    own = len(split) + np.arange(len(group))
+    return np.unique(np.where(split[group], own, group), return_inverse=True)[1]
 
 
 def _shelves(size: NDArray) -> NDArray:

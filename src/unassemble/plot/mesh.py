@@ -68,8 +68,8 @@ def draw_mesh(
     )
 
 
-def draw_hinges(ax: Axes, points: NDArray, hinges: NDArray) -> list[Line2D]:
-    """Mark vertices that join pieces."""
+def draw_hinges(ax: Axes, points: NDArray, hinges: NDArray, count: int) -> list[Line2D]:
+    """Mark vertices that join pieces; in a drawing, `count` of them may have become more."""
     if not len(hinges):
         return []
     x, y = points[hinges].T
@@ -82,7 +82,7 @@ def draw_hinges(ax: Axes, points: NDArray, hinges: NDArray) -> list[Line2D]:
     ax.plot(x, y, linestyle="none", markersize=5.5, zorder=5, **marks)
     from matplotlib.lines import Line2D
 
-    label = f"{len(hinges):,} hinge{'s' * (len(hinges) > 1)}"
+    label = f"{count:,} hinge{'s' * (count > 1)}"
     return [Line2D([], [], linestyle="none", markersize=5, label=label, **marks)]
 
 

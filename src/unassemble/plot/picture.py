@@ -10,7 +10,7 @@ import numpy as np
 from ..report import scale_text
 from . import style
 from .canvas import check_plot, footer, header, panels, write_figure
-from .layout import laid_out
+from .layout import drawing_of
 from .mesh import draw_hinges, draw_mesh, draw_worst, extent, outer_loops
 
 if TYPE_CHECKING:
@@ -37,14 +37,13 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     """
     if path is not None:
         check_plot(path)
-    triangles = recovery.triangles[np.isfinite(recovery.points[recovery.triangles, 0]).all(axis=1)]
-    mesh = triangles, recovery.boundary, recovery.boundary_offsets
-    points = laid_out(recovery.points, *mesh)
-    figure, (ax,) = panels([extent(points, triangles)])
-    handles = draw_mesh(ax, points, *mesh, outer_loops(points, *mesh[1:]))
-    handles += draw_hinges(ax, points, recovery.hinges)
+    drawing = drawing_of(recovery)
+    outer = outer_loops(drawing.points, drawing.boundary, drawing.offsets)
+    figure, (ax,) = panels([extent(drawing.points, drawing.triangles)])
+    handles = draw_mesh(ax, drawing.points, drawing.triangles, drawing.boundary, drawing.offsets, outer)
+    handles += draw_hinges(ax, drawing.points, drawing.hinges, len(recovery.hinges))
     if not recovery.certified:
-        handles += draw_worst(ax, points, recovery.worst_entries)
+        handles += draw_worst(ax, drawing.points, drawing.pairs)
     header(figure, recovery.status, details(recovery), style.STATUS.get(recovery.status, style.TEXT))
     footer(figure, handles)
     if path is not None:
