@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from . import certify as certificates
 from .errors import InputError
+from .joined import JoinedMesh
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, read_matrix
 from .placement import Anchor, Direction, Placement
-from .joined import JoinedMesh
 from .planar.deviations import coordinate_covariances
 from .planar.hinges import join
 from .planar.piece import PieceMesh, positions, refined
@@ -212,9 +212,7 @@ def _recover(
     )
 
 
-def _place(
-    topology: Topology, placement: Placement, meshes: list[PieceMesh]
-) -> tuple[list[NDArray], list[str]]:
+def _place(topology: Topology, placement: Placement, meshes: list[PieceMesh]) -> tuple[list[NDArray], list[str]]:
     """Every piece in its final frame, hinges joined; and what is to be said about it."""
     placed, notes = [], []
     for label, (piece, mesh) in enumerate(zip(topology.pieces, meshes, strict=True)):

@@ -122,7 +122,9 @@ class Placement:
         elif self.handed:
             frame = self._handed([fit[0] for fit in fits], z, rows[:2])
         elif self.tensor:
-            raise InputError("two anchors leave the mirror image open: give a third, not in line, or --handed left|right")
+            raise InputError(
+                "two anchors leave the mirror image open: give a third, not in line, or --handed left|right"
+            )
         else:
             frame = fits[canonical_frame(z, piece.edges)[0].mirror][0]
             notes.append("the anchors leave two mirror images; the choice between them is by convention")

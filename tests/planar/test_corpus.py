@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from meshes import SHARED, largest_error, needs_shared, specimen, triangle_set
 
+from meshes import SHARED, largest_error, needs_shared, specimen, triangle_set
 from unassemble import recover
 
 MESHES = sorted((SHARED / "corpus" / "planar").glob("*.npz")) if SHARED.is_dir() else []

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from meshes import edge_list, largest_error, random_mesh, specimen
 
+from meshes import edge_list, largest_error, random_mesh, specimen
 from unassemble import GeometryError
 from unassemble.certify import certify
 from unassemble.planar.conformal import ConformalOptions, conformal_map, estimate_scale

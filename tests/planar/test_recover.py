@@ -5,8 +5,8 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from meshes import delaunay, largest_error, random_mesh, specimen, triangle_set
 
+from meshes import delaunay, largest_error, random_mesh, specimen, triangle_set
 from unassemble import InputError, NotPlanarError, TopologyError, recover
 
 
@@ -257,7 +257,9 @@ def test_uniform_grid_with_stored_zeros():
     k = 30
     grid = np.stack(np.meshgrid(np.arange(k), np.arange(k)), axis=-1).reshape(-1, 2) / k
     cell = (np.arange(k - 1)[:, None] * k + np.arange(k - 1)).ravel()
-    triangles = np.vstack([np.column_stack([cell, cell + 1, cell + k + 1]), np.column_stack([cell, cell + k + 1, cell + k])])
+    triangles = np.vstack(
+        [np.column_stack([cell, cell + 1, cell + k + 1]), np.column_stack([cell, cell + k + 1, cell + k])]
+    )
     known = specimen(grid, triangles, c=12.0)
     found = recover(known.matrix)
     assert found.certified

@@ -36,6 +36,11 @@ def rms(d: NDArray) -> float:
     return float(np.linalg.norm(d) / np.sqrt(len(d)))
 
 
+def rank(matrix: NDArray) -> int:
+    singular = np.linalg.svd(matrix, compute_uv=False)
+    return int((singular > 1e-10 * singular[0]).sum())
+
+
 def estimators(mesh: Mesh) -> tuple[NDArray, NDArray]:
     """Linear maps from changes of the weights to displacements (x, y): of the null vector, of the polish."""
     pseudo_inverse = scipy.linalg.pinvh(mesh.energy, rtol=1e-13)
@@ -66,7 +71,7 @@ def test_derivative_of_the_weights(mesh):
 
 
 def test_jacobian_has_only_the_similarities_in_its_null_space(mesh):
-    assert np.linalg.matrix_rank(mesh.jacobian, rtol=1e-10) == 2 * mesh.n - 4
+    assert rank(mesh.jacobian) == 2 * mesh.n - 4
     for d in (1, 1j, mesh.p, 1j * mesh.p):
         np.testing.assert_allclose(mesh.weight_change(d * np.ones(mesh.n)), 0, atol=1e-11)
 
@@ -74,7 +79,7 @@ def test_jacobian_has_only_the_similarities_in_its_null_space(mesh):
 def test_scale_is_not_confounded_with_the_shape(mesh):
     """The weights themselves are no combination of the columns of J."""
     w = mesh.weights(mesh.p)
-    assert np.linalg.matrix_rank(np.column_stack([mesh.jacobian, w]), rtol=1e-10) == 2 * mesh.n - 3
+    assert rank(np.column_stack([mesh.jacobian, w])) == 2 * mesh.n - 3
 
 
 def test_energy_and_jacobian_are_linked(mesh):

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from meshes import delaunay, edge_list, random_mesh, triangle_set
 
+from meshes import delaunay, edge_list, random_mesh, triangle_set
 from unassemble import NotPlanarError, TopologyError
 from unassemble.topology import recognise
 from unassemble.topology.boundary import loops

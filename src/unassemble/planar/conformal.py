@@ -175,16 +175,16 @@ class _Search:
             Relative change of c in the last step.
         """
         matrix = self._pencil.matrix(shift)
-        if self._factor is None:
-            self._factor = factorisation(matrix)
-        self._factor.factorise(matrix)
+        factor = self._factor = self._factor or factorisation(matrix)
+        factor.factorise(matrix)
         self.factorisations += 1
         basis: list[NDArray] = []
         energy_images: list[NDArray] = []
         area_images: list[NDArray] = []
         c, spread = np.inf, 1.0
         for _ in range(steps or self._options.krylov_steps):
-            z = self._solve(self._pencil.area_form(z))
+            z = np.append(factor.solve(self._pencil.area_form(z)[:-1]), 0)
+            self.solves += 1
             size = np.linalg.norm(z)
             for _ in range(2):
                 for u in basis:
@@ -204,10 +204,6 @@ class _Search:
         z = sum(coefficient * u for coefficient, u in zip(y, basis, strict=True))
         _log.debug("shift %.12g: c = %.16g, last change %.1e", shift, c, spread)
         return z, c, spread
-
-    def _solve(self, image: NDArray) -> NDArray:
-        self.solves += 1
-        return np.append(self._factor.solve(image[:-1]), 0)
 
 
 def _ritz(basis: list[NDArray], energy_images: list[NDArray], area_images: list[NDArray]) -> tuple[float, NDArray]:

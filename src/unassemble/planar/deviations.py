@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,7 +32,7 @@ def coordinate_covariances(
     z : (n,) complex128
         The Laplacian's frame.
     sigma : float
-        In units of the weights, that is divided by \\|c\\|.
+        In units of the weights, that is divided by the modulus of c.
     free_scale : bool
         Whether c was fitted as well.
     stretch : (2, 2) float64, optional
@@ -70,7 +72,7 @@ def _gauge(z: NDArray) -> NDArray:
     return np.linalg.qr(np.column_stack(columns))[0]
 
 
-def _noise_blocks(n_edges: int):
+def _noise_blocks(n_edges: int) -> Iterator[NDArray[np.float64]]:
     """Columns r with sum r r' = I, exactly or in the mean."""
     if n_edges <= _EXACT:
         for start in range(0, n_edges, _BLOCK):

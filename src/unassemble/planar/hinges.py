@@ -51,9 +51,7 @@ def _groups(topology: Topology) -> NDArray:
     return np.asarray(connected_components(graph, directed=False)[1][:n])
 
 
-def _equations(
-    topology: Topology, positions: list[NDArray]
-) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+def _equations(topology: Topology, positions: list[NDArray]) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """One equation for each piece at a hinge after the first: (t_p - 1) z_p + s_p - ... = z_q - z_p."""
     n = len(positions)
     shared = [np.flatnonzero(topology.multiplicity[p.vertices] > 1) for p in topology.pieces]

@@ -11,7 +11,7 @@ STATUS = {"certified": "#2a7f4f", "uncertified": "#b3441e"}
 
 DPI = 160
 LARGEST = (9.0, 7.2)  # inches: the box that a mesh is fitted into
-NARROWEST = 5.2  # inches: what a line of text needs
+NARROWEST = 6.2  # inches: what a line of text needs
 MARGIN = 0.25
 HEADER = 0.76
 FOOTER = 0.42

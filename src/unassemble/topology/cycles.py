@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -58,7 +60,7 @@ def three_cycles(n: int, edges: NDArray) -> tuple[NDArray, NDArray]:
     return triangles, opposite
 
 
-def _edge_lookup(n: int, edges: NDArray):
+def _edge_lookup(n: int, edges: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
     """A function from pairs of vertices to rows of `edges`, -1 where there is no edge."""
     indptr = np.zeros(n + 1, dtype=np.int32)
     np.cumsum(np.bincount(edges[:, 0], minlength=n), out=indptr[1:])

@@ -145,7 +145,9 @@ def _cut(
     edge_piece = np.where(gluing.count > 0, piece[gluing.first // 3], -1)
     if n_pieces == 1 and len(edges) == (edge_piece == 0).sum() and len(_vertices_of_pieces(n, triangles, piece)) == n:
         offsets = np.append(np.flatnonzero(np.diff(loop, prepend=-1)), len(loop))
-        return (Piece(np.arange(n), np.arange(len(edges)), edges, triangles, opposite, gluing.faces, boundary, offsets),)
+        return (
+            Piece(np.arange(n), np.arange(len(edges)), edges, triangles, opposite, gluing.faces, boundary, offsets),
+        )
     return tuple(
         _local_piece(n, edges, triangles, opposite, boundary, loop, rows)
         for rows in zip(
