@@ -98,14 +98,16 @@ def lake(size: float = 0.055) -> Specimen:
     except ImportError as error:
         raise InputError(_MISSING.format(name="scikit-fem")) from error
     points, triangles = _lake_mesh(size)
-    stiffness = laplace.assemble(Basis(MeshTri(points.T, triangles.T), ElementTriP1())).tocoo()
+    mesh = MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(triangles.T))
+    stiffness = laplace.coo_data(Basis(mesh, ElementTriP1()))  # its conversion to a matrix would drop zeros
     rng = np.random.default_rng(2002)
     place = rng.permutation(len(points))
-    # Index by index: adding sparse matrices would drop entries that happen to be zero.
-    row = np.append(place[stiffness.row], np.arange(len(points)))
-    column = np.append(place[stiffness.col], np.arange(len(points)))
+    # Index by index: adding sparse matrices would drop zeros as well.
+    row = np.append(place[stiffness.indices[0]], np.arange(len(points)))
+    column = np.append(place[stiffness.indices[1]], np.arange(len(points)))
     value = np.append(-2.5 * stiffness.data, rng.standard_normal(len(points)))
-    matrix = sp.coo_array((value, (row, column)), shape=stiffness.shape)
+    matrix = sp.coo_array((value, (row, column)), shape=(len(points), len(points)))
+    matrix.sum_duplicates()
     return Specimen(
         "lake",
         "a lake with islands, meshed by Netgen, assembled by scikit-fem, turned into -2.5 L + D, rows shuffled",
