@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from meshes import delaunay, largest_error, random_mesh, specimen, triangle_set
 from unassemble import InputError, NotPlanarError, TopologyError, recover
+from unassemble.linalg import pardiso
 
 
 @pytest.mark.fallback
@@ -88,6 +89,17 @@ def test_same_answer_on_every_run():
     matrix = specimen(*random_mesh(3000), c=2.0).matrix
     first, second = recover(matrix), recover(matrix)
     assert np.array_equal(first.points, second.points)
+
+
+@pytest.mark.skipif(not pardiso.available(), reason="MKL is not installed")
+@pytest.mark.parametrize("refine", [True, False])
+def test_both_solvers_give_the_same_answer(refine, monkeypatch):
+    matrix = specimen(*random_mesh(1500, seed=2), c=-6.0, diagonal=True).matrix
+    points = []
+    for solver in ("pardiso", "superlu"):
+        monkeypatch.setenv("UNASSEMBLE_SOLVER", solver)
+        points.append(recover(matrix, refine=refine).points)
+    assert np.abs(points[1] - points[0]).max() < (1e-11 if refine else 1e-7)
 
 
 def test_anchors_put_the_mesh_where_it_was():

@@ -35,11 +35,27 @@ def weight_roundings(piece: Piece, z: NDArray) -> NDArray[np.float64]:
     return (inverse_sine[first] + np.where(second >= 0, inverse_sine[second], 0.0)) / 2
 
 
-def weight_gradient(piece: Piece, z: NDArray) -> tuple[NDArray[np.int64], NDArray[np.complex128]]:
-    """Derivative of the weights: dw_e = Re sum_k g_ek dz_(v_ek).
+def corner_gradients(piece: Piece, z: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Half the cotangent at each corner and how it changes as the ends of the facing edge move.
 
     From gamma = arg(w / u) at the corner between sides u and w,
     d cot(gamma) = -Im(dw / w - du / u) / sin(gamma)^2.
+
+    Returns
+    -------
+    to_tail, to_head : (m, 3) complex128
+        g with d cot / 2 = Re(g dz) for the tail and head of the edge facing the corner; the corner itself
+        has minus their sum.
+    cotangent : (m, 3) float64
+    """
+    u, w = _legs(piece, z)
+    product = np.conj(u) * w
+    factor = 0.5j * (np.abs(u) * np.abs(w) / product.imag) ** 2
+    return -factor / u, factor / w, product.real / product.imag
+
+
+def weight_gradient(piece: Piece, z: NDArray) -> tuple[NDArray[np.int64], NDArray[np.complex128]]:
+    """Derivative of the weights: dw_e = Re sum_k g_ek dz_(v_ek).
 
     Returns
     -------
@@ -48,10 +64,7 @@ def weight_gradient(piece: Piece, z: NDArray) -> tuple[NDArray[np.int64], NDArra
     g : (e, 4) complex128
         Zero in the last column on the boundary.
     """
-    u, w = _legs(piece, z)
-    sine2 = (np.conj(u) * w).imag ** 2 / (np.abs(u) * np.abs(w)) ** 2
-    factor = 0.5j / sine2
-    to_tail, to_head = (-factor / u).ravel(), (factor / w).ravel()
+    to_tail, to_head, _ = (part.ravel() for part in corner_gradients(piece, z))
     first, second = piece.facing.T
     inner = second >= 0
     second = np.where(inner, second, first)

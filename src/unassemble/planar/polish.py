@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..topology import Piece
 from .cotangent import edge_weights, weight_roundings
+from .iterative import IterativeNormalEquations
 from .normal import NormalEquations, WeightJacobian, distant_pair
 
 _log = logging.getLogger(__name__)
@@ -34,6 +35,8 @@ class PolishOptions:
         Below this a step that does not contract is taken for rounding.
     contraction : float
         A step longer than this times the one before asks for a new factorisation.
+    direct_limit : int
+        Up to this many vertices J'J is factorised; above, conjugate gradients take a tenth of the memory.
     """
 
     max_steps: int = 40
@@ -41,6 +44,7 @@ class PolishOptions:
     tolerance: float = 5e-16
     rounding: float = 1e-10
     contraction: float = 0.2
+    direct_limit: int = 1_500_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +108,12 @@ def polish(
         jacobian = WeightJacobian(piece, fit.z, spread)
         fresh = system is None
         if system is None:
-            system = _GaussNewton(jacobian, pins, fit.weights, free_scale=scale is None)
+            equations: NormalEquations | IterativeNormalEquations
+            if len(z) <= options.direct_limit:
+                equations = NormalEquations(jacobian, pins)
+            else:
+                equations = IterativeNormalEquations(piece, jacobian, fit.z)
+            system = _GaussNewton(jacobian, equations, fit.weights, free_scale=scale is None)
             factorisations += 1
         move = system.step(jacobian, fit.misfit)
         previous, length = length, float(np.abs(move).max())
@@ -175,8 +184,15 @@ def _downhill(problem: _Problem, fit: _Fit, move: NDArray) -> _Fit | None:
 class _GaussNewton:
     """Steps of the linearised problem min |J d + g w - r| over displacements d and log-scale g."""
 
-    def __init__(self, jacobian: WeightJacobian, pins: NDArray, weights: NDArray, *, free_scale: bool):
-        self._equations = NormalEquations(jacobian, pins)
+    def __init__(
+        self,
+        jacobian: WeightJacobian,
+        equations: NormalEquations | IterativeNormalEquations,
+        weights: NDArray,
+        *,
+        free_scale: bool,
+    ):
+        self._equations = equations
         self._weights = weights if free_scale else None
         if free_scale:
             self._slope = jacobian.transpose(weights)
