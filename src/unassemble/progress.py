@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from shutil import get_terminal_size
 from types import TracebackType
 from typing import IO, Self
 
@@ -70,7 +71,9 @@ class StageDisplay:
         from tqdm import tqdm
 
         tqdm.monitor_interval = 0  # its own thread would wake up for nothing
-        with tqdm(file=self._stream, bar_format="{desc}, {elapsed}", leave=False, dynamic_ncols=True) as line:
+        size = get_terminal_size()  # never zero, which some terminals say and tqdm would believe
+        form = "{desc}, {elapsed}"
+        with tqdm(file=self._stream, bar_format=form, leave=False, ncols=size.columns, nrows=size.lines) as line:
             line.start_t = self._start
             while True:
                 line.set_description_str(self._stage or "working")

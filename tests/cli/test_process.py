@@ -139,3 +139,24 @@ def test_damaged_file_on_a_terminal_free_run(work):
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
     assert "mesh.npz" not in work.files()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="terminals of POSIX")
+def test_progress_on_a_terminal():
+    import pty
+
+    code = (
+        "import time\n"
+        "from unassemble.progress import StageDisplay\n"
+        "with StageDisplay(delay=0.1) as display:\n"
+        "    display('polish')\n"
+        "    time.sleep(1.5)\n"
+    )
+    control, terminal = pty.openpty()
+    with subprocess.Popen([sys.executable, "-c", code], stderr=terminal) as process:
+        assert process.wait(timeout=60) == 0
+    shown = os.read(control, 4096).decode()
+    os.close(terminal)
+    os.close(control)
+    assert "polishing, 00:0" in shown
+    assert shown.endswith("\r")
