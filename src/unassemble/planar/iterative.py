@@ -2,9 +2,10 @@
 
 The direct factor of J'J has about ten times the entries of the conformal one. Where that is too
 much memory, this serves: J'J measures how angles change, the conformal energy how far a displacement is from being
-conformal, triangle by triangle. With triangles weighted so that both agree on each of them the two are
-spectrally equivalent on irregular meshes whatever their size (a displacement that is nearly
-conformal is nearly in both null spaces), and the energy is Hermitian with one complex unknown a vertex.
+conformal, triangle by triangle. With triangles weighted so that both agree on each of them the two are close
+to spectrally equivalent on irregular meshes (a displacement that is nearly conformal is nearly in both null
+spaces), and the energy is Hermitian with one complex unknown a vertex. On lattices they are not: the steps needed grow
+with the size.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ class IterativeNormalEquations:
     ):
         self._forward = jacobian.matrix.tocsr()
         self._gauge = np.linalg.qr(np.column_stack([np.ones(len(z)), z - z.mean()]))[0]
-        energy = _weighted_energy(piece, z)
+        energy = _weighted_energy(piece, z, jacobian.spread)
         self._factor = factorisation(energy)
         self._factor.factorise(energy)
         self._tolerance, self._max_iterations = tolerance, max_iterations
@@ -90,7 +91,7 @@ class IterativeNormalEquations:
         return d - self._gauge @ (self._gauge.conj().T @ d)
 
 
-def _weighted_energy(piece: Piece, z: NDArray) -> UpperTriangle:
+def _weighted_energy(piece: Piece, z: NDArray, spread: NDArray) -> UpperTriangle:
     """Sum over triangles of a_t (L_t / 2 - T_t), without the last vertex's row and column.
 
     L_t and T_t are the triangle's Laplacian and signed area; a_t makes the trace of its term that of its share of J'J
@@ -99,7 +100,7 @@ def _weighted_energy(piece: Piece, z: NDArray) -> UpperTriangle:
     to_tail, to_head, cotangent = corner_gradients(piece, z)
     trace = cotangent.sum(axis=1) / 2
     gradients = np.abs(to_tail) ** 2 + np.abs(to_head) ** 2 + np.abs(to_tail + to_head) ** 2
-    weight = gradients.sum(axis=1) / 2 / trace
+    weight = (gradients / spread[piece.opposite] ** 2).sum(axis=1) / 2 / trace
     # Each corner contributes to the edge that faces it, run through from tail to head.
     share = weight[:, None] * cotangent / 4
     area = np.repeat(weight[:, None], 3, axis=1) * _BELOW_ONE / 4

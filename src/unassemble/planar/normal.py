@@ -26,9 +26,9 @@ class WeightJacobian:
     def __init__(self, piece: Piece, z: NDArray, spread: NDArray | None = None):
         self.n = piece.n_vertices
         vertices, g = weight_gradient(piece, z)
-        if spread is not None:
-            g /= spread[:, None]
         e = len(vertices)
+        self.spread = np.ones(e) if spread is None else spread
+        g /= self.spread[:, None]
         blocks = np.stack([g.real, -g.imag], axis=-1).reshape(-1, 1, 2)
         self.matrix = sp.bsr_array(
             (blocks, vertices.ravel().astype(np.int32), np.arange(0, 4 * e + 1, 4, dtype=np.int32)),
