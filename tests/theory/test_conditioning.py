@@ -119,6 +119,20 @@ def test_lattices_are_harder_than_irregular_meshes():
     assert error[1] / error[0] > 1.25
 
 
+def test_misfit_form_is_at_most_twice_the_sum_over_triangles(mesh):
+    """|J d|^2 <= 2 sum q_t, and q_t sees only the anti-conformal part of d."""
+    total = np.zeros((2 * mesh.n, 2 * mesh.n))
+    for corners, e in zip(mesh.t, mesh.sides, strict=True):
+        own = Mesh(mesh.p[corners], np.arange(3)[None]).jacobian
+        # beta is a multiple of e'd; where it vanishes, so does q_t.
+        conformal = np.block([[e.real, -e.imag], [e.imag, e.real]])
+        assert np.abs(own @ scipy.linalg.null_space(conformal)).max() < 1e-10 * np.abs(own).max()
+        both = np.concatenate([corners, mesh.n + corners])
+        total[np.ix_(both, both)] += own.T @ own
+    slack = scipy.linalg.eigvalsh(2 * total - mesh.jacobian.T @ mesh.jacobian)
+    assert slack[0] > -1e-10 * slack[-1]
+
+
 def test_chord_iteration_contracts_by_the_distance_from_the_mesh(mesh):
     """One factorisation at a start that is off by d leaves d^2 after a step and d^3 after two."""
     target = mesh.weights(mesh.p)
