@@ -1,6 +1,6 @@
 """Draw the picture of the README: a matrix on the left, the mesh recovered from it on the right.
 
-    python docs/make_picture.py
+python docs/make_picture.py
 """
 
 from pathlib import Path
