@@ -42,7 +42,7 @@ class FixedPointOptions:
     max_steps: int = 50
     loops: bool = False
     embedding: str = "modified-bfs"
-    newton: NewtonOptions = NewtonOptions(tolerance=1e-9, max_products=20_000)
+    newton: NewtonOptions = NewtonOptions(tolerance=1e-9, max_products=2_000)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +52,13 @@ class FixedPointResult:
     Attributes
     ----------
     z : (n,) complex128
+    boundaries : (k + 1, n_B) complex128
+        The boundary at the start and after each step.
     moves : (k,) float64
         Largest movement of a boundary vertex in each step, relative to the diameter.
+    residuals : (k,) float64
+        What was left of the tube's angle equations in each step. They seldom have a solution: the tube is a ring, its
+        square Jacobian is singular at the solution, and inner cotangents that are a little off lie outside its range.
     converged : bool
     status : str
     products : int
@@ -61,7 +66,9 @@ class FixedPointResult:
     """
 
     z: NDArray[np.complex128]
+    boundaries: NDArray[np.complex128]
     moves: NDArray[np.float64]
+    residuals: NDArray[np.float64]
     converged: bool
     status: str
     products: int
@@ -89,20 +96,22 @@ def boundary_fixed_point(
     options = options or FixedPointOptions()
     tube = ring(piece)
     harmonic, corners = HarmonicReduction(piece, weights), corners_of(tube.piece)
-    z, moves, products, status = harmonic.extend(np.asarray(boundary_values, np.complex128)), [], 0, None
+    place = np.searchsorted(tube.piece.vertices, harmonic.boundary)
+    trace, moves, residuals, products = [np.asarray(boundary_values, np.complex128)], [], [], 0
+    z, status = harmonic.extend(trace[0]), None
     angles = angles_of(z, piece.triangles).ravel()[tube.corners]
     while status is None:
         system = _tube_system(piece, tube, corners, weights, z, options)
         solved = solve(system, system.pack(np.clip(angles, 1e-3, np.pi - 1e-3)), options.newton)
         products += solved.products
+        residuals.append(float(solved.history.residuals.min()))
         angles = system.angles(solved.x)
-        placed = _embed(tube, angles, options)
-        place = np.searchsorted(tube.piece.vertices, harmonic.boundary)
-        new = aligned(placed[place], z[harmonic.boundary])
-        moves.append(float(np.abs(new - z[harmonic.boundary]).max() / np.abs(np.ptp(z.real) + 1j * np.ptp(z.imag))))
-        z = harmonic.extend(new)
-        status = _verdict(moves, options)
-    return FixedPointResult(z, np.array(moves), moves[-1] <= options.tolerance, status, products)
+        trace.append(aligned(_embed(tube, angles, options)[place], trace[-1]))
+        moves.append(float(np.abs(trace[-1] - trace[-2]).max() / abs(complex(np.ptp(z.real), np.ptp(z.imag)))))
+        z = harmonic.extend(trace[-1])
+        status = _verdict(moves, solved.converged, options)
+    converged = status.startswith("converged")
+    return FixedPointResult(z, np.array(trace), np.array(moves), np.array(residuals), converged, status, products)
 
 
 def ring(piece: Piece) -> Part:
@@ -140,11 +149,13 @@ def _embed(tube: Part, angles: NDArray, options: FixedPointOptions) -> NDArray:
     return bfs_embedding(tube.piece, angles, averaging=True)
 
 
-def _verdict(moves: list[float], options: FixedPointOptions) -> str | None:
-    if moves[-1] <= options.tolerance:
-        return f"converged: the boundary moved by {moves[-1]:.1e} in step {len(moves)}"
+def _verdict(moves: list[float], tube_solved: bool, options: FixedPointOptions) -> str | None:
     if not np.isfinite(moves[-1]):
         return f"diverged in step {len(moves)}; try a better first guess, or the whole angle system"
+    if moves[-1] <= options.tolerance and tube_solved:
+        return f"converged: the boundary moved by {moves[-1]:.1e} in step {len(moves)}"
+    if moves[-1] <= options.tolerance:
+        return f"stalled in step {len(moves)}: the tube's angle equations have no solution near; try a better guess"
     if len(moves) >= options.max_steps:
         return f"stopped: the boundary still moved by {moves[-1]:.1e} in step {len(moves)}, the last one allowed"
     return None
