@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from ..boundary import FixedPointOptions, boundary_fixed_point
+from ..nullspace import deficiency
 from ..substitution import substitution
 from .cases import Case, case
 from .convergence import Histories
@@ -111,14 +112,15 @@ def _reached(runs: dict[str, Histories]) -> Claim:
 def _ranks(runs: dict[str, Histories]) -> Claim:
     at = [ranks(r.case.system(), r.case.system().pack(r.case.angles)) for r in runs.values()]
     mended = [ranks(s, s.pack(c.angles)) for c in (r.case for r in runs.values()) for s in (c.system(sines=True),)]
+    predicted = [deficiency(c.piece, c.corners, c.truth) for c in (r.case for r in runs.values())]
     linear = [r.case.corners.counts.m + r.case.corners.w - a.linear for r, a in zip(runs.values(), at, strict=True)]
     return Claim(
         "rank-solution", "3.2", "At the solution the Jacobian is rank deficient, the rows (3)-(4) becoming dependent",
         f"deficient by {_each([a.deficiency for a in at])}; the rows (3)-(4) by {_each(linear)}", "holds in part",
-        "The rows (3)-(4) are independent at every point. What is lost are spirals about interior vertices whose "
-        "spokes are faced by equal angles on both sides, and one unknown for each hole; a generic mesh without "
-        f"holes loses nothing. With the products of sines the deficiency is {_each([a.deficiency for a in mended])}.",
-        tuple(float(a.deficiency) for a in (*at, *mended)),
+        "The rows (3)-(4) are independent at every point. The null space is known in closed form: an antisymmetric "
+        f"matrix of the circumradii predicts {_each(predicted)}. Generic meshes lose h, or 1 for h = 0 and odd w. "
+        f"With the products of sines the deficiency is {_each([a.deficiency for a in mended])}.",
+        tuple(float(d) for d in (*(a.deficiency for a in at), *(a.deficiency for a in mended), *predicted)),
     )  # fmt: skip
 
 
@@ -128,8 +130,8 @@ def _ranks_away(runs: dict[str, Histories]) -> Claim:
     return Claim(
         "rank-start", "3.2", "Away from the solution the Jacobian has full rank",
         f"at the paper's own start, pi/3, it is deficient by {_each(start)}", "fails",
-        "With equal angles every interior vertex has its spiral: w, and one more where there are more unknowns than "
-        "equations. At a random point near the solution the rank is full, or short by that one.",
+        "With equal angles the deficiency is w + h, exactly: every interior vertex has a spiral, every hole another. "
+        "At a random point near the solution the rank is that of the smaller side of the matrix.",
         tuple(float(d) for d in start),
     )  # fmt: skip
 
@@ -229,7 +231,7 @@ def _fixed_point() -> Claim:
     return Claim(
         "fixed-point", "6", "Boundary-Fixed-Point converges, very slowly, from an almost accurate guess",
         f"from errors of 1e-7 the error grows by {_each(growth, '{:.1f}')} in each step (grid, ellipse)", "fails",
-        "The mesh is a fixed point, but a repelling one; so with the paper's embedding, with and without the loop "
+        "The mesh is a fixed point, but a repelling one; so with the paper's embedding, too, with and without loop "
         "equations. The tube's own Jacobian is square and singular: its equations have no solution unless the "
         "inner cotangents are exact.",
         tuple(growth),

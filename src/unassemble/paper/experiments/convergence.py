@@ -59,7 +59,7 @@ def histories(case: Case) -> Histories:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The angle method and the direct method on one matrix, c unknown to both.
+    """The angle method and the direct method on one matrix; both find c, and both try c = 1 first.
 
     Attributes
     ----------

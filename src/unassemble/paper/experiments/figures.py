@@ -100,7 +100,7 @@ def figures_9_to_12(
 
 
 def _embedding(case: Case, shown: Embedded, layout: Embedded, number: int, angle: str, folder: Path) -> Path:
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10.4, 5.6), layout="constrained")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10.4, 5.6), layout="constrained", sharex=True, sharey=True)
     for axes, item in ((left, shown), (right, layout)):
         draw_mesh(axes, item.z, case.piece.triangles, mark=True)
         axes.set_title(
