@@ -18,9 +18,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", nargs="?", default="paper-output")
     made = regenerate(parser.parse_args().folder, conformal_map)
-    print(claims_table(list(made.claims)))
-    print(comparison_table(list(made.comparisons)))
-    print("\n".join(str(path) for path in made.files))
+    files = "\n".join(str(path) for path in made.files)
+    print(claims_table(made.claims), comparison_table(made.comparisons), files, sep="\n")  # noqa: T201
 
 
 if __name__ == "__main__":

@@ -17,6 +17,6 @@ def distance(z: NDArray, target: NDArray) -> float:
 
     The mirror image counts as the same mesh.
     """
-    span = target.max() if np.isrealobj(target) else complex(np.ptp(target.real), np.ptp(target.imag))
+    span = abs(complex(np.ptp(target.real), np.ptp(target.imag)))
     candidates = (np.abs(aligned(y, target) - target).max() for y in (z, z.conj()))
-    return float(min(candidates) / abs(span))
+    return float(min(candidates) / span)

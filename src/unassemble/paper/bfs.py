@@ -14,9 +14,7 @@ from scipy.sparse import csgraph
 from ..topology import Piece
 
 
-def bfs_embedding(
-    piece: Piece, angles: NDArray, *, root: int = 0, averaging: bool = False
-) -> NDArray[np.complex128]:
+def bfs_embedding(piece: Piece, angles: NDArray, *, root: int = 0, averaging: bool = False) -> NDArray[np.complex128]:
     """Positions from angles, triangle by triangle outwards from one of them.
 
     Parameters

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from ..errors import TopologyError
 from ..topology import Piece
 from .alignment import aligned
+from .bfs import bfs_embedding
 from .corners import Corners, corners_of
 from .equations import AngleSystem
 from .harmonic import HarmonicReduction, tube_triangles
 from .layout import least_squares_layout
-from .bfs import bfs_embedding
 from .newton import NewtonOptions, solve
 from .parts import Part, part
 from .starts import angles_of
@@ -42,7 +42,7 @@ class FixedPointOptions:
     max_steps: int = 50
     loops: bool = False
     embedding: str = "modified-bfs"
-    newton: NewtonOptions = NewtonOptions(tolerance=1e-9, max_products=2_000)
+    newton: NewtonOptions = field(default_factory=lambda: NewtonOptions(tolerance=1e-9, max_products=2_000))
 
 
 @dataclass(frozen=True, eq=False)

@@ -121,7 +121,7 @@ class AngleSystem:
     def jacobian(self, x: NDArray) -> Jacobian:
         """J(x), matrix-free."""
         angles = self.angles(x)
-        derivative = -np.sin(angles) ** 2 if self.unknowns == "cotangents" else -1 / np.sin(angles) ** 2
+        derivative = -(np.sin(angles) ** 2) if self.unknowns == "cotangents" else -1 / np.sin(angles) ** 2
         return Jacobian(self, derivative, 1 / np.tan(angles) if self.sines else None)
 
     def advance(self, x: NDArray, step: NDArray, *, reach: float = 0.9) -> tuple[NDArray, float]:

@@ -39,7 +39,7 @@ class HarmonicReduction:
         shape = (self._matrix.shape[0], *boundary_values.shape[1:])
         values = np.zeros(shape, dtype=boundary_values.dtype)
         values[self.boundary] = boundary_values
-        if self._factor is not None:
+        if len(self.interior):
             values[self.interior] = self._solve(-(self._coupling @ boundary_values))
         return values
 
@@ -56,7 +56,8 @@ class HarmonicReduction:
         return (self._matrix @ values)[self.boundary]
 
     def _solve(self, rhs: NDArray) -> NDArray:
-        assert self._factor is not None
+        if self._factor is None:
+            return np.zeros((0, *rhs.shape[1:]), dtype=rhs.dtype)
         if np.iscomplexobj(rhs):
             return self._factor.solve(rhs.real.copy()) + 1j * self._factor.solve(rhs.imag.copy())
         return self._factor.solve(rhs)
@@ -66,4 +67,5 @@ def tube_triangles(piece: Piece) -> NDArray[np.bool_]:
     """(m,) elements with at least one boundary vertex: the tube."""
     on_boundary = np.zeros(piece.n_vertices, dtype=bool)
     on_boundary[piece.boundary] = True
-    return on_boundary[piece.triangles].any(axis=1)
+    touching: NDArray[np.bool_] = np.any(on_boundary[piece.triangles], axis=1)
+    return touching

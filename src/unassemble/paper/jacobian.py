@@ -92,9 +92,7 @@ class Jacobian:
         n = self.derivative.size
         column, ones = np.arange(n), np.ones(n)
         interior = corners.fan < corners.w
-        to_angle, to_cotangent = (
-            (self.derivative, ones) if system.unknowns == "cotangents" else (ones, self.derivative)
-        )
+        to_angle, to_cotangent = (self.derivative, ones) if system.unknowns == "cotangents" else (ones, self.derivative)
         rows = [column // 3, system.row_of_interior + corners.fan[interior], system.row_of_edges + corners.edge]
         columns = [column, column[interior], column]
         data = [to_angle, to_angle[interior], to_cotangent]

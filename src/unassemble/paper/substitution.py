@@ -88,9 +88,7 @@ def _tube_edges(piece: Piece) -> NDArray:
     return np.flatnonzero(tube[one // 3] & ((two < 0) | tube[two // 3]))
 
 
-def _equations(
-    piece: Piece, weights: NDArray, rows: NDArray, spread: NDArray, z_b: NDArray
-) -> tuple[NDArray, NDArray]:
+def _equations(piece: Piece, weights: NDArray, rows: NDArray, spread: NDArray, z_b: NDArray) -> tuple[NDArray, NDArray]:
     """Residual and dense Jacobian (all x, then all y) of the edge equations `rows` in the boundary positions."""
     z = spread @ z_b
     cotangent, slope = cotangents_of(piece, z)

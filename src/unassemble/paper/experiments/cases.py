@@ -21,16 +21,20 @@ class DirectAnswer(Protocol):
     """What a direct method has to say: positions (n,) complex, c, and what it cost."""
 
     @property
-    def z(self) -> NDArray[np.complex128]: ...
+    def z(self) -> NDArray[np.complex128]:
+        """Positions."""
 
     @property
-    def scale(self) -> float: ...
+    def scale(self) -> float:
+        """The factor c of A = cL + D."""
 
     @property
-    def factorisations(self) -> int: ...
+    def factorisations(self) -> int:
+        """Sparse factorisations."""
 
     @property
-    def solves(self) -> int: ...
+    def solves(self) -> int:
+        """Triangular solves with them."""
 
 
 Direct = Callable[[Piece, NDArray], DirectAnswer]
@@ -111,7 +115,7 @@ class Run:
 
 
 def case(name: str) -> Case:
-    """"square", "ellipse" or "rocket": Figures 4, 5, 6."""
+    """The mesh of Figure 4 ("square"), 5 ("ellipse") or 6 ("rocket")."""
     figure, mesh = {"square": (4, meshes.square), "ellipse": (5, meshes.ellipse), "rocket": (6, meshes.rocket)}[name]
     return case_of(mesh(), name, figure)
 
@@ -120,7 +124,7 @@ def case_of(mesh: meshes.Mesh, name: str, figure: int = 0) -> Case:
     """Any mesh of one piece."""
     edges, weights = meshes.stiffness(mesh)
     (piece,) = recognise(len(mesh.points), edges).pieces
-    z = (mesh.points @ [1, 1j])[piece.vertices]
+    z: NDArray[np.complex128] = (mesh.points @ np.array([1, 1j]))[piece.vertices]
     p = z[piece.triangles]
     if ((p[:, 1] - p[:, 0]).conj() * (p[:, 2] - p[:, 0])).imag.sum() < 0:
         z = z.conj()

@@ -11,6 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from .cases import Case, Run
@@ -96,7 +97,9 @@ def figures_9_to_12(
     """BFS-Embedding, and Modified BFS with Coordinate-Smoothing, of the same rough angles, beside today's layout."""
     angle = f"largest angle error {run.angle_error:.0e}, residual {run.residual:.0e}"
     pairs = ((numbers[0], "BFS-Embedding"), (numbers[1], "Modified BFS, Coordinate-Smoothing"))
-    return [_embedding(case, found[name], found["least-squares layout"], number, angle, folder) for number, name in pairs]
+    return [
+        _embedding(case, found[name], found["least-squares layout"], number, angle, folder) for number, name in pairs
+    ]
 
 
 def _embedding(case: Case, shown: Embedded, layout: Embedded, number: int, angle: str, folder: Path) -> Path:
@@ -142,7 +145,7 @@ def _finish_history(axes: Axes, title: str) -> None:
     axes.legend(frameon=False, fontsize=8)
 
 
-def _save(figure: plt.Figure, path: Path) -> Path:
+def _save(figure: Figure, path: Path) -> Path:
     figure.savefig(path, dpi=130)
     plt.close(figure)
     return path

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-
 # A Delaunay triangulation of the ellipse's 24 points. It has ties (the octagon, trapezoids between the rings), which
 # stand here as the source breaks them, so that no triangulation code can decide otherwise.
 _ELLIPSE = [
@@ -87,7 +86,7 @@ def stiffness(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     cotangent = (ahead * behind).sum(axis=2) / cross
     sides = np.sort(np.stack([np.roll(t, -1, axis=1), np.roll(t, -2, axis=1)], axis=2), axis=2)
     edges, place = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
-    return edges, np.bincount(place.ravel(), cotangent.ravel() / 2)
+    return edges.astype(np.int64), np.bincount(place.ravel(), cotangent.ravel() / 2).astype(np.float64)
 
 
 def _ellipse_coarse() -> Mesh:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import logging
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from os import PathLike
 from pathlib import Path
 
-from .cases import Direct, cases
+from .cases import Case, Direct, Run, cases
 from .claims import Claim, claims
-from .convergence import Comparison, compare, histories
-from .embeddings import embeddings, rough_angles
+from .convergence import Comparison, Histories, compare, histories
+from .embeddings import RESIDUALS, Embedded, embeddings, rough_angles
 
 _log = logging.getLogger(__name__)
 
@@ -25,18 +26,30 @@ class Regenerated:
     files: tuple[Path, ...]
 
 
-def measure(direct: Direct) -> tuple[list[Claim], list[Comparison], dict]:
-    """Every number of the tables, and the runs behind the figures; nothing is drawn or written."""
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Every number of the tables, and the runs behind the figures."""
+
+    cases: tuple[Case, ...]
+    histories: dict[str, Histories]
+    rough: dict[str, Run]
+    embedded: dict[str, dict[str, Embedded]]
+    claims: tuple[Claim, ...]
+    comparisons: tuple[Comparison, ...]
+
+
+def measure(direct: Direct) -> Measured:
+    """Run everything; nothing is drawn or written."""
     all_cases = cases()
     runs = {}
     for c in all_cases:
         _log.info("convergence on the mesh of Figure %d", c.figure)
         runs[c.name] = histories(c)
-    rough = {c.name: (c, rough_angles(c)) for c in all_cases if c.name != "ellipse"}
-    found = {name: (c, run, embeddings(c, run.angles)) for name, (c, run) in rough.items()}
-    table = claims(runs, {name: (run.angle_error, shown) for name, (_, run, shown) in found.items()})
-    comparisons = [row for c in all_cases for row in compare(c, direct)]
-    return table, comparisons, {"cases": all_cases, "histories": runs, "embeddings": found}
+    rough = {c.name: rough_angles(c) for c in all_cases if c.name in RESIDUALS}
+    found = {c.name: embeddings(c, rough[c.name].angles) for c in all_cases if c.name in RESIDUALS}
+    table = claims(runs, {name: (rough[name].angle_error, found[name]) for name in found})
+    comparisons = tuple(row for c in all_cases for row in compare(c, direct))
+    return Measured(all_cases, runs, rough, found, tuple(table), comparisons)
 
 
 def regenerate(directory: str | PathLike[str], direct: Direct) -> Regenerated:
@@ -54,17 +67,19 @@ def regenerate(directory: str | PathLike[str], direct: Direct) -> Regenerated:
 
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
-    table, comparisons, runs = measure(direct)
-    h, found = runs["histories"], runs["embeddings"]
-    files = [figures.figure_3(runs["cases"], folder), *figures.figures_4_to_6(runs["cases"], folder)]
+    measured = measure(direct)
+    cases_of = {c.name: c for c in measured.cases}
+    h = measured.histories
+    files = [figures.figure_3(measured.cases, folder), *figures.figures_4_to_6(measured.cases, folder)]
     files += [figures.figure_7(h["square"], folder), figures.figure_8(h["ellipse"], h["rocket"], folder)]
     for name, numbers in (("rocket", (9, 11)), ("square", (10, 12))):
-        files += figures.figures_9_to_12(*found[name], numbers, folder)
-    files += _write(folder, table, comparisons)
-    return Regenerated(tuple(table), tuple(comparisons), tuple(sorted(files)))
+        shown = (cases_of[name], measured.rough[name], measured.embedded[name])
+        files += figures.figures_9_to_12(*shown, numbers, folder)
+    files += _write(folder, measured.claims, measured.comparisons)
+    return Regenerated(measured.claims, measured.comparisons, tuple(sorted(files)))
 
 
-def _write(folder: Path, table: list[Claim], comparisons: list[Comparison]) -> list[Path]:
+def _write(folder: Path, table: Sequence[Claim], comparisons: Sequence[Comparison]) -> list[Path]:
     texts = {
         "claims.md": claims_table(table),
         "comparison.md": comparison_table(comparisons),
@@ -78,14 +93,16 @@ def _write(folder: Path, table: list[Claim], comparisons: list[Comparison]) -> l
     return [folder / name for name in texts]
 
 
-def claims_table(table: list[Claim]) -> str:
+def claims_table(table: Sequence[Claim]) -> str:
     """The claims in Markdown."""
     lines = ["| section | the paper says | measured | verdict | why |", "|---|---|---|---|---|"]
-    lines += [f"| {c.section} | {c.says} | {c.measured} | {c.verdict} | {c.why} |" for c in table]
+    for c in table:
+        cells = (c.section, c.says, c.measured, c.verdict, c.why)
+        lines.append("| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"
 
 
-def comparison_table(rows: list[Comparison]) -> str:
+def comparison_table(rows: Sequence[Comparison]) -> str:
     """The comparison with the direct method in Markdown; ratios are angle method to direct method."""
     lines = [
         "| mesh | angle method | time | products | error | direct: time | solves | error | time ratio | "
