@@ -12,9 +12,7 @@ from unassemble.paper.experiments import meshes
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "paper-meshes"
 
 
-@pytest.mark.parametrize(
-    ("name", "file"), [("ellipse", "fig5_ellipse.npz"), ("rocket", "fig6_rocket.npz")]
-)
+@pytest.mark.parametrize(("name", "file"), [("ellipse", "fig5_ellipse.npz"), ("rocket", "fig6_rocket.npz")])
 def test_same_points_and_triangles_as_the_source(name, file):
     if not (SHARED / file).exists():
         pytest.skip("the source's meshes are not here")
