@@ -40,19 +40,25 @@ def test_every_triangle_is_entered_through_an_earlier_one(paper_case):
 
 
 def test_bfs_is_unstable_and_smoothing_and_layout_are_not(paper_case):
-    """Independent errors of 1e-3 in the angles."""
-    noise = 1e-3 * np.random.default_rng(0).standard_normal(paper_case.angles.size)
-    angles = paper_case.angles + noise
-    bfs = bfs_embedding(paper_case.piece, angles)
-    averaged = bfs_embedding(paper_case.piece, angles, averaging=True)
-    smooth = coordinate_smoothing(paper_case.piece, angles, averaged)
-    layout = least_squares_layout(paper_case.piece, angles)
-    errors = [distance(z, paper_case.truth) for z in (bfs, averaged, smooth, layout)]
-    assert errors[1] < errors[0]
-    assert errors[2] < 0.5 * errors[0]
-    assert errors[3] < 0.5 * errors[0]
-    assert errors[3] < 2e-3
-    assert inverted(layout, paper_case.piece.triangles) == 0
+    """Independent errors of 1e-3 in the angles, geometric means over ten draws."""
+    logarithms = []
+    for seed in range(10):
+        angles = paper_case.angles + 1e-3 * np.random.default_rng(seed).standard_normal(paper_case.angles.size)
+        averaged = bfs_embedding(paper_case.piece, angles, averaging=True)
+        found = (
+            bfs_embedding(paper_case.piece, angles),
+            averaged,
+            coordinate_smoothing(paper_case.piece, angles, averaged),
+            least_squares_layout(paper_case.piece, angles),
+        )
+        logarithms.append([np.log(distance(z, paper_case.truth)) for z in found])
+        assert inverted(found[3], paper_case.piece.triangles) == 0
+    bfs, averaged, smooth, layout = np.exp(np.mean(logarithms, axis=0))
+    assert layout < 1e-3
+    assert layout < smooth < averaged
+    if paper_case.name != "rocket":  # "does not always correct long range losses", section 5.1
+        assert smooth < 0.3 * bfs
+    assert averaged < 1.3 * bfs  # averaging alone does not always help
 
 
 def test_law_of_sines_jacobian_against_differences(paper_case):

@@ -95,6 +95,29 @@ def test_a_rank_deficient_solution_is_isolated_and_a_double_root(assemble, side,
     assert np.abs(x - example.angles).max() < 1e-3
 
 
+def other_solution(example):
+    """Newton with truncated least squares from a little way along the smallest singular vector, c unknown."""
+    system = AngleSystem(example.corners, example.weights, unknowns="angles", scale_free=True)
+    x0 = system.pack(example.angles)
+    direction = np.linalg.svd(system.jacobian(x0).sparse().toarray())[2][-1]
+    x = x0 + 0.05 * direction / np.abs(direction).max()
+    for _ in range(20):
+        x = x - np.linalg.lstsq(system.jacobian(x).sparse().toarray(), system.residual(x), rcond=1e-9)[0]
+    return system, x, np.abs(x - x0)[:-1].max()
+
+
+@pytest.mark.parametrize(("side", "holes"), [(9, 1), (10, 1)])
+def test_with_a_hole_and_c_unknown_there_are_other_solutions(assemble, side, holes):
+    """Exact solutions of (1)-(4) that belong to no mesh, with the paper's c above its true value."""
+    example = assemble(perforated(side, holes))
+    system, x, moved = other_solution(example)
+    assert np.linalg.norm(system.residual(x)) < 1e-12
+    assert moved > 1e-3
+    assert x[:-1].min() > 0
+    assert x[-1] - 1 > 1e-7  # the inequality says c >= 1
+    assert violations(example.piece, example.corners, x[:-1]).embedding > 1e-3
+
+
 @pytest.mark.parametrize("angle", [0.0, 0.7])
 def test_anisotropy_contracts_and_leaves_a_rotation(assemble, angle):
     """Section 7 says that x is dilated by sqrt(Kx / Ky). It is contracted; and the matrix is that of any rotated copy.
