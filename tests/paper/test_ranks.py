@@ -72,12 +72,18 @@ def test_deficiency_on_the_papers_meshes(paper_case):
     assert ranks(free, free.pack(paper_case.angles)).deficiency == expected
 
 
-def test_the_products_of_sines_restore_full_rank(paper_case, generic):
-    for case in (paper_case, generic):
-        system = system_of(case, sines=True)
-        found = ranks(system, system.pack(case.angles))
-        assert found.deficiency == 0
-        assert found.least > 0.01
+def test_the_products_of_sines_restore_full_rank_on_the_papers_meshes(paper_case):
+    system = system_of(paper_case, sines=True)
+    found = ranks(system, system.pack(paper_case.angles))
+    assert found.deficiency == 0
+    assert found.least > 0.02
+
+
+def test_the_products_of_sines_restore_full_rank(generic):
+    system = system_of(generic, sines=True)
+    found = ranks(system, system.pack(generic.angles))
+    assert found.deficiency == 0
+    assert found.least > 0.01
 
 
 def test_at_equal_angles_the_deficiency_is_w_plus_h(paper_case):
