@@ -95,7 +95,8 @@ def _three_orders(runs: dict[str, Histories]) -> Claim:
     return Claim(
         "three-orders", "4", "BiCG-Newton reduces the residual by three orders within 100 inner iterations, everywhere",
         f"{_each(free)} iterations with c unknown; {_each(known)} with c known", "holds in part",
-        "With c known everywhere, with c unknown to within an eighth: the count depends on when an outer step ends.", (*free, *known),
+        "With c known everywhere, with c unknown to within an eighth: the count depends on when an outer step ends.",
+        (*free, *known),
     )  # fmt: skip
 
 
