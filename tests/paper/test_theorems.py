@@ -5,12 +5,15 @@ import pytest
 from skfem import Basis, BilinearForm, ElementTriP1, MeshTri
 from skfem.helpers import grad
 
+from unassemble.paper import AngleOptions, recover_angles
 from unassemble.paper.alignment import distance
 from unassemble.paper.bfs import bfs_embedding
 from unassemble.paper.corners import corners_of
 from unassemble.paper.equations import AngleSystem
 from unassemble.paper.experiments.cases import case_of
 from unassemble.paper.experiments.examples import perforated, spiral_angles, wheel
+from unassemble.paper.experiments.meshes import Mesh
+from unassemble.paper.newton import NewtonOptions
 from unassemble.paper.nullspace import deficiency
 from unassemble.paper.validity import violations
 
@@ -150,6 +153,20 @@ def test_anisotropy_contracts_and_leaves_a_rotation(assemble, angle):
     undone = contracted * [np.sqrt(kx / ky), 1.0]
     np.testing.assert_allclose(matrix(undone, anisotropic) / np.sqrt(kx * ky), given, atol=1e-13)
     assert (distance(undone @ np.array([1, 1j]), mesh.points @ np.array([1, 1j])) > 0.05) == (angle != 0.0)
+
+
+def test_a_triangular_hole_taken_for_an_element_fits_no_angles(assemble):
+    """What the paper assumes away in section 2.2: the status says that nothing fits."""
+    base = perforated(9, 0)
+    t = base.triangles
+    centre = base.points[t].mean(axis=1)
+    island = int(np.argmin(np.hypot(*(centre - 4.0).T)))
+    whole = assemble(base)
+    holed = case_of(Mesh(base.points, np.delete(t, island, axis=0)), "island")
+    assert len(holed.piece.triangles) == len(whole.piece.triangles)  # recognition fills it
+    found = recover_angles(holed.piece, holed.weights, options=AngleOptions(newton=NewtonOptions(max_products=3_000)))
+    assert not found.converged
+    assert found.history.residuals.min() > 1e-2
 
 
 def test_interior_vertices_are_those_on_no_boundary_edge(paper_case):
