@@ -44,5 +44,14 @@ def part(whole: Piece, mask: NDArray) -> Part:
     flat = triangles.ravel()
     boundary = np.column_stack([flat[following_corner(1, rim)], flat[following_corner(2, rim)]])[order]
     offsets = np.append(np.flatnonzero(np.diff(loop[order], prepend=-1)), len(loop))
-    piece = Piece(vertices, rows, np.searchsorted(vertices, whole.edges[rows]), triangles, opposite, boundary, offsets)
+    piece = Piece(
+        vertices=vertices,
+        edge_rows=rows,
+        edges=np.searchsorted(vertices, whole.edges[rows]),
+        triangles=triangles,
+        opposite=opposite,
+        facing=gluing.faces,
+        boundary=boundary,
+        loop_offsets=offsets,
+    )
     return Part(piece, of, (3 * of[:, None] + np.arange(3)).ravel())
