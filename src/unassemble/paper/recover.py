@@ -38,6 +38,7 @@ class AngleOptions:
     embedding : {"layout", "bfs", "modified-bfs", "smoothing"}
         "smoothing" is Coordinate-Smoothing after Modified BFS-Embedding.
     newton : NewtonOptions
+        Damped by default: whole steps, the paper's choice, go astray on meshes with thin triangles.
     """
 
     unknowns: Unknowns = "cotangents"
@@ -45,7 +46,7 @@ class AngleOptions:
     sines: bool = True
     outer: int | Literal["longest"] | None = None
     embedding: Embedding = "layout"
-    newton: NewtonOptions = field(default_factory=lambda: NewtonOptions(tolerance=1e-10))
+    newton: NewtonOptions = field(default_factory=lambda: NewtonOptions(tolerance=1e-10, damped=True))
 
     def __post_init__(self) -> None:
         if self.unknowns not in ("cotangents", "angles"):
