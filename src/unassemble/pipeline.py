@@ -23,7 +23,7 @@ from .planar.deviations import coordinate_covariances
 from .planar.hinges import join
 from .planar.piece import PieceMesh, positions, refined
 from .recovery import Recovery
-from .topology import Topology, recognise
+from .topology import Piece, Topology, recognise
 from .verdict import verdict
 
 _log = logging.getLogger(__name__)
@@ -59,8 +59,8 @@ def recover(
         standard input. Explicit zeros are structure.
     operator : {"auto", "laplacian"}
         Which operator A belongs to.
-    method : {None, "conformal"}
-        How positions are found.
+    method : {None, "conformal", "angles"}
+        How positions are found: by the conformal null vector, the default, or by the 2002 paper's equations for angles.
     refine : bool
         Polish the positions by Gauss-Newton to the level that the entries allow.
     scale : float, optional
@@ -123,14 +123,14 @@ def recover(
         checked = check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
     placement = Placement.checked(checked.n, anchors, tensor, direction, handed)
     with thread_limit(threads):
-        return _recover(checked, placement, clock, refine, scale, noise, standard_deviations)
+        return _recover(checked, placement, clock, method or "conformal", refine, scale, noise, standard_deviations)
 
 
 def _check_options(operator: str, method: str | None, scale: float | None, noise: float | None) -> None:
     if operator not in ("auto", "laplacian"):
         raise InputError(f"the operator {operator!r} is not available in this version: use 'auto' or 'laplacian'")
-    if method not in (None, "conformal"):
-        raise InputError(f"the method {method!r} is not available in this version: use 'conformal'")
+    if method not in (None, "conformal", "angles"):
+        raise InputError(f"the method {method!r} is not available in this version: use 'conformal' or 'angles'")
     if scale is not None and not (np.isfinite(scale) and scale != 0):
         raise InputError(f"the scale is a finite nonzero number, not {scale}")
     if noise is not None and not (np.isfinite(noise) and noise > 0):
@@ -145,6 +145,7 @@ def _recover(
     matrix: OperatorMatrix,
     placement: Placement,
     clock: _Clock,
+    method: str,
     refine: bool,
     scale: float | None,
     noise: float | None,
@@ -156,9 +157,9 @@ def _recover(
     with clock("topology"):
         topology = recognise(matrix.n, matrix.edges)
     weights = [-matrix.entries[piece.edge_rows] for piece in topology.pieces]
-    with clock("conformal"):
+    with clock(method):
         meshes = [
-            positions(piece, w, scale=known, sharp=not refine)
+            _by_angles(piece, w, known) if method == "angles" else positions(piece, w, scale=known, sharp=not refine)
             for piece, w in zip(topology.pieces, weights, strict=True)
         ]
     if refine:
@@ -210,6 +211,14 @@ def _recover(
         standard_deviations=deviations,
         chi_square=chi_square,
     )
+
+
+def _by_angles(piece: Piece, weights: NDArray, scale: float | None) -> PieceMesh:
+    """The method of the 2002 paper."""
+    from .paper import recover_angles
+
+    found = recover_angles(piece, weights, scale=scale)
+    return PieceMesh(found.z, found.scale, () if found.converged else (f"angle iteration {found.status}",))
 
 
 def _place(topology: Topology, placement: Placement, meshes: list[PieceMesh]) -> tuple[list[NDArray], list[str]]:

@@ -46,7 +46,6 @@ BAD = [
     (["--operator", "surface"], "--operator surface is not available in this version"),
     (["--operator", "heat"], "'heat'"),
     (["--method", "metric"], "--method metric is not available in this version"),
-    (["--method", "angles"], "--method angles is not available in this version"),
     (["--realise"], "--realise is not available in this version"),
     (["--threads", "0"], "x>=1"),
     (["--report", "r.html"], "not available in this version"),

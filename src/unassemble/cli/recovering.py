@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..recovery import Recovery
 
 _LATER_OPERATORS = ("elasticity", "surface")
-_LATER_METHODS = ("metric", "angles")
+_LATER_METHODS = ("metric",)
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,9 @@ class _Files:
 @click.option(
     "--operator", type=click.Choice(["auto", "laplacian", *_LATER_OPERATORS]), default="auto", show_default=True
 )
-@click.option("--method", type=click.Choice(["conformal", *_LATER_METHODS]), help="The default picks the best.")
+@click.option(
+    "--method", type=click.Choice(["conformal", "angles", *_LATER_METHODS]), help="The default picks the best."
+)
 @click.option("--no-refine", is_flag=True, help="Leave out the polish.")
 @click.option("--scale", type=Number("a nonzero number", bool), metavar="C", help="The factor c is known.")
 @click.option(

@@ -1,0 +1,50 @@
+"""Small meshes and angle sequences that settle questions the paper leaves open."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay
+
+from .meshes import Mesh, counter_clockwise
+
+
+def wheel(radii: NDArray) -> Mesh:
+    """A hub and a rim point at each radius (k,), k >= 4, at equal angles about the hub.
+
+    Every angle that faces a boundary edge is 2 pi / k whatever the radii: the boundary entries (2) of the matrix are
+    the same for all of them. This is Figure 2's point.
+    """
+    k = len(radii)
+    rim = np.asarray(radii) * np.exp(2j * np.pi * np.arange(k) / k)
+    points = np.vstack([[0.0, 0.0], np.column_stack([rim.real, rim.imag])])
+    i = np.arange(k)
+    return Mesh(points, np.column_stack([np.zeros(k, np.int64), 1 + i, 1 + (i + 1) % k]))
+
+
+def spiral_angles(k: int, twist: float) -> NDArray[np.float64]:
+    """(k, 3) angles of a wheel of k triangles that satisfy conditions 1 and 2 of a valid sequence, and not 3.
+
+    At the hub 2 pi / k, on the rim the two base angles plus and minus `twist`: the sums are right, but going once
+    around the hub the spokes grow by (sin(base + twist) / sin(base - twist))^k.
+    """
+    hub = 2 * np.pi / k
+    base = (np.pi - hub) / 2
+    return np.tile([hub, base + twist, base - twist], (k, 1))
+
+
+def perforated(side: int, holes: int, *, seed: int = 0) -> Mesh:
+    """A jittered grid of side x side points with up to four holes around grid points; `side` at least 12 for four."""
+    rng = np.random.default_rng(seed)
+    grid = np.stack(np.meshgrid(np.arange(side), np.arange(side)), -1).reshape(-1, 2).astype(float)
+    inside = ((grid > 0) & (grid < side - 1)).all(axis=1)
+    grid[inside] += 0.2 * rng.uniform(-1, 1, (int(inside.sum()), 2))
+    triangles = counter_clockwise(grid, Delaunay(grid).simplices)
+    a, b, c = grid[triangles].transpose(1, 0, 2)
+    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    centre = (a + b + c) / 3
+    kept = area > 1e-6
+    for x, y in ((3, 3), (side - 4, side - 4), (3, side - 4), (side - 4, 3))[:holes]:
+        kept &= np.hypot(centre[:, 0] - x, centre[:, 1] - y) > 1.3
+    used, local = np.unique(triangles[kept], return_inverse=True)
+    return Mesh(grid[used], local.reshape(-1, 3).astype(np.int64))
