@@ -149,7 +149,7 @@ def test_npz_has_exactly_the_keys_that_have_content(tmp_path):
     recovery = lake()
     save(recovery, tmp_path / "mesh.npz")
     with np.load(tmp_path / "mesh.npz", allow_pickle=False) as content:
-        assert set(content) == {"points", "triangles", "component", "hinges", "scale"}
+        assert set(content) == {"points", "triangles", "component", "hinges", "scale", "node_status"}
         for name in content:
             expected = getattr(recovery, name)
             np.testing.assert_array_equal(content[name], expected)

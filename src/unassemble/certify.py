@@ -130,6 +130,7 @@ def chi_square_verdict(differences: NDArray, sigma: float, freedom: int) -> dict
     """
     from scipy.stats import chi2
 
-    statistic = float(np.sum((differences / sigma) ** 2))
-    p_value = float(chi2.sf(statistic, freedom)) if freedom > 0 else 1.0
+    with np.errstate(over="ignore"):
+        statistic = float(np.sum((differences / sigma) ** 2))
+    p_value = float(chi2.sf(statistic, freedom)) if freedom > 0 and np.isfinite(statistic) else 0.0
     return {"statistic": statistic, "degrees_of_freedom": float(freedom), "p_value": p_value, "sigma": sigma}

@@ -34,11 +34,14 @@ class NotPlanarError(RecoveryError):
     ----------
     witness : tuple of (int, int)
         Edges of a subdivision of K5 or K3,3 in the graph.
+    why : str
+        The reason without the witness.
     """
 
-    def __init__(self, message: str, witness: tuple[tuple[int, int], ...] = ()):
+    def __init__(self, message: str, witness: tuple[tuple[int, int], ...] = (), why: str = ""):
         super().__init__(message)
         self.witness = witness
+        self.why = why
 
 
 class TopologyError(RecoveryError):

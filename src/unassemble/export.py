@@ -41,8 +41,8 @@ def check_output(path: str | os.PathLike[str]) -> None:
 def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
     """Write a recovered mesh, whole or not at all; the extension names the format.
 
-    ``.npz`` holds ``points``, ``triangles``, ``component``, ``hinges``, ``scale`` and, where some point is not
-    determined, ``node_status``. Other formats are those of meshio (:mod:`unassemble.formats`).
+    ``.npz`` holds ``points``, ``triangles``, ``component``, ``hinges``, ``scale`` and ``node_status``. Other formats
+    are those of meshio (:mod:`unassemble.formats`).
 
     Parameters
     ----------
@@ -72,8 +72,7 @@ def arrays(recovery: Recovery) -> dict[str, Any]:
     if recovery.n_cells:
         content["triangles"] = recovery.triangles
     content |= {"component": recovery.component, "hinges": recovery.hinges, "scale": recovery.scale}
-    if recovery.node_status.any():
-        content["node_status"] = recovery.node_status
+    content["node_status"] = recovery.node_status
     return content
 
 

@@ -21,9 +21,10 @@ from .matrix import OperatorMatrix, check_matrix, read_matrix
 from .placement import Anchor, Direction, Placement
 from .planar.deviations import coordinate_covariances
 from .planar.hinges import join
-from .planar.piece import PieceMesh, positions, refined
+from .planar.piece import PieceMesh
 from .recovery import Recovery
-from .topology import Piece, Topology, recognise
+from .solving import solve
+from .topology import Topology, recognise
 from .verdict import verdict
 
 _log = logging.getLogger(__name__)
@@ -66,8 +67,9 @@ def recover(
     scale : float, optional
         c, where it is known.
     noise : float, optional
-        Standard deviation of independent Gaussian errors in the entries; the certificate becomes a
-        chi-square test.
+        Standard deviation of independent Gaussian errors in the entries of the upper triangle; the certificate
+        becomes a chi-square test. Where both triangles carry errors of their own their mean is fitted, and its
+        error is smaller by a factor sqrt(2).
     drop_zeros : float, optional
         Forget stored entries of at most this times the largest off-diagonal entry of their row and of their
         transpose's.
@@ -152,22 +154,11 @@ def _recover(
     standard_deviations: bool,
 ) -> Recovery:
     # With a tensor, c L is what is left of c div(K grad): its factor is c sqrt(det K).
-    stretch = np.sqrt(placement.tensor.determinant) if placement.tensor else 1.0
+    stretch = placement.tensor.root_determinant if placement.tensor else 1.0
     known = None if scale is None else scale * stretch
     with clock("topology"):
         topology = recognise(matrix.n, matrix.edges)
-    weights = [-matrix.entries[piece.edge_rows] for piece in topology.pieces]
-    with clock(method):
-        meshes = [
-            _by_angles(piece, w, known) if method == "angles" else positions(piece, w, scale=known, sharp=not refine)
-            for piece, w in zip(topology.pieces, weights, strict=True)
-        ]
-    if refine:
-        with clock("polish"):
-            meshes = [
-                refined(piece, w, mesh, scale=known, rounding=noise is None)
-                for piece, w, mesh in zip(topology.pieces, weights, meshes, strict=True)
-            ]
+    topology, meshes = solve(topology, matrix, clock, method=method, scale=known, refine=refine, rounding=noise is None)
     with clock("place"):
         placed, notes = _place(topology, placement, meshes)
         mesh = JoinedMesh.of(topology, placed, np.array([m.scale for m in meshes]) / stretch)
@@ -213,14 +204,6 @@ def _recover(
     )
 
 
-def _by_angles(piece: Piece, weights: NDArray, scale: float | None) -> PieceMesh:
-    """The method of the 2002 paper."""
-    from .paper import recover_angles
-
-    found = recover_angles(piece, weights, scale=scale)
-    return PieceMesh(found.z, found.scale, () if found.converged else (f"angle iteration {found.status}",))
-
-
 def _place(topology: Topology, placement: Placement, meshes: list[PieceMesh]) -> tuple[list[NDArray], list[str]]:
     """Every piece in its final frame, hinges joined; and what is to be said about it."""
     placed, notes = [], []
@@ -229,9 +212,10 @@ def _place(topology: Topology, placement: Placement, meshes: list[PieceMesh]) ->
         placed.append(z)
         prefix = f"piece {label}: " if len(meshes) > 1 else ""
         notes += [prefix + remark for remark in (*mesh.notes, *remarks)]
-    if not placement.anchors:
-        placed = join(topology, placed)
-    notes += _topology_notes(topology)
+    known = np.array([placement.known_positions(piece) for piece in topology.pieces])
+    placed = join(topology, placed, known)
+    notes += placement.unused(topology)
+    notes += [*_topology_notes(topology), *topology.failures]
     return placed, notes
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,10 +12,26 @@ from numpy.typing import NDArray
 from .errors import InputError
 from .planar.frame import Similarity, canonical_frame, collinear, fit_similarity
 from .reductions import ConstantTensor
-from .topology import Piece
+from .topology import Piece, Topology
 
 Anchor = tuple[int, float, float]
 Direction = tuple[int, int, float]
+
+
+def _converted(
+    anchors: Sequence[Anchor] | None, direction: Direction | None
+) -> tuple[tuple[Anchor, ...], Direction | None]:
+    """Rows as integers, coordinates as floats."""
+    try:
+        placed = tuple((operator.index(row), float(x), float(y)) for row, x, y in anchors or ())
+        if direction is not None:
+            first, second, degrees = direction
+            direction = operator.index(first), operator.index(second), float(degrees)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            "anchors are triples (row, x, y) and a direction is a triple (row, row, degrees), with whole rows"
+        ) from error
+    return placed, direction
 
 
 @dataclass(frozen=True)
@@ -52,7 +69,7 @@ class Placement:
         handed: str | None,
     ) -> Placement:
         """Validate what a caller gives for a matrix of order n."""
-        placed = tuple((int(row), float(x), float(y)) for row, x, y in anchors or ())
+        placed, direction = _converted(anchors, direction)
         rows = [row for row, _, _ in placed]
         for row in rows + list(map(int, direction[:2] if direction else ())):
             if not 0 <= row < n:
@@ -61,6 +78,8 @@ class Placement:
             raise InputError(f"row {next(r for r in rows if rows.count(r) > 1)} is anchored twice")
         if not np.isfinite([t[1:] for t in placed]).all():
             raise InputError("an anchor's coordinates are not finite numbers")
+        if len({t[1:] for t in placed}) < len(placed):
+            raise InputError("two anchors have the same position: different rows are different points")
         if direction and (direction[0] == direction[1] or not np.isfinite(direction[2])):
             raise InputError(f"the direction {direction} needs two different rows and a finite angle")
         if handed not in (None, "left", "right"):
@@ -69,7 +88,7 @@ class Placement:
             raise InputError("a direction and two or more anchors fix the same freedom: give one of them")
         if handed and not direction and len(placed) < 2:
             raise InputError("handedness needs a line to refer to: give a direction or two anchors as well")
-        return cls(placed, ConstantTensor(*tensor) if tensor else None, direction, handed)
+        return cls(placed, ConstantTensor(*tensor) if tensor is not None else None, direction, handed)
 
     def apply(self, piece: Piece, z: NDArray) -> tuple[NDArray, list[str]]:
         """True positions of a piece from its positions z (n,) in any frame of the Laplacian's.
@@ -104,6 +123,21 @@ class Placement:
             positions = positions + (targets[0] - positions[rows[0]])
         return positions, notes
 
+    def known_positions(self, piece: Piece) -> int:
+        """How many points of a piece are fixed from outside; a direction counts as two."""
+        anchored = len(self._anchors_of(piece)[0])
+        return 2 if self.direction and np.isin(self.direction[:2], piece.vertices).all() else anchored
+
+    def unused(self, topology: Topology) -> list[str]:
+        """Sentences about what was given and could not be used."""
+        notes = []
+        lost = [row for row, _, _ in self.anchors if topology.multiplicity[row] == 0]
+        if lost:
+            notes.append(f"the anchors of rows {', '.join(map(str, lost))} belong to no triangle and were not used")
+        if self.direction and not any(np.isin(self.direction[:2], p.vertices).all() for p in topology.pieces):
+            notes.append("the direction joins rows of different pieces and was not used")
+        return notes
+
     def _anchors_of(self, piece: Piece) -> tuple[NDArray, NDArray]:
         """Local rows and complex targets of the anchors in a piece."""
         rows = np.array([row for row, _, _ in self.anchors], dtype=np.int64)
@@ -116,9 +150,9 @@ class Placement:
         fits = [fit_similarity(z[rows], known, mirror=mirror) for mirror in (False, True)]
         notes = []
         if len(rows) > 2 and not collinear(known):
-            frame, misfit = min(fits, key=lambda fit: fit[1])
-            if misfit > 1e-6 * np.abs(known - known.mean()).max():
-                notes.append(f"the anchors do not fit the mesh: root mean square misfit {misfit:.3g}")
+            frame = min(fits, key=lambda fit: fit[1])[0]
+            if self.handed:
+                notes.append("three or more anchors fix the mirror image; the handedness was not used")
         elif self.handed:
             frame = self._handed([fit[0] for fit in fits], z, rows[:2])
         elif self.tensor:
@@ -129,6 +163,9 @@ class Placement:
             frame = fits[canonical_frame(z, piece.edges)[0].mirror][0]
             notes.append("the anchors leave two mirror images; the choice between them is by convention")
         placed = frame(z)
+        misfit = float(np.abs(placed[rows] - known).max())
+        if misfit > 1e-6 * np.abs(known - known.mean()).max():
+            notes.append(f"the anchors do not fit the mesh: one is missed by {misfit:.3g}")
         return (self.tensor.from_laplacian(placed) if self.tensor else placed), notes
 
     def _by_direction(self, piece: Piece, z: NDArray, ends: NDArray) -> NDArray:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from .certify import CERTIFIED, CONFIDENCE, Certificate
 from .matrix import OperatorMatrix
 from .topology import Topology
@@ -13,11 +15,13 @@ def verdict(
     topology: Topology, certificate: Certificate, chi_square: Mapping[str, float] | None, matrix: OperatorMatrix
 ) -> tuple[str, str]:
     """``"certified"`` or ``"uncertified"``, and why."""
-    if chi_square:
+    if chi_square and chi_square["degrees_of_freedom"] > 0:
         return _with_noise(chi_square)
     error = certificate.backward_error
     if error <= CERTIFIED:
         return "certified", f"the operator re-assembled on this mesh gives the matrix back to {error:.1e}"
+    if topology.failures:
+        return "uncertified", f"{len(topology.failures)} part of the matrix has no mesh: {topology.failures[0]}"
     bare = topology.bare_edges[matrix.entries[topology.bare_edges] != 0]
     if len(bare):
         i, j = topology.edges[bare[0]]
@@ -25,6 +29,8 @@ def verdict(
             "uncertified",
             f"{len(bare)} nonzero entries belong to no triangle, the first between rows {i} and {j}",
         )
+    if not np.isfinite(error):
+        return "uncertified", "the mesh has triangles that are flat, or points that are not finite"
     (i, j), misfit = certificate.pairs[certificate.misfits.argmax()], certificate.misfits.max()
     return (
         "uncertified",

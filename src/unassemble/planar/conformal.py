@@ -126,7 +126,14 @@ def conformal_map(
     """
     options = options or ConformalOptions()
     unit = estimate_scale(piece, weights)
-    search = _Search(ConformalPencil(piece, weights / unit), options)
+    with np.errstate(over="ignore"):
+        relative = weights / unit if unit else np.full_like(weights, np.inf)
+    if not np.isfinite(relative).all() or (scale is not None and not 1e-6 < abs(scale / unit) < 1e6):
+        raise GeometryError(
+            "the entries of a piece, or they and the given scale, differ by so many orders of magnitude "
+            "that no triangles could have them"
+        )
+    search = _Search(ConformalPencil(piece, relative), options)
     z = _smooth_start(piece)
     known = scale if scale is not None else 1.0
     if scale is not None or abs(known / unit - 1) < 0.3:
@@ -190,7 +197,7 @@ class _Search:
                 for u in basis:
                     z = z - np.vdot(u, z) * u
             left = np.linalg.norm(z)
-            if left < 1e-13 * size:  # the space is invariant
+            if not left > 1e-13 * size:  # the space is invariant
                 spread = 0.0
                 break
             z = z / left
@@ -201,6 +208,8 @@ class _Search:
             spread = abs(previous / c - 1) if np.isfinite(previous) else 1.0
             if spread < 1e-15:
                 break
+        if not basis:
+            raise GeometryError("no map has positive area: the entries, or the given scale, fit no mesh on this graph")
         z = sum(coefficient * u for coefficient, u in zip(y, basis, strict=True))
         _log.debug("shift %.12g: c = %.16g, last change %.1e", shift, c, spread)
         return z, c, spread
@@ -212,9 +221,13 @@ def _ritz(basis: list[NDArray], energy_images: list[NDArray], area_images: list[
     energy = w.conj() @ np.array(energy_images).T
     area = w.conj() @ np.array(area_images).T
     # With its indefinite side on the left the pencil is regular: 1/c is the greatest eigenvalue.
-    inverse, vectors = scipy.linalg.eigh((area + area.conj().T) / 2, (energy + energy.conj().T) / 2)
+    try:
+        inverse, vectors = scipy.linalg.eigh((area + area.conj().T) / 2, (energy + energy.conj().T) / 2)
+    except (np.linalg.LinAlgError, ValueError) as error:
+        # Not positive definite, or not even finite: the Dirichlet energy of a mesh is neither.
+        raise GeometryError("the entries do not make a positive energy: they belong to no planar mesh") from error
     if inverse[-1] <= 0:
-        raise GeometryError("no map of positive area: the entries fit no planar mesh on this graph")
+        raise GeometryError("no map has positive area: the entries, or the given scale, fit no mesh on this graph")
     return float(1 / inverse[-1]), vectors[:, -1]
 
 

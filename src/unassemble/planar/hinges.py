@@ -10,8 +10,10 @@ from scipy.sparse.linalg import lsqr
 
 from ..topology import Topology
 
+_DENSE = 500  # pieces; above, an iterative least-squares solution
 
-def join(topology: Topology, positions: list[NDArray]) -> list[NDArray]:
+
+def join(topology: Topology, positions: list[NDArray], known: NDArray | None = None) -> list[NDArray]:
     """Move pieces by similarities close to translations so that shared vertices coincide.
 
     With turn t_p and shift s_p of piece p, t_p z_p + s_p = t_q z_q + s_q at every shared vertex; of all
@@ -23,23 +25,36 @@ def join(topology: Topology, positions: list[NDArray]) -> list[NDArray]:
     topology : Topology
     positions : list of (n_p,) complex128
         Each piece in its own frame.
+    known : (number of pieces,) int, optional
+        Known positions in each piece. Pieces with two or more stay where they are; of others joined to none
+        of those the one with the most, or the first, does.
     """
     if not len(topology.hinges):
         return positions
-    group = _groups(topology)
-    if (np.bincount(group) == 1).all():
-        return positions
-    rows, columns, values, rhs = _equations(topology, positions)
     n = len(positions)
-    system = coo_array((values, (rows, columns)), shape=(len(rhs), 2 * n)).tocsr()
+    known = np.zeros(n, dtype=np.int64) if known is None else known
+    held = _held(_groups(topology), known)
+    rows, columns, values, rhs = _equations(topology, positions)
     # Unknowns are t - 1 and s; the least-norm solution keeps turns near 1. Shifts are scaled to matter little.
     extent = max(float(np.abs(z).max()) for z in positions)
-    weight = np.r_[np.ones(n), np.full(n, 1e3 * extent)]
-    solution = weight * lsqr(system * weight[None, :], rhs, atol=1e-15, btol=1e-15, iter_lim=20 * n + 1000)[0]
-    turn, shift = 1 + solution[:n], solution[n:]
-    # Each group keeps its first piece in place.
-    first = np.unique(group, return_index=True)[1][group]
-    return [(turn[p] * z + shift[p] - shift[first[p]]) / turn[first[p]] for p, z in enumerate(positions)]
+    weight = np.r_[np.where(held, 0.0, 1.0), np.where(held, 0.0, 1e3 * extent)]
+    system = coo_array((values * weight[columns], (rows, columns)), shape=(len(rhs), 2 * n)).tocsr()
+    if n <= _DENSE:
+        solution = np.linalg.lstsq(system.toarray(), rhs, rcond=1e-12)[0]
+    else:
+        solution = lsqr(system, rhs, atol=1e-15, btol=1e-15, iter_lim=20 * n + 1000)[0]
+    turn, shift = 1 + (weight * solution)[:n], (weight * solution)[n:]
+    return [turn[p] * z + shift[p] for p, z in enumerate(positions)]
+
+
+def _held(group: NDArray, known: NDArray) -> NDArray[np.bool_]:
+    """Pieces that stay where they are."""
+    held = known >= 2
+    order = np.lexsort((np.arange(len(group)), -known, group))
+    best = order[np.flatnonzero(np.diff(group[order], prepend=-1))]
+    settled = np.bincount(group, held, len(group))[group] > 0
+    held[best[~settled[best]]] = True
+    return held
 
 
 def _groups(topology: Topology) -> NDArray:

@@ -32,18 +32,20 @@ class ConstantTensor:
 
     def __post_init__(self) -> None:
         values = (self.kxx, self.kxy, self.kyy)
-        if not (np.isfinite(values).all() and self.kxx > 0 and self.kyy > 0 and self.determinant > 0):
+        positive = np.isfinite(values).all() and self.kxx > 0 and self.kyy > 0
+        if not positive or abs(self.kxy) >= np.sqrt(self.kxx) * np.sqrt(self.kyy):
             raise InputError(f"the tensor {values} is not positive definite: KXX > 0 and KXX KYY > KXY^2 are needed")
 
     @property
-    def determinant(self) -> float:
-        """det K."""
-        return self.kxx * self.kyy - self.kxy**2
+    def root_determinant(self) -> float:
+        """The root of det K."""
+        size = max(self.kxx, self.kyy)  # taken out, so that no product overflows or vanishes
+        return size * float(np.sqrt((self.kxx / size) * (self.kyy / size) - (self.kxy / size) ** 2))
 
     @property
     def root(self) -> NDArray[np.float64]:
         """S (2, 2): the positive square root, (K + s I) / sqrt(tr K + 2 s) with s = sqrt(det K)."""
-        s = np.sqrt(self.determinant)
+        s = self.root_determinant
         k = np.array([[self.kxx, self.kxy], [self.kxy, self.kyy]])
         return (k + s * np.eye(2)) / np.sqrt(self.kxx + self.kyy + 2 * s)
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse import csgraph
 
 from ..errors import NotPlanarError, TopologyError
 from . import planarity
@@ -15,6 +19,70 @@ from .surface import Piece, Topology
 
 
 def recognise(n: int, edges: NDArray) -> Topology:
+    """Find the triangles of a planar mesh in its graph, see :func:`recognise_connected`.
+
+    Where that fails and the graph has several connected components each is tried by itself; those without a mesh
+    are listed in ``failures``.
+
+    Parameters
+    ----------
+    n : int
+        Number of vertices.
+    edges : (e, 2) int64
+        Pairs i < j in lexicographic order.
+
+    Raises
+    ------
+    NotPlanarError
+        With a Kuratowski subgraph as witness.
+    TopologyError
+        If no component has triangles that fit together.
+    """
+    try:
+        return recognise_connected(n, edges)
+    except (NotPlanarError, TopologyError):
+        components = _components(n, edges)
+        if len(components) == 1:
+            raise
+        return _recognise_each(n, edges, components)
+
+
+def _components(n: int, edges: NDArray) -> list[NDArray]:
+    """Rows of `edges` in each connected component of the graph, largest component first."""
+    graph = sp.coo_array((np.ones(len(edges), np.int8), edges.T), shape=(n, n))
+    count, label = csgraph.connected_components(graph, directed=False)
+    groups = [rows for rows in _groups(label[edges[:, 0]], count) if len(rows)]
+    return sorted(groups, key=len, reverse=True)
+
+
+def _recognise_each(n: int, edges: NDArray, components: list[NDArray]) -> Topology:
+    pieces: list[Piece] = []
+    failures: list[NotPlanarError | TopologyError] = []
+    for rows in components:
+        vertices, local = np.unique(edges[rows], return_inverse=True)
+        try:
+            part = recognise_connected(len(vertices), local.reshape(-1, 2))
+        except (NotPlanarError, TopologyError) as error:
+            failures.append(_elsewhere(error, vertices))
+            continue
+        pieces += [replace(p, vertices=vertices[p.vertices], edge_rows=rows[p.edge_rows]) for p in part.pieces]
+    if not pieces:
+        raise failures[0]
+    pieces.sort(key=lambda piece: int(piece.vertices[0]))
+    return Topology(n, edges, tuple(pieces), "component by component", tuple(map(str, failures)))
+
+
+def _elsewhere(error: NotPlanarError | TopologyError, vertices: NDArray) -> NotPlanarError | TopologyError:
+    """The same error in the numbering of the whole."""
+    where = f"in the component of row {vertices[0]} ({len(vertices)} rows): "
+    if isinstance(error, NotPlanarError):
+        return _not_planar_witness(
+            where, error.why, tuple((int(vertices[a]), int(vertices[b])) for a, b in error.witness)
+        )
+    return TopologyError(where + str(error))
+
+
+def recognise_connected(n: int, edges: NDArray) -> Topology:
     """Find the triangles of a planar mesh in its graph.
 
     3-cycles with something on both sides are no faces. If every edge lies on at most two of the others, and these
@@ -67,10 +135,13 @@ def recognise(n: int, edges: NDArray) -> Topology:
 
 
 def _not_planar(n: int, edges: NDArray, why: str) -> NotPlanarError:
-    witness = planarity.kuratowski_edges(n, edges)
+    return _not_planar_witness("", why, planarity.kuratowski_edges(n, edges))
+
+
+def _not_planar_witness(where: str, why: str, witness: tuple[tuple[int, int], ...]) -> NotPlanarError:
     shown = ", ".join(f"{a}-{b}" for a, b in witness[:12]) + (", ..." if len(witness) > 12 else "")
     return NotPlanarError(
-        f"the graph of the matrix is not planar: {why} (rows joined by nonzero entries: {shown})", witness
+        f"{where}the graph of the matrix is not planar: {why} (rows joined by nonzero entries: {shown})", witness, why
     )
 
 

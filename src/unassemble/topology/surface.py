@@ -77,12 +77,15 @@ class Topology:
         In order of their lowest vertex.
     method : str
         How the faces were found: ``"3-cycles"`` or ``"embedding"``.
+    failures : tuple of str
+        Why connected components of the graph have no mesh, where others have one.
     """
 
     n_vertices: int
     edges: NDArray[np.int64]
     pieces: tuple[Piece, ...]
     method: str
+    failures: tuple[str, ...] = ()
 
     @cached_property
     def multiplicity(self) -> NDArray[np.int64]:
