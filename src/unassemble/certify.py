@@ -101,16 +101,17 @@ def _assemble(
     """
     n = len(points)
     kxx, kxy, kyy = tensor or (1.0, 0.0, 1.0)
-    corner = points[triangles]
-    side = np.roll(corner, -2, axis=1) - np.roll(corner, -1, axis=1)
-    turned = np.stack([kyy * side[..., 0] - kxy * side[..., 1], kxx * side[..., 1] - kxy * side[..., 0]], axis=-1)
-    twice_area = np.abs(side[:, 0, 0] * side[:, 1, 1] - side[:, 0, 1] * side[:, 1, 0])
+    corners = [np.ascontiguousarray(column) for column in triangles.T]
+    x, y = (np.ascontiguousarray(column) for column in points.T)
+    sides = [(x[b] - x[a], y[b] - y[a]) for a, b in (corners[1:], corners[2::-2], corners[:2])]
     ends, values = [], []
-    with np.errstate(divide="ignore", invalid="ignore"):  # a flat triangle certifies nothing
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a flat triangle certifies nothing
+        weight = factor / (2 * np.abs(sides[0][0] * sides[1][1] - sides[0][1] * sides[1][0]))
         for i, j in ((0, 1), (1, 2), (2, 0)):
-            low, high = np.minimum(triangles[:, i], triangles[:, j]), np.maximum(triangles[:, i], triangles[:, j])
-            ends.append((low, high))
-            values.append(factor * (side[:, i] * turned[:, j]).sum(axis=1) / (2 * twice_area))
+            (xi, yi), (xj, yj) = sides[i], sides[j]
+            product = kyy * (xi * xj) - kxy * (xi * yj + yi * xj) + kxx * (yi * yj)
+            ends.append((np.minimum(corners[i], corners[j]), np.maximum(corners[i], corners[j])))
+            values.append(weight * product)
     rows, columns = (np.concatenate(part) for part in zip(*ends, strict=True))
     summed = sp.coo_array((np.concatenate(values), (rows, columns)), shape=(n, n)).tocsr()
     summed.sort_indices()

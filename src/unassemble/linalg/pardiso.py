@@ -76,6 +76,7 @@ class PardisoFactorisation:
         self._iparm[9] = 30  # never perturb a pivot: shifts next to an eigenvalue have small ones, rightly
         self._iparm[17] = -1  # count the entries of the factor
         self._iparm[20] = 1  # Bunch-Kaufman pivots; without them shifts next to an eigenvalue lose all digits
+        self._iparm[23] = 1  # two-level parallel factorisation: its solves take half the time on two cores
         self._iparm[34] = 1  # indices count from 0
         if matrix.block > 1:
             self._iparm[36] = matrix.block  # rows of square blocks

@@ -138,7 +138,7 @@ def conformal_map(
     known = scale if scale is not None else 1.0
     if scale is not None or abs(known / unit - 1) < 0.3:
         z, c, _ = search.near(known / unit, z)
-        # Twenty roundings of c itself: the quotient is that accurate at any size, being stationary.
+        # The quotient is stationary, and accurate to some hundred roundings at any size.
         if scale is not None or abs(c * unit / known - 1) < 1e-13:
             return ConformalMap(z, known, search.factorisations, search.solves, True)
         spread = 1e-2 if c * unit / known > 1 else None  # beyond c the quotients tell nothing
