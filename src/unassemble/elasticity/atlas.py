@@ -53,7 +53,12 @@ class NullFields:
 
 
 def null_fields(
-    nodal: NodalMatrix, valid: NDArray[np.bool_], body: NDArray[np.int64], *, patch: int | None = None
+    nodal: NodalMatrix,
+    valid: NDArray[np.bool_],
+    body: NDArray[np.int64],
+    *,
+    patch: int | None = None,
+    ratio: float | None = None,
 ) -> NullFields:
     """Least singular fields of all valid identities of a body.
 
@@ -65,9 +70,11 @@ def null_fields(
         Nodes of the body, whose identities to use.
     patch : int, optional
         Most rows in one chart.
+    ratio : float, optional
+        lambda / mu, where it is known.
     """
     parts = _patches(nodal, body, patch or _PATCH[nodal.dim])
-    made = [chart(nodal, valid, rows, whole=len(parts) == 1) for rows in parts]
+    made = [chart(nodal, valid, rows, whole=len(parts) == 1, ratio=ratio) for rows in parts]
     made = [one for one in made if len(one.nodes)]
     _log.debug("%d charts of %s fields", len(made), [len(one.values) for one in made])
     if not made:
@@ -76,7 +83,7 @@ def null_fields(
         one = made[0]
         return NullFields(one.nodes, one.fields, one.values, one.rows, 1)
     nodes, fields = _join(made, nodal.n)
-    return _measured(nodal, valid, parts, nodes, fields, sum(one.rows for one in made), len(made))
+    return _measured(nodal, valid, parts, nodes, fields, made, ratio)
 
 
 def _patches(nodal: NodalMatrix, body: NDArray[np.int64], size: int) -> list[NDArray[np.int64]]:
@@ -145,8 +152,8 @@ def _measured(
     parts: list[NDArray[np.int64]],
     nodes: NDArray[np.int64],
     fields: NDArray[np.float64],
-    rows: int,
-    charts: int,
+    made: list[Chart],
+    ratio: float | None,
 ) -> NullFields:
     """Rayleigh-Ritz on the whole body, through the identities part by part."""
     d, k = fields.shape[1:]
@@ -154,9 +161,9 @@ def _measured(
     place[nodes] = np.arange(len(nodes))
     triangle = np.zeros((0, k))
     for part in parts:
-        local = identities(nodal, valid, part)
+        local = identities(nodal, valid, part, ratio)
         residual = local.residual(fields[place[local.columns]]).reshape(-1, k)
         triangle = np.linalg.qr(np.concatenate([triangle, np.linalg.qr(residual, mode="r")]), mode="r")
     _, values, v = scipy.linalg.svd(triangle)
     fields = (fields.reshape(-1, k) @ v[::-1].T).reshape(-1, d, k)
-    return NullFields(nodes, fields, values[::-1], rows, charts)
+    return NullFields(nodes, fields, values[::-1], sum(one.rows for one in made), len(made))

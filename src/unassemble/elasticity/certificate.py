@@ -6,6 +6,7 @@ taking differences of equations that contain the same one.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
@@ -15,7 +16,9 @@ from numpy.typing import NDArray
 from .nodal import NodalMatrix
 
 
-def largest_residual(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64]) -> float:
+def largest_residual(
+    nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64], ratio: float | None = None
+) -> float:
     """Largest misfit of a valid identity among determined nodes.
 
     Parameters
@@ -24,6 +27,8 @@ def largest_residual(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArr
     valid : (n, d, d) bool
     points : (n, d) float64
         NaN where not determined; identities that touch such a node are skipped.
+    ratio : float, optional
+        lambda / mu, where it was used to determine nodes.
 
     Returns
     -------
@@ -46,7 +51,7 @@ def largest_residual(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArr
         block = sp.csr_array((entries, nodal.indices, nodal.indptr), shape=(nodal.n, nodal.n))
         value[c, b] = (block @ x).T / size
     worst = 0.0
-    for misfit, needed in _differences(value, usable, d):
+    for misfit, needed in _differences(value, usable, d, ratio):
         worst = max(worst, float(np.abs(misfit[needed]).max(initial=0)))
     return worst
 
@@ -57,7 +62,9 @@ def _mean_distance(nodal: NodalMatrix, points: NDArray) -> float:
     return float(np.nanmean(length)) if np.isfinite(length).any() else 1.0
 
 
-def _differences(value: NDArray, usable: NDArray[np.bool_], d: int):
+def _differences(
+    value: NDArray, usable: NDArray[np.bool_], d: int, ratio: float | None
+) -> Iterator[tuple[NDArray, NDArray]]:
     """Pairs of misfit and mask, (n,) each; value[c, b, a] is A^{cb} x_a."""
     for c, b, a in product(range(d), repeat=3):
         if len({a, b, c}) == 3:  # A^{cb} x_a = 0
@@ -71,3 +78,9 @@ def _differences(value: NDArray, usable: NDArray[np.bool_], d: int):
         if a != b:  # A^{bb} x_b = p_b + 2 q_b
             misfit = value[b, b, b] - value[b, a, a] - 2 * value[a, b, a]
             yield misfit, usable[:, b, b] & usable[:, b, a] & usable[:, a, b]
+    if ratio is None:
+        return
+    for a, b in product(range(d), repeat=2):
+        if a != b:  # p_b = ratio q_b
+            yield value[b, a, a] - ratio * value[a, b, a], usable[:, b, a] & usable[:, a, b]
+            yield value[b, b, b] - (ratio + 2) * value[a, a, b], usable[:, b, b] & usable[:, a, a]

@@ -43,7 +43,9 @@ class Chart:
     rows: int
 
 
-def chart(nodal: NodalMatrix, valid: NDArray[np.bool_], rows: NDArray[np.int64], *, whole: bool) -> Chart:
+def chart(
+    nodal: NodalMatrix, valid: NDArray[np.bool_], rows: NDArray[np.int64], *, whole: bool, ratio: float | None = None
+) -> Chart:
     """Compute the least singular fields of the identities of some rows.
 
     Parameters
@@ -54,8 +56,10 @@ def chart(nodal: NodalMatrix, valid: NDArray[np.bool_], rows: NDArray[np.int64],
     whole : bool
         Whether these are all rows of the body. Otherwise fields are added until the rest is stiff, so that the
         charts together hold every field of the body that fits.
+    ratio : float, optional
+        lambda / mu, where it is known.
     """
-    local = identities(nodal, valid, rows)
+    local = identities(nodal, valid, rows, ratio)
     n, d = len(local.columns), local.dim
     if not n:
         return Chart(local.columns, np.empty((0, d, 0)), np.empty(0), 0)
@@ -78,12 +82,13 @@ def _shifted(normal: sp.bsr_array) -> Factorisation:
     """Factorise the normal matrix, made definite by a small multiple of the identity."""
     d = normal.blocksize[0]
     n = normal.shape[0] // d
+    shift = _SHIFT * np.median(normal.diagonal())
+    normal = (normal + shift * sp.eye_array(n * d, format="bsr")).tobsr((d, d))  # no diagonal block may be missing
+    normal.sort_indices()
     row = np.repeat(np.arange(n), np.diff(normal.indptr))
     upper = normal.indices >= row
     indptr = np.concatenate([[0], np.cumsum(np.bincount(row[upper], minlength=n))]).astype(np.int32)
     data = np.ascontiguousarray(normal.data[upper])
-    diagonal = np.trace(data[indptr[:-1]], axis1=1, axis2=2) / d
-    data[indptr[:-1]] += _SHIFT * np.median(diagonal) * np.eye(d)
     matrix = UpperTriangle(data, normal.indices[upper].astype(np.int32), indptr)
     solver = factorisation(matrix, definite=True)
     solver.factorise(matrix)

@@ -21,22 +21,25 @@ from numpy.typing import NDArray
 from .nodal import NodalMatrix
 
 
-def boundary_terms(d: int) -> NDArray[np.float64]:
-    """(d, d, d, 2 d) what p_1 .. p_d, q_1 .. q_d put into the places c, b, a."""
+def boundary_terms(d: int, ratio: float | None = None) -> NDArray[np.float64]:
+    """(d, d, d, 2 d) what p_1 .. p_d, q_1 .. q_d put into the places c, b, a.
+
+    With p = ratio q known, (d, d, d, d) what q_1 .. q_d put there.
+    """
     terms = np.zeros((d, d, d, 2 * d))
     for k in range(d):
         for m in range(d):
             terms[k, m, m, k] += 1  # delta_ab p_c
             terms[m, k, m, d + k] += 1  # delta_ac q_b
             terms[m, m, k, d + k] += 1  # delta_cb q_a
-    return terms
+    return terms if ratio is None else ratio * terms[..., :d] + terms[..., d:]
 
 
-def boundary_basis(valid: NDArray[np.bool_]) -> NDArray[np.float64]:
+def boundary_basis(valid: NDArray[np.bool_], ratio: float | None = None) -> NDArray[np.float64]:
     """Orthonormal basis of the boundary terms seen by the valid pairs (d, d) of one node: (d, d, d, k)."""
     d = len(valid)
-    seen = boundary_terms(d) * valid[:, :, None, None]
-    u, s, _ = np.linalg.svd(seen.reshape(d**3, 2 * d), full_matrices=False)
+    seen = boundary_terms(d, ratio) * valid[:, :, None, None]
+    u, s, _ = np.linalg.svd(seen.reshape(d**3, -1), full_matrices=False)
     return u[:, s > 1e-10].reshape(d, d, d, -1)
 
 
@@ -55,6 +58,8 @@ class Identities:
     data : (nnz, d, d) float64
         Blocks relative to the size of their row, zero where not valid.
     valid : (m, d, d) bool
+    ratio : float or None
+        lambda / mu, where it is known.
     """
 
     rows: NDArray[np.int64]
@@ -63,6 +68,7 @@ class Identities:
     indices: NDArray[np.int32]
     data: NDArray[np.float64]
     valid: NDArray[np.bool_]
+    ratio: float | None = None
 
     @property
     def dim(self) -> int:
@@ -75,7 +81,7 @@ class Identities:
         d = self.dim
         code = self.valid.reshape(len(self.rows), -1) @ (1 << np.arange(d * d))
         kinds = [np.flatnonzero(code == value) for value in np.unique(code)]
-        return [(rows, boundary_basis(self.valid[rows[0]])) for rows in kinds]
+        return [(rows, boundary_basis(self.valid[rows[0]], self.ratio)) for rows in kinds]
 
     @cached_property
     def _stacked(self) -> sp.csr_array:
@@ -103,13 +109,13 @@ class Identities:
         return (self._stacked.T @ residual.reshape(-1, d * k)).reshape(-1, d, k)
 
     def normal_matrix(self) -> sp.bsr_array:
-        """(n d, n d) the normal matrix in blocks of d, sorted, without the zero blocks' diagonal missing."""
-        d, n = self.dim, len(self.columns)
+        """(n d, n d) the normal matrix in blocks of d; blocks of zeros are missing."""
+        d = self.dim
         stacked = self._stacked
         gram = sp.kron(stacked.T @ stacked, np.eye(d), format="bsr")
         q = self._boundary_part()
         product = q.T.tobsr(blocksize=(d, 2 * d)) @ q
-        normal = (gram - product.tobsr(blocksize=(d, d)) + 0 * sp.eye_array(n * d, format="bsr")).tobsr((d, d))
+        normal = (gram - product.tobsr(blocksize=(d, d))).tobsr((d, d))
         normal.sort_indices()
         return normal
 
@@ -143,7 +149,21 @@ class Identities:
         return found[:, :d], found[:, d:]
 
 
-def identities(nodal: NodalMatrix, valid: NDArray[np.bool_], rows: NDArray[np.int64]) -> Identities:
+def _telling(valid: NDArray[np.bool_], ratio: float | None) -> NDArray[np.bool_]:
+    """(m,) rows with an equation left once p and q are eliminated."""
+    d = valid.shape[1]
+    code = valid.reshape(len(valid), -1) @ (1 << np.arange(d * d))
+    telling = np.zeros(len(valid), dtype=bool)
+    for value in np.unique(code):
+        here = np.flatnonzero(code == value)
+        one = valid[here[0]]
+        telling[here] = one.sum() * d > boundary_basis(one, ratio).shape[3]
+    return telling
+
+
+def identities(
+    nodal: NodalMatrix, valid: NDArray[np.bool_], rows: NDArray[np.int64], ratio: float | None = None
+) -> Identities:
     """Collect the valid identities of some nodes.
 
     Parameters
@@ -152,9 +172,11 @@ def identities(nodal: NodalMatrix, valid: NDArray[np.bool_], rows: NDArray[np.in
     valid : (n, d, d) bool
         See :func:`~unassemble.elasticity.nodal.valid_pairs`.
     rows : (m,) int64
-        Nodes whose rows to use; those without a valid pair are dropped.
+        Nodes whose rows to use; those that say nothing once p and q are eliminated are dropped.
+    ratio : float, optional
+        lambda / mu, where it is known to be one number: half as many unknowns p and q, and more equations left.
     """
-    rows = rows[valid[rows].any(axis=(1, 2))]
+    rows = rows[_telling(valid[rows], ratio)]
     count = np.diff(nodal.indptr)[rows]
     start = np.repeat(nodal.indptr[rows] - np.concatenate([[0], np.cumsum(count)[:-1]]), count) if len(rows) else []
     entry = (np.arange(count.sum()) + start).astype(np.int64)
@@ -167,4 +189,4 @@ def identities(nodal: NodalMatrix, valid: NDArray[np.bool_], rows: NDArray[np.in
     columns = np.flatnonzero(touched)
     local = np.cumsum(touched) - 1
     indptr = np.concatenate([[0], np.cumsum(np.bincount(row[live], minlength=len(rows)))]).astype(np.int32)
-    return Identities(rows, columns, indptr, local[neighbour].astype(np.int32), data[live], valid[rows])
+    return Identities(rows, columns, indptr, local[neighbour].astype(np.int32), data[live], valid[rows], ratio)

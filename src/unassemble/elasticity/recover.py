@@ -131,7 +131,12 @@ def scalar_parts(matrix: sp.csr_array, *, block_size: int | None = None) -> Scal
 
 
 def recover_elasticity(
-    matrix: sp.csr_array, *, block_size: int | None = None, cells: bool = True, patch: int | None = None
+    matrix: sp.csr_array,
+    *,
+    block_size: int | None = None,
+    numbering: Numbering | None = None,
+    cells: bool = True,
+    patch: int | None = None,
 ) -> ElasticityRecovery:
     """Recover node positions from the stiffness matrix of isotropic linear elasticity.
 
@@ -141,6 +146,8 @@ def recover_elasticity(
         Symmetric; unknowns may be eliminated, replaced by identity rows, or penalised.
     block_size : int, optional
         2 or 3; found where it is not given.
+    numbering : Numbering, optional
+        Where it is known; see :func:`.unknowns.given_numbering`.
     cells : bool
         Look for elements too.
     patch : int, optional
@@ -156,7 +163,7 @@ def recover_elasticity(
     clock = _Clock()
     matrix = sp.csr_array(matrix, dtype=np.float64)
     _check(matrix)
-    numbering = find_numbering(matrix, block_size)
+    numbering = numbering or find_numbering(matrix, block_size)
     nodal = nodal_matrix(matrix, numbering)
     if uncoupled(nodal):
         raise GeometryError(
@@ -165,8 +172,7 @@ def recover_elasticity(
     clock.lap("numbering")
     solution = _solve(nodal, patch)
     clock.lap("null space")
-    result = _describe(nodal, numbering, solution, clock, cells)
-    return result
+    return _describe(nodal, numbering, solution, clock, cells)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,50 +184,76 @@ class _Solution:
     freedoms: tuple[str, ...]
     exact: bool
     warnings: tuple[str, ...]
+    ratio: float | None = None
+
+    @property
+    def whole(self) -> bool:
+        """Whether every node is determined, up to translation and scale of its piece."""
+        return self.exact and not any(self.freedoms) and bool(np.isfinite(self.points).all())
+
+    @property
+    def rank(self) -> tuple[bool, bool, int]:
+        """For comparison of solutions: exact, unique, and how many coordinates are determined."""
+        return self.exact, not any(self.freedoms), int(np.isfinite(self.points).sum())
 
 
 def _solve(nodal: NodalMatrix, patch: int | None) -> _Solution:
-    """With the strict reading of validity, and where that fails with the lenient one."""
-    strict = valid_pairs(nodal)
+    """Read validity strictly; where that leaves nodes loose, leniently, and with Poisson's ratio once it is known."""
+    readings = [valid_pairs(nodal)]
     lenient = valid_pairs(nodal, strict=False)
-    try:
-        solution = _positions(nodal, strict, patch)
-        if (solution.exact and not any(solution.freedoms)) or np.array_equal(strict, lenient):
-            return solution
-        failure = None
-    except GeometryError as error:
-        if np.array_equal(strict, lenient):
-            raise
-        solution, failure = None, error
-    try:
-        other = _positions(nodal, lenient, patch)
-        if other.exact:
-            return other
-    except GeometryError as error:
-        failure = failure or error
-    if solution is None:
+    if not np.array_equal(readings[0], lenient):
+        readings.append(lenient)
+    best: _Solution | None = None
+    failure: GeometryError | None = None
+    for valid in readings:
+        try:
+            found = _positions(nodal, valid, patch)
+            found = _with_ratio(nodal, found, patch)
+        except GeometryError as error:
+            failure = failure or error
+            continue
+        best = found if best is None or found.rank > best.rank else best
+        if best.whole:
+            break
+    if best is None:
         raise failure or GeometryError("no positions fit the valid rows")
-    return solution
+    return best
 
 
-def _positions(nodal: NodalMatrix, valid: NDArray[np.bool_], patch: int | None) -> _Solution:
+def _with_ratio(nodal: NodalMatrix, found: _Solution, patch: int | None) -> _Solution:
+    """Once more with Poisson's ratio, if it is one number and nodes were left loose."""
+    if found.whole or not found.exact:
+        return found
+    nu = poisson_ratio(nodal, found.valid, found.points)
+    if nu is None:
+        return found
+    try:
+        other = _positions(nodal, found.valid, patch, 2 * nu / (1 - 2 * nu))
+    except GeometryError:
+        return found
+    return other if other.rank > found.rank else found
+
+
+def _positions(
+    nodal: NodalMatrix, valid: NDArray[np.bool_], patch: int | None, ratio: float | None = None
+) -> _Solution:
     """Positions piece by piece."""
     component, n_pieces = _pieces(nodal, valid)
+    graph = sp.csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2)
     points = np.full((nodal.n, nodal.dim), np.nan)
     evidence, freedoms, exact, warnings = [], [], [], []
-    failure = None
+    failure: GeometryError | None = None
     for piece in range(n_pieces):
         body = np.flatnonzero(component == piece)
-        found = null_fields(nodal, valid, body, patch=patch)
+        found = null_fields(nodal, valid, body, patch=patch, ratio=ratio)
         try:
             one = shape(found.fields, found.values)
         except GeometryError as error:
-            failure = error
+            failure = failure or error
             warnings.append(f"piece {piece} with node {body[0]}: {error}")
-            evidence.append(Evidence(int((found.values < 1e-9).sum()), float("nan"), float("nan"), found.rows))
+            evidence.append(Evidence(int((found.values < CERTIFIED).sum()), float("nan"), float("nan"), found.rows))
             continue
         points[found.nodes] = one.points
-        graph = sp.csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2)
         points[body] = in_gauge(points[body], graph[body][:, body])
         evidence.append(_evidence(found, one))
         freedoms.append(one.freedom)
@@ -229,7 +261,9 @@ def _positions(nodal: NodalMatrix, valid: NDArray[np.bool_], patch: int | None) 
     if not exact:
         raise failure or GeometryError("no row annihilates constants: no node has a valid equation")
     component = np.where(np.isfinite(points).all(axis=1), component, -1)
-    return _Solution(valid, component, points, tuple(evidence), tuple(freedoms), all(exact), tuple(warnings))
+    return _Solution(
+        valid, component, points, tuple(evidence), tuple(freedoms), all(exact), tuple(warnings), ratio
+    )
 
 
 def _pieces(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
@@ -256,7 +290,7 @@ def _describe(
 ) -> ElasticityRecovery:
     """Certificate, material, cells and the sentences that go with them."""
     points = solution.points
-    error = largest_residual(nodal, solution.valid, points)
+    error = largest_residual(nodal, solution.valid, points, solution.ratio)
     ratio = poisson_ratio(nodal, solution.valid, points) if error < 1e-6 else None
     clock.lap("certificate")
     found = recognise_cells(nodal, points) if want_cells and error < 1e-6 else no_cells(nodal.dim)
@@ -267,6 +301,8 @@ def _describe(
     warnings = list(solution.warnings)
     if loose.any():
         warnings.append(f"{loose.sum()} of {nodal.n} nodes are tied to eliminated unknowns only and stay undetermined")
+    if solution.ratio is not None:
+        warnings.append("Poisson's ratio, read off the nodes that determine it, was used to determine others")
     return ElasticityRecovery(
         points, numbering.node_of_row, numbering.direction_of_row, loose.astype(np.int8), solution.component,
         solution.evidence, ratio, found, backward, status, reason, numbering.kind, tuple(warnings), clock.seconds,

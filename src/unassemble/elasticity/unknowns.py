@@ -7,15 +7,16 @@ the rows of interior nodes. And the pattern: the unknowns of a node couple to th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import permutations
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError, RecoveryError
+from .directions import find_directions, nodes_by_neighbours
 
 _ROUNDING = 1e-9
+_ROUNDS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +32,11 @@ class Numbering:
     direction_of_row : (N,) int64
     identity_row : (N,) bool
         Rows that couple to nothing: unknowns replaced by the identity.
-    kind : {"interleaved", "by component", "pattern"}
+    kind : {"interleaved", "by component", "pattern", "given"}
     share : float
         Share of the pairs (row, direction) whose entries add up to zero, among rows that couple.
+    common : float
+        How far the rows of a node couple to the same nodes: 1 if all do.
     """
 
     block_size: int
@@ -42,6 +45,7 @@ class Numbering:
     identity_row: NDArray[np.bool_]
     kind: str
     share: float
+    common: float
 
     @property
     def n_nodes(self) -> int:
@@ -73,17 +77,47 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
     found = []
     for d in sizes:
         found += [_regular(matrix, identity, d, kind) for kind in ("interleaved", "by component")]
-    best = max((one for one in found if one is not None), key=lambda one: one.share, default=None)
-    if best is None or best.share < 0.5:
-        tried = [_from_pattern(matrix, identity, d) for d in sizes]
-        candidates = [one for one in [best, *tried] if one is not None]
-        best = max(candidates, key=lambda one: one.share, default=None)
+    best = max(found, key=_quality)
+    if best is None or best.share < 0.5 or (best.kind == "by component" and best.common < 0.9):
+        best = max([best, *_searched(matrix, identity, sizes)], key=_quality)
     if best is None or best.share <= 0:
         raise RecoveryError(
             "no numbering with 2 or 3 unknowns per node makes the rows annihilate translations: this is no "
             "elasticity matrix, or its unknowns are scaled one by one"
         )
     return best
+
+
+def _quality(one: Numbering | None) -> float:
+    """Rows add up to zero, those of a node couple to the same nodes, and most nodes have all their directions."""
+    if one is None:
+        return 0.0
+    return one.share * one.common * len(one.node_of_row) / (one.n_nodes * one.block_size)
+
+
+def _searched(matrix: sp.csr_array, identity: NDArray, sizes: tuple[int, ...]) -> list[Numbering]:
+    """Numberings without any order to rely on: directions first, then nodes."""
+    group = _same_pattern(matrix, identity)
+    found = []
+    for d in sizes:
+        whole = group if np.bincount(group).max() <= d else _split(group, d)
+        starts = [whole] if np.bincount(whole).max() <= d else []
+        for start in [*starts, np.arange(len(group))]:
+            node = start
+            for _ in range(_ROUNDS):  # directions tell nodes apart, and nodes help to find directions
+                direction = find_directions(matrix, node, identity, d)
+                found.append(_measured(matrix, identity, node, direction, d))
+                merged = nodes_by_neighbours(matrix, direction, d)
+                if len(np.unique(merged * d + direction)) < len(merged) or merged.max() == node.max():
+                    break
+                node = _by_first_row(merged)
+                found.append(_measured(matrix, identity, node, direction, d))
+    return found
+
+
+def _measured(matrix: sp.csr_array, identity: NDArray, node: NDArray, direction: NDArray, d: int) -> Numbering:
+    share, common = _share(matrix, identity, direction, d), _common(matrix, node, direction)
+    return Numbering(d, node, direction, identity, "pattern", share, common)
 
 
 def _uncoupled_rows(matrix: sp.csr_array) -> NDArray[np.bool_]:
@@ -99,18 +133,20 @@ def _regular(matrix: sp.csr_array, identity: NDArray, d: int, kind: str) -> Numb
         return None
     row = np.arange(order)
     node, direction = (row // d, row % d) if kind == "interleaved" else (row % (order // d), row // (order // d))
-    if _common(matrix, node, direction) < 0.6:
+    common = _common(matrix, node, direction)
+    if common < 0.6:
         return None
-    return Numbering(d, node, direction, identity, kind, _share(matrix, identity, direction, d))
+    return Numbering(d, node, direction, identity, kind, _share(matrix, identity, direction, d), common)
 
 
 def _common(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> float:
     """How far the rows of one node couple to the same nodes: 1 if all do, about 1 / d if their nodes are made up."""
-    n, d = node.max() + 1, direction.max() + 1
+    n = node.max() + 1
     onto = sp.csr_array((np.ones(len(node), np.int32), (np.arange(len(node)), node)), shape=(len(node), n))
     pattern = sp.csr_array((np.ones(matrix.nnz, np.int32), matrix.indices, matrix.indptr), shape=matrix.shape)
     rows = pattern @ onto
-    return rows.nnz / (d * (onto.T.tocsr() @ rows).nnz)
+    union = (onto.T.tocsr() @ rows).tocsr()
+    return rows.nnz / float(np.diff(union.indptr) @ np.bincount(node))
 
 
 def _share(matrix: sp.csr_array, identity: NDArray, direction: NDArray, d: int) -> float:
@@ -125,21 +161,6 @@ def _share(matrix: sp.csr_array, identity: NDArray, direction: NDArray, d: int) 
     zero = np.abs(matrix @ ones)[live] <= _ROUNDING * size[:, None]
     own = zero[np.arange(len(size)), direction[live]]
     return float((zero & own[:, None]).mean())
-
-
-def _from_pattern(matrix: sp.csr_array, identity: NDArray, d: int) -> Numbering | None:
-    """Nodes are rows of the same pattern; directions follow from how rows couple to labelled neighbours."""
-    group = _same_pattern(matrix, identity)
-    size = np.bincount(group)
-    if size.max() > d:
-        group = _split(group, d)
-        size = np.bincount(group)
-    if size.max() > d or (size == d).mean() < 0.2:
-        return None
-    direction = _directions(matrix, group, identity, d)
-    if direction is None:
-        return None
-    return Numbering(d, group, direction, identity, "pattern", _share(matrix, identity, direction, d))
 
 
 def _same_pattern(matrix: sp.csr_array, identity: NDArray) -> NDArray[np.int64]:
@@ -180,77 +201,24 @@ def _split(group: NDArray[np.int64], d: int) -> NDArray[np.int64]:
     return _by_first_row(split)
 
 
-def _directions(matrix: sp.csr_array, group: NDArray, identity: NDArray, d: int) -> NDArray[np.int64]:
-    """Directions of all rows: the order of the rows within whole nodes where that works, else a search."""
-    order = np.argsort(group, kind="stable")
-    size = np.bincount(group)
-    start = np.concatenate([[0], np.cumsum(size)[:-1]])
-    members = [order[start[size == k][:, None] + np.arange(k)] for k in range(1, d + 1)]
-    ordered = np.full(len(group), -1)
-    ordered[members[-1]] = np.arange(d)
-    search = _DirectionSearch(matrix, group, members, identity, d)
-    direction = search.complete(ordered)
-    if _share(matrix, identity, direction, d) < 0.3:
-        other = search.complete(np.full(len(group), -1))
-        direction = max(direction, other, key=lambda one: _share(matrix, identity, one, d))
-    return direction
+def given_numbering(matrix: sp.csr_array, node_of_row: NDArray, direction_of_row: NDArray) -> Numbering:
+    """A numbering that the caller knows.
 
-
-class _DirectionSearch:
-    """Directions that spread over the nodes, the surest first.
-
-    Entries between the same directions add up to minus the diagonal over a row, those between different ones to
-    little: so a row has the direction of those labelled rows to which it couples most negatively.
+    Raises
+    ------
+    InputError
+        If two rows have the same node and direction, or the arrays do not fit the matrix.
     """
-
-    def __init__(self, matrix: sp.csr_array, group: NDArray, members: list[NDArray], identity: NDArray, d: int):
-        off = matrix.tocoo()
-        between = group[off.row] != group[off.col]
-        sign = np.sign(matrix.diagonal().sum())
-        entries = (-sign * off.data[between], (off.row[between], off.col[between]))
-        self._coupling = sp.csr_array(entries, shape=matrix.shape)
-        self._strength = np.asarray(abs(self._coupling).sum(axis=1)).ravel()
-        self._members, self._live, self._d = members, ~identity, d
-
-    def complete(self, direction: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Fill in directions of -1, then let every node reconsider until nothing changes."""
-        direction = direction.copy()
-        whole = self._members[-1]
-        while True:
-            best, margin = self._assign(direction)
-            margin[direction >= 0] = 0
-            if margin.max(initial=0) <= 0:
-                loose = np.flatnonzero(direction[whole[:, 0]] < 0)
-                if not len(loose):
-                    break
-                direction[whole[loose[0]]] = np.arange(self._d)  # a first node: its order is ours to choose
-                continue
-            # A twentieth more nodes at a time: late doubts meet more labelled neighbours.
-            sure = np.sort(margin)[-max(1, int((direction >= 0).sum() // 20), int((margin > 0.5).sum()))]
-            take = margin >= sure
-            direction[take] = best[take]
-        for _ in range(20):
-            best, margin = self._assign(direction)
-            changed = (best != direction) & (margin > 0)
-            if not changed.any():
-                break
-            direction[changed] = best[changed]
-        return np.where(direction < 0, 0, direction)
-
-    def _assign(self, direction: NDArray) -> tuple[NDArray, NDArray]:
-        """Best directions of each row's node, and by how much they beat the second best, relative."""
-        known = np.flatnonzero((direction >= 0) & self._live)
-        label = np.zeros((len(direction), self._d))
-        label[known, direction[known]] = 1
-        score = self._coupling @ label
-        best = direction.copy()
-        margin = np.zeros(len(direction))
-        for rows in self._members:
-            if len(rows):
-                choices = np.array(list(permutations(range(self._d), rows.shape[1])))
-                fit = score[rows[:, None, :], choices[None]].sum(axis=2)
-                two = np.partition(fit, -2, axis=1)[:, -2:]
-                best[rows] = choices[np.argmax(fit, axis=1)]
-                size = self._strength[rows].sum(axis=1) / self._d
-                margin[rows] = ((two[:, 1] - two[:, 0]) / np.where(size > 0, size, 1))[:, None]
-        return best, margin
+    node, direction = np.asarray(node_of_row, dtype=np.int64), np.asarray(direction_of_row, dtype=np.int64)
+    order = matrix.shape[0]
+    if node.shape != (order,) or direction.shape != (order,):
+        raise InputError(f"node and direction are needed for each of the {order} rows")
+    d = int(direction.max()) + 1
+    if d not in (2, 3) or direction.min() < 0:
+        raise InputError("directions are numbered 0, 1 and, in space, 2")
+    node = _by_first_row(node)
+    if len(np.unique(node * d + direction)) < order:
+        raise InputError("two rows have the same node and direction")
+    identity = _uncoupled_rows(matrix)
+    share, common = _share(matrix, identity, direction, d), _common(matrix, node, direction)
+    return Numbering(d, node, direction, identity, "given", share, common)
