@@ -14,6 +14,7 @@ import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..errors import GeometryError
 from ..linalg import Factorisation, UpperTriangle, factorisation
 from .identities import Identities, identities
 from .nodal import NodalMatrix
@@ -81,18 +82,27 @@ def chart(
 def _shifted(normal: sp.bsr_array) -> Factorisation:
     """Factorise the normal matrix, made definite by a small multiple of the identity."""
     d = normal.blocksize[0]
-    n = normal.shape[0] // d
-    shift = _SHIFT * np.median(normal.diagonal())
-    normal = (normal + shift * sp.eye_array(n * d, format="bsr")).tobsr((d, d))  # no diagonal block may be missing
-    normal.sort_indices()
-    row = np.repeat(np.arange(n), np.diff(normal.indptr))
-    upper = normal.indices >= row
+    typical = float(np.median(normal.diagonal()))
+    for shift in (_SHIFT, 30 * _SHIFT, 1000 * _SHIFT):
+        shifted = normal + shift * typical * sp.eye_array(normal.shape[0], format="bsr")  # no diagonal block is missing
+        matrix = _upper(sp.bsr_array(shifted.tobsr((d, d))))
+        solver = factorisation(matrix, definite=True)
+        try:
+            solver.factorise(matrix)
+        except ArithmeticError:  # rounding made a pivot vanish
+            solver.release()
+            continue
+        return solver
+    raise GeometryError("the normal matrix of the identities is not positive; the entries may differ too much in size")
+
+
+def _upper(matrix: sp.bsr_array) -> UpperTriangle:
+    matrix.sort_indices()
+    n = len(matrix.indptr) - 1
+    row = np.repeat(np.arange(n), np.diff(matrix.indptr))
+    upper = matrix.indices >= row
     indptr = np.concatenate([[0], np.cumsum(np.bincount(row[upper], minlength=n))]).astype(np.int32)
-    data = np.ascontiguousarray(normal.data[upper])
-    matrix = UpperTriangle(data, normal.indices[upper].astype(np.int32), indptr)
-    solver = factorisation(matrix, definite=True)
-    solver.factorise(matrix)
-    return solver
+    return UpperTriangle(np.ascontiguousarray(matrix.data[upper]), matrix.indices[upper].astype(np.int32), indptr)
 
 
 def _least_fields(local: Identities, solver: Factorisation, count: int) -> tuple[NDArray, NDArray]:

@@ -91,8 +91,8 @@ def valid_pairs(nodal: NodalMatrix, *, strict: bool = True) -> NDArray[np.bool_]
 
     Row i of A^{cb} annihilates constants, unless a coupled unknown of component b was taken away or the
     diagonal was changed. The converse fails on regular meshes, where what is missing can add up to zero (two
-    eliminated nodes opposite each other). It does not in A^{bb}, whose entries have mostly one sign. So the
-    strict rule asks for the sum of row i in A^{bb} too, unless a penalty on the diagonal explains it.
+    eliminated nodes opposite each other). So the strict rule asks it of all rows of a node at once: they couple to the same
+    unknowns, and a neighbour that is known to lack the direction spoils it. A penalty on the diagonal explains itself and spoils its own row only.
 
     Returns
     -------
@@ -105,8 +105,10 @@ def valid_pairs(nodal: NodalMatrix, *, strict: bool = True) -> NDArray[np.bool_]
     valid = zero & present[:, :, None] & present[:, None, :] & (nodal.size > 0)[:, None, None]
     if not strict:
         return valid
-    whole = np.diagonal(zero, axis1=1, axis2=2) | penalised(nodal)
-    return valid & whole[:, None, :]
+    d = nodal.dim
+    excused = penalised(nodal)[:, None, :] & np.eye(d, dtype=bool) | ~present[:, :, None]
+    lacking = sp.csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2) @ ~present
+    return valid & ((zero | excused).all(axis=1) & (lacking == 0))[:, None, :]
 
 
 def penalised(nodal: NodalMatrix) -> NDArray[np.bool_]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 import numpy as np
@@ -185,6 +185,7 @@ class _Solution:
     exact: bool
     warnings: tuple[str, ...]
     ratio: float | None = None
+    strict: bool = True
 
     @property
     def whole(self) -> bool:
@@ -198,23 +199,20 @@ class _Solution:
 
 
 def _solve(nodal: NodalMatrix, patch: int | None) -> _Solution:
-    """Read validity strictly; where that leaves nodes loose, leniently, and with Poisson's ratio once it is known."""
-    readings = [valid_pairs(nodal)]
-    lenient = valid_pairs(nodal, strict=False)
-    if not np.array_equal(readings[0], lenient):
-        readings.append(lenient)
+    """Read validity strictly, and only where that determines nothing leniently."""
     best: _Solution | None = None
     failure: GeometryError | None = None
-    for valid in readings:
+    for strict in (True, False):
+        valid = valid_pairs(nodal, strict=strict)
         try:
             found = _positions(nodal, valid, patch)
-            found = _with_ratio(nodal, found, patch)
+            found = replace(_with_ratio(nodal, found, patch), strict=strict)
         except GeometryError as error:
             failure = failure or error
             continue
-        best = found if best is None or found.rank > best.rank else best
-        if best.whole:
-            break
+        if found.exact and not any(found.freedoms):
+            return found
+        best = best or found
     if best is None:
         raise failure or GeometryError("no positions fit the valid rows")
     return best
@@ -324,6 +322,11 @@ def _verdict(solution: _Solution, error: float, found: Cells) -> tuple[str, str]
         return "uncertified", (
             f"no exact null vector exists (singular value {worst:.1e}); the points are the best fit, as for materials "
             "that are not isotropic, or elements that do not reproduce linear functions"
+        )
+    if not solution.strict:
+        return "uncertified", (
+            "supports leave too few rows that are surely whole; rows whose entries add up to zero were taken for whole, "
+            "which they need not be"
         )
     if found.recognised and found.backward_error <= CERTIFIED:
         return "certified", f"the matrix re-assembled on the {found.n_cells} elements is the given one"

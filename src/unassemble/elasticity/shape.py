@@ -72,24 +72,21 @@ def shape(fields: NDArray[np.float64], values: NDArray[np.float64]) -> Shape:
 
 
 def _set_aside(null: NDArray) -> tuple[NDArray, NDArray[np.bool_]]:
-    """Find nodes that carry fields of their own, and the fields that the other nodes share."""
-    n, d, _ = null.shape
-    loose = np.zeros(n, dtype=bool)
-    while null.shape[2] > d + 1 and loose.mean() < 0.5:
-        mobility = (null**2).sum(axis=(1, 2))
-        mobility[loose] = 0
-        typical = np.median(mobility[~loose])
-        outliers = mobility > max(0.5 * mobility.max(), 4 * typical)
-        if not outliers.any():
-            break
-        loose |= outliers
-        _, s, v = scipy.linalg.svd(null[~loose].reshape(-1, null.shape[2]), full_matrices=False)
-        shared, own = v[s > _LOOSE * s[0]], v[s <= _LOOSE * s[0]]
-        if len(own):
-            still = np.einsum("nak,lk->nal", null, own)
-            loose |= np.abs(still).max(axis=(1, 2)) > 1e-2 * _LOOSE
-            null = _orthonormal(np.einsum("nak,lk->nal", null, shared), ~loose)
-    return null, loose
+    """Find nodes that carry fields of their own, and the fields that the other nodes share.
+
+    Loose nodes move more than others in the null fields, and their own fields vanish at the others exactly. So the
+    fields that the least mobile nodes share are the body's, and what vanishes at all of these is loose.
+    """
+    n, d, k = null.shape
+    calm = np.argsort((null**2).sum(axis=(1, 2)), kind="stable")
+    for share in (0.75, 0.5, 0.25, 0.12):
+        some = calm[: max(int(share * n), min(n, d + 2))]
+        _, s, v = scipy.linalg.svd(null[some].reshape(-1, k), full_matrices=False)
+        if (s > _LOOSE * s[0]).sum() == d + 1:
+            own = np.einsum("nak,lk->nal", null, v[s <= _LOOSE * s[0]])
+            loose = np.abs(own).max(axis=(1, 2)) > 10 * _LOOSE
+            return _orthonormal(np.einsum("nak,lk->nal", null, v[: d + 1]), ~loose), loose
+    return null, np.zeros(n, dtype=bool)
 
 
 def _orthonormal(fields: NDArray, kept: NDArray[np.bool_]) -> NDArray:
