@@ -68,11 +68,9 @@ def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64]) -> Cells:
     """
     d = nodal.dim
     known = np.isfinite(points).all(axis=1)
-    pattern = sp.csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(nodal.n, nodal.n))
     live = (np.abs(nodal.data).max(axis=(1, 2)) > 1e-13 * nodal.size[nodal.node]) & known[nodal.node]
     live &= known[nodal.indices]
-    pattern = sp.csr_array((live.astype(float), nodal.indices, nodal.indptr), shape=(nodal.n, nodal.n))
-    pattern.eliminate_zeros()
+    pattern = sp.csr_array((np.ones(live.sum()), (nodal.node[live], nodal.indices[live])), shape=(nodal.n, nodal.n))
     if pattern.nnz <= nodal.n:
         return no_cells(d)
     graph = Graph(pattern)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
 
 class Graph:
@@ -81,11 +84,10 @@ def ordered_boxes(cells: NDArray[np.int64], points: NDArray[np.float64]) -> NDAr
     For each choice of d corners as neighbours of the first, the others are predicted as those of a parallelepiped; the choice
     whose predictions are nearest to distinct corners wins.
     """
-    from itertools import combinations
-
     m, corners = cells.shape
     d = points.shape[1]
-    x = points[cells] - points[cells[:, :1]]
+    x = _rounded(points[cells])
+    x = x - x[:, :1]
     bits = (np.arange(corners)[:, None] >> np.arange(d)) & 1
     best = np.full(m, np.inf)
     order = np.zeros((m, corners), dtype=np.int64)
@@ -98,7 +100,8 @@ def ordered_boxes(cells: NDArray[np.int64], points: NDArray[np.float64]) -> NDAr
         misfit = np.where(distinct, distance.min(axis=2).sum(axis=1), np.inf)
         better = misfit < best
         best[better], order[better] = misfit[better], nearest[better]
-    cells, order = cells[np.isfinite(best)], order[np.isfinite(best)]
+    for odd in np.flatnonzero(~np.isfinite(best)):
+        order[odd] = _assigned(x[odd], bits)
     cube = np.take_along_axis(cells, order, axis=1)
     edges = points[cube[:, 1 << np.arange(d)]] - points[cube[:, :1]]
     mirrored = np.linalg.det(edges) < 0
@@ -107,3 +110,22 @@ def ordered_boxes(cells: NDArray[np.int64], points: NDArray[np.float64]) -> NDAr
     swapped[mirrored] = cube[mirrored][:, exchange]
     ring = [0, 1, 3, 2] if d == 2 else [0, 1, 3, 2, 4, 5, 7, 6]
     return swapped[:, ring]
+
+
+def _rounded(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Corners of each cell (m, k, d) after the linear map that makes their covariance the identity: nearly a cube."""
+    centred = x - x.mean(axis=1, keepdims=True)
+    value, vector = np.linalg.eigh(np.einsum("mka,mkb->mab", centred, centred))
+    value = np.maximum(value, 1e-12 * value[:, -1:])
+    return np.einsum("mka,mab->mkb", centred, vector / np.sqrt(value)[:, None, :])
+
+
+def _assigned(x: NDArray[np.float64], bits: NDArray) -> NDArray[np.int64]:
+    """The same for one distorted cell (k, d), with the cheapest assignment for each choice."""
+    best, order = np.inf, np.arange(len(x))
+    for choice in combinations(range(1, len(x)), x.shape[1]):
+        distance = np.linalg.norm((bits @ x[list(choice)])[:, None] - x[None], axis=2)
+        rows, columns = linear_sum_assignment(distance)
+        if distance[rows, columns].sum() < best:
+            best, order = distance[rows, columns].sum(), columns
+    return order

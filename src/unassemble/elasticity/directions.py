@@ -41,11 +41,21 @@ def find_directions(matrix: sp.csr_array, group: NDArray, identity: NDArray, d: 
     for known in _starts(members, len(group), d):
         direction = search.complete(known)
         energy = search.energy(direction)
-        if best is None or energy < best[0]:
+        if best is None or energy < best[0] - 1e-9:  # equally good names of axes: the first start keeps the order
             best = (energy, direction)
         if energy < _SETTLED:
             break
-    return best[1] if best is not None else np.zeros(len(group), np.int64)
+    return _named_in_order(best[1], members, d) if best is not None else np.zeros(len(group), np.int64)
+
+
+def _named_in_order(direction: NDArray, members: list[NDArray], d: int) -> NDArray[np.int64]:
+    """Exchange the names of directions so that those of whole nodes, or of all rows, increase as often as possible."""
+    names = [np.array(one) for one in permutations(range(d))]
+    if len(members[-1]):
+        ordered = [int((name[direction[members[-1]]] == np.arange(d)).all(axis=1).sum()) for name in names]
+    else:
+        ordered = [int((np.diff(name[direction]) > 0).sum()) for name in names]
+    return names[int(np.argmax(ordered))][direction]
 
 
 def _starts(members: list[NDArray], n: int, d: int) -> list[NDArray]:

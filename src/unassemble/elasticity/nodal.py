@@ -79,11 +79,12 @@ def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
     )
     blocks = entries.tocsr().tobsr(blocksize=(d, d))
     blocks.sort_indices()
-    indptr, indices = blocks.indptr.astype(np.int32), blocks.indices.astype(np.int32)
-    off = np.abs(blocks.data).sum(axis=(1, 2)) / d**2
+    indptr = blocks.indptr.astype(np.int32)
+    indices, data = blocks.indices[: indptr[-1]].astype(np.int32), blocks.data[: indptr[-1]]
+    off = np.abs(data).sum(axis=(1, 2)) / d**2
     off[np.repeat(np.arange(n), np.diff(indptr)) == indices] = 0
     size = np.add.reduceat(off, indptr[:-1])
-    return NodalMatrix(indptr, indices, blocks.data, row_of.reshape(n, d), size)
+    return NodalMatrix(indptr, indices, data, row_of.reshape(n, d), size)
 
 
 def valid_pairs(nodal: NodalMatrix, *, strict: bool = True) -> NDArray[np.bool_]:
