@@ -20,6 +20,7 @@ from .nodal import NodalMatrix, valid_pairs
 _KINDS = {2: ("triangles", "quads"), 3: ("tetrahedra", "hexahedra")}
 _FITS = 1e-9
 _EMPTY = 1e-7  # of the largest coefficient; candidates below carry no material
+_LINEAR = {2: 8, 3: 20}  # blocks per row, at most, in meshes of linear simplices; others have too many cliques to try
 _MOST = 400_000  # candidates beyond which nobody waits for the answer
 
 
@@ -75,14 +76,14 @@ def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64]) -> Cells:
         return no_cells(d)
     graph = Graph(pattern)
     entries = _Entries.of(nodal)
-    box = boxes(graph, d)
+    box = boxes(graph, d) if pattern.nnz <= nodal.n * 3**d else np.empty((0, 2**d), np.int64)
     if len(box) and len(np.unique(box)) > 0.9 * known.sum() and len(box) < _MOST // 4:
         box = ordered_boxes(box, points)
         for order in (2, 3, 4, 1):
             found = _fit(nodal, points, box, order, entries, _KINDS[d][1])
             if found.recognised:
                 return found
-    if nodal.n * (2 if d == 2 else 8) > _MOST:
+    if nodal.n * (2 if d == 2 else 8) > _MOST or pattern.nnz > nodal.n * _LINEAR[d]:
         return no_cells(d)
     return _fit(nodal, points, _oriented(simplices(graph, d), points), 1, entries, _KINDS[d][0])
 
