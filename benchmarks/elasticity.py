@@ -1,8 +1,11 @@
 """Coordinates from elasticity matrices: time and memory beside PyAMG's, and growth with the number of nodes.
 
-Run ``python benchmarks/elasticity.py``; options ``--sizes 10 15 31`` (vertices per edge of the cube), ``--kinds tet-p1 hex-q1``.
-Each case is a cube clamped and eliminated on one face, inner vertices moved at random, homogeneous material, assembled by
-scikit-fem. The peer is PyAMG's smoothed aggregation with conjugate gradients to 1e-8 on the same matrix, without coordinates:
+Run ``python benchmarks/elasticity.py``; options ``--sizes 10 15 31`` (vertices per edge of the cube), ``--kinds
+tet-p1 hex-q1``.
+Each case is a cube clamped and eliminated on one face, inner vertices moved at random, homogeneous material,
+assembled by
+scikit-fem. The peer is PyAMG's smoothed aggregation with conjugate gradients to 1e-8 on the same matrix, without
+coordinates:
 once with its defaults on the scalar matrix, once with the block size.
 """
 
@@ -104,8 +107,8 @@ def main() -> None:
                 mine = in_process("--one", "recover", str(path))
                 peers = {name: in_process("--one", name, str(path)) for name in ("plain", "block", "true", "recovered")}
             print(
-                f"{kind} {mine['nodes']:7d} nodes: coordinates {mine['seconds']:6.2f} s {mine['memory']:6.0f} MiB, error "
-                f"{mine['error']:.0e}, {mine['status']}; PyAMG "
+                f"{kind} {mine['nodes']:7d} nodes: coordinates {mine['seconds']:6.2f} s {mine['memory']:6.0f} MiB, "
+                f"error {mine['error']:.0e}, {mine['status']}; PyAMG "
                 + "; ".join(
                     f"{name} {one['seconds']:.2f} s {one['memory']:.0f} MiB {one['iterations']} it"
                     for name, one in peers.items()

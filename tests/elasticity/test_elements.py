@@ -47,7 +47,8 @@ def test_clamped_body(kind, varying):
     assert found.certified
     assert len(found.points) == len(nodes)
     assert error(found.points, given.points[nodes]) < TOLERANCE
-    # Linear elements lose no node. Nodes of quadratic ones inside the clamped layer of cells touch eliminated nodes only.
+    # Linear elements lose no node. Nodes of quadratic ones inside the clamped layer of cells touch eliminated nodes
+    # only.
     if kind in COUNTS and kind != "tri-p2":
         assert not found.node_status.any()
     else:

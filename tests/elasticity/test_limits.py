@@ -9,7 +9,11 @@ from assembled import box, eliminated, error, on_plane, permuted_nodes, stiffnes
 from skfem.helpers import ddot, grad, sym_grad, trace
 
 from unassemble.elasticity import (
-    recover_elasticity, rigid_body_modes, save_amgcl_coordinates, save_petsc_vec, scalar_parts,
+    recover_elasticity,
+    rigid_body_modes,
+    save_amgcl_coordinates,
+    save_petsc_vec,
+    scalar_parts,
 )  # fmt: skip
 from unassemble.errors import GeometryError, OutputError
 
@@ -72,7 +76,9 @@ def test_pyamg_bar():
     truth = example["vertices"]
     if len(truth) != len(found.points):  # the clamped end is not in the matrix
         ends = [np.abs(truth[:, 0] - end) > 1e-9 for end in (truth[:, 0].min(), truth[:, 0].max())]
-        truth = min((truth[kept] for kept in ends if kept.sum() == len(found.points)), key=lambda x: error(found.points, x))
+        truth = min(
+            (truth[kept] for kept in ends if kept.sum() == len(found.points)), key=lambda x: error(found.points, x)
+        )
     assert found.certified
     assert error(found.points, truth) < 1e-11
 

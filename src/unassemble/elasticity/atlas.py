@@ -1,6 +1,7 @@
 """The atlas: charts joined where they overlap into fields on the whole body.
 
-Neighbouring charts share two layers of nodes and more. Coefficients c_P of the fields Z_P are wanted for which the charts agree
+Neighbouring charts share two layers of nodes and more. Coefficients c_P of the fields Z_P are wanted for which the
+charts agree
 there and the residual of every chart is least:
 
     minimise  sum over P of |S_P c_P|^2  +  sum over nodes j and charts P of |Z_P(j) c_P - mean over the charts of j|^2
@@ -39,7 +40,8 @@ class NullFields:
     fields : (n, d, k) float64
         Orthonormal.
     values : (k,) float64
-        Singular values, increasing; fields beyond the null fields are those of the joined charts, and their values upper bounds.
+        Singular values, increasing; fields beyond the null fields are those of the joined charts, and their values
+        upper bounds.
     rows : int
         Nodes with valid identities.
     charts : int
@@ -163,7 +165,7 @@ def _measured(
     for part in parts:
         local = identities(nodal, valid, part, ratio)
         residual = local.residual(fields[place[local.columns]]).reshape(-1, k)
-        triangle = np.linalg.qr(np.concatenate([triangle, np.linalg.qr(residual, mode="r")]), mode="r")
+        triangle = np.asarray(np.linalg.qr(np.vstack([triangle, np.linalg.qr(residual, mode="r")]), mode="r"))
     _, values, v = scipy.linalg.svd(triangle)
     fields = (fields.reshape(-1, k) @ v[::-1].T).reshape(-1, d, k)
     return NullFields(nodes, fields, values[::-1], sum(one.rows for one in made), len(made))

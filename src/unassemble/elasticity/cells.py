@@ -1,7 +1,9 @@
 """Elements, recognised by re-assembly.
 
-With the positions known, the matrix is linear in the Lame coefficients of the cells: each candidate, a clique of the graph,
-gets two unknowns, and a sparse least-squares problem on the entries between nodes tells which candidates carry material.
+With the positions known, the matrix is linear in the Lame coefficients of the cells: each candidate, a clique of the
+graph,
+gets two unknowns, and a sparse least-squares problem on the entries between nodes tells which candidates carry
+material.
 The residual is the certificate. Material may differ from cell to cell.
 """
 
@@ -15,7 +17,7 @@ from numpy.typing import NDArray
 
 from .cliques import Graph, boxes, ordered_boxes, simplices
 from .elements import element_blocks
-from .nodal import NodalMatrix, valid_pairs
+from .nodal import NodalMatrix, determined, valid_pairs
 
 _KINDS = {2: ("triangles", "quads"), 3: ("tetrahedra", "hexahedra")}
 _FITS = 1e-9
@@ -37,7 +39,8 @@ class Cells:
     lame : (m, 2) float64
         lambda and mu of each cell, up to one common factor (the unknown size of the body).
     backward_error : float
-        Largest difference between an entry and the re-assembled one, relative to the largest off-diagonal entry of its row.
+        Largest difference between an entry and the re-assembled one, relative to the largest off-diagonal entry of
+        its row.
     """
 
     kind: str
@@ -68,7 +71,7 @@ def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64]) -> Cells:
     contribute to them. Cells all of whose entries are left out cannot be seen and are not reported.
     """
     d = nodal.dim
-    known = np.isfinite(points).all(axis=1)
+    known = determined(points)
     live = (np.abs(nodal.data).max(axis=(1, 2)) > 1e-13 * nodal.size[nodal.node]) & known[nodal.node]
     live &= known[nodal.indices]
     pattern = sp.csr_array((np.ones(live.sum()), (nodal.node[live], nodal.indices[live])), shape=(nodal.n, nodal.n))
@@ -118,9 +121,7 @@ def _oriented(cells: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[
     return cells
 
 
-def _fit(
-    nodal: NodalMatrix, points: NDArray, cells: NDArray, order: int, entries: _Entries, kind: str
-) -> Cells:
+def _fit(nodal: NodalMatrix, points: NDArray, cells: NDArray, order: int, entries: _Entries, kind: str) -> Cells:
     """Least squares for the coefficients of all candidates."""
     d = nodal.dim
     if not len(cells) or not len(entries.key):

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .nodal import NodalMatrix
+from .nodal import NodalMatrix, determined
 
 
 def largest_residual(
@@ -36,7 +36,7 @@ def largest_residual(
         Relative to the size of a row, times the mean distance between coupled nodes.
     """
     d = nodal.dim
-    known = np.isfinite(points).all(axis=1)
+    known = determined(points)
     x = np.where(known[:, None], points, 0.0)
     blind = sp.csr_array(
         (np.abs(nodal.data).max(axis=(1, 2)), nodal.indices, nodal.indptr), shape=(nodal.n, nodal.n)

@@ -1,8 +1,10 @@
 """Charts: the positions that the identities of a few neighbouring nodes allow.
 
 The identities behave like a differential operator of fourth order, so that one factorisation of the
-whole body is dear in space and ill-conditioned, while an iteration needs many steps. But they are local, and so is their
-answer: the rows of some two thousand neighbouring nodes determine the positions of all nodes they touch, up to few freedoms.
+whole body is dear in space and ill-conditioned, while an iteration needs many steps. But they are local, and so is
+their
+answer: the rows of some two thousand neighbouring nodes determine the positions of all nodes they touch, up to few
+freedoms.
 """
 
 from __future__ import annotations

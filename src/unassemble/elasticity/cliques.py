@@ -81,7 +81,8 @@ def boxes(graph: Graph, d: int) -> NDArray[np.int64]:
 def ordered_boxes(cells: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.int64]:
     """Put the corners of each cell in meshio's order, positively oriented.
 
-    For each choice of d corners as neighbours of the first, the others are predicted as those of a parallelepiped; the choice
+    For each choice of d corners as neighbours of the first, the others are predicted as those of a parallelepiped;
+    the choice
     whose predictions are nearest to distinct corners wins.
     """
     m, corners = cells.shape

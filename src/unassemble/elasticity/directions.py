@@ -1,7 +1,8 @@
 """Directions and nodes of unknowns that stand in no order.
 
 Entries between unknowns of the same direction add up to minus the diagonal over a row, those between different
-directions to little. So the right directions have the least energy: the sum of all entries between unknowns of the same one.
+directions to little. So the right directions have the least energy: the sum of all entries between unknowns of the
+same one.
 """
 
 from __future__ import annotations
@@ -103,7 +104,7 @@ class _Search:
             best, margin = self._assign(direction)
             margin[direction >= 0] = 0
             if margin.max(initial=0) <= 0:
-                loose = np.flatnonzero(direction[whole[:, 0]] < 0) if len(whole) else []
+                loose: NDArray[np.int64] = np.flatnonzero(direction[whole[:, 0]] < 0)
                 if not len(loose):
                     break
                 direction[whole[loose[0]]] = np.arange(self._d)  # another piece: its order is ours to choose
@@ -115,7 +116,10 @@ class _Search:
         return self._reconsider(direction)
 
     def _reconsider(self, direction: NDArray) -> NDArray:
-        """Lower the energy node by node; half of those that want to, at a time, so that neighbours do not swap for ever."""
+        """Lower the energy node by node.
+
+        Half of those that want to, at a time, so that neighbours do not swap for ever.
+        """
         rng = np.random.default_rng(0)
         for _ in range(60):
             best, margin = self._assign(direction)

@@ -178,7 +178,7 @@ def identities(
     """
     rows = rows[_telling(valid[rows], ratio)]
     count = np.diff(nodal.indptr)[rows]
-    start = np.repeat(nodal.indptr[rows] - np.concatenate([[0], np.cumsum(count)[:-1]]), count) if len(rows) else []
+    start = np.repeat(nodal.indptr[rows] - (np.cumsum(count) - count), count)
     entry = (np.arange(count.sum()) + start).astype(np.int64)
     row = np.repeat(np.arange(len(rows)), count)
     data = nodal.data[entry] * (valid[rows] / nodal.size[rows, None, None])[row]

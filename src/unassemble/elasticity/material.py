@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .identities import identities
-from .nodal import NodalMatrix
+from .nodal import NodalMatrix, determined
 
 _CONSTANT = 1e-6  # spread of lambda / mu, relative to 1 + lambda / mu, up to which it counts as one number
 
@@ -24,7 +24,7 @@ def poisson_ratio(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[
     points : (n, d) float64
         NaN where not determined.
     """
-    known = np.isfinite(points).all(axis=1)
+    known = determined(points)
     local = identities(nodal, valid, np.arange(nodal.n))
     if not len(local.rows):
         return None

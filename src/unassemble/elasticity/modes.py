@@ -10,6 +10,7 @@ import scipy.io
 from numpy.typing import NDArray
 
 from ..errors import OutputError
+from .nodal import determined
 
 _VEC_CLASS_ID = 1211214
 
@@ -30,11 +31,12 @@ def rigid_body_modes(
     Returns
     -------
     (N, 3) or (N, 6) float64
-        Translations, then rotations, row by row of the matrix. Rotations about the centroid, each column of norm sqrt(N / d)
+        Translations, then rotations, row by row of the matrix. Rotations about the centroid, each column of norm
+        sqrt(N / d)
         or so, so that none swamps another.
     """
     d = points.shape[1]
-    known = np.isfinite(points).all(axis=1)
+    known = determined(points)
     x = points - points[known].mean(axis=0) if known.any() else np.zeros_like(points)
     x = np.where(known[:, None], x, 0.0)
     radius = np.sqrt((x**2).sum(axis=1).mean())
@@ -65,7 +67,7 @@ def save_amgcl_coordinates(path: str | PathLike[str], points: NDArray[np.float64
 
 
 def _determined(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    loose = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    loose = np.flatnonzero(~determined(points))
     if len(loose):
         raise OutputError(
             f"node {loose[0]} and {len(loose) - 1} more have no coordinates, and this format has no way to say so; "

@@ -92,8 +92,10 @@ def valid_pairs(nodal: NodalMatrix, *, strict: bool = True) -> NDArray[np.bool_]
 
     Row i of A^{cb} annihilates constants, unless a coupled unknown of component b was taken away or the
     diagonal was changed. The converse fails on regular meshes, where what is missing can add up to zero (two
-    eliminated nodes opposite each other). So the strict rule asks it of all rows of a node at once: they couple to the same
-    unknowns, and a neighbour that is known to lack the direction spoils it. A penalty on the diagonal explains itself and spoils its own row only.
+    eliminated nodes opposite each other). So the strict rule asks it of all rows of a node at once: they couple to
+    the same
+    unknowns, and a neighbour that is known to lack the direction spoils it. A penalty on the diagonal explains
+    itself and spoils its own row only.
 
     Returns
     -------
@@ -108,7 +110,8 @@ def valid_pairs(nodal: NodalMatrix, *, strict: bool = True) -> NDArray[np.bool_]
         return valid
     d = nodal.dim
     excused = penalised(nodal)[:, None, :] & np.eye(d, dtype=bool) | ~present[:, :, None]
-    lacking = sp.csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2) @ ~present
+    graph = sp.csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2)
+    lacking = graph @ ~present
     return valid & ((zero | excused).all(axis=1) & (lacking == 0))[:, None, :]
 
 
@@ -123,3 +126,8 @@ def uncoupled(nodal: NodalMatrix) -> bool:
     """Whether no component is coupled to another: a vector Laplacian, several scalar matrices side by side."""
     off = np.abs(nodal.data[:, ~np.eye(nodal.dim, dtype=bool)])
     return bool(off.max(initial=0) <= 1e-12 * np.median(nodal.size[nodal.size > 0])) if nodal.size.any() else True
+
+
+def determined(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) nodes that have coordinates."""
+    return np.asarray(np.isfinite(points).all(axis=1))

@@ -107,7 +107,7 @@ def _without_translations(fields: NDArray) -> NDArray:
 
 def _choose(moving: NDArray) -> tuple[NDArray, str]:
     """The coordinates, or a representative and the name of what remains free."""
-    n, d, k = moving.shape
+    _, d, k = moving.shape
     if k == 1:
         return moving[..., 0], ""
     if k == 0:
