@@ -101,7 +101,7 @@ class _Entries:
 
     @classmethod
     def of(cls, nodal: NodalMatrix) -> _Entries:
-        complete = valid_pairs(nodal).all(axis=(1, 2))
+        complete = np.asarray(valid_pairs(nodal).all(axis=(1, 2)))
         i, j = nodal.node.astype(np.int64), nodal.indices.astype(np.int64)
         off = np.abs(nodal.data).max(axis=(1, 2))
         off[i == j] = 0

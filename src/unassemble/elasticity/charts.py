@@ -22,6 +22,7 @@ from .identities import Identities, identities
 from .nodal import NodalMatrix
 
 _SHIFT = 1e-12  # above the rounding of the normal matrix, below every eigenvalue that is not zero
+_STEPS = 2  # each divides what is not wanted by its eigenvalue over the shift, 1e4 and more
 _STIFF = 1e-4  # fields whose singular value is larger need no place in a chart of several
 
 
@@ -108,12 +109,14 @@ def _upper(matrix: sp.bsr_array) -> UpperTriangle:
 
 
 def _least_fields(local: Identities, solver: Factorisation, count: int) -> tuple[NDArray, NDArray]:
-    """Inverse iteration on a block of fields, then Rayleigh-Ritz through the identities themselves."""
+    """Inverse iteration on a block of fields, then Rayleigh-Ritz on squares: values to half the digits."""
     n, d = len(local.columns), local.dim
     x = np.random.default_rng(0).standard_normal((n * d, count))
-    for _ in range(3):
+    for _ in range(_STEPS):
         x = np.linalg.qr(solver.solve(x))[0]
-    return _ritz(local, x.reshape(n, d, -1))
+    residual = local.residual(x.reshape(n, d, -1)).reshape(-1, count)
+    squares, v = scipy.linalg.eigh(residual.T @ residual)
+    return (x @ v).reshape(n, d, -1), np.sqrt(np.maximum(squares, 0))
 
 
 def _ritz(local: Identities, x: NDArray) -> tuple[NDArray, NDArray]:
@@ -128,7 +131,7 @@ def _ritz(local: Identities, x: NDArray) -> tuple[NDArray, NDArray]:
 def _refine(local: Identities, solver: Factorisation, fields: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
     """One step of inverse iteration in correction form: its error is that of the residual, not of the factor."""
     n, d, k = fields.shape
-    null = values < 1e-8
+    null = values < 1e-6
     if null.any():
         gradient = local.gradient(local.residual(fields[..., null]))
         step = solver.solve(gradient.reshape(n * d, -1)).reshape(n, d, -1)
