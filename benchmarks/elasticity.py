@@ -1,0 +1,121 @@
+"""Coordinates from elasticity matrices: time and memory beside PyAMG's, and growth with the number of nodes.
+
+Run ``python benchmarks/elasticity.py``; options ``--sizes 10 15 31`` (vertices per edge of the cube), ``--kinds
+tet-p1 hex-q1``.
+Each case is a cube clamped and eliminated on one face, inner vertices moved at random, homogeneous material,
+assembled by
+scikit-fem. The peer is PyAMG's smoothed aggregation with conjugate gradients to 1e-8 on the same matrix, without
+coordinates:
+once with its defaults on the scalar matrix, once with the block size.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+import scipy.sparse as sp
+
+
+def assemble(kind: str, size: int, path: Path) -> None:
+    """Write matrix and true points of a clamped cube."""
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "elasticity"))
+    from assembled import box, eliminated, on_plane, stiffness
+
+    case = stiffness(kind, box(kind, (size,) * 3, perturb=0.2))
+    matrix, nodes = eliminated(case, np.repeat(on_plane(case, 0)[:, None], 3, axis=1))
+    np.savez(path, data=matrix.data, indices=matrix.indices, indptr=matrix.indptr, points=case.points[nodes])
+
+
+def load(path: Path) -> tuple[sp.csr_array, np.ndarray]:
+    file = np.load(path)
+    return sp.csr_array((file["data"], file["indices"], file["indptr"])), file["points"]
+
+
+def peak() -> float:
+    """MiB this process has used at most (its own: getrusage would count its parent's)."""
+    line = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
+    return int(line.split()[1]) / 1024
+
+
+def measure_recovery(path: Path) -> dict:
+    from unassemble.elasticity import recover_elasticity
+
+    matrix, points = load(path)
+    before, start = peak(), perf_counter()
+    found = recover_elasticity(matrix, cells=False)
+    seconds = perf_counter() - start
+    a, b = found.points, points - points.mean(axis=0)
+    a = a - a.mean(axis=0)
+    scale = (a * b).sum() / (a * a).sum()
+    error = np.linalg.norm(scale * a - b, axis=1).max() / np.linalg.norm(np.ptp(b, axis=0))
+    return {
+        "nodes": len(points), "seconds": seconds, "memory": peak() - before, "error": float(error),
+        "status": found.status, "gap": found.evidence[0].gap,
+    }  # fmt: skip
+
+
+def measure_pyamg(path: Path, near_null: str) -> dict:
+    import pyamg
+
+    matrix, points = load(path)
+    rhs = np.random.default_rng(0).standard_normal(matrix.shape[0])
+    given: dict = {}
+    if near_null in ("true", "recovered"):
+        from unassemble.elasticity import recover_elasticity, rigid_body_modes
+
+        row = np.arange(matrix.shape[0])
+        if near_null == "recovered":
+            given = {"B": recover_elasticity(matrix, cells=False).rigid_body_modes()}
+        else:
+            given = {"B": rigid_body_modes(points, row // 3, row % 3)}
+    before, start = peak(), perf_counter()
+    operator = sp.csr_matrix(matrix) if near_null == "plain" else sp.bsr_matrix(matrix, blocksize=(3, 3))
+    solver = pyamg.smoothed_aggregation_solver(operator, **given)
+    residuals: list = []
+    solver.solve(rhs, tol=1e-8, accel="cg", residuals=residuals, maxiter=1000)
+    return {"seconds": perf_counter() - start, "memory": peak() - before, "iterations": len(residuals) - 1}
+
+
+def in_process(*arguments: str) -> dict:
+    """Each measurement in a process of its own, so that memory peaks do not mix."""
+    done = subprocess.run([sys.executable, __file__, *arguments], capture_output=True, text=True, check=True)
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--sizes", nargs="+", type=int, default=[10, 15, 22, 31])
+    parser.add_argument("--kinds", nargs="+", default=["tet-p1", "hex-q1"])
+    parser.add_argument("--one", nargs="+")
+    chosen = parser.parse_args()
+    if chosen.one:
+        what, path = chosen.one[0], Path(chosen.one[1])
+        print(json.dumps(measure_recovery(path) if what == "recover" else measure_pyamg(path, what)))
+        return
+    for kind in chosen.kinds:
+        for size in chosen.sizes:
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / "case.npz"
+                assemble(kind, size, path)
+                mine = in_process("--one", "recover", str(path))
+                peers = {name: in_process("--one", name, str(path)) for name in ("plain", "block", "true", "recovered")}
+            print(
+                f"{kind} {mine['nodes']:7d} nodes: coordinates {mine['seconds']:6.2f} s {mine['memory']:6.0f} MiB, "
+                f"error {mine['error']:.0e}, {mine['status']}; PyAMG "
+                + "; ".join(
+                    f"{name} {one['seconds']:.2f} s {one['memory']:.0f} MiB {one['iterations']} it"
+                    for name, one in peers.items()
+                ),
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()

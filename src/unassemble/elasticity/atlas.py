@@ -1,0 +1,171 @@
+"""The atlas: charts joined where they overlap into fields on the whole body.
+
+Neighbouring charts share two layers of nodes and more. Coefficients c_P of the fields Z_P are wanted for which the
+charts agree
+there and the residual of every chart is least:
+
+    minimise  sum over P of |S_P c_P|^2  +  sum over nodes j and charts P of |Z_P(j) c_P - mean over the charts of j|^2
+
+over |c| = 1. This has a few unknowns per chart and is well conditioned: the charts' own
+conditioning is behind us. Exact null fields of the body are exactly those of value zero.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .charts import Chart, chart, patches
+from .identities import identities
+from .nodal import NodalMatrix
+
+_log = logging.getLogger(__name__)
+_PATCH = {2: 6000, 3: 1900}  # rows per chart: larger ones cost more to factorise, smaller ones overlap more
+_MOST = 64  # fields of the whole body to look for
+
+
+@dataclass(frozen=True, eq=False)
+class NullFields:
+    """Fields on the nodes of a body that fit its identities best.
+
+    Attributes
+    ----------
+    nodes : (n,) int64
+        Nodes that some valid identity touches.
+    fields : (n, d, k) float64
+        Orthonormal.
+    values : (k,) float64
+        Singular values, increasing; fields beyond the null fields are those of the joined charts, and their values
+        upper bounds.
+    rows : int
+        Nodes with valid identities.
+    charts : int
+    """
+
+    nodes: NDArray[np.int64]
+    fields: NDArray[np.float64]
+    values: NDArray[np.float64]
+    rows: int
+    charts: int
+
+
+def null_fields(
+    nodal: NodalMatrix,
+    valid: NDArray[np.bool_],
+    body: NDArray[np.int64],
+    *,
+    patch: int | None = None,
+    ratio: float | None = None,
+) -> NullFields:
+    """Least singular fields of all valid identities of a body.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    valid : (n, d, d) bool
+    body : (m,) int64
+        Nodes of the body, whose identities to use.
+    patch : int, optional
+        Most rows in one chart.
+    ratio : float, optional
+        lambda / mu, where it is known.
+    """
+    parts = _patches(nodal, body, patch or _PATCH[nodal.dim])
+    made = [chart(nodal, valid, rows, whole=len(parts) == 1, ratio=ratio) for rows in parts]
+    made = [one for one in made if len(one.nodes)]
+    _log.debug("%d charts of %s fields", len(made), [len(one.values) for one in made])
+    if not made:
+        return NullFields(np.empty(0, np.int64), np.empty((0, nodal.dim, 0)), np.empty(0), 0, 0)
+    if len(made) == 1:
+        one = made[0]
+        return NullFields(one.nodes, one.fields, one.values, one.rows, 1)
+    nodes, fields = _join(made, nodal.n)
+    return _measured(nodal, valid, parts, nodes, fields, made, ratio)
+
+
+def _patches(nodal: NodalMatrix, body: NDArray[np.int64], size: int) -> list[NDArray[np.int64]]:
+    if len(body) <= 1.5 * size:
+        return [body]
+    graph = sp.csr_array((np.ones(len(nodal.indices), np.int8), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2)
+    return [body[part] for part in patches(graph[body][:, body], size)]
+
+
+def _join(charts: list[Chart], n: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Nodes of the charts, and orthonormal fields on them whose charts agree best."""
+    d = charts[0].fields.shape[1]
+    copies = np.zeros(n)
+    for one in charts:
+        copies[one.nodes] += 1
+    nodes = np.flatnonzero(copies)
+    average = _average(charts, copies, n)
+    form = -(average.T @ average).toarray()
+    offset = 0
+    for one in charts:
+        k = len(one.values)
+        here = slice(offset, offset + k)
+        form[here, here] += np.eye(k) + np.diag(one.values**2)
+        offset += k
+    coefficients = _lowest(form, min(_MOST, offset))
+    fields = (average @ coefficients).reshape(n, d, -1)[nodes] / np.sqrt(copies[nodes])[:, None, None]
+    flat = np.linalg.qr(fields.reshape(len(nodes) * d, -1))[0]
+    return nodes, flat.reshape(len(nodes), d, -1)
+
+
+def _average(charts: list[Chart], copies: NDArray, n: int) -> sp.csr_array:
+    """(n d, coefficients) the sum of all copies of a node over the square root of their number."""
+    blocks, node, offset = [], [], 0
+    for one in charts:
+        blocks.append(one.fields / np.sqrt(copies[one.nodes])[:, None, None])
+        node.append(one.nodes)
+    d = charts[0].fields.shape[1]
+    entries, rows, columns = [], [], []
+    for block, where in zip(blocks, node, strict=True):
+        k = block.shape[2]
+        row = where[:, None, None] * d + np.arange(d)[None, :, None] + np.zeros(k, np.int64)
+        entries.append(block.ravel())
+        rows.append(row.ravel())
+        columns.append(np.broadcast_to(np.arange(offset, offset + k), block.shape).ravel())
+        offset += k
+    place = (np.concatenate(rows), np.concatenate(columns))
+    return sp.coo_array((np.concatenate(entries), place), shape=(n * d, offset)).tocsr()
+
+
+def _lowest(form: NDArray, count: int) -> NDArray:
+    """Eigenvectors of the least eigenvalues of a positive semidefinite form, by inverse iteration."""
+    n = len(form)
+    if n <= 4 * count:
+        return np.asarray(scipy.linalg.eigh(form)[1][:, :count])
+    factor = scipy.linalg.cho_factor(form + 1e-13 * np.eye(n))
+    x = np.random.default_rng(0).standard_normal((n, count))
+    for _ in range(4):
+        x = np.linalg.qr(scipy.linalg.cho_solve(factor, x))[0]
+    _, v = scipy.linalg.eigh(x.T @ form @ x)
+    return np.asarray(x @ v)
+
+
+def _measured(
+    nodal: NodalMatrix,
+    valid: NDArray[np.bool_],
+    parts: list[NDArray[np.int64]],
+    nodes: NDArray[np.int64],
+    fields: NDArray[np.float64],
+    made: list[Chart],
+    ratio: float | None,
+) -> NullFields:
+    """Rayleigh-Ritz on the whole body, through the identities part by part."""
+    d, k = fields.shape[1:]
+    place = np.full(nodal.n, -1)
+    place[nodes] = np.arange(len(nodes))
+    triangle = np.zeros((0, k))
+    for part in parts:
+        local = identities(nodal, valid, part, ratio)
+        residual = local.residual(fields[place[local.columns]]).reshape(-1, k)
+        triangle = np.asarray(np.linalg.qr(np.vstack([triangle, np.linalg.qr(residual, mode="r")]), mode="r"))
+    _, values, v = scipy.linalg.svd(triangle)
+    fields = (fields.reshape(-1, k) @ v[::-1].T).reshape(-1, d, k)
+    return NullFields(nodes, fields, values[::-1], sum(one.rows for one in made), len(made))

@@ -1,0 +1,197 @@
+"""Directions and nodes of unknowns that stand in no order.
+
+Entries between unknowns of the same direction add up to minus the diagonal over a row, those between different
+directions to little. So the right directions have the least energy: the sum of all entries between unknowns of the
+same one.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations, permutations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+_STARTS = 8
+_SETTLED = 0.05  # energy, relative to the trace, of directions that need no further start
+
+
+def find_directions(matrix: sp.csr_array, group: NDArray, identity: NDArray, d: int) -> NDArray[np.int64]:
+    """Direction of each row.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+    group : (N,) int64
+        Rows of one group belong to one node; at most d each. Nodes may be spread over several groups.
+    identity : (N,) bool
+    d : int
+
+    Returns
+    -------
+    (N,) int64
+        Which direction is called 0 is arbitrary unless the rows of whole nodes stand in order.
+    """
+    order = np.argsort(group, kind="stable")
+    size = np.bincount(group)
+    start = np.concatenate([[0], np.cumsum(size)[:-1]])
+    members = [order[start[size == k][:, None] + np.arange(k)] for k in range(1, d + 1)]
+    search = _Search(matrix, group, members, identity, d)
+    best: tuple[float, NDArray] | None = None
+    for known in _starts(members, len(group), d):
+        direction = search.complete(known)
+        energy = search.energy(direction)
+        if best is None or energy < best[0] - 1e-9:  # equally good names of axes: the first start keeps the order
+            best = (energy, direction)
+        if energy < _SETTLED:
+            break
+    return _named_in_order(best[1], members, d) if best is not None else np.zeros(len(group), np.int64)
+
+
+def _named_in_order(direction: NDArray, members: list[NDArray], d: int) -> NDArray[np.int64]:
+    """Exchange the names of directions so that those of whole nodes, or of all rows, increase as often as possible."""
+    names = [np.array(one) for one in permutations(range(d))]
+    if len(members[-1]):
+        ordered = [int((name[direction[members[-1]]] == np.arange(d)).all(axis=1).sum()) for name in names]
+    else:
+        ordered = [int((np.diff(name[direction]) > 0).sum()) for name in names]
+    return names[int(np.argmax(ordered))][direction]
+
+
+def _starts(members: list[NDArray], n: int, d: int) -> list[NDArray]:
+    """First all whole nodes in the order of their rows; then one node each; without any, d consecutive rows."""
+    whole = members[-1]
+    starts = []
+    if len(whole):
+        ordered = np.full(n, -1)
+        ordered[whole] = np.arange(d)
+        starts.append(ordered)
+        seeds = whole[np.unique(np.linspace(0, len(whole) - 1, _STARTS).astype(int))]
+    else:
+        seeds = np.unique(np.linspace(0, n - d, _STARTS).astype(int))[:, None] + np.arange(d)
+    for seed in seeds:
+        one = np.full(n, -1)
+        one[seed] = np.arange(d)
+        starts.append(one)
+    return starts
+
+
+class _Search:
+    """Directions that spread over the nodes, the surest first, and are then reconsidered."""
+
+    def __init__(self, matrix: sp.csr_array, group: NDArray, members: list[NDArray], identity: NDArray, d: int):
+        off = matrix.tocoo()
+        between = group[off.row] != group[off.col]
+        sign = np.sign(matrix.diagonal().sum())
+        entries = (-sign * off.data[between], (off.row[between], off.col[between]))
+        self._coupling = sp.csr_array(entries, shape=matrix.shape)
+        self._strength = np.asarray(abs(self._coupling).sum(axis=1)).ravel()
+        self._trace = float(np.abs(matrix.diagonal()[~identity]).sum())
+        self._diagonal = float(sign * matrix.diagonal()[~identity].sum())
+        self._members, self._live, self._d = members, ~identity, d
+
+    def energy(self, direction: NDArray) -> float:
+        """Sum of the entries between rows of the same direction, relative to the trace."""
+        label = self._labels(direction)
+        return (self._diagonal - float((label * (self._coupling @ label)).sum())) / self._trace
+
+    def complete(self, direction: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Fill in directions of -1, then let every node reconsider until nothing changes."""
+        direction = direction.copy()
+        whole = self._members[-1]
+        while True:
+            best, margin = self._assign(direction)
+            margin[direction >= 0] = 0
+            if margin.max(initial=0) <= 0:
+                loose: NDArray[np.int64] = np.flatnonzero(direction[whole[:, 0]] < 0)
+                if not len(loose):
+                    break
+                direction[whole[loose[0]]] = np.arange(self._d)  # another piece: its order is ours to choose
+                continue
+            # A twentieth more nodes at a time: late doubts meet more labelled neighbours.
+            count = max(1, int((direction >= 0).sum() // 20), int((margin > 0.5).sum()))
+            take = margin >= np.partition(margin, -count)[-count]
+            direction[take] = best[take]
+        return self._reconsider(direction)
+
+    def _reconsider(self, direction: NDArray) -> NDArray:
+        """Lower the energy node by node.
+
+        Half of those that want to, at a time, so that neighbours do not swap for ever.
+        """
+        rng = np.random.default_rng(0)
+        for _ in range(60):
+            best, margin = self._assign(direction)
+            wanting = (best != direction) & (margin > 1e-9)
+            if not wanting.any():
+                break
+            coin = np.zeros(len(direction), dtype=bool)
+            for rows in self._members:
+                coin[rows] = (rng.random(len(rows)) < 0.5)[:, None]
+            change = coin & (margin > 0)
+            direction = np.where(change, best, direction)
+        return np.where(direction < 0, 0, direction)
+
+    def _labels(self, direction: NDArray) -> NDArray:
+        known = np.flatnonzero((direction >= 0) & self._live)
+        label = np.zeros((len(direction), self._d))
+        label[known, direction[known]] = 1
+        return label
+
+    def _assign(self, direction: NDArray) -> tuple[NDArray, NDArray]:
+        """Best directions of each row's node, and by how much they beat the second best, relative."""
+        score = self._coupling @ self._labels(direction)
+        best = direction.copy()
+        margin = np.zeros(len(direction))
+        for rows in self._members:
+            if len(rows):
+                choices = np.array(list(permutations(range(self._d), rows.shape[1])))
+                fit = score[rows[:, None, :], choices[None]].sum(axis=2)
+                two = np.partition(fit, -2, axis=1)[:, -2:]
+                best[rows] = choices[np.argmax(fit, axis=1)]
+                size = self._strength[rows].sum(axis=1) / self._d
+                margin[rows] = ((two[:, 1] - two[:, 0]) / np.where(size > 0, size, 1))[:, None]
+        return best, margin
+
+
+def nodes_by_neighbours(matrix: sp.csr_array, direction: NDArray, d: int) -> NDArray[np.int64]:
+    """Pair rows of different directions that couple to the same rows, although entries that vanished are not stored.
+
+    Row r of direction c and row s of direction b belong to one node if r couples to those rows of direction b
+    to which s does, and s to those of direction c to which r does. Both have to prefer each other.
+    """
+    order = matrix.shape[0]
+    pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
+    rows = [np.flatnonzero(direction == a) for a in range(d)]
+    first, second = [], []
+    for c, b in combinations(range(d), 2):
+        if not len(rows[c]) or not len(rows[b]):
+            continue
+        cross = pattern[rows[c]][:, rows[b]]
+        own_c, own_b = pattern[rows[c]][:, rows[c]], pattern[rows[b]][:, rows[b]]
+        r, s = _mutual_best(cross, own_c, own_b, rows[c], rows[b])
+        first.append(rows[c][r])
+        second.append(rows[b][s])
+    if not first:
+        return np.arange(order)
+    pairs = (np.concatenate(first), np.concatenate(second))
+    link = sp.csr_array((np.ones(len(pairs[0])), pairs), shape=(order, order))
+    return sp.csgraph.connected_components(link, directed=False)[1].astype(np.int64)
+
+
+def _mutual_best(
+    cross: sp.csr_array, own_c: sp.csr_array, own_b: sp.csr_array, rows_c: NDArray, rows_b: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Pairs (r, s) that are each other's most similar partner."""
+    common = (cross @ own_b + own_c @ cross).tocoo()
+    size_r = np.asarray(cross.sum(axis=1)).ravel() + np.asarray(own_c.sum(axis=1)).ravel()
+    size_s = np.asarray(cross.sum(axis=0)).ravel() + np.asarray(own_b.sum(axis=1)).ravel()
+    alike = 2 * common.data / (size_r[common.row] + size_s[common.col])
+    # Rows next to each other win where nothing else decides.
+    alike = alike - 1e-6 * np.minimum(np.abs(rows_c[common.row] - rows_b[common.col]), 1e4) / 1e4
+    best_r, best_s = np.zeros(len(size_r)), np.zeros(len(size_s))
+    np.maximum.at(best_r, common.row, alike)
+    np.maximum.at(best_s, common.col, alike)
+    chosen = (alike == best_r[common.row]) & (alike == best_s[common.col]) & (alike > 0.5)
+    return common.row[chosen], common.col[chosen]

@@ -1,0 +1,76 @@
+"""Rigid-body modes for multigrid, and coordinate files for other solvers."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+import scipy.io
+from numpy.typing import NDArray
+
+from ..errors import OutputError
+from .nodal import determined
+
+_VEC_CLASS_ID = 1211214
+
+
+def rigid_body_modes(
+    points: NDArray[np.float64],
+    node_of_row: NDArray[np.int64],
+    direction_of_row: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """Near-null space of an elasticity matrix, in the layout that PyAMG expects.
+
+    Parameters
+    ----------
+    points : (n, d) float64
+        NaN rows get translations only.
+    node_of_row, direction_of_row : (N,) int64
+
+    Returns
+    -------
+    (N, 3) or (N, 6) float64
+        Translations, then rotations, row by row of the matrix. Rotations about the centroid, each column of norm
+        sqrt(N / d)
+        or so, so that none swamps another.
+    """
+    d = points.shape[1]
+    known = determined(points)
+    x = points - points[known].mean(axis=0) if known.any() else np.zeros_like(points)
+    x = np.where(known[:, None], x, 0.0)
+    radius = np.sqrt((x**2).sum(axis=1).mean())
+    x = (x / radius if radius > 0 else x)[node_of_row]
+    row = np.arange(len(node_of_row))
+    planes = [(0, 1)] if d == 2 else [(0, 1), (2, 0), (1, 2)]
+    modes = np.zeros((len(row), d + len(planes)))
+    modes[row, direction_of_row] = 1
+    for k, (a, b) in enumerate(planes, start=d):
+        modes[:, k] = np.where(direction_of_row == b, x[:, a], 0) - np.where(direction_of_row == a, x[:, b], 0)
+    return modes
+
+
+def save_petsc_vec(path: str | PathLike[str], points: NDArray[np.float64]) -> None:
+    """Write coordinates as a Vec in PETSc's binary format, node by node, for ``PCSetCoordinates``.
+
+    Big-endian: class identifier 1211214 and length as 32-bit integers, then the values as doubles.
+    """
+    values = _determined(points).ravel()
+    header = np.array([_VEC_CLASS_ID, len(values)], dtype=">i4")
+    Path(path).write_bytes(header.tobytes() + values.astype(">f8").tobytes())
+
+
+def save_amgcl_coordinates(path: str | PathLike[str], points: NDArray[np.float64]) -> None:
+    """Write coordinates as a dense Matrix Market array of n rows and d columns, for AMGCL's ``-C``."""
+    with Path(path).open("wb") as file:
+        scipy.io.mmwrite(file, _determined(points), precision=17, symmetry="general")
+
+
+def _determined(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    loose = np.flatnonzero(~determined(points))
+    if len(loose):
+        raise OutputError(
+            f"node {loose[0]} and {len(loose) - 1} more have no coordinates, and this format has no way to say so; "
+            "write the .npz, or fill them in first"
+        )
+    return points

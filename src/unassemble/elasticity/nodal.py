@@ -1,0 +1,133 @@
+"""A vector-valued matrix seen node by node, and which of its rows still say something about positions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .unknowns import Numbering
+
+_ROUNDING = 1e-9  # a row that annihilates constants does so to rounding; supports leave 1e-3 and more
+_PENALTY = 1e3  # a diagonal entry this many times the rest of its row is a penalty
+
+
+@dataclass(frozen=True, eq=False)
+class NodalMatrix:
+    """Square blocks of order d, one per pair of coupled nodes, in CSR form.
+
+    Attributes
+    ----------
+    indptr, indices : int32
+        Graph of the nodes, columns increasing, every node coupled to itself.
+    data : (nnz, d, d) float64
+        ``data[k, c, b]`` is A^{cb}_ij; unknowns that the matrix lacks have zeros.
+    row_of : (n, d) int64
+        Matrix row of each unknown, -1 where there is none.
+    size : (n,) float64
+        Mean absolute sum of a node's off-diagonal blocks, the unit in which its equations are measured.
+    """
+
+    indptr: NDArray[np.int32]
+    indices: NDArray[np.int32]
+    data: NDArray[np.float64]
+    row_of: NDArray[np.int64]
+    size: NDArray[np.float64]
+
+    @property
+    def n(self) -> int:
+        """Number of nodes."""
+        return len(self.indptr) - 1
+
+    @property
+    def dim(self) -> int:
+        """Order of the blocks, which is the dimension of space."""
+        return self.data.shape[1]
+
+    @property
+    def node(self) -> NDArray[np.int32]:
+        """(nnz,) the node to whose rows each block belongs."""
+        return np.repeat(np.arange(self.n, dtype=np.int32), np.diff(self.indptr))
+
+    def row_sums(self, entries: NDArray | None = None) -> NDArray:
+        """(n, ...) sums over each node's blocks."""
+        entries = self.data if entries is None else entries
+        return np.add.reduceat(entries, self.indptr[:-1], axis=0)  # no node is empty
+
+
+def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
+    """Gather the unknowns of each node into blocks.
+
+    Unknowns whose row and column are those of the identity are left out, as if they had been eliminated.
+    """
+    n, d = numbering.n_nodes, numbering.block_size
+    place = numbering.node_of_row * d + numbering.direction_of_row
+    row_of = np.full(n * d, -1, dtype=np.int64)
+    live = ~numbering.identity_row
+    row_of[place[live]] = np.flatnonzero(live)
+    coo = matrix.tocoo()
+    keep = live[coo.row] & live[coo.col]
+    diagonal = np.arange(n) * d
+    entries = sp.coo_array(
+        (
+            np.concatenate([coo.data[keep], np.zeros(n)]),
+            (np.concatenate([place[coo.row[keep]], diagonal]), np.concatenate([place[coo.col[keep]], diagonal])),
+        ),
+        shape=(n * d, n * d),
+    )
+    blocks = entries.tocsr().tobsr(blocksize=(d, d))
+    blocks.sort_indices()
+    indptr = blocks.indptr.astype(np.int32)
+    indices, data = blocks.indices[: indptr[-1]].astype(np.int32), blocks.data[: indptr[-1]]
+    off = np.abs(data).sum(axis=(1, 2)) / d**2
+    off[np.repeat(np.arange(n), np.diff(indptr)) == indices] = 0
+    size = np.add.reduceat(off, indptr[:-1])
+    return NodalMatrix(indptr, indices, data, row_of.reshape(n, d), size)
+
+
+def valid_pairs(nodal: NodalMatrix, *, strict: bool = True) -> NDArray[np.bool_]:
+    """Which rows of which blocks hold every coefficient that assembly gave them.
+
+    Row i of A^{cb} annihilates constants, unless a coupled unknown of component b was taken away or the
+    diagonal was changed. The converse fails on regular meshes, where what is missing can add up to zero (two
+    eliminated nodes opposite each other). So the strict rule asks it of all rows of a node at once: they couple to
+    the same
+    unknowns, and a neighbour that is known to lack the direction spoils it. A penalty on the diagonal explains
+    itself and spoils its own row only.
+
+    Returns
+    -------
+    (n, d, d) bool
+        Component c of the row, component b of the columns.
+    """
+    size = np.where(nodal.size > 0, nodal.size, np.inf)[:, None, None]
+    present = nodal.row_of >= 0
+    zero = np.abs(nodal.row_sums()) <= _ROUNDING * size
+    valid = zero & present[:, :, None] & present[:, None, :] & (nodal.size > 0)[:, None, None]
+    if not strict:
+        return valid
+    d = nodal.dim
+    excused = penalised(nodal)[:, None, :] & np.eye(d, dtype=bool) | ~present[:, :, None]
+    graph = sp.csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2)
+    lacking = graph @ ~present
+    return valid & ((zero | excused).all(axis=1) & (lacking == 0))[:, None, :]
+
+
+def penalised(nodal: NodalMatrix) -> NDArray[np.bool_]:
+    """(n, d) unknowns with a penalty on the diagonal."""
+    own = nodal.data[nodal.node == nodal.indices]
+    diagonal = np.abs(np.diagonal(own, axis1=1, axis2=2))
+    return (diagonal > _PENALTY * nodal.size[:, None]) & (nodal.size > 0)[:, None]
+
+
+def uncoupled(nodal: NodalMatrix) -> bool:
+    """Whether no component is coupled to another: a vector Laplacian, several scalar matrices side by side."""
+    off = np.abs(nodal.data[:, ~np.eye(nodal.dim, dtype=bool)])
+    return bool(off.max(initial=0) <= 1e-12 * np.median(nodal.size[nodal.size > 0])) if nodal.size.any() else True
+
+
+def determined(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) nodes that have coordinates."""
+    return np.asarray(np.isfinite(points).all(axis=1))

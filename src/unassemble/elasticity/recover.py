@@ -1,0 +1,156 @@
+"""Coordinates from an elasticity matrix, and nothing else: the whole room on one page."""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..errors import GeometryError, MatrixError
+from .cells import Cells, no_cells, recognise_cells
+from .certificate import largest_residual
+from .material import poisson_ratio
+from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled
+from .positions import Solution, solve
+from .results import ElasticityRecovery, ScalarParts
+from .unknowns import Numbering, find_numbering
+
+CERTIFIED = 1e-9
+
+
+def scalar_parts(matrix: sp.csr_array, *, block_size: int | None = None) -> ScalarParts | None:
+    """Take a vector Laplacian apart; None for matrices that couple directions or have no nodes of several unknowns."""
+    numbering = find_numbering(sp.csr_array(matrix), block_size)
+    nodal = nodal_matrix(sp.csr_array(matrix), numbering)
+    if not uncoupled(nodal):
+        return None
+    nodes = tuple(np.flatnonzero(nodal.row_of[:, a] >= 0) for a in range(nodal.dim))
+    rows = [nodal.row_of[here, a] for a, here in enumerate(nodes)]
+    return ScalarParts(tuple(sp.csr_array(matrix)[r][:, r] for r in rows), nodes, numbering)
+
+
+def recover_elasticity(
+    matrix: sp.csr_array,
+    *,
+    block_size: int | None = None,
+    numbering: Numbering | None = None,
+    cells: bool = True,
+    patch: int | None = None,
+) -> ElasticityRecovery:
+    """Recover node positions from the stiffness matrix of isotropic linear elasticity.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+        Symmetric; unknowns may be eliminated, replaced by identity rows, or penalised.
+    block_size : int, optional
+        2 or 3; found where it is not given.
+    numbering : Numbering, optional
+        Where it is known; see :func:`.unknowns.given_numbering`.
+    cells : bool
+        Look for elements too.
+    patch : int, optional
+        Most nodes per chart; see :mod:`.atlas`.
+
+    Raises
+    ------
+    MatrixError
+        If the matrix is not symmetric.
+    RecoveryError
+        If it is no elasticity matrix, or determines nothing.
+    """
+    clock = _Clock()
+    matrix = sp.csr_array(matrix, dtype=np.float64)
+    _check(matrix)
+    numbering = numbering or find_numbering(matrix, block_size)
+    nodal = nodal_matrix(matrix, numbering)
+    if uncoupled(nodal):
+        raise GeometryError(
+            "the directions are not coupled: these are scalar matrices side by side; recover one of them by itself"
+        )
+    clock.lap("numbering")
+    solution = solve(nodal, patch)
+    clock.lap("null space")
+    return _describe(nodal, numbering, solution, clock, cells)
+
+
+def _describe(
+    nodal: NodalMatrix, numbering: Numbering, solution: Solution, clock: _Clock, want_cells: bool
+) -> ElasticityRecovery:
+    """Certificate, material, cells and the sentences that go with them."""
+    points = solution.points
+    error = largest_residual(nodal, solution.valid, points, solution.ratio)
+    ratio = poisson_ratio(nodal, solution.valid, points) if error < 1e-6 else None
+    clock.lap("certificate")
+    found = recognise_cells(nodal, points) if want_cells and error < 1e-6 else no_cells(nodal.dim)
+    clock.lap("cells")
+    backward = found.backward_error if found.recognised else error
+    status, reason = _verdict(solution, error, found)
+    loose = ~determined(points)
+    warnings = list(solution.warnings)
+    if loose.any():
+        warnings.append(f"{loose.sum()} of {nodal.n} nodes are tied to eliminated unknowns only and stay undetermined")
+    if solution.ratio is not None:
+        warnings.append("Poisson's ratio, read off the nodes that determine it, was used to determine others")
+    return ElasticityRecovery(
+        points, numbering.node_of_row, numbering.direction_of_row, np.asarray(loose, dtype=np.int8), solution.component,
+        solution.evidence, ratio, found, backward, status, reason, numbering.kind, tuple(warnings), clock.seconds,
+    )  # fmt: skip
+
+
+_FREEDOMS = {
+    "axes": "each axis keeps a scale of its own",
+    "affine": "an affine map stays free, since the material around every valid row is homogeneous",
+}
+
+
+def _verdict(solution: Solution, error: float, found: Cells) -> tuple[str, str]:
+    remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
+    if remaining:
+        return "uncertified", f"the null space is larger than it should be: {remaining[0]}"
+    if not solution.exact:
+        worst = max(one.residual for one in solution.evidence)
+        return "uncertified", (
+            f"no exact null vector exists (singular value {worst:.1e}); the points are the best fit, as for materials "
+            "that are not isotropic, or elements that do not reproduce linear functions"
+        )
+    if not solution.strict:
+        return "uncertified", (
+            "supports leave too few rows that are surely whole; rows whose entries add up to zero were taken for "
+            "whole, which they need not be"
+        )
+    if found.recognised and found.backward_error <= CERTIFIED:
+        return "certified", f"the matrix re-assembled on the {found.n_cells} elements is the given one"
+    if error <= CERTIFIED:
+        return "certified", "the valid identities hold to rounding, and only translations and scale satisfy them"
+    return "uncertified", f"the largest residual of a valid identity is {error:.1e}"
+
+
+def _check(matrix: sp.csr_array) -> None:
+    if matrix.shape[0] != matrix.shape[1]:
+        raise MatrixError(f"the matrix has {matrix.shape[0]} rows and {matrix.shape[1]} columns; it must be square")
+    if not np.isfinite(matrix.data).all():
+        raise MatrixError("the matrix has entries that are not finite")
+    off = abs(matrix - matrix.T)
+    scale = abs(matrix).max(axis=1).toarray().ravel()
+    worst = off.tocoo()
+    bad = np.flatnonzero(worst.data > 1e-8 * scale[worst.row])
+    if len(bad):
+        at = bad[0]
+        raise MatrixError(
+            f"entry ({worst.row[at]}, {worst.col[at]}) differs from its transpose's; it must be symmetric"
+        )
+
+
+class _Clock:
+    """Seconds by stage."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._last = perf_counter()
+
+    def lap(self, name: str) -> None:
+        now = perf_counter()
+        self.seconds[name] = now - self._last
+        self._last = now

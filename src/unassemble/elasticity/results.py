@@ -1,0 +1,111 @@
+"""Frozen results of the room."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .cells import Cells
+from .modes import rigid_body_modes
+from .unknowns import Numbering
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How uniquely the matrix determines a piece.
+
+    Attributes
+    ----------
+    null_dimension : int
+        Independent fields that satisfy all valid identities, nodes that stay loose left out. 4 in space, 3 in the
+        plane: translations and scale.
+    residual : float
+        Singular value of the coordinates: norm of the residual over the norm of the centred field.
+    gap : float
+        Singular value of the best field that is none of these; an upper bound on large bodies.
+    rows : int
+        Nodes with valid identities.
+    """
+
+    null_dimension: int
+    residual: float
+    gap: float
+    rows: int
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticityRecovery:
+    """Nodes and directions of a vector-valued matrix, and their positions.
+
+    Attributes
+    ----------
+    points : (n, d) float64
+        Row i belongs to node i; NaN where the matrix does not determine it. Axes are those of the matrix; per piece the
+        centroid is the origin and the mean edge length of the graph 1. The sign (a point reflection) is free.
+    node_of_row, direction_of_row : (N,) int64
+    node_status : (n,) int8
+        0 determined, 1 not.
+    component : (n,) int64
+        Piece of each node, -1 for nodes without one.
+    evidence : tuple of Evidence
+        One per piece.
+    poisson_ratio : float or None
+        Where it is one number; plane strain in the plane.
+    cells : Cells
+        Elements, where they are recognised.
+    backward_error : float
+        Largest residual of a valid identity; or of the re-assembled matrix where `cells` hold.
+    status : {"certified", "uncertified"}
+    reason : str
+    numbering : str
+        How the unknowns are numbered: ``"interleaved"``, ``"by component"`` or ``"pattern"``.
+    warnings : tuple of str
+    timings : mapping of str to float
+        Seconds by stage.
+    """
+
+    points: NDArray[np.float64]
+    node_of_row: NDArray[np.int64]
+    direction_of_row: NDArray[np.int64]
+    node_status: NDArray[np.int8]
+    component: NDArray[np.int64]
+    evidence: tuple[Evidence, ...]
+    poisson_ratio: float | None
+    cells: Cells
+    backward_error: float
+    status: str
+    reason: str
+    numbering: str
+    warnings: tuple[str, ...] = ()
+    timings: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def certified(self) -> bool:
+        """Whether the coordinates satisfy the matrix to rounding, and nothing else does."""
+        return self.status == "certified"
+
+    def rigid_body_modes(self) -> NDArray[np.float64]:
+        """(N, 3) or (N, 6) near-null space in PyAMG's layout; see :func:`.modes.rigid_body_modes`."""
+        return rigid_body_modes(self.points, self.node_of_row, self.direction_of_row)
+
+
+@dataclass(frozen=True, eq=False)
+class ScalarParts:
+    """A vector-valued matrix whose directions do not know of each other.
+
+    Attributes
+    ----------
+    matrices : tuple of (n_k, n_k) sparse
+        One scalar matrix per direction, over the nodes that have that direction.
+    nodes : tuple of (n_k,) int64
+        Node of each row of these matrices.
+    numbering : Numbering
+    """
+
+    matrices: tuple[sp.csr_array, ...]
+    nodes: tuple[NDArray[np.int64], ...]
+    numbering: Numbering

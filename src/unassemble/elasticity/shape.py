@@ -1,0 +1,143 @@
+"""From null fields to coordinates: projecting translations out, setting aside what stays loose, choosing the gauge."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..errors import GeometryError
+
+EXACT = 1e-9  # singular values below this are zero; matrices are rounded to 1e-16, gaps are 1e-4 and more
+_LOOSE = 1e-7  # a field this small at a node leaves it alone
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Coordinates of one piece.
+
+    Attributes
+    ----------
+    points : (n, d) float64
+        Centred, of norm one; NaN where loose.
+    loose : (n,) bool
+        Nodes that can move while the others stay.
+    dimension : int
+        Of the null space, translations counted, loose nodes left out.
+    freedom : {"", "axes", "affine"}
+        What remains beyond translation and scale.
+    exact : bool
+        Whether the field is a null field, not only the best one.
+    """
+
+    points: NDArray[np.float64]
+    loose: NDArray[np.bool_]
+    dimension: int
+    freedom: str
+    exact: bool
+
+
+def shape(fields: NDArray[np.float64], values: NDArray[np.float64]) -> Shape:
+    """Find the coordinates among the least singular fields.
+
+    Parameters
+    ----------
+    fields : (n, d, k) float64
+        Orthonormal.
+    values : (k,) float64
+        Increasing singular values.
+
+    Raises
+    ------
+    GeometryError
+        If the null space leaves more than an affine map free, or there are too few nodes.
+    """
+    n, d, k = fields.shape
+    if k <= d:
+        raise GeometryError(f"{n} nodes with valid rows are too few to tell their positions")
+    exact = values[d] <= EXACT
+    null = fields[..., values <= EXACT] if exact else fields[..., : d + 1]
+    loose = np.zeros(n, dtype=bool)
+    if null.shape[2] > d + 1:
+        null, loose = _set_aside(null)
+    kept = null[~loose]
+    moving = _without_translations(kept)
+    dimension = d + moving.shape[2]
+    points = np.full((n, d), np.nan)
+    points[~loose], freedom = _choose(moving)
+    return Shape(points, loose, dimension, freedom, bool(exact))
+
+
+def _set_aside(null: NDArray) -> tuple[NDArray, NDArray[np.bool_]]:
+    """Find nodes that carry fields of their own, and the fields that the other nodes share.
+
+    Loose nodes move more than others in the null fields, and their own fields vanish at the others exactly. So the
+    fields that the least mobile nodes share are the body's, and what vanishes at all of these is loose.
+    """
+    n, d, k = null.shape
+    calm = np.argsort((null**2).sum(axis=(1, 2)), kind="stable")
+    for share in (0.75, 0.5, 0.25, 0.12):
+        some = calm[: max(int(share * n), min(n, d + 2))]
+        _, s, v = scipy.linalg.svd(null[some].reshape(-1, k), full_matrices=False)
+        if (s > _LOOSE * s[0]).sum() == d + 1:
+            own = np.einsum("nak,lk->nal", null, v[s <= _LOOSE * s[0]])
+            loose = np.abs(own).max(axis=(1, 2)) > 10 * _LOOSE
+            return _orthonormal(np.einsum("nak,lk->nal", null, v[: d + 1]), ~loose), loose
+    return null, np.zeros(n, dtype=bool)
+
+
+def _orthonormal(fields: NDArray, kept: NDArray[np.bool_]) -> NDArray:
+    """Fields orthonormal over the kept nodes, zero at the others."""
+    q = np.linalg.qr(fields[kept].reshape(-1, fields.shape[2]))[0]
+    full = np.zeros_like(fields)
+    full[kept] = q.reshape(-1, *fields.shape[1:])
+    return full
+
+
+def _without_translations(fields: NDArray) -> NDArray:
+    """Orthonormal basis of the centred fields."""
+    n, d, k = fields.shape
+    centred = (fields - fields.mean(axis=0)).reshape(n * d, k)
+    u, s, _ = scipy.linalg.svd(centred, full_matrices=False)
+    return u[:, s > 1e-6].reshape(n, d, -1)
+
+
+def _choose(moving: NDArray) -> tuple[NDArray, str]:
+    """The coordinates, or a representative and the name of what remains free."""
+    _, d, k = moving.shape
+    if k == 1:
+        return moving[..., 0], ""
+    if k == 0:
+        raise GeometryError("no field but translations fits the valid rows; this is no isotropic elasticity matrix")
+    single = [scipy.linalg.svd(moving[:, a], full_matrices=False) for a in range(d)]
+    ranks = [int((s > 1e-6).sum()) for _, s, _ in single]
+    if k == d and ranks == [1] * d:
+        return np.stack([u[:, 0] for u, _, _ in single], axis=1) / np.sqrt(d), "axes"
+    if k == d * d and ranks == [d] * d:
+        return single[0][0][:, :d] / np.sqrt(d), "affine"
+    raise GeometryError(
+        f"the valid rows leave a null space of dimension {d + k} where {d + 1} is expected: too many unknowns are "
+        "eliminated for the matrix to determine the nodes"
+    )
+
+
+def in_gauge(points: NDArray, graph: sp.csr_array) -> NDArray[np.float64]:
+    """Centroid at the origin, mean edge length 1, and of the two point reflections that with positive third moments.
+
+    Parameters
+    ----------
+    points : (n, d) float64
+        NaN rows are left out.
+    graph : (n, n) sparse
+    """
+    pairs = sp.triu(graph, 1).tocoo()
+    length = np.linalg.norm(points[pairs.row] - points[pairs.col], axis=1)
+    mean = np.nanmean(length) if np.isfinite(length).any() else 1.0
+    centred = (points - np.nanmean(points, axis=0)) / (mean if mean > 0 else 1.0)
+    moments = np.nansum(centred**3, axis=0)
+    spread = np.nansum(np.abs(centred) ** 3, axis=0)
+    decisive = np.flatnonzero(np.abs(moments) > 1e-6 * spread)
+    return -centred if len(decisive) and moments[decisive[0]] < 0 else centred

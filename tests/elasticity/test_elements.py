@@ -1,0 +1,86 @@
+"""Every element, structured and perturbed, homogeneous and not: coordinates to rounding."""
+
+import numpy as np
+import pytest
+from assembled import ELEMENTS, box, eliminated, error, heterogeneous, on_plane, permuted_nodes, stiffness
+
+from unassemble.elasticity import recover_elasticity
+
+TOLERANCE = 1e-8
+COUNTS = {"tri-p1": (8, 9), "tri-p2": (6, 7), "quad-q1": (8, 9), "tet-p1": (5, 6, 7), "hex-q1": (5, 6, 7)}
+
+
+def varying_ratio(x):
+    return 1 + x[1] + x[0] * x[1]
+
+
+def case(kind, perturb, varying):
+    counts = COUNTS.get(kind, (4, 5, 4))
+    material = {"lam": heterogeneous, "mu": varying_ratio} if varying else {"lam": 1.5, "mu": 1.0}
+    return permuted_nodes(stiffness(kind, box(kind, counts, perturb=perturb), **material), seed=1)
+
+
+@pytest.mark.parametrize("kind", ELEMENTS)
+@pytest.mark.parametrize("perturb", [0.0, 0.2])
+@pytest.mark.parametrize("varying", [False, True])
+def test_free_body(kind, perturb, varying):
+    given = case(kind, perturb, varying)
+    found = recover_elasticity(given.matrix)
+    assert found.certified
+    assert not found.node_status.any()
+    assert error(found.points, given.points) < TOLERANCE
+    assert [one.null_dimension for one in found.evidence] == [given.dim + 1]
+    assert found.evidence[0].gap > 1e4 * found.evidence[0].residual
+    assert found.backward_error < 1e-11
+    if varying:
+        assert found.poisson_ratio is None
+    else:
+        assert found.poisson_ratio == pytest.approx(0.3, abs=1e-10)
+
+
+@pytest.mark.parametrize("kind", ELEMENTS)
+@pytest.mark.parametrize("varying", [False, True])
+def test_clamped_body(kind, varying):
+    given = case(kind, 0.2, varying)
+    matrix, nodes = eliminated(given, np.repeat(on_plane(given, 0)[:, None], given.dim, axis=1))
+    found = recover_elasticity(matrix)
+    assert found.certified
+    assert len(found.points) == len(nodes)
+    assert error(found.points, given.points[nodes]) < TOLERANCE
+    # Linear elements lose no node. Nodes of quadratic ones inside the clamped layer of cells touch eliminated nodes
+    # only.
+    if kind in COUNTS and kind != "tri-p2":
+        assert not found.node_status.any()
+    else:
+        loose = given.points[nodes][found.node_status == 1]
+        assert (loose[:, 0] < np.unique(given.points[:, 0]).max() * 0.5).all()
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [("tri-p1", "triangles"), ("quad-q1", "quads"), ("tet-p1", "tetrahedra"), ("hex-q1", "hexahedra")]
+)
+@pytest.mark.parametrize("perturb", [0.0, 0.2])
+def test_cells(kind, name, perturb):
+    given = case(kind, perturb, varying=False)
+    found = recover_elasticity(given.matrix)
+    assert found.cells.kind == name
+    assert found.cells.backward_error < 1e-9
+    truth = {frozenset(cell) for cell in given.cells.tolist()}
+    # scikit-fem's vertices are numbered as the nodes of linear elements
+    assert {frozenset(cell) for cell in found.cells.cells.tolist()} == truth
+    lam, mu = found.cells.lame.T
+    assert lam / mu == pytest.approx(np.full(len(lam), 1.5), abs=1e-6)
+    edges = found.points[found.cells.cells[:, [1, -1]]] - found.points[found.cells.cells[:, :1]]
+    if given.dim == 2:
+        sign = np.linalg.det(edges)
+        assert (sign > 0).all()
+
+
+def test_poisson_ratio_near_one_half_loses_digits():
+    """Stated accuracy: nu = 0.499 costs less than four digits on a graded mesh."""
+    nu = 0.499
+    given = stiffness("hex-q1", box("hex-q1", (7, 7, 7), perturb=0.1, grading=2.0), lam=2 * nu / (1 - 2 * nu), mu=1.0)
+    found = recover_elasticity(given.matrix)
+    assert found.certified
+    assert error(found.points, given.points) < 1e-10
+    assert found.poisson_ratio == pytest.approx(nu, abs=1e-9)

@@ -1,0 +1,118 @@
+"""What the matrix does not tell is said, not guessed; and what coordinates are for."""
+
+import numpy as np
+import pyamg
+import pytest
+import scipy.sparse as sp
+import skfem
+from assembled import box, eliminated, error, on_plane, permuted_nodes, stiffness
+from skfem.helpers import ddot, grad, sym_grad, trace
+
+from unassemble.elasticity import (
+    recover_elasticity,
+    rigid_body_modes,
+    save_amgcl_coordinates,
+    save_petsc_vec,
+    scalar_parts,
+)  # fmt: skip
+from unassemble.errors import GeometryError, OutputError
+
+
+@skfem.BilinearForm
+def orthotropic(u, v, w):
+    e, f = sym_grad(u), sym_grad(v)
+    return trace(e) * trace(f) + 2 * ddot(e, f) + 0.3 * e[0, 0] * f[0, 0]
+
+
+@skfem.BilinearForm
+def vector_laplace(u, v, w):
+    return ddot(grad(u), grad(v))
+
+
+def test_orthotropic_material_is_a_best_fit():
+    given = stiffness("quad-q1", box("quad-q1", (8, 8), perturb=0.2), form=orthotropic)
+    found = recover_elasticity(given.matrix)
+    assert found.status == "uncertified"
+    assert "no exact null vector" in found.reason
+    assert found.evidence[0].residual > 1e-6
+    assert error(found.points, given.points) < 0.1  # the shape is nearly right all the same
+
+
+def test_homogeneous_interior_leaves_an_affine_map():
+    """With the whole boundary eliminated nothing fixes the axes: every linear field satisfies the identities."""
+    given = stiffness("tri-p1", box("tri-p1", (9, 10), perturb=0.2))
+    rim = on_plane(given, 0) | on_plane(given, 0, 1.0) | on_plane(given, 1) | on_plane(given, 1, 1.0)
+    matrix, nodes = eliminated(given, np.repeat(rim[:, None], 2, axis=1))
+    found = recover_elasticity(matrix)
+    assert found.status == "uncertified"
+    assert "affine" in found.reason
+    known = np.isfinite(found.points).all(axis=1)
+    design = np.column_stack([found.points[known], np.ones(known.sum())])
+    _, residual, *_ = np.linalg.lstsq(design, given.points[nodes][known], rcond=None)
+    assert residual.max() < 1e-16
+
+
+def test_vector_laplacian_comes_apart():
+    given = stiffness("tet-p1", box("tet-p1", (4, 4, 4)), form=vector_laplace)
+    with pytest.raises(GeometryError, match="not coupled"):
+        recover_elasticity(given.matrix)
+    parts = scalar_parts(given.matrix)
+    assert len(parts.matrices) == 3
+    assert abs(parts.matrices[0] - parts.matrices[2]).max() < 1e-14
+    assert scalar_parts(stiffness("tet-p1", box("tet-p1", (4, 4, 4))).matrix) is None
+
+
+def test_charts_agree_with_one_factorisation():
+    given = permuted_nodes(stiffness("tet-p1", box("tet-p1", (9, 9, 9), perturb=0.2)))
+    for patch in (10_000, 200):
+        found = recover_elasticity(given.matrix, patch=patch, cells=False)
+        assert found.certified
+        assert error(found.points, given.points) < 1e-10
+
+
+def test_pyamg_bar():
+    example = pyamg.gallery.load_example("bar")
+    found = recover_elasticity(sp.csr_array(example["A"]))
+    truth = example["vertices"]
+    if len(truth) != len(found.points):  # the clamped end is not in the matrix
+        ends = [np.abs(truth[:, 0] - end) > 1e-9 for end in (truth[:, 0].min(), truth[:, 0].max())]
+        truth = min(
+            (truth[kept] for kept in ends if kept.sum() == len(found.points)), key=lambda x: error(found.points, x)
+        )
+    assert found.certified
+    assert error(found.points, truth) < 1e-11
+
+
+def test_modes_are_annihilated_and_serve_multigrid():
+    given = permuted_nodes(stiffness("hex-q1", box("hex-q1", (25, 6, 6), perturb=0.1, stretch=(5, 1, 1))))
+    matrix, nodes = eliminated(given, np.repeat(on_plane(given, 0)[:, None], 3, axis=1))
+    row = np.arange(matrix.shape[0])
+    found = recover_elasticity(matrix, cells=False)
+    free = recover_elasticity(given.matrix, cells=False)
+    size = abs(given.matrix).sum(axis=1).max()
+    assert np.abs(given.matrix @ free.rigid_body_modes()).max() < 1e-10 * size
+    counts = {}
+    rhs = np.random.default_rng(0).standard_normal(len(row))
+    true = rigid_body_modes(given.points[nodes], row // 3, row % 3)
+    for name, modes in {"true": true, "recovered": found.rigid_body_modes(), "none": None}.items():
+        solver = pyamg.smoothed_aggregation_solver(sp.bsr_matrix(matrix, blocksize=(3, 3)), B=modes)
+        residuals = []
+        solver.solve(rhs, tol=1e-8, accel="cg", residuals=residuals)
+        counts[name] = len(residuals) - 1
+    assert abs(counts["recovered"] - counts["true"]) <= 0.05 * counts["true"]
+    assert counts["recovered"] < counts["none"]
+
+
+def test_exports(tmp_path):
+    points = np.random.default_rng(0).standard_normal((5, 3))
+    save_petsc_vec(tmp_path / "x.bin", points)
+    raw = (tmp_path / "x.bin").read_bytes()
+    assert np.frombuffer(raw[:8], ">i4").tolist() == [1211214, 15]
+    assert np.array_equal(np.frombuffer(raw[8:], ">f8").reshape(5, 3), points)
+    save_amgcl_coordinates(tmp_path / "x.mtx", points)
+    from scipy.io import mmread
+
+    assert np.array_equal(mmread(tmp_path / "x.mtx"), points)
+    points[2] = np.nan
+    with pytest.raises(OutputError, match="node 2"):
+        save_petsc_vec(tmp_path / "y.bin", points)
