@@ -86,7 +86,7 @@ def _describe(
     found = recognise_cells(nodal, points) if want_cells and error < 1e-6 else no_cells(nodal.dim)
     clock.lap("cells")
     backward = found.backward_error if found.recognised else error
-    status, reason = _verdict(solution, error, found)
+    status, reason = _verdict(solution, error, found, numbering)
     loose = ~determined(points)
     warnings = list(solution.warnings)
     if loose.any():
@@ -105,7 +105,7 @@ _FREEDOMS = {
 }
 
 
-def _verdict(solution: Solution, error: float, found: Cells) -> tuple[str, str]:
+def _verdict(solution: Solution, error: float, found: Cells, numbering: Numbering) -> tuple[str, str]:
     remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
     if remaining:
         return "uncertified", f"the null space is larger than it should be: {remaining[0]}"
@@ -122,6 +122,11 @@ def _verdict(solution: Solution, error: float, found: Cells) -> tuple[str, str]:
         )
     if found.recognised and found.backward_error <= CERTIFIED:
         return "certified", f"the matrix re-assembled on the {found.n_cells} elements is the given one"
+    if numbering.kind == "pattern" and numbering.incomplete:
+        return "uncertified", (
+            "which rows belong to one node was inferred from the pattern, where some nodes lack rows; only elements "
+            "that re-assemble to the matrix would show that the inference is right"
+        )
     if error <= CERTIFIED:
         return "certified", "the valid identities hold to rounding, and only translations and scale satisfy them"
     return "uncertified", f"the largest residual of a valid identity is {error:.1e}"

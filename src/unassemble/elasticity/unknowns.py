@@ -48,6 +48,11 @@ class Numbering:
     common: float
 
     @property
+    def incomplete(self) -> bool:
+        """Whether some node lacks rows."""
+        return len(self.node_of_row) != self.block_size * self.n_nodes
+
+    @property
     def n_nodes(self) -> int:
         """Number of nodes."""
         return int(self.node_of_row.max()) + 1
