@@ -19,7 +19,12 @@ from .surface import Piece, Topology
 
 
 def recognise(n: int, edges: NDArray) -> Topology:
-    """Find the triangles of a planar mesh in its graph, see :func:`recognise_connected`.
+    """Find the triangles of a planar mesh in its graph.
+
+    3-cycles with something on both sides are no faces. If every edge lies on at most two of the others, and these
+    glue together to orientable surfaces with the Euler number of a sphere with as many holes as there are
+    boundary loops, then the surfaces are planar and those 3-cycles are faces: no planarity test is needed, and no
+    tri-connectivity. Otherwise a planar embedding is computed, and its triangular faces are the elements.
 
     Where that fails and the graph has several connected components each is tried by itself; those without a mesh
     are listed in ``failures``.
@@ -39,7 +44,7 @@ def recognise(n: int, edges: NDArray) -> Topology:
         If no component has triangles that fit together.
     """
     try:
-        return recognise_connected(n, edges)
+        return _recognise_whole(n, edges)
     except (NotPlanarError, TopologyError):
         components = _components(n, edges)
         if len(components) == 1:
@@ -61,7 +66,7 @@ def _recognise_each(n: int, edges: NDArray, components: list[NDArray]) -> Topolo
     for rows in components:
         vertices, local = np.unique(edges[rows], return_inverse=True)
         try:
-            part = recognise_connected(len(vertices), local.reshape(-1, 2))
+            part = _recognise_whole(len(vertices), local.reshape(-1, 2))
         except (NotPlanarError, TopologyError) as error:
             failures.append(_elsewhere(error, vertices))
             continue
@@ -82,28 +87,8 @@ def _elsewhere(error: NotPlanarError | TopologyError, vertices: NDArray) -> NotP
     return TopologyError(where + str(error))
 
 
-def recognise_connected(n: int, edges: NDArray) -> Topology:
-    """Find the triangles of a planar mesh in its graph.
-
-    3-cycles with something on both sides are no faces. If every edge lies on at most two of the others, and these
-    glue together to orientable surfaces with the Euler number of a sphere with as many holes as there are
-    boundary loops, then the surfaces are planar and those 3-cycles are faces: no planarity test is needed, and no
-    tri-connectivity. Otherwise a planar embedding is computed, and its triangular faces are the elements.
-
-    Parameters
-    ----------
-    n : int
-        Number of vertices.
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
-
-    Raises
-    ------
-    NotPlanarError
-        With a Kuratowski subgraph as witness.
-    TopologyError
-        If there are no triangles, or they do not fit together.
-    """
+def _recognise_whole(n: int, edges: NDArray) -> Topology:
+    """All of the graph at once, or an error."""
     if n >= 3 and len(edges) > 3 * n - 6:
         raise _not_planar(n, edges, f"it has {len(edges)} edges, and a planar graph has at most 3 n - 6 = {3 * n - 6}")
     triangles, opposite = three_cycles(n, edges)
