@@ -36,48 +36,52 @@ def kuratowski_edges(n: int, edges: NDArray) -> tuple[tuple[int, int], ...]:
     return tuple(sorted((min(a, b), max(a, b)) for a, b in pairs))
 
 
-def triangular_faces(n: int, edges: NDArray) -> tuple[NDArray, NDArray]:
-    """Faces with three edges of one planar embedding.
+def rotation_system(n: int, edges: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+    """Half-edges tail -> head, grouped by tail, each group in its cyclic order about it in a planar embedding.
+
+    Parameters
+    ----------
+    n : int
+    edges : (e, 2) int64
 
     Returns
     -------
-    triangles : (m, 3) int64
-        Vertices.
-    opposite : (m, 3) int64
-        Rows of `edges` that face the corners.
+    tail, head : (2 e,) int64
+        None if the graph is not planar.
     """
-    tail, head = _rotation_system(n, edges)
-    key = np.minimum(tail, head) * n + np.maximum(tail, head)
-    edge = np.searchsorted(edges[:, 0] * n + edges[:, 1], key)
-    successor = _next_along_face(n, tail, head)
-    second = successor[np.arange(len(tail))]
-    third = successor[second]
-    start = np.arange(len(tail))
-    # Count each face once, at its lowest half-edge; a loop along a bridge has no three different vertices.
-    closed = (successor[third] == start) & (start < second) & (start < third)
-    closed &= (tail != tail[second]) & (tail[second] != tail[third]) & (tail[third] != tail)
-    a, b, c = start[closed], second[closed], third[closed]
-    return np.column_stack([tail[a], tail[b], tail[c]]), np.column_stack([edge[b], edge[c], edge[a]])
-
-
-def _next_along_face(n: int, tail: NDArray, head: NDArray) -> NDArray:
-    """From a -> b to b -> c, where c follows a in the rotation about b."""
-    count = len(tail)
-    order = np.lexsort((head, tail))
-    position = np.empty(count, dtype=np.int64)  # of each half-edge's twin
-    key = tail[order] * n + head[order]
-    position = order[np.searchsorted(key, head * n + tail)]
-    last = np.append(np.flatnonzero(np.diff(tail)), count - 1)
-    turn = np.arange(1, count + 1)
-    turn[last] = np.append(0, last[:-1] + 1)
-    return turn[position]
-
-
-def _rotation_system(n: int, edges: NDArray) -> tuple[NDArray, NDArray]:
-    """Half-edges tail -> head, grouped by tail, each group in cyclic order about it."""
+    if n >= 3 and len(edges) > 3 * n - 6:
+        return None
+    if _suite is not None:
+        return _rotation_by_suite(n, edges)
     import networkx
 
-    _, embedding = networkx.check_planarity(networkx.Graph(edges.tolist()))
-    pairs = [(v, w) for v in sorted(embedding) for w in embedding.neighbors_cw_order(v)]
-    half_edges = np.array(pairs, dtype=np.int64)
-    return half_edges[:, 0], half_edges[:, 1]
+    planar, embedding = networkx.check_planarity(networkx.Graph(edges.tolist()))
+    if not planar:
+        return None
+    pairs = np.array([(v, w) for v in sorted(embedding) for w in embedding.neighbors_cw_order(v)], dtype=np.int64)
+    return pairs[:, 0], pairs[:, 1]
+
+
+def _rotation_by_suite(n: int, edges: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+    """The suite takes and gives adjacency lists as text; its vertices count from 1, and 0 ends a list."""
+    both = np.concatenate([edges, edges[:, ::-1]])
+    both = both[np.lexsort((both[:, 1], both[:, 0]))]
+    degree = np.bincount(both[:, 0], minlength=n)
+    start = np.cumsum(degree) - degree + 2 * np.arange(n)  # a list has its own vertex before, a zero after
+    numbers = np.zeros(len(both) + 2 * n, dtype=np.int64)
+    numbers[start] = np.arange(1, n + 1)
+    numbers[np.arange(len(both)) + 2 * both[:, 0] + 1] = both[:, 1] + 1
+    words = np.array(list(map(str, numbers.tolist())), dtype=object)
+    words[start] += ":"
+    graph = _suite.Graph()
+    graph.gp_ReadFromString(f"N={n}\n" + " ".join(words.tolist()) + "\n")
+    if graph.gp_Embed(_suite.EMBEDFLAGS_PLANAR) != _suite.OK:
+        return None
+    graph.gp_SortVertices()  # back from the order of its depth-first search
+    text = graph.gp_WriteToString(_suite.WRITE_ADJLIST)
+    lists = np.array(text.partition("\n")[2].replace(":", " ").split(), dtype=np.int64)
+    end = np.flatnonzero(lists == 0)
+    head = np.delete(lists, np.r_[0, end[:-1] + 1, end]) - 1
+    count = np.diff(np.r_[-1, end]) - 2
+    tail = np.repeat(lists[np.r_[0, end[:-1] + 1]] - 1, count)
+    return tail, head

@@ -95,7 +95,7 @@ def _recognise_whole(n: int, edges: NDArray) -> Topology:
     if (np.bincount(opposite.ravel(), minlength=1) > 2).any():
         face = ~not_faces(n, edges, triangles, opposite)
         triangles, opposite = triangles[face], opposite[face]
-    pieces = _planar_pieces(n, edges, triangles, opposite)
+    pieces = planar_pieces(n, edges, triangles, opposite)
     covered = np.zeros(len(edges), dtype=bool)
     covered[opposite] = True
     if pieces is not None and covered.all():
@@ -110,7 +110,7 @@ def _recognise_whole(n: int, edges: NDArray) -> Topology:
     if pieces is not None:  # edges without a triangle do not hinder the rest
         return Topology(n, edges, pieces, "3-cycles")
     triangles, opposite = planarity.triangular_faces(n, edges)
-    pieces = _planar_pieces(n, edges, triangles, opposite)
+    pieces = planar_pieces(n, edges, triangles, opposite)
     if pieces is None:
         raise TopologyError(
             "the triangular faces of the planar graph do not glue together to surfaces with a boundary; "
@@ -130,7 +130,7 @@ def _not_planar_witness(where: str, why: str, witness: tuple[tuple[int, int], ..
     )
 
 
-def _planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> tuple[Piece, ...] | None:
+def planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> tuple[Piece, ...] | None:
     """Cut triangles into oriented pieces; None where one of them is not a sphere with holes."""
     if not len(triangles):
         return ()

@@ -1,0 +1,62 @@
+"""A first guess from angles alone.
+
+In a cell, the corners of a circle, all others see an edge e under the same angle theta_e, with w_e = (cot theta_e
++ cot theta'_e) / 2 over the cells on its two sides. The angles of one cell add up to pi, and its corner between
+edges d and e measures pi - theta_d - theta_e. With each weight shared equally between both sides the angles of a cell
+still add up to about pi; those of a hole are too large, since its weights are those of one side only. Likewise
+the corners at an interior vertex add up to about 2 pi.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..topology.faces import FaceComplex
+
+_SAMPLE = 2000
+
+
+def shared_angles(complex_: FaceComplex, weights: NDArray) -> NDArray[np.float64]:
+    """(2 e,) theta of each half-edge, for weights shared equally and scaled by the likeliest c.
+
+    Parameters
+    ----------
+    complex_ : FaceComplex
+    weights : (e,) float64
+        -A_ij = c w_ij.
+    """
+    return np.pi / 2 - np.arctan(weights / _scale(complex_, weights))[np.arange(2 * len(weights)) >> 1]
+
+
+def face_sums(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]:
+    """(faces,) sum of the angles around each face, about pi for a cell."""
+    return np.bincount(complex_.face, angles)
+
+
+def vertex_excess(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]:
+    """(n,) sum of the corners about each vertex less 2 pi: about 0 at interior vertices, negative on the boundary."""
+    corners = np.bincount(complex_.tail, minlength=complex_.n_vertices) * np.pi
+    return corners - 2 * np.bincount(complex_.tail, angles, complex_.n_vertices) - 2 * np.pi
+
+
+def _scale(complex_: FaceComplex, weights: NDArray) -> float:
+    """The c for which half of the short faces have an angle sum below pi."""
+    unit = float(np.median(np.abs(weights[weights != 0]))) * np.sign(weights.sum())
+    if not unit:
+        return 1.0
+    short = np.flatnonzero(complex_.simple & (complex_.size <= 4))
+    if not len(short):
+        return unit
+    faces = short[np.linspace(0, len(short) - 1, min(len(short), _SAMPLE)).astype(int)]
+    start, size = complex_.offsets[faces], complex_.size[faces]
+    place = np.column_stack([start, start + 1, start + 2, start + size - 1])  # of a triangle the last one twice
+    share = (weights / unit)[complex_.order[place] >> 1]
+    counted = np.column_stack([np.ones((len(faces), 3), bool), size == 4])
+    low, high = np.full(len(faces), -8.0), np.full(len(faces), 8.0)
+    for _ in range(40):
+        middle = (low + high) / 2
+        angle = np.pi / 2 - np.arctan(share / np.exp(middle)[:, None])
+        above = (angle * counted).sum(axis=1) > np.pi  # angles grow with c
+        low, high = np.where(above, low, middle), np.where(above, middle, high)
+    return unit * float(np.exp(np.median((low + high) / 2)))

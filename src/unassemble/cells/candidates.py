@@ -1,0 +1,207 @@
+"""Everything that can be a cell: faces, and triangles whose third edge has vanished from the boundary."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..topology.faces import FaceComplex
+from .angles import face_sums, shared_angles, vertex_excess
+
+_SHORT = 4  # faces of so many edges are cells unless the numbers say otherwise
+_FULL = 1.3 * np.pi  # angle sum below which a face may be a cell
+_INNER = -0.35 * np.pi  # angle excess above which a vertex may be an inner one
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Cells that a graph may have; any set of them that shares no half-edge is a reading of the graph.
+
+    Attributes
+    ----------
+    n_vertices : int
+    edges : (e, 2) int64
+    weights : (e,) float64
+        -A_ij of each edge.
+    offsets : (cells + 1,) int64
+    vertices : (offsets[-1],) int64
+        Cell k has the vertices ``vertices[offsets[k]:offsets[k + 1]]``, in running order.
+    sides : (s, 2) int64
+        Pairs (cell, half-edge) of what each cell takes up.
+    belief : (cells,) float64
+        From the angles: 1 for a certain cell, 0 for a certain hole, about.
+    first : (cells,) bool
+        The faces that make the likeliest reading without vanished boundary edges.
+    outer : (cells,) bool
+        The face of each block that bounds it from outside.
+    corner : (cells,) bool
+        Triangles a-b-c of two edges a-b, b-c of an empty face; the third has vanished from the boundary, which it
+        does if the angle at b is a right one.
+    """
+
+    n_vertices: int
+    edges: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    offsets: NDArray[np.int64]
+    vertices: NDArray[np.int64]
+    sides: NDArray[np.int64]
+    belief: NDArray[np.float64]
+    first: NDArray[np.bool_]
+    outer: NDArray[np.bool_]
+    corner: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, drawing: FaceComplex, weights: NDArray) -> Candidates:
+        """All candidates of one drawing of the graph."""
+        blocks = drawing.split()
+        angles = shared_angles(blocks, weights)
+        sums = face_sums(blocks, angles)
+        outer = _longest(blocks, sums)
+        faces = np.flatnonzero(blocks.simple)
+        outside = (blocks.size > _SHORT) | outer | ~blocks.simple
+        whole = blocks.joined(outside)
+        corners = _open_corners(whole, outside[blocks.face])
+        size = np.r_[blocks.size[faces], np.full(len(corners), 3)]
+        offsets = np.append(0, np.cumsum(size))
+        chosen = np.isin(blocks.face[blocks.order], faces)
+        vertices = np.r_[
+            blocks.tail[blocks.order[chosen]],
+            np.column_stack([whole.tail[corners], whole.head[corners], whole.head[whole.successor[corners]]]).ravel(),
+        ]
+        number = np.full(len(blocks.size), -1)
+        number[faces] = np.arange(len(faces))
+        excess = vertex_excess(blocks, angles)[whole.head[corners]]
+        return cls(
+            n_vertices=drawing.n_vertices,
+            edges=drawing.edges,
+            weights=weights,
+            offsets=offsets,
+            vertices=vertices,
+            sides=np.concatenate(
+                [
+                    np.column_stack([number[blocks.face[blocks.order[chosen]]], blocks.order[chosen]]),
+                    _corner_sides(whole, corners, len(faces)),
+                ]
+            ),
+            belief=np.r_[1 - np.abs(sums[faces] / np.pi - 1), 0.5 - np.abs(excess) / np.pi],
+            first=np.r_[(blocks.size <= _SHORT)[faces] & ~outer[faces], np.zeros(len(corners), bool)],
+            outer=np.r_[outer[faces], np.zeros(len(corners), bool)],
+            corner=np.r_[np.zeros(len(faces), bool), np.ones(len(corners), bool)],
+        )
+
+    @property
+    def count(self) -> int:
+        """Number of candidates."""
+        return len(self.belief)
+
+    @property
+    def size(self) -> NDArray[np.int64]:
+        """(cells,) number of vertices."""
+        return np.diff(self.offsets)
+
+    @cached_property
+    def conflicts(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Half-edges that several candidates want: `sides` of these, sorted by half-edge, and where each run starts."""
+        order = np.argsort(self.sides[:, 1], kind="stable")
+        start = np.flatnonzero(np.diff(self.sides[order, 1], prepend=-1))
+        return self.sides[order], np.append(start, len(order))
+
+    def starts(self) -> Iterator[NDArray[np.bool_]]:
+        """Readings to begin with, the likeliest first."""
+        by_angles = ~self.corner & (self.belief > 2 - _FULL / np.pi) & (self.size > 3)
+        corners = self.corner & (self.belief > 0.5 + _INNER / np.pi)
+        faces = (self.first, (self.first & (self.size == 3)) | (by_angles & ~self.outer))
+        seen = set()
+        for chosen in faces:
+            for extra in (corners, np.zeros_like(corners)):
+                labels = self.covering(self.compatible(np.where(chosen | extra, 1 + self.belief, -np.inf)), self.belief)
+                if labels.tobytes() not in seen:
+                    seen.add(labels.tobytes())
+                    yield labels
+
+    def compatible(self, value: NDArray) -> NDArray[np.bool_]:
+        """(cells,) candidates of finite value, none of which loses to a better one that wants the same half-edge.
+
+        Rounds of local maxima: a candidate is taken if it beats all rivals that are still in play.
+        """
+        cell, start = self.conflicts[0][:, 0], self.conflicts[1]
+        rank = np.empty(self.count, dtype=np.int64)
+        # Ties in random order: in the order of numbers they would be settled one by one along a boundary.
+        ties = np.random.default_rng(0).permutation(self.count)
+        rank[np.lexsort((ties, value))] = np.arange(self.count)
+        rank[~np.isfinite(value)] = -1
+        taken = np.zeros(self.count, dtype=bool)
+        run = np.repeat(np.arange(len(start) - 1), np.diff(start))
+        while (rank >= 0).any():
+            best = np.maximum.reduceat(rank[cell], start[:-1])
+            beaten = np.zeros(self.count, dtype=bool)
+            beaten[cell[rank[cell] < best[run]]] = True
+            winners = (rank >= 0) & ~beaten
+            taken |= winners
+            lost = np.zeros(len(start) - 1, dtype=bool)
+            lost[run[winners[cell]]] = True
+            rank[cell[lost[run]]] = -1
+        return taken
+
+    def covering(self, labels: NDArray[np.bool_], value: NDArray) -> NDArray[np.bool_]:
+        """The same labels with further candidates, the most valued ones, for edges that border no cell.
+
+        A nonzero weight is the cotangent of some angle: every edge borders a cell.
+        """
+        labels = labels.copy()
+        cell, half = self.sides.T
+        while True:
+            used = np.zeros(2 * len(self.edges), dtype=bool)
+            used[half[labels[cell]]] = True
+            bare = (self.weights != 0) & ~used.reshape(-1, 2).any(axis=1)
+            blocked = np.zeros(self.count, dtype=bool)
+            blocked[cell[used[half]]] = True
+            wanted = np.zeros(self.count, dtype=bool)
+            wanted[cell[bare[half >> 1]]] = True
+            wanted &= ~blocked & ~labels
+            if not wanted.any():
+                return labels
+            order = np.lexsort((-value[cell], half >> 1))
+            order = order[wanted[cell[order]] & bare[half[order] >> 1]]
+            best = order[np.flatnonzero(np.diff(half[order] >> 1, prepend=-1))]
+            chosen = np.zeros(self.count, dtype=bool)
+            chosen[cell[best]] = True
+            labels |= self.compatible(np.where(chosen, value, -np.inf))
+
+
+def _longest(blocks: FaceComplex, sums: NDArray) -> NDArray[np.bool_]:
+    """One face of each block: its longest, among equals that of the largest angle sum; it is never a cell."""
+    block = blocks.block[blocks.order[blocks.offsets[:-1]]]
+    order = np.lexsort((sums, blocks.size, block))
+    last = order[np.append(np.flatnonzero(np.diff(block[order])), len(order) - 1)]
+    longest = np.zeros(len(sums), dtype=bool)
+    longest[last] = True
+    return longest
+
+
+def _open_corners(whole: FaceComplex, outside: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Half-edges a -> b that b -> c follows in an empty face, with a and c different and not joined."""
+    half = np.flatnonzero(outside)
+    a, c = whole.tail[half], whole.head[whole.successor[half]]
+    given = whole.edges[:, 0] * whole.n_vertices + whole.edges[:, 1]
+    key = np.minimum(a, c) * whole.n_vertices + np.maximum(a, c)
+    joined = given[np.minimum(np.searchsorted(given, key), len(given) - 1)] == key
+    return half[(a != c) & ~joined]
+
+
+def _corner_sides(whole: FaceComplex, corners: NDArray, first: int) -> NDArray[np.int64]:
+    """Pairs (candidate, half-edge) of what each corner takes up.
+
+    Where nothing else meets at b, a cell on the far side of both edges would contain the vanished edge as a diagonal:
+    the corner takes up the far sides as well.
+    """
+    number = first + np.arange(len(corners))
+    follower = whole.successor[corners]
+    lone = np.bincount(whole.tail, minlength=whole.n_vertices)[whole.head[corners]] == 2
+    near = np.column_stack([np.r_[number, number], np.r_[corners, follower]])
+    far = np.column_stack([np.r_[number[lone], number[lone]], np.r_[corners[lone] ^ 1, follower[lone] ^ 1]])
+    return np.concatenate([near, far])

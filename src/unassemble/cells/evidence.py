@@ -1,0 +1,113 @@
+"""What the misfit says about each candidate: one linear least-squares problem for positions and labels together.
+
+With label s_k of each candidate the weights are w_e = 1/2 sum_k s_k cot_ke. At a solved reading the misfit r is
+explained to first order by displacements d of the vertices, a change g of the scale and changes of the labels:
+
+    minimise  | r - J d - g w - B ds |^2 + ridge^2 | ds |^2,        B_ek = 1/2 cot_ke,
+
+each row divided by its weight. Displacements spread the misfit over the mesh, so that the largest
+residuals need not surround the wrong cell; the labels that take part in the best explanation do.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..errors import SolverError
+from ..linalg import UpperTriangle, factorisation
+from ..planar.cotangent import edge_weights
+from ..planar.normal import WeightJacobian, distant_pair
+from ..planar.piece import PieceMesh
+from ..topology import Piece
+from .reading import FITS, Reading, fans_of
+
+_RIDGE = 0.1
+_LONGEST = 40  # edges of a face that may be a cell
+_STEEPEST = 20.0  # cotangents beyond belong to slivers of a wrong start
+
+
+def label_changes(reading: Reading) -> NDArray[np.float64]:
+    """(cells,) the change of each label that explains the misfit best; NaN where nothing can be said."""
+    changes = np.full(reading.candidates.count, np.nan)
+    for piece, mesh in zip(reading.pieces, reading.meshes, strict=True):
+        if mesh and (reading.misfit[piece.edge_rows] > FITS).any():
+            _explain(reading, piece, mesh, changes)
+    return changes
+
+
+def _explain(reading: Reading, piece: Piece, mesh: PieceMesh, changes: NDArray) -> None:
+    """Fill in the changes of the candidates within one piece."""
+    candidates = reading.candidates
+    local = np.full(candidates.n_vertices, -1)
+    local[piece.vertices] = np.arange(piece.n_vertices)
+    inside = np.logical_and.reduceat(local[candidates.vertices] >= 0, candidates.offsets[:-1])
+    chosen = inside & (candidates.size <= _LONGEST)
+    z = mesh.z - mesh.z.mean()
+    z = z / np.abs(z).max()
+    with np.errstate(all="ignore"):
+        w = edge_weights(piece, z)
+        misfit = reading.weights[piece.edge_rows] / mesh.scale - w
+    if not (np.isfinite(w).all() and np.isfinite(misfit).all() and chosen.any()):
+        return
+    response = _response(reading, piece, z, local, chosen)
+    extra = response.shape[0] - len(w)  # diagonals of candidates that are no cells yet
+    size = np.abs(w + misfit)
+    typical = float(np.median(size[size > 0]))
+    spread = np.r_[size + typical, np.full(extra, typical)]
+    jacobian = WeightJacobian(piece, z, spread[: len(w)]).matrix.tocsr()
+    jacobian.resize(response.shape[0], jacobian.shape[1])
+    free = np.ones(2 * piece.n_vertices, dtype=bool)
+    pins = distant_pair(z)
+    free[np.r_[2 * pins, 2 * pins + 1]] = False
+    scaled = sp.diags_array(1 / spread)
+    scale_column = sp.csr_array((np.append(w, np.zeros(extra)) / spread)[:, None])
+    columns = sp.hstack([jacobian[:, free], scaled @ response, scale_column]).tocsr()
+    n_labels = response.shape[1]
+    ridge = np.r_[np.zeros(free.sum()), np.full(n_labels, _RIDGE**2), 0.0]
+    normal = (columns.T @ columns + sp.diags_array(ridge)).tocsr()
+    rhs = columns.T @ (np.append(misfit, np.zeros(extra)) / spread)
+    solution = _solve(normal, rhs)
+    if solution is not None:
+        changes[chosen] = solution[free.sum() : -1]
+
+
+def _response(reading: Reading, piece: Piece, z: NDArray, local: NDArray, chosen: NDArray[np.bool_]) -> sp.csr_array:
+    """B: half the cotangents of each chosen candidate; further rows for diagonals that the piece does not have."""
+    triangles, cell = fans_of(reading.candidates, chosen)
+    at = z[local[triangles]]
+    u, v = at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at
+    product = np.conj(u) * v
+    area = np.bincount(cell, product.imag[:, 0], len(chosen))
+    with np.errstate(all="ignore"):
+        cotangent = product.real / product.imag * np.sign(area)[cell][:, None]
+    cotangent = np.clip(np.nan_to_num(cotangent, posinf=_STEEPEST, neginf=-_STEEPEST), -_STEEPEST, _STEEPEST)
+    n = len(local)
+    ends = triangles[:, [[1, 2], [2, 0], [0, 1]]]
+    key = ends.min(axis=2) * n + ends.max(axis=2)
+    pairs = piece.vertices[piece.edges]
+    known = pairs.min(axis=1) * n + pairs.max(axis=1)
+    rest = np.setdiff1d(key, known)
+    all_keys = np.concatenate([known, rest])
+    order = np.argsort(all_keys)
+    row = order[np.searchsorted(all_keys[order], key)]
+    number = np.cumsum(chosen) - 1
+    return sp.csr_array(
+        (cotangent.ravel() / 2, (row.ravel(), np.repeat(number[cell], 3))), shape=(len(all_keys), int(chosen.sum()))
+    )
+
+
+def _solve(normal: sp.csr_array, rhs: NDArray) -> NDArray | None:
+    """Positive definite solve; None where the factorisation breaks down."""
+    upper = sp.triu(normal, format="csr")
+    upper.sort_indices()
+    matrix = UpperTriangle(upper.data, upper.indices, upper.indptr)
+    try:
+        factor = factorisation(matrix)
+        factor.factorise(matrix)
+        solution = factor.solve(rhs)
+        factor.release()
+    except SolverError:
+        return None
+    return solution if np.isfinite(solution).all() else None

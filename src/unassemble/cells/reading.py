@@ -1,0 +1,152 @@
+"""A reading of the graph: some candidates taken for cells, solved, and held against the matrix."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import GeometryError, SolverError
+from ..planar.conformal import conformal_map
+from ..planar.cotangent import edge_weights
+from ..planar.piece import PieceMesh
+from ..topology import Piece
+from ..topology.recognise import planar_pieces
+from .candidates import Candidates
+
+FITS = 1e-6
+"""Largest misfit, relative to the row, of a conformal solve with the right cells; the polish does the rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """Cells, the triangulated pieces that they make, and how the weights of these fit.
+
+    Attributes
+    ----------
+    candidates : Candidates
+    labels : (cells,) bool
+        What is taken for a cell.
+    edges : (e', 2) int64
+        Those of the graph, with the vanished ones of the cells' triangles.
+    weights : (e',) float64
+        Zero for these.
+    pieces : tuple of Piece
+        Empty where the cells do not make planar surfaces.
+    meshes : tuple of PieceMesh or None
+        None where a piece has no positions.
+    misfit : (e',) float64
+        |c w - a| relative to the smaller of both rows' largest entries, at most 1; 1 on edges of no piece.
+    """
+
+    candidates: Candidates
+    labels: NDArray[np.bool_]
+    edges: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    pieces: tuple[Piece, ...]
+    meshes: tuple[PieceMesh | None, ...]
+    misfit: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, candidates: Candidates, labels: NDArray[np.bool_]) -> Reading:
+        """Triangulate the cells and solve every piece."""
+        n = candidates.n_vertices
+        triangles = triangulation(candidates, labels)
+        key = _keys(n, triangles)
+        given = candidates.edges[:, 0] * n + candidates.edges[:, 1]
+        union = np.union1d(given, key)
+        edges = np.column_stack([union // n, union % n])
+        weights = np.zeros(len(union))
+        weights[np.searchsorted(union, given)] = candidates.weights
+        pieces = planar_pieces(n, edges, triangles, np.searchsorted(union, key)) or ()
+        misfit = np.where(weights != 0, 1.0, 0.0)
+        size = row_sizes(n, edges, weights)
+        meshes: list[PieceMesh | None] = []
+        for piece in pieces:
+            mesh = _solved(piece, weights[piece.edge_rows])
+            meshes.append(mesh)
+            if mesh:
+                rows = piece.edge_rows
+                with np.errstate(all="ignore"):  # flat triangles fit nothing
+                    gap = np.abs(mesh.scale * edge_weights(piece, mesh.z) - weights[rows]) / size[rows]
+                misfit[rows] = np.where(gap < 1, gap, 1.0)
+        return cls(candidates, labels, edges, weights, pieces, tuple(meshes), misfit)
+
+    @property
+    def fits(self) -> bool:
+        """Whether every entry is reproduced."""
+        return bool(len(self.pieces) and (self.misfit <= FITS).all())
+
+    @cached_property
+    def size(self) -> float:
+        """Root mean square of the misfit."""
+        return float(np.sqrt(np.mean(self.misfit**2))) if self.pieces else np.inf
+
+    @property
+    def like_noise(self) -> bool:
+        """Whether the misfit is small and spread evenly, as errors of the entries are and wrong cells are not."""
+        return bool(len(self.pieces)) and self.size < 1e-2 and float(self.misfit.max()) < 12 * self.size
+
+
+def triangulation(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(m, 3) triangles of the chosen cells, longer ones in fans.
+
+    The apex of a fan moves on where a diagonal would be an edge already, of the graph or of another cell.
+    """
+    n, shift = candidates.n_vertices, np.zeros(candidates.count, dtype=np.int64)
+    given = candidates.edges[:, 0] * n + candidates.edges[:, 1]
+    for _ in range(int(candidates.size.max())):
+        triangles, cell, diagonal = _fans(candidates, labels, shift)
+        key = _keys(n, triangles)[:, 1]  # each diagonal belongs to the triangle before it
+        key, owner = key[diagonal], cell[diagonal]
+        value, place, count = np.unique(key, return_inverse=True, return_counts=True)
+        clash = np.isin(value, given) | (count > 1)
+        if not clash.any():
+            break
+        moved = owner[clash[place]]
+        # Of two cells that want the same diagonal one keeps it.
+        keeps = np.unique(key[clash[place]], return_index=True)[1]
+        moved = np.setdiff1d(moved, moved[keeps][count[clash] > 1])
+        shift[moved] += 1
+    return triangles
+
+
+def _fans(candidates: Candidates, labels: NDArray, shift: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Triangles, the cell of each, and whether its last side is a diagonal."""
+    cells = np.flatnonzero(labels)
+    size = candidates.size[cells]
+    cell = np.repeat(cells, size - 2)
+    step = np.arange(len(cell)) - np.repeat(np.cumsum(size - 2) - (size - 2), size - 2) + 1
+    start, length = candidates.offsets[cell], candidates.size[cell]
+    corner = (shift[cell][:, None] + np.column_stack([np.zeros_like(step), step, step + 1])) % length[:, None]
+    return candidates.vertices[start[:, None] + corner], cell, step < length - 2
+
+
+def fans_of(candidates: Candidates, labels: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(m, 3) triangles of cells, each in a fan about its first vertex, and (m,) the cell of each."""
+    triangles, cell, _ = _fans(candidates, labels, np.zeros(candidates.count, dtype=np.int64))
+    return triangles, cell
+
+
+def _keys(n: int, triangles: NDArray) -> NDArray[np.int64]:
+    """(m, 3) keys i n + j, i < j, of the edges facing the corners."""
+    ends = triangles[:, [[1, 2], [2, 0], [0, 1]]]
+    return ends.min(axis=2) * n + ends.max(axis=2)
+
+
+def row_sizes(n: int, edges: NDArray, weights: NDArray) -> NDArray[np.float64]:
+    """(e,) the smaller of the largest entries of both rows of each edge."""
+    largest = np.zeros(n)
+    for end in edges.T:
+        np.maximum.at(largest, end, np.abs(weights))
+    return largest[edges].min(axis=1)
+
+
+def _solved(piece: Piece, weights: NDArray) -> PieceMesh | None:
+    try:
+        found = conformal_map(piece, weights, sharp=False)
+    except (GeometryError, SolverError):
+        return None
+    return PieceMesh(found.z, found.scale) if np.isfinite(found.z).all() and found.scale else None

@@ -1,0 +1,91 @@
+"""Faces of a graph: from its short cycles where these settle it, else from a planar embedding."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import planarity
+from .cycles import three_cycles
+from .faces import FaceComplex, from_cycles, from_rotation, half_edges
+from .separating import not_faces
+from .short_cycles import chordless_four_cycles
+
+
+def short_faces(n: int, edges: NDArray) -> list[NDArray[np.int64]]:
+    """3-cycles and chordless 4-cycles that may all be faces: no edge lies on more than two of them.
+
+    Returns
+    -------
+    list of (m, 3) and (m, 4) int64
+        Vertices in running order.
+    """
+    triangles, opposite = three_cycles(n, edges)
+    count = np.bincount(opposite.ravel(), minlength=len(edges))
+    if (count > 2).any():
+        face = ~not_faces(n, edges, triangles, opposite)
+        triangles, opposite = triangles[face], opposite[face]
+        count = np.bincount(opposite.ravel(), minlength=len(edges))
+    quads = chordless_four_cycles(n, edges, count < 2)
+    if len(quads):
+        sides = half_edges(n, edges, quads.ravel(), np.roll(quads, -1, axis=1).ravel()).reshape(quads.shape) >> 1
+        count = count + np.bincount(sides.ravel(), minlength=len(edges))
+        quads = quads[(count[sides] <= 2).all(axis=1)]
+    return [triangles, quads]
+
+
+def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
+    """Drawings of a planar graph on the sphere, the likeliest first.
+
+    Where the graph is not tri-connected it has many. A mesh has nearly all of its short cycles as faces: first the
+    surface that they make by themselves, then an embedding in which all of them are faces, last any.
+
+    Parameters
+    ----------
+    n : int
+    edges : (e, 2) int64
+        Pairs i < j in lexicographic order; at least one.
+    """
+    cycles = short_faces(n, edges)
+    surface = from_cycles(n, edges, cycles)
+    if surface is not None:
+        yield surface
+    if sum(map(len, cycles)):
+        rotation = _with_faces(n, edges, cycles)
+        if rotation is not None:
+            yield from_rotation(n, edges, *rotation)
+    rotation = planarity.rotation_system(n, edges)
+    if rotation is not None:
+        yield from_rotation(n, edges, *rotation)
+
+
+def _with_faces(n: int, edges: NDArray, cycles: list[NDArray]) -> tuple[NDArray, NDArray] | None:
+    """Rotation system of an embedding in which given cycles are faces; None if there is none.
+
+    Each cycle gets a hub, and each of its edges a midpoint joined to the hub: the hub must lie on one side of the
+    cycle, and all midpoints on its rim see it.
+    """
+    sides = [half_edges(n, edges, c.ravel(), np.roll(c, -1, axis=1).ravel()).reshape(c.shape) >> 1 for c in cycles]
+    rim = np.unique(np.concatenate([s.ravel() for s in sides]))
+    midpoint = np.full(len(edges), -1)
+    midpoint[rim] = n + np.arange(len(rim))
+    hub = n + len(rim)
+    spokes = []
+    for s in sides:
+        spokes.append(np.column_stack([midpoint[s.ravel()], hub + np.repeat(np.arange(len(s)), s.shape[1])]))
+        hub += len(s)
+    halves = np.column_stack([edges[rim].ravel(), np.repeat(midpoint[rim], 2)])
+    plain = np.delete(edges, rim, axis=0)
+    rotation = planarity.rotation_system(hub, np.concatenate([plain, halves, *spokes]))
+    if rotation is None:
+        return None
+    tail, head = rotation
+    tail, head = tail[tail < n], head[tail < n]
+    # Back from midpoints to the far ends.
+    on_rim = head >= n
+    ends = edges[rim[head[on_rim] - n]]
+    head = head.copy()
+    head[on_rim] = ends.sum(axis=1) - tail[on_rim]
+    return tail, head

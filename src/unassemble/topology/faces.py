@@ -1,0 +1,242 @@
+"""A graph drawn on the sphere: half-edges that close to faces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse import csgraph
+
+from .boundary import loops
+from .orientation import glue, orient
+
+_ROUNDS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class FaceComplex:
+    """A graph and, for each side of each edge, the side that follows it along a face.
+
+    Half-edge 2 k runs along edge k from its lower to its higher vertex, 2 k + 1 back: ``h ^ 1`` is the other side.
+
+    Attributes
+    ----------
+    n_vertices : int
+    edges : (e, 2) int64
+        Pairs i < j in lexicographic order.
+    successor : (2 e,) int64
+        The next half-edge of the face on the left.
+    """
+
+    n_vertices: int
+    edges: NDArray[np.int64]
+    successor: NDArray[np.int64]
+
+    @property
+    def tail(self) -> NDArray[np.int64]:
+        """(2 e,) vertex at which each half-edge starts."""
+        return self.edges.ravel()
+
+    @cached_property
+    def head(self) -> NDArray[np.int64]:
+        """(2 e,) vertex at which each half-edge ends."""
+        return self.edges[:, ::-1].ravel()
+
+    @cached_property
+    def _loops(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        return loops(self.successor)
+
+    @property
+    def face(self) -> NDArray[np.int64]:
+        """(2 e,) face on the left of each half-edge."""
+        return self._loops[0]
+
+    @property
+    def order(self) -> NDArray[np.int64]:
+        """(2 e,) half-edges face by face, in running order."""
+        return self._loops[1]
+
+    @cached_property
+    def size(self) -> NDArray[np.int64]:
+        """(faces,) number of edges of each face."""
+        return np.bincount(self.face)
+
+    @cached_property
+    def offsets(self) -> NDArray[np.int64]:
+        """(faces + 1,) face k is ``order[offsets[k]:offsets[k + 1]]``."""
+        return np.append(0, np.cumsum(self.size))
+
+    @cached_property
+    def simple(self) -> NDArray[np.bool_]:
+        """(faces,) whether a face is a cycle of three or more different vertices."""
+        distinct = np.unique(self.face * self.n_vertices + self.tail) // self.n_vertices
+        return (np.bincount(distinct, minlength=len(self.size)) == self.size) & (self.size >= 3)
+
+    @cached_property
+    def block(self) -> NDArray[np.int64]:
+        """(2 e,) label of the part that hangs together by edges and faces."""
+        m = len(self.successor)
+        rows = np.arange(m)
+        graph = sp.coo_array((np.ones(2 * m, np.int8), (np.r_[rows, rows], np.r_[rows ^ 1, self.successor])))
+        return csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
+
+    def is_sphere(self) -> bool:
+        """Euler's formula v - e + f = 2 for every block, a vertex counted once for each of its turns."""
+        turn, _ = loops(self.successor[np.arange(len(self.successor)) ^ 1])
+        counts = [np.bincount(self.block[_first(label)]) for label in (turn, self.face)]
+        edges = np.bincount(self.block[::2])
+        return bool((counts[0] - edges + counts[1] == 2).all())
+
+    def split(self) -> FaceComplex:
+        """The same graph block by block: faces that pass a vertex more than once are cut there."""
+        rank = np.empty(len(self.order), dtype=np.int64)
+        rank[self.order] = np.arange(len(rank))
+        visit = np.lexsort((rank, self.face * self.n_vertices + self.head))
+        key = (self.face * self.n_vertices + self.head)[visit]
+        successor = self.successor.copy()
+        # Of several visits each continues as the one before it would: what lies between closes to a face.
+        successor[visit] = self.successor[visit[_cyclic_neighbour(key, -1)]]
+        return FaceComplex(self.n_vertices, self.edges, successor)
+
+    def joined(self, empty: NDArray[np.bool_]) -> FaceComplex:
+        """Blocks hung into each other's empty faces: at each vertex one such face of each block becomes one face.
+
+        Parameters
+        ----------
+        empty : (faces,) bool
+        """
+        at = np.flatnonzero(empty[self.face])
+        # One visit for each block and vertex, that of the longest face.
+        at = at[np.lexsort((-self.size[self.face[at]], self.block[at], self.head[at]))]
+        key = self.head[at] * (int(self.block.max()) + 1) + self.block[at]
+        at = at[np.flatnonzero(np.diff(key, prepend=-1))]
+        successor = self.successor.copy()
+        successor[at] = self.successor[at[_cyclic_neighbour(self.head[at], 1)]]
+        return FaceComplex(self.n_vertices, self.edges, successor)
+
+
+def from_rotation(n: int, edges: NDArray, tail: NDArray, head: NDArray) -> FaceComplex:
+    """The complex of a planar embedding.
+
+    Parameters
+    ----------
+    n : int
+    edges : (e, 2) int64
+    tail, head : (2 e,) int64
+        Half-edges grouped by tail, each group in cyclic order.
+    """
+    half = half_edges(n, edges, tail, head)
+    successor = np.empty(2 * len(edges), dtype=np.int64)
+    # From a -> b to b -> c, where c follows a in the rotation about b.
+    successor[half ^ 1] = half[_cyclic_neighbour(tail, 1)]
+    return FaceComplex(n, edges, successor)
+
+
+def from_cycles(n: int, edges: NDArray, cycles: list[NDArray]) -> FaceComplex | None:
+    """The complex whose faces are given cycles and the loops that bound the surface they make.
+
+    Parameters
+    ----------
+    n : int
+    edges : (e, 2) int64
+    cycles : list of (m_k, k) int64
+        Triangles, quadrilaterals, ..., in any orientation.
+
+    Returns
+    -------
+    FaceComplex or None
+        Trees that hang on the surface are blocks of their own. None if any other edge lies on no cycle, or one on more
+        than two, or the surfaces do not lie on spheres.
+    """
+    cycles = _oriented(n, edges, cycles)
+    sides = [half_edges(n, edges, c.ravel(), np.roll(c, -1, axis=1).ravel()).reshape(c.shape) for c in cycles]
+    used = np.bincount(np.concatenate([s.ravel() for s in sides]), minlength=2 * len(edges))
+    bare = np.flatnonzero(~used.reshape(-1, 2).any(axis=1))
+    if (used > 1).any() or not _hanging(n, edges)[bare].all():
+        return None
+    successor = np.full(2 * len(edges), -1, dtype=np.int64)
+    for side in sides:
+        successor[side] = np.roll(side, -1, axis=1)
+    successor[2 * bare], successor[2 * bare + 1] = 2 * bare + 1, 2 * bare
+    complex_ = FaceComplex(n, edges, _with_boundary(successor))
+    return complex_ if complex_.is_sphere() else None
+
+
+def half_edges(n: int, edges: NDArray, tail: NDArray, head: NDArray) -> NDArray[np.int64]:
+    """Half-edges from `tail` to `head`, which are joined by an edge."""
+    key = np.minimum(tail, head) * n + np.maximum(tail, head)
+    return 2 * np.searchsorted(edges[:, 0] * n + edges[:, 1], key) + (tail > head)
+
+
+def fan(cycles: NDArray) -> NDArray[np.int64]:
+    """(m, k - 2, 3) triangles about the first vertex of cycles (m, k)."""
+    apex = np.broadcast_to(cycles[:, :1], (len(cycles), cycles.shape[1] - 2))
+    return np.stack([apex, cycles[:, 1:-1], cycles[:, 2:]], axis=-1)
+
+
+def _oriented(n: int, edges: NDArray, cycles: list[NDArray]) -> list[NDArray]:
+    """Turn cycles so that neighbours run along common edges in opposite directions, as far as that is possible."""
+    # Fans of triangles, glued along edges of the graph and, within a cycle, along its diagonals.
+    triangles, opposite, first = [], [], []
+    n_edges = len(edges)
+    for c in cycles:
+        t = fan(c)
+        ends = np.stack([t[:, :, [1, 2]], t[:, :, [2, 0]], t[:, :, [0, 1]]], axis=2)
+        facing = half_edges(n, edges, ends[..., 0].ravel(), ends[..., 1].ravel()).reshape(t.shape) >> 1
+        diagonal = n_edges + np.arange(len(c) * (c.shape[1] - 3)).reshape(len(c), c.shape[1] - 3)
+        facing[:, :-1, 1] = diagonal
+        facing[:, 1:, 2] = diagonal
+        n_edges += diagonal.size
+        first.append(sum(map(len, triangles)) + np.arange(len(c)) * (c.shape[1] - 2))
+        triangles.append(t.reshape(-1, 3))
+        opposite.append(facing.reshape(-1, 3))
+    if not first:
+        return []
+    gluing = glue(n_edges, np.concatenate(opposite))
+    flip, _, _ = orient(np.concatenate(triangles), gluing)
+    return [np.where(flip[rows][:, None], c[:, ::-1], c) for rows, c in zip(first, cycles, strict=True)]
+
+
+def _with_boundary(successor: NDArray) -> NDArray[np.int64]:
+    """Close the free half-edges, those without a successor, to loops, turning about their heads."""
+    successor = successor.copy()
+    predecessor = np.full_like(successor, -1)
+    inner = np.flatnonzero(successor >= 0)
+    predecessor[successor[inner]] = inner
+    free = np.flatnonzero(successor < 0)
+    current = free ^ 1
+    turning = np.arange(len(free))
+    while len(turning):
+        current[turning] = predecessor[current[turning]] ^ 1
+        turning = turning[predecessor[current[turning]] >= 0]
+    successor[free] = current
+    return successor
+
+
+def _hanging(n: int, edges: NDArray) -> NDArray[np.bool_]:
+    """Edges of the trees that hang on the rest of the graph, as far as a few rounds of plucking leaves go."""
+    hanging = np.zeros(len(edges), dtype=bool)
+    for _ in range(_ROUNDS):
+        degree = np.bincount(edges[~hanging].ravel(), minlength=n)
+        leaf = ~hanging & (degree[edges] == 1).any(axis=1)
+        if not leaf.any():
+            break
+        hanging |= leaf
+    return hanging
+
+
+def _first(label: NDArray) -> NDArray:
+    """One place of each label."""
+    return np.unique(label, return_index=True)[1]
+
+
+def _cyclic_neighbour(key: NDArray, step: int) -> NDArray[np.int64]:
+    """Places of the cyclic neighbours within runs of equal keys."""
+    start = np.flatnonzero(np.diff(key, prepend=-1))
+    count = np.diff(np.append(start, len(key)))
+    place = np.arange(len(key))
+    base = np.repeat(start, count)
+    return base + (place - base + step) % np.repeat(count, count)
