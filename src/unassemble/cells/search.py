@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,11 @@ from .reading import Reading
 
 _log = logging.getLogger(__name__)
 
-_ROUNDS = 25
+_PATIENCE = 6  # leaps without an improvement
+_SOLVES = 80
 _CLEAR = 0.35  # a label that is to change by so much is turned over
-_SINGLES = 12
+_SINGLES = 8
+_EXCHANGES = 24
 
 
 def read_cells(n: int, edges: NDArray, weights: NDArray) -> Reading | None:
@@ -56,40 +59,80 @@ def _better(one: Reading | None, other: Reading) -> Reading:
 
 
 def _repaired(reading: Reading) -> Reading:
-    """Turn labels over as the misfit asks for it, until it vanishes or nothing new is left to try."""
-    best = reading
+    """Turn labels over as the misfit asks for it."""
+    best = _leaps(reading)
+    return best if best.fits else _descent(best)
+
+
+def _leaps(reading: Reading) -> Reading:
+    """All clear changes at once, uphill too: with many wrong cells the misfit of the way is no guide."""
+    best, since_best = reading, 0
     seen = {reading.labels.tobytes()}
-    for _ in range(_ROUNDS):
+    while reading.pieces and not reading.fits and since_best < _PATIENCE:
         changes = np.nan_to_num(label_changes(reading))
         labels = next((x for x in _proposals(reading, changes) if x.tobytes() not in seen), None)
         if labels is None:
             break
         seen.add(labels.tobytes())
-        turned = np.count_nonzero(labels != reading.labels)
         reading = Reading.of(reading.candidates, labels)
-        _log.debug("%d labels turned over: misfit %.1e", turned, reading.size)
+        since_best = 0 if reading.size < best.size else since_best + 1
         best = _better(best, reading)
-        if best.fits or not reading.pieces:
-            break
+        _log.debug("leap: misfit %.1e", reading.size)
     return best
 
 
-def _proposals(reading: Reading, changes: NDArray):  # type: ignore[no-untyped-def]
-    """Labels to try next: all clear changes together, then the largest one by one."""
+def _descent(reading: Reading) -> Reading:
+    """Small changes, each of which lowers the misfit."""
+    solves = 0
+    while solves < _SOLVES and reading.pieces and not reading.fits:
+        changes = np.nan_to_num(label_changes(reading))
+        for labels in _proposals(reading, changes):
+            trial = Reading.of(reading.candidates, labels)
+            solves += 1
+            if trial.size < reading.size or solves == _SOLVES:
+                break
+        else:
+            return reading
+        reading = _better(reading, trial)
+        _log.debug("descent: misfit %.1e", reading.size)
+    return reading
+
+
+def _proposals(reading: Reading, changes: NDArray) -> Iterator[NDArray[np.bool_]]:
+    """Labels to try next: all clear changes together, then the largest one by one, then exchanges of neighbours."""
     gain = np.where(reading.labels, -changes, changes)
     top = float(gain.max(initial=0.0))
     if not top > 0:
         return
+    seen = {reading.labels.tobytes()}
     clear = gain >= max(_CLEAR, 0.6 * top) if top > _CLEAR else gain >= 0.7 * top
-    yield _turned(reading, changes, clear)
-    for k in np.argsort(-gain, kind="stable")[:_SINGLES]:
-        yield _turned(reading, changes, np.arange(len(gain)) == k)
+    singles = [np.array([k]) for k in np.argsort(-gain, kind="stable")[:_SINGLES]]
+    for turned in (np.flatnonzero(clear), *singles, *_exchanges(reading, gain)):
+        labels = _turned(reading, changes, turned)
+        if labels.tobytes() not in seen:
+            seen.add(labels.tobytes())
+            yield labels
 
 
-def _turned(reading: Reading, changes: NDArray, turned: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _exchanges(reading: Reading, gain: NDArray) -> NDArray[np.int64]:
+    """(k, 2) a cell and an empty candidate across an edge of it: a hole that is to move on by one face."""
+    cell, half = reading.candidates.sides.T
+    order = np.argsort(half)
+    cell, half = cell[order], half[order]
+    here = np.flatnonzero(half % 2 == 0)
+    there = np.minimum(np.searchsorted(half, half[here] + 1), len(half) - 1)
+    met = half[there] == half[here] + 1
+    pairs = np.column_stack([cell[here[met]], cell[there[met]]])
+    pairs = pairs[reading.labels[pairs].sum(axis=1) == 1]
+    return pairs[np.argsort(-gain[pairs].sum(axis=1), kind="stable")[:_EXCHANGES]]
+
+
+def _turned(reading: Reading, changes: NDArray, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
     """The labels with some turned over; what stands in the way of a new cell goes, bare edges get a cell again."""
     candidates = reading.candidates
     labels = reading.labels
+    turned = np.zeros(len(labels), dtype=bool)
+    turned[rows] = True
     value = np.where(labels, 1.0, -np.inf)
     value[turned] = np.where(labels[turned], -np.inf, 2.0 + changes[turned])
     chosen = candidates.compatible(value)

@@ -49,16 +49,50 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
         Pairs i < j in lexicographic order; at least one.
     """
     cycles = short_faces(n, edges)
+    seen = []
+    for drawing in _drawings(n, edges, cycles):
+        faces = _fingerprint(drawing)
+        if not any(np.array_equal(faces, other) for other in seen):
+            seen.append(faces)
+            yield drawing
+
+
+def _drawings(n: int, edges: NDArray, cycles: list[NDArray]) -> Iterator[FaceComplex]:
     surface = from_cycles(n, edges, cycles)
     if surface is not None:
         yield surface
-    if sum(map(len, cycles)):
-        rotation = _with_faces(n, edges, cycles)
-        if rotation is not None:
-            yield from_rotation(n, edges, *rotation)
+    rotation = _with_faces(n, edges, cycles) if sum(map(len, cycles)) else None
+    if rotation is not None:
+        yield from_rotation(n, edges, *rotation)
     rotation = planarity.rotation_system(n, edges)
     if rotation is not None:
         yield from_rotation(n, edges, *rotation)
+
+
+def _fingerprint(drawing: FaceComplex) -> NDArray[np.float64]:
+    """The same for drawings with the same faces, mirrored or not: sums over each face of a number for each edge."""
+    number = np.random.default_rng(0).random(len(drawing.edges))
+    blocks = drawing.split()
+    return np.sort(np.round(np.bincount(blocks.face, number[np.arange(len(blocks.face)) >> 1]), 9))
+
+
+def triangular_faces(n: int, edges: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Faces with three edges of one planar embedding.
+
+    Returns
+    -------
+    triangles : (m, 3) int64
+        Vertices.
+    opposite : (m, 3) int64
+        Rows of `edges` that face the corners.
+    """
+    rotation = planarity.rotation_system(n, edges)
+    if rotation is None:
+        return np.empty((0, 3), np.int64), np.empty((0, 3), np.int64)
+    drawing = from_rotation(n, edges, *rotation)
+    faces = drawing.simple & (drawing.size == 3)
+    half = drawing.order[np.repeat(faces, drawing.size)].reshape(-1, 3)
+    return drawing.tail[half], half[:, [1, 2, 0]] >> 1
 
 
 def _with_faces(n: int, edges: NDArray, cycles: list[NDArray]) -> tuple[NDArray, NDArray] | None:

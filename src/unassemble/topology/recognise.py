@@ -13,6 +13,7 @@ from ..errors import NotPlanarError, TopologyError
 from . import planarity
 from .boundary import boundary_corners, following, loops
 from .cycles import three_cycles
+from .embedding import triangular_faces
 from .orientation import Gluing, glue, orient, reglue
 from .separating import not_faces
 from .surface import Piece, Topology
@@ -87,29 +88,40 @@ def _elsewhere(error: NotPlanarError | TopologyError, vertices: NDArray) -> NotP
     return TopologyError(where + str(error))
 
 
-def _recognise_whole(n: int, edges: NDArray) -> Topology:
-    """All of the graph at once, or an error."""
+def triangulated(n: int, edges: NDArray) -> tuple[Piece, ...] | None:
+    """The surfaces that the 3-cycles of a graph make; None where they make none, or some are no sphere with holes.
+
+    Edges may be left over.
+
+    Raises
+    ------
+    NotPlanarError
+        If there are more edges than a planar graph can have.
+    """
     if n >= 3 and len(edges) > 3 * n - 6:
         raise _not_planar(n, edges, f"it has {len(edges)} edges, and a planar graph has at most 3 n - 6 = {3 * n - 6}")
     triangles, opposite = three_cycles(n, edges)
     if (np.bincount(opposite.ravel(), minlength=1) > 2).any():
         face = ~not_faces(n, edges, triangles, opposite)
         triangles, opposite = triangles[face], opposite[face]
-    pieces = planar_pieces(n, edges, triangles, opposite)
-    covered = np.zeros(len(edges), dtype=bool)
-    covered[opposite] = True
-    if pieces is not None and covered.all():
+    return planar_pieces(n, edges, triangles, opposite) or None
+
+
+def _recognise_whole(n: int, edges: NDArray) -> Topology:
+    """All of the graph at once, or an error."""
+    pieces = triangulated(n, edges)
+    if pieces is not None and sum(len(piece.edges) for piece in pieces) == len(edges):
         return Topology(n, edges, pieces, "3-cycles")
     if not planarity.is_planar(n, edges):
         raise _not_planar(n, edges, "it contains the subdivision of K5 or K3,3 on these edges")
+    if pieces is not None:  # edges without a triangle do not hinder the rest
+        return Topology(n, edges, pieces, "3-cycles")
+    triangles, opposite = triangular_faces(n, edges)
     if not len(triangles):
         raise TopologyError(
             f"the graph of the matrix ({n} vertices, {len(edges)} edges) is planar but has no triangle: "
             "no element can be recognised (if zero entries were dropped, keep them stored)"
         )
-    if pieces is not None:  # edges without a triangle do not hinder the rest
-        return Topology(n, edges, pieces, "3-cycles")
-    triangles, opposite = planarity.triangular_faces(n, edges)
     pieces = planar_pieces(n, edges, triangles, opposite)
     if pieces is None:
         raise TopologyError(
@@ -131,7 +143,17 @@ def _not_planar_witness(where: str, why: str, witness: tuple[tuple[int, int], ..
 
 
 def planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> tuple[Piece, ...] | None:
-    """Cut triangles into oriented pieces; None where one of them is not a sphere with holes."""
+    """Cut triangles into oriented pieces; None where one of them is not a sphere with holes.
+
+    Parameters
+    ----------
+    n : int
+    edges : (e, 2) int64
+    triangles : (m, 3) int64
+        In any orientation.
+    opposite : (m, 3) int64
+        Rows of `edges` that face the corners.
+    """
     if not len(triangles):
         return ()
     gluing = glue(len(edges), opposite)
