@@ -24,7 +24,7 @@ from .planar.hinges import join
 from .planar.piece import PieceMesh
 from .recovery import Recovery
 from .solving import solve
-from .topology import Topology, recognise
+from .topology import Topology, local_numbering, recognise
 from .verdict import verdict
 
 _log = logging.getLogger(__name__)
@@ -157,7 +157,7 @@ def _recover(
     stretch = placement.tensor.root_determinant if placement.tensor else 1.0
     known = None if scale is None else scale * stretch
     with clock("topology"):
-        topology = recognise(matrix.n, matrix.edges)
+        topology = recognise(matrix.n, matrix.edges, local_numbering(matrix.n, matrix.edges))
     topology, meshes = solve(topology, matrix, clock, method=method, scale=known, refine=refine, rounding=noise is None)
     with clock("place"):
         placed, notes = _place(topology, placement, meshes)

@@ -47,7 +47,7 @@ def solve(
                 weights = -matrix.entries[piece.edge_rows]
                 solved.append((piece, _start(piece, weights, method, scale, sharp=not refine)))
             except (GeometryError, SolverError) as error:
-                failures.append(type(error)(f"in the piece of row {piece.vertices[0]}: {error}"))
+                failures.append(type(error)(f"in the piece of row {piece.vertices.min()}: {error}"))
     if not solved:
         raise failures[0]
     if failures:

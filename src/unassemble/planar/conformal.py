@@ -140,6 +140,7 @@ def conformal_map(
         z, c, _ = search.near(known / unit, z)
         # The quotient is stationary, and accurate to some hundred roundings at any size.
         if scale is not None or abs(c * unit / known - 1) < 1e-13:
+            z = search.corrected(z, c)
             return ConformalMap(z, known, search.factorisations, search.solves, True)
         spread = 1e-2 if c * unit / known > 1 else None  # beyond c the quotients tell nothing
     else:
@@ -153,6 +154,8 @@ def conformal_map(
         converged = distance <= (1e-9 if sharp else 1e-5) and spread < 1e-12
         if converged:
             break
+    if sharp:
+        z = search.corrected(z, c)
     _log.debug("scale %.16g after %d factorisations, %d solves", c * unit, search.factorisations, search.solves)
     return ConformalMap(z, float(c * unit), search.factorisations, search.solves, converged)
 
@@ -213,6 +216,17 @@ class _Search:
         z = sum(coefficient * u for coefficient, u in zip(y, basis, strict=True))
         _log.debug("shift %.12g: c = %.16g, last change %.1e", shift, c, spread)
         return z, c, spread
+
+    def corrected(self, z: NDArray, c: float) -> NDArray:
+        """One step of inverse iteration on a correction of z, with the last factorisation.
+
+        The solves round relative to the extent of the mesh, and all that they round adds up in the row of the pinned
+        vertex, which they leave out. The residual is accurate relative to edges, and so is what this leaves.
+        """
+        residual = self._pencil.energy_form(z) - c * self._pencil.area_form(z)
+        assert self._factor is not None
+        self.solves += 1
+        return z - np.append(self._factor.solve(residual[:-1]), 0)
 
 
 def _ritz(basis: list[NDArray], energy_images: list[NDArray], area_images: list[NDArray]) -> tuple[float, NDArray]:
