@@ -16,6 +16,7 @@ Mullen, Tong, Alliez, Desbrun, "Spectral conformal parameterization", CGF 27, 20
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +24,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from ..linalg import Factorisation, factorisation
+from ..linalg import Factorisation, UpperTriangle, factorisation
 from ..topology import Piece
 from .pencil import ConformalPencil
 
@@ -104,6 +105,7 @@ def conformal_map(
     *,
     scale: float | None = None,
     sharp: bool = True,
+    analyse: Callable[[UpperTriangle], Factorisation] = factorisation,
     options: ConformalOptions | None = None,
 ) -> ConformalMap:
     """Positions and scale of one piece.
@@ -117,6 +119,8 @@ def conformal_map(
         c, where it is known. Otherwise c = 1 is tried first if the estimate allows it.
     sharp : bool
         Go on until z, not only c, has converged. A polish does not need that.
+    analyse : callable
+        Makes a factorisation from the pattern of :func:`~unassemble.planar.pencil.pencil_pattern`.
     options : ConformalOptions, optional
 
     Raises
@@ -133,7 +137,7 @@ def conformal_map(
             "the entries of a piece, or they and the given scale, differ by so many orders of magnitude "
             "that no triangles could have them"
         )
-    search = _Search(ConformalPencil(piece, relative), options)
+    search = _Search(ConformalPencil(piece, relative), analyse, options)
     z = _smooth_start(piece)
     known = scale if scale is not None else 1.0
     if scale is not None or abs(known / unit - 1) < 0.3:
@@ -163,8 +167,14 @@ def conformal_map(
 class _Search:
     """Shift-and-invert Krylov steps on the pencil, in units in which c is near 1."""
 
-    def __init__(self, pencil: ConformalPencil, options: ConformalOptions):
+    def __init__(
+        self,
+        pencil: ConformalPencil,
+        analyse: Callable[[UpperTriangle], Factorisation],
+        options: ConformalOptions,
+    ):
         self._pencil = pencil
+        self._analyse = analyse
         self._options = options
         self._factor: Factorisation | None = None
         self.factorisations = 0
@@ -185,7 +195,7 @@ class _Search:
             Relative change of c in the last step.
         """
         matrix = self._pencil.matrix(shift)
-        factor = self._factor = self._factor or factorisation(matrix)
+        factor = self._factor = self._factor or self._analyse(matrix)
         factor.factorise(matrix)
         self.factorisations += 1
         basis: list[NDArray] = []

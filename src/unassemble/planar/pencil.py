@@ -18,6 +18,12 @@ from ..linalg import UpperTriangle, upper_from_edges
 from ..topology import Piece
 
 
+def pencil_pattern(n: int, edges: NDArray) -> UpperTriangle:
+    """The pattern of M(s) on a piece with these edges, (e, 2) in lexicographic order."""
+    edges = edges[edges[:, 1] < n - 1]  # the pinned vertex is the higher end of all its edges
+    return upper_from_edges(n - 1, edges, np.zeros(len(edges), np.complex128), np.zeros(n - 1))
+
+
 class ConformalPencil:
     """M(s) with the last vertex pinned at zero, which removes the constants from its null space.
 
