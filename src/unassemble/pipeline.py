@@ -16,15 +16,17 @@ from numpy.typing import NDArray
 from . import certify as certificates
 from .errors import InputError
 from .joined import JoinedMesh
+from .linalg import AnalysisAhead, factorisation
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, read_matrix
 from .placement import Anchor, Direction, Placement
 from .planar.deviations import coordinate_covariances
 from .planar.hinges import join
+from .planar.pencil import pencil_pattern
 from .planar.piece import PieceMesh
 from .recovery import Recovery
 from .solving import solve
-from .topology import Topology, recognise
+from .topology import Topology, local_numbering, recognise
 from .verdict import verdict
 
 _log = logging.getLogger(__name__)
@@ -125,7 +127,9 @@ def recover(
         checked = check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
     placement = Placement.checked(checked.n, anchors, tensor, direction, handed)
     with thread_limit(threads):
-        return _recover(checked, placement, clock, method or "conformal", refine, scale, noise, standard_deviations)
+        return _recover(
+            checked, placement, clock, method or "conformal", refine, scale, noise, standard_deviations, threads
+        )
 
 
 def _check_options(operator: str, method: str | None, scale: float | None, noise: float | None) -> None:
@@ -152,13 +156,27 @@ def _recover(
     scale: float | None,
     noise: float | None,
     standard_deviations: bool,
+    threads: int | None,
 ) -> Recovery:
     # With a tensor, c L is what is left of c div(K grad): its factor is c sqrt(det K).
     stretch = placement.tensor.root_determinant if placement.tensor else 1.0
     known = None if scale is None else scale * stretch
     with clock("topology"):
-        topology = recognise(matrix.n, matrix.edges)
-    topology, meshes = solve(topology, matrix, clock, method=method, scale=known, refine=refine, rounding=noise is None)
+        numbering = local_numbering(matrix.n, matrix.edges)
+        analyse: AnalysisAhead | None = None
+        if method == "conformal":  # most matrices are those of a single piece, and its pencil has their pattern
+            analyse = AnalysisAhead(pencil_pattern(matrix.n, numbering.edges), threads)
+        topology = recognise(matrix.n, matrix.edges, numbering)
+    topology, meshes = solve(
+        topology,
+        matrix,
+        clock,
+        method=method,
+        scale=known,
+        refine=refine,
+        rounding=noise is None,
+        analyse=analyse or factorisation,
+    )
     with clock("place"):
         placed, notes = _place(topology, placement, meshes)
         mesh = JoinedMesh.of(topology, placed, np.array([m.scale for m in meshes]) / stretch)

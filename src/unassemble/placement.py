@@ -108,13 +108,13 @@ class Placement:
         if len(rows) >= 2:
             return self._by_anchors(piece, z, rows, targets)
         if self.direction and np.isin(self.direction[:2], piece.vertices).all():
-            ends = np.searchsorted(piece.vertices, self.direction[:2])
+            ends = piece.local(np.array(self.direction[:2]))
             positions = self._by_direction(piece, z, ends)
             notes: list[str] = []
         elif self.tensor:
             raise InputError(
-                f"the tensor cannot be undone for the piece of row {piece.vertices[0]} without its orientation: give "
-                "three anchors that are not in line, or --direction ROW,ROW,DEGREES with --handed left|right"
+                f"the tensor cannot be undone for the piece of row {piece.vertices.min()} without its orientation: "
+                "give three anchors that are not in line, or --direction ROW,ROW,DEGREES with --handed left|right"
             )
         else:
             frame, note = canonical_frame(z, piece.edges)
@@ -143,7 +143,7 @@ class Placement:
         rows = np.array([row for row, _, _ in self.anchors], dtype=np.int64)
         targets = np.array([complex(x, y) for _, x, y in self.anchors], dtype=np.complex128)
         here = np.isin(rows, piece.vertices)
-        return np.searchsorted(piece.vertices, rows[here]), targets[here]
+        return piece.local(rows[here]), targets[here]
 
     def _by_anchors(self, piece: Piece, z: NDArray, rows: NDArray, targets: NDArray) -> tuple[NDArray, list[str]]:
         known = self.tensor.to_laplacian(targets) if self.tensor else targets

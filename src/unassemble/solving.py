@@ -9,6 +9,7 @@ from dataclasses import replace
 from numpy.typing import NDArray
 
 from .errors import GeometryError, SolverError
+from .linalg import Factorisation, UpperTriangle, factorisation
 from .matrix import OperatorMatrix
 from .planar.piece import PieceMesh, positions, refined
 from .topology import Piece, Topology
@@ -25,8 +26,9 @@ def solve(
     scale: float | None,
     refine: bool,
     rounding: bool,
+    analyse: Callable[[UpperTriangle], Factorisation] = factorisation,
 ) -> tuple[Topology, list[PieceMesh]]:
-    """Positions and scale of each piece, in no particular frame.
+    """Positions and scale of each piece, in no particular frame; `analyse` as for the conformal map.
 
     Returns
     -------
@@ -45,9 +47,9 @@ def solve(
         for piece in topology.pieces:
             try:
                 weights = -matrix.entries[piece.edge_rows]
-                solved.append((piece, _start(piece, weights, method, scale, sharp=not refine)))
+                solved.append((piece, _start(piece, weights, method, scale, sharp=not refine, analyse=analyse)))
             except (GeometryError, SolverError) as error:
-                failures.append(type(error)(f"in the piece of row {piece.vertices[0]}: {error}"))
+                failures.append(type(error)(f"in the piece of row {piece.vertices.min()}: {error}"))
     if not solved:
         raise failures[0]
     if failures:
@@ -66,10 +68,18 @@ def solve(
     return topology, meshes
 
 
-def _start(piece: Piece, weights: NDArray, method: str, scale: float | None, *, sharp: bool) -> PieceMesh:
+def _start(
+    piece: Piece,
+    weights: NDArray,
+    method: str,
+    scale: float | None,
+    *,
+    sharp: bool,
+    analyse: Callable[[UpperTriangle], Factorisation],
+) -> PieceMesh:
     if method == "angles":
         return _by_angles(piece, weights, scale)
-    return positions(piece, weights, scale=scale, sharp=sharp)
+    return positions(piece, weights, scale=scale, sharp=sharp, analyse=analyse)
 
 
 def _by_angles(piece: Piece, weights: NDArray, scale: float | None) -> PieceMesh:

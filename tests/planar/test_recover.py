@@ -40,6 +40,14 @@ def test_scale_is_found_with_its_sign(c):
     assert found.scale == pytest.approx(c, rel=1e-12)
 
 
+@pytest.mark.parametrize("c", [1.0, -41.0])
+def test_without_polish_errors_stay_at_the_level_of_edges(c):
+    known = specimen(*random_mesh(20_000, seed=4), c=c, seed=2)
+    found = recover(known.matrix, refine=False)
+    assert found.backward_error < 1e-12
+    assert largest_error(found.points, known.points) < 1e-11
+
+
 def test_known_scale_is_kept():
     known = specimen(*random_mesh(300), c=4.0)
     assert recover(known.matrix, scale=4.0).certified

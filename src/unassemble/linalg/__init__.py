@@ -1,7 +1,8 @@
 """Sparse linear algebra behind one small interface."""
 
+from .ahead import AnalysisAhead
 from .factorisation import Factorisation, backend, factorisation
 from .threads import threads
 from .upper import UpperTriangle, upper_from_edges
 
-__all__ = ["Factorisation", "UpperTriangle", "backend", "factorisation", "threads", "upper_from_edges"]
+__all__ = ["AnalysisAhead", "Factorisation", "UpperTriangle", "backend", "factorisation", "threads", "upper_from_edges"]

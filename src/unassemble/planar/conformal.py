@@ -16,6 +16,7 @@ Mullen, Tong, Alliez, Desbrun, "Spectral conformal parameterization", CGF 27, 20
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +24,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from ..linalg import Factorisation, factorisation
+from ..linalg import Factorisation, UpperTriangle, factorisation
 from ..topology import Piece
 from .pencil import ConformalPencil
 
@@ -104,6 +105,7 @@ def conformal_map(
     *,
     scale: float | None = None,
     sharp: bool = True,
+    analyse: Callable[[UpperTriangle], Factorisation] = factorisation,
     options: ConformalOptions | None = None,
 ) -> ConformalMap:
     """Positions and scale of one piece.
@@ -117,6 +119,8 @@ def conformal_map(
         c, where it is known. Otherwise c = 1 is tried first if the estimate allows it.
     sharp : bool
         Go on until z, not only c, has converged. A polish does not need that.
+    analyse : callable
+        Makes a factorisation from the pattern of :func:`~unassemble.planar.pencil.pencil_pattern`.
     options : ConformalOptions, optional
 
     Raises
@@ -133,13 +137,14 @@ def conformal_map(
             "the entries of a piece, or they and the given scale, differ by so many orders of magnitude "
             "that no triangles could have them"
         )
-    search = _Search(ConformalPencil(piece, relative), options)
+    search = _Search(ConformalPencil(piece, relative), analyse, options)
     z = _smooth_start(piece)
     known = scale if scale is not None else 1.0
     if scale is not None or abs(known / unit - 1) < 0.3:
         z, c, _ = search.near(known / unit, z)
         # The quotient is stationary, and accurate to some hundred roundings at any size.
         if scale is not None or abs(c * unit / known - 1) < 1e-13:
+            z = search.corrected(z, c)
             return ConformalMap(z, known, search.factorisations, search.solves, True)
         spread = 1e-2 if c * unit / known > 1 else None  # beyond c the quotients tell nothing
     else:
@@ -153,6 +158,8 @@ def conformal_map(
         converged = distance <= (1e-9 if sharp else 1e-5) and spread < 1e-12
         if converged:
             break
+    if sharp:
+        z = search.corrected(z, c)
     _log.debug("scale %.16g after %d factorisations, %d solves", c * unit, search.factorisations, search.solves)
     return ConformalMap(z, float(c * unit), search.factorisations, search.solves, converged)
 
@@ -160,8 +167,14 @@ def conformal_map(
 class _Search:
     """Shift-and-invert Krylov steps on the pencil, in units in which c is near 1."""
 
-    def __init__(self, pencil: ConformalPencil, options: ConformalOptions):
+    def __init__(
+        self,
+        pencil: ConformalPencil,
+        analyse: Callable[[UpperTriangle], Factorisation],
+        options: ConformalOptions,
+    ):
         self._pencil = pencil
+        self._analyse = analyse
         self._options = options
         self._factor: Factorisation | None = None
         self.factorisations = 0
@@ -182,7 +195,7 @@ class _Search:
             Relative change of c in the last step.
         """
         matrix = self._pencil.matrix(shift)
-        factor = self._factor = self._factor or factorisation(matrix)
+        factor = self._factor = self._factor or self._analyse(matrix)
         factor.factorise(matrix)
         self.factorisations += 1
         basis: list[NDArray] = []
@@ -213,6 +226,17 @@ class _Search:
         z = sum(coefficient * u for coefficient, u in zip(y, basis, strict=True))
         _log.debug("shift %.12g: c = %.16g, last change %.1e", shift, c, spread)
         return z, c, spread
+
+    def corrected(self, z: NDArray, c: float) -> NDArray:
+        """One step of inverse iteration on a correction of z, with the last factorisation.
+
+        The solves round relative to the extent of the mesh, and all that they round adds up in the row of the pinned
+        vertex, which they leave out. The residual is accurate relative to edges, and so is what this leaves.
+        """
+        residual = self._pencil.energy_form(z) - c * self._pencil.area_form(z)
+        assert self._factor is not None
+        self.solves += 1
+        return z - np.append(self._factor.solve(residual[:-1]), 0)
 
 
 def _ritz(basis: list[NDArray], energy_images: list[NDArray], area_images: list[NDArray]) -> tuple[float, NDArray]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SolverError
+from ..linalg import Factorisation, UpperTriangle
 from ..topology import Piece
 from .conformal import conformal_map
 from .polish import polish
@@ -30,9 +32,16 @@ class PieceMesh:
     notes: tuple[str, ...] = ()
 
 
-def positions(piece: Piece, weights: NDArray, *, scale: float | None, sharp: bool) -> PieceMesh:
+def positions(
+    piece: Piece,
+    weights: NDArray,
+    *,
+    scale: float | None,
+    sharp: bool,
+    analyse: Callable[[UpperTriangle], Factorisation],
+) -> PieceMesh:
     """Conformal solve; `sharp` where no polish follows."""
-    found = conformal_map(piece, weights, scale=scale, sharp=sharp)
+    found = conformal_map(piece, weights, scale=scale, sharp=sharp, analyse=analyse)
     notes = () if found.converged else ("the conformal solve did not converge",)
     return PieceMesh(found.z, found.scale, notes)
 

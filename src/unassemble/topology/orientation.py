@@ -9,6 +9,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
+from .search import breadth_first
+
 
 @dataclass(frozen=True, eq=False)
 class Gluing:
@@ -76,7 +78,7 @@ def orient(triangles: NDArray, gluing: Gluing) -> tuple[NDArray, NDArray, NDArra
         (np.tile(np.where(clash, 2, 1).astype(np.int8), 2), (np.r_[one, two], np.r_[two, one])), shape=(m, m)
     )
     n_pieces, piece = csgraph.connected_components(dual, directed=False)
-    order, parent = _spanning_tree(dual, n_pieces, piece)
+    order, parent = breadth_first(dual)
     rows = np.arange(m)
     above = np.where(parent < 0, rows, parent)
     turned = np.asarray(dual[rows, above]).ravel() == 2
@@ -93,24 +95,6 @@ def _runs_upwards(triangles: NDArray, corner: NDArray) -> NDArray:
     flat = triangles.ravel()
     base, position = 3 * (corner // 3), corner % 3
     return flat[base + (position + 1) % 3] < flat[base + (position + 2) % 3]
-
-
-def _spanning_tree(dual: sp.csr_array, n_pieces: int, piece: NDArray) -> tuple[NDArray, NDArray]:
-    """Breadth-first order and parents, -1 at the first triangle of each piece."""
-    m = dual.shape[0]
-    if n_pieces == 1:
-        order, parent = csgraph.breadth_first_order(dual, 0, directed=True)
-        return order, np.where(parent < 0, -1, parent)
-    # One search from an extra node that is joined to every piece, however many there are.
-    _, first = np.unique(piece, return_index=True)
-    indptr = np.append(dual.indptr, dual.indptr[-1] + n_pieces)
-    graph = sp.csr_array(
-        (np.ones(indptr[-1], np.int8), np.append(dual.indices, first.astype(dual.indices.dtype)), indptr),
-        shape=(m + 1, m + 1),
-    )
-    order, parent = csgraph.breadth_first_order(graph, m, directed=True)
-    parent = parent[:m]
-    return order[1:], np.where((parent < 0) | (parent == m), -1, parent)
 
 
 def _parity_to_root(order: NDArray, parent: NDArray, turned: NDArray) -> NDArray[np.bool_]:

@@ -14,12 +14,13 @@ from . import planarity
 from .boundary import boundary_corners, following, loops
 from .cycles import three_cycles
 from .embedding import triangular_faces
+from .numbering import Numbering
 from .orientation import Gluing, glue, orient, reglue
 from .separating import not_faces
 from .surface import Piece, Topology
 
 
-def recognise(n: int, edges: NDArray) -> Topology:
+def recognise(n: int, edges: NDArray, numbering: Numbering | None = None) -> Topology:
     """Find the triangles of a planar mesh in its graph.
 
     3-cycles with something on both sides are no faces. If every edge lies on at most two of the others, and these
@@ -36,6 +37,8 @@ def recognise(n: int, edges: NDArray) -> Topology:
         Number of vertices.
     edges : (e, 2) int64
         Pairs i < j in lexicographic order.
+    numbering : Numbering, optional
+        Of the same graph: in which to work, and which pieces keep where they are the whole graph.
 
     Raises
     ------
@@ -44,43 +47,81 @@ def recognise(n: int, edges: NDArray) -> Topology:
     TopologyError
         If no component has triangles that fit together.
     """
+    if numbering is None:
+        numbering = Numbering(np.arange(n), np.arange(len(edges)), edges)
     try:
-        return _recognise_whole(n, edges)
+        return _recognise_numbered(n, edges, [numbering])
     except (NotPlanarError, TopologyError):
-        components = _components(n, edges)
-        if len(components) == 1:
+        parts = components(n, edges)
+        if len(parts) == 1:
             raise
-        return _recognise_each(n, edges, components)
+        return _recognise_numbered(n, edges, parts)
 
 
-def _components(n: int, edges: NDArray) -> list[NDArray]:
-    """Rows of `edges` in each connected component of the graph, largest component first."""
+def surfaces(n: int, edges: NDArray, numbering: Numbering | None = None) -> Topology:
+    """The surfaces that 3-cycles make; no planarity test, and edges or whole components may be left over.
+
+    Parameters
+    ----------
+    n, edges, numbering
+        As for :func:`recognise`.
+    """
+    whole = numbering or Numbering(np.arange(n), np.arange(len(edges)), edges)
+    pieces: list[Piece] = []
+    try:
+        found = triangulated(n, whole.edges)
+        parts = [whole] if found is not None else components(n, edges)
+    except NotPlanarError:
+        parts = components(n, edges)
+    for part in parts:
+        if len(parts) > 1 or part is not whole:
+            try:
+                found = triangulated(len(part.vertices), part.edges)
+            except NotPlanarError:
+                continue
+        pieces += [
+            replace(p, vertices=part.vertices[p.vertices], edge_rows=part.edge_rows[p.edge_rows]) for p in found or ()
+        ]
+    pieces.sort(key=lambda piece: int(piece.vertices.min()))
+    return Topology(n, edges, tuple(pieces), "3-cycles")
+
+
+def components(n: int, edges: NDArray) -> list[Numbering]:
+    """Connected components with edges, each in a numbering of its own, largest first."""
     graph = sp.coo_array((np.ones(len(edges), np.int8), edges.T), shape=(n, n))
     count, label = csgraph.connected_components(graph, directed=False)
-    groups = [rows for rows in _groups(label[edges[:, 0]], count) if len(rows)]
-    return sorted(groups, key=len, reverse=True)
+    parts = []
+    for rows in sorted(_groups(label[edges[:, 0]], count), key=len, reverse=True):
+        if len(rows):
+            vertices, ends = np.unique(edges[rows], return_inverse=True)
+            parts.append(Numbering(vertices, rows, ends.reshape(-1, 2)))
+    return parts
 
 
-def _recognise_each(n: int, edges: NDArray, components: list[NDArray]) -> Topology:
+def _recognise_numbered(n: int, edges: NDArray, parts: list[Numbering]) -> Topology:
+    """Parts of the graph one by one, in the numbering of each; an error where none has a mesh."""
     pieces: list[Piece] = []
     failures: list[NotPlanarError | TopologyError] = []
-    for rows in components:
-        vertices, local = np.unique(edges[rows], return_inverse=True)
+    method = "component by component"
+    for part in parts:
+        where = f"in the component of row {part.vertices.min()} ({len(part.vertices)} rows): " if len(parts) > 1 else ""
         try:
-            part = _recognise_whole(len(vertices), local.reshape(-1, 2))
+            found = _recognise_whole(len(part.vertices), part.edges)
         except (NotPlanarError, TopologyError) as error:
-            failures.append(_elsewhere(error, vertices))
+            failures.append(_renumbered(error, where, part.vertices))
             continue
-        pieces += [replace(p, vertices=vertices[p.vertices], edge_rows=rows[p.edge_rows]) for p in part.pieces]
+        method = found.method if len(parts) == 1 else method
+        pieces += [
+            replace(p, vertices=part.vertices[p.vertices], edge_rows=part.edge_rows[p.edge_rows]) for p in found.pieces
+        ]
     if not pieces:
         raise failures[0]
-    pieces.sort(key=lambda piece: int(piece.vertices[0]))
-    return Topology(n, edges, tuple(pieces), "component by component", tuple(map(str, failures)))
+    pieces.sort(key=lambda piece: int(piece.vertices.min()))
+    return Topology(n, edges, tuple(pieces), method, tuple(map(str, failures)))
 
 
-def _elsewhere(error: NotPlanarError | TopologyError, vertices: NDArray) -> NotPlanarError | TopologyError:
+def _renumbered(error: NotPlanarError | TopologyError, where: str, vertices: NDArray) -> NotPlanarError | TopologyError:
     """The same error in the numbering of the whole."""
-    where = f"in the component of row {vertices[0]} ({len(vertices)} rows): "
     if isinstance(error, NotPlanarError):
         return _not_planar_witness(
             where, error.why, tuple((int(vertices[a]), int(vertices[b])) for a, b in error.witness)

@@ -16,7 +16,7 @@ class Piece:
     Attributes
     ----------
     vertices : (k,) int64
-        Rows of the matrix.
+        Rows of the matrix, in any order.
     edge_rows : (e,) int64
         Rows of the whole graph's edge list.
     edges : (e, 2) int64
@@ -46,6 +46,11 @@ class Piece:
     def n_vertices(self) -> int:
         """Number of vertices."""
         return len(self.vertices)
+
+    def local(self, rows: NDArray) -> NDArray[np.int64]:
+        """Local vertices of some of its matrix rows."""
+        order = np.argsort(self.vertices)
+        return order[np.searchsorted(self.vertices, rows, sorter=order)]
 
     @property
     def n_loops(self) -> int:
