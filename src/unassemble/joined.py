@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .topology import Topology
+from .topology import Polygons, Topology
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,8 +19,12 @@ class JoinedMesh:
     points : (n, 2) float64
         NaN for vertices of no piece.
     triangles : (m, 3) int64
-        Counter-clockwise.
+        Counter-clockwise; those of divided polygons included.
     triangle_piece : (m,) int64
+    in_polygon : (m,) bool
+        Triangles that are part of a polygon.
+    polygons : Polygons
+        Counter-clockwise.
     component : (n,) int64
         Piece of each point, the lowest at hinges, -1 for none.
     scale : (number of pieces,) float64
@@ -32,6 +36,8 @@ class JoinedMesh:
     points: NDArray[np.float64]
     triangles: NDArray[np.int64]
     triangle_piece: NDArray[np.int64]
+    in_polygon: NDArray[np.bool_]
+    polygons: Polygons
     component: NDArray[np.int64]
     scale: NDArray[np.float64]
     boundary: NDArray[np.int64]
@@ -42,7 +48,9 @@ class JoinedMesh:
         """Join pieces at positions `placed`, turning over those that are mirrored."""
         points = np.full((topology.n_vertices, 2), np.nan)
         component = np.full(topology.n_vertices, -1, dtype=np.int64)
-        triangles, boundaries, lengths = [], [], []
+        triangles, divided, boundaries, lengths = [], [], [], []
+        vanished = np.zeros(len(topology.edges), dtype=bool)
+        vanished[topology.vanished] = True
         for label, (piece, z) in reversed(list(enumerate(zip(topology.pieces, placed, strict=True)))):
             points[piece.vertices] = np.column_stack([z.real, z.imag])
             component[piece.vertices] = label
@@ -52,6 +60,8 @@ class JoinedMesh:
             local = piece.triangles[:, [0, 2, 1]] if mirrored else piece.triangles
             ring = piece.boundary[::-1, ::-1] if mirrored else piece.boundary
             triangles.append(piece.vertices[local])
+            diagonal = vanished[piece.edge_rows] & (piece.facing[:, 1] >= 0)
+            divided.append(diagonal[piece.opposite].any(axis=1))
             boundaries.append(piece.vertices[ring])
             loop_lengths = np.diff(piece.loop_offsets)
             lengths.append(loop_lengths[::-1] if mirrored else loop_lengths)
@@ -59,6 +69,8 @@ class JoinedMesh:
             points=points,
             triangles=np.concatenate(triangles),
             triangle_piece=np.repeat(np.arange(len(placed)), [len(t) for t in triangles]),
+            in_polygon=np.concatenate(divided),
+            polygons=topology.polygons.counter_clockwise(points),
             component=component,
             scale=scale,
             boundary=np.concatenate(boundaries),

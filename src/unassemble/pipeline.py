@@ -26,7 +26,7 @@ from .planar.pencil import pencil_pattern
 from .planar.piece import PieceMesh
 from .recovery import Recovery
 from .solving import solve
-from .topology import Topology, local_numbering, recognise
+from .topology import Polygons, Topology, local_numbering, surfaces
 from .verdict import verdict
 
 _log = logging.getLogger(__name__)
@@ -46,6 +46,7 @@ def recover(
     direction: Direction | None = None,
     handed: str | None = None,
     standard_deviations: bool = False,
+    triangulate: bool = False,
     variable: str | None = None,
     threads: int | None = None,
     progress: Callable[[str], None] | None = None,
@@ -85,6 +86,9 @@ def recover(
         Side of that line, or of the line between two anchors, on which the piece's centroid lies.
     standard_deviations : bool
         Compute error bars: for `noise`, or for the noise that the misfit shows.
+    triangulate : bool
+        Divide cells of more than three vertices into triangles; the vertices lie on a circle, so that every division
+        is a Delaunay triangulation and the matrix does not prefer one.
     variable : str, optional
         Name of the variable in a ``.mat`` file.
     threads : int, optional
@@ -128,7 +132,16 @@ def recover(
     placement = Placement.checked(checked.n, anchors, tensor, direction, handed)
     with thread_limit(threads):
         return _recover(
-            checked, placement, clock, method or "conformal", refine, scale, noise, standard_deviations, threads
+            checked,
+            placement,
+            clock,
+            method or "conformal",
+            refine,
+            scale,
+            noise,
+            standard_deviations,
+            threads,
+            triangulate,
         )
 
 
@@ -148,7 +161,7 @@ def _is_matrix(A: Any) -> bool:
 
 
 def _recover(
-    matrix: OperatorMatrix,
+    stored: OperatorMatrix,
     placement: Placement,
     clock: _Clock,
     method: str,
@@ -157,19 +170,20 @@ def _recover(
     noise: float | None,
     standard_deviations: bool,
     threads: int | None,
+    triangulate: bool,
 ) -> Recovery:
     # With a tensor, c L is what is left of c div(K grad): its factor is c sqrt(det K).
     stretch = placement.tensor.root_determinant if placement.tensor else 1.0
     known = None if scale is None else scale * stretch
     with clock("topology"):
-        numbering = local_numbering(matrix.n, matrix.edges)
+        numbering = local_numbering(stored.n, stored.edges)
         analyse: AnalysisAhead | None = None
         if method == "conformal":  # most matrices are those of a single piece, and its pencil has their pattern
-            analyse = AnalysisAhead(pencil_pattern(matrix.n, numbering.edges), threads)
-        topology = recognise(matrix.n, matrix.edges, numbering)
-    topology, meshes = solve(
+            analyse = AnalysisAhead(pencil_pattern(stored.n, numbering.edges), threads)
+        topology = surfaces(stored.n, stored.edges, numbering)
+    matrix, topology, meshes = solve(
         topology,
-        matrix,
+        stored,
         clock,
         method=method,
         scale=known,
@@ -182,8 +196,8 @@ def _recover(
         mesh = JoinedMesh.of(topology, placed, np.array([m.scale for m in meshes]) / stretch)
     with clock("certify"):
         certificate = certificates.certify(
-            matrix.edges,
-            matrix.entries,
+            stored.edges,
+            stored.entries,
             mesh.points,
             mesh.triangles,
             mesh.scale[mesh.triangle_piece],
@@ -199,12 +213,15 @@ def _recover(
     chi_square = certificates.chi_square_verdict(certificate.differences, noise, freedom) if noise else None
     status, reason = verdict(topology, certificate, chi_square, matrix)
     worst, misfits = certificate.worst() if status == "uncertified" else certificate.worst(0)
+    polygons = Polygons.none() if triangulate else mesh.polygons
     return Recovery(
         points=mesh.points,
-        triangles=mesh.triangles,
+        triangles=mesh.triangles if triangulate else mesh.triangles[~mesh.in_polygon],
         component=mesh.component,
         hinges=topology.hinges,
         scale=mesh.scale,
+        polygons_offsets=polygons.offsets,
+        polygons_data=polygons.vertices,
         boundary=mesh.boundary,
         boundary_offsets=mesh.boundary_offsets,
         node_status=(topology.multiplicity == 0).astype(np.int8),
@@ -233,7 +250,7 @@ def _place(topology: Topology, placement: Placement, meshes: list[PieceMesh]) ->
     known = np.array([placement.known_positions(piece) for piece in topology.pieces])
     placed = join(topology, placed, known)
     notes += placement.unused(topology)
-    notes += [*_topology_notes(topology), *topology.failures]
+    notes += [*_topology_notes(topology), *_vanished_notes(topology), *topology.failures]
     return placed, notes
 
 
@@ -251,6 +268,21 @@ def _topology_notes(topology: Topology) -> list[str]:
             f"{len(topology.undetermined)} rows belong to no triangle and have no position: "
             f"{_some(topology.undetermined)}"
         )
+    return notes
+
+
+def _vanished_notes(topology: Topology) -> list[str]:
+    notes = []
+    polygons = topology.polygons
+    if polygons.count:
+        notes.append(
+            f"{polygons.count} cells have more than three vertices, on one circle: entries on their diagonals "
+            "vanish whichever way they are divided, so any division into triangles gives the same matrix"
+        )
+    diagonals = int((polygons.size - 3).sum())
+    if len(topology.vanished) > diagonals:
+        count = len(topology.vanished) - diagonals
+        notes.append(f"{count} boundary edges, which face right angles, have no entry in the matrix")
     return notes
 
 

@@ -25,6 +25,10 @@ class Recovery:
         Coordinates; row i belongs to matrix row i. NaN where the matrix determines none.
     triangles : (m, 3) int64
         Cells, rows of `points`, counter-clockwise.
+    polygons_offsets : (polygons + 1,) int64
+    polygons_data : (polygons_offsets[-1],) int64
+        Cells that the matrix leaves undivided, counter-clockwise: polygon k is
+        ``polygons_data[polygons_offsets[k]:polygons_offsets[k + 1]]``.
     component : (n,) int64
         Edge-connected piece of each point, -1 for points of no cell; a vertex shared by pieces carries the lowest
         label.
@@ -63,6 +67,8 @@ class Recovery:
 
     points: NDArray[np.float64]
     triangles: NDArray[np.int64]
+    polygons_offsets: NDArray[np.int64]
+    polygons_data: NDArray[np.int64]
     component: NDArray[np.int64]
     hinges: NDArray[np.int64]
     scale: NDArray[np.float64]
@@ -94,7 +100,12 @@ class Recovery:
     @property
     def n_cells(self) -> int:
         """Number of cells of all kinds."""
-        return len(self.triangles)
+        return len(self.triangles) + self.n_polygons
+
+    @property
+    def n_polygons(self) -> int:
+        """Number of cells with more than three vertices."""
+        return len(self.polygons_offsets) - 1
 
     @property
     def n_components(self) -> int:

@@ -8,7 +8,8 @@ from dataclasses import replace
 
 from numpy.typing import NDArray
 
-from .errors import GeometryError, SolverError
+from .cells import Outcome, completed
+from .errors import GeometryError, RecoveryError, SolverError
 from .linalg import Factorisation, UpperTriangle, factorisation
 from .matrix import OperatorMatrix
 from .planar.piece import PieceMesh, positions, refined
@@ -27,44 +28,61 @@ def solve(
     refine: bool,
     rounding: bool,
     analyse: Callable[[UpperTriangle], Factorisation] = factorisation,
-) -> tuple[Topology, list[PieceMesh]]:
+) -> tuple[OperatorMatrix, Topology, list[PieceMesh]]:
     """Positions and scale of each piece, in no particular frame; `analyse` as for the conformal map.
 
     Returns
     -------
+    matrix : OperatorMatrix
+        With entries that had vanished as zeros.
     topology : Topology
-        Without the pieces that have no positions; these are listed in its ``failures``.
+        Of that matrix, without the pieces that have no positions; these are listed in its ``failures``.
     meshes : list of PieceMesh
 
     Raises
     ------
-    GeometryError, SolverError
+    RecoveryError
         If no piece has positions.
     """
-    solved: list[tuple[Piece, PieceMesh]] = []
-    failures: list[GeometryError | SolverError] = []
+
+    def start(piece: Piece) -> Outcome:
+        try:
+            weights = -matrix.entries[piece.edge_rows]
+            return _start(piece, weights, method, scale, sharp=not refine, analyse=analyse)
+        except (GeometryError, SolverError) as error:
+            return error
+
     with clock(method):
-        for piece in topology.pieces:
-            try:
-                weights = -matrix.entries[piece.edge_rows]
-                solved.append((piece, _start(piece, weights, method, scale, sharp=not refine, analyse=analyse)))
-            except (GeometryError, SolverError) as error:
-                failures.append(type(error)(f"in the piece of row {piece.vertices.min()}: {error}"))
-    if not solved:
-        raise failures[0]
-    if failures:
-        topology = replace(
-            topology,
-            pieces=tuple(piece for piece, _ in solved),
-            failures=(*topology.failures, *map(str, failures)),
-        )
-    meshes = [mesh for _, mesh in solved]
+        outcomes = [start(piece) for piece in topology.pieces]
+    with clock("cells"):
+        matrix, complete, outcomes = completed(matrix, topology, outcomes)
+        # The search leaves c free, stops early and knows one method.
+        if complete is not topology and (scale is not None or not refine or method != "conformal"):
+            outcomes = [start(piece) for piece in complete.pieces]
+        topology = complete
+    topology, meshes = _successes(topology, outcomes)
     if refine:
         with clock("polish"):
             meshes = [
                 refined(piece, -matrix.entries[piece.edge_rows], mesh, scale=scale, rounding=rounding)
-                for piece, mesh in solved
+                for piece, mesh in zip(topology.pieces, meshes, strict=True)
             ]
+    return matrix, topology, meshes
+
+
+def _successes(topology: Topology, outcomes: list[Outcome]) -> tuple[Topology, list[PieceMesh]]:
+    """Pieces that have positions; an error where there are none."""
+    meshes = [mesh for mesh in outcomes if isinstance(mesh, PieceMesh)]
+    errors: list[RecoveryError] = [
+        type(error)(f"in the piece of row {piece.vertices.min()}: {error}")
+        for piece, error in zip(topology.pieces, outcomes, strict=True)
+        if not isinstance(error, PieceMesh)
+    ]
+    if not meshes:
+        raise errors[0]
+    if errors:
+        pieces = [p for p, mesh in zip(topology.pieces, outcomes, strict=True) if isinstance(mesh, PieceMesh)]
+        topology = replace(topology, pieces=tuple(pieces), failures=(*topology.failures, *map(str, errors)))
     return topology, meshes
 
 

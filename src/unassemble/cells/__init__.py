@@ -3,6 +3,7 @@
 Where entries vanish the graph alone does not tell: see the page on theory in the documentation.
 """
 
+from .completion import Outcome, completed
 from .search import read_cells
 
-__all__ = ["read_cells"]
+__all__ = ["Outcome", "completed", "read_cells"]

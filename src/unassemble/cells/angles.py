@@ -31,13 +31,14 @@ def shared_angles(complex_: FaceComplex, weights: NDArray) -> NDArray[np.float64
 
 def face_sums(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]:
     """(faces,) sum of the angles around each face, about pi for a cell."""
-    return np.bincount(complex_.face, angles)
+    return np.asarray(np.bincount(complex_.face, angles), dtype=np.float64)
 
 
 def vertex_excess(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]:
     """(n,) sum of the corners about each vertex less 2 pi: about 0 at interior vertices, negative on the boundary."""
     corners = np.bincount(complex_.tail, minlength=complex_.n_vertices) * np.pi
-    return corners - 2 * np.bincount(complex_.tail, angles, complex_.n_vertices) - 2 * np.pi
+    turned = np.bincount(complex_.tail, angles, complex_.n_vertices)
+    return np.asarray(corners - 2 * turned - 2 * np.pi, dtype=np.float64)
 
 
 def _scale(complex_: FaceComplex, weights: NDArray) -> float:

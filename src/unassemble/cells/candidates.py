@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..topology import Polygons
 from ..topology.faces import FaceComplex
 from .angles import face_sums, shared_angles, vertex_excess
 
@@ -27,9 +28,7 @@ class Candidates:
     edges : (e, 2) int64
     weights : (e,) float64
         -A_ij of each edge.
-    offsets : (cells + 1,) int64
-    vertices : (offsets[-1],) int64
-        Cell k has the vertices ``vertices[offsets[k]:offsets[k + 1]]``, in running order.
+    cells : Polygons
     sides : (s, 2) int64
         Pairs (cell, half-edge) of what each cell takes up.
     belief : (cells,) float64
@@ -46,8 +45,7 @@ class Candidates:
     n_vertices: int
     edges: NDArray[np.int64]
     weights: NDArray[np.float64]
-    offsets: NDArray[np.int64]
-    vertices: NDArray[np.int64]
+    cells: Polygons
     sides: NDArray[np.int64]
     belief: NDArray[np.float64]
     first: NDArray[np.bool_]
@@ -79,8 +77,7 @@ class Candidates:
             n_vertices=drawing.n_vertices,
             edges=drawing.edges,
             weights=weights,
-            offsets=offsets,
-            vertices=vertices,
+            cells=Polygons(offsets, vertices),
             sides=np.concatenate(
                 [
                     np.column_stack([number[blocks.face[blocks.order[chosen]]], blocks.order[chosen]]),
@@ -101,7 +98,7 @@ class Candidates:
     @property
     def size(self) -> NDArray[np.int64]:
         """(cells,) number of vertices."""
-        return np.diff(self.offsets)
+        return self.cells.size
 
     @cached_property
     def conflicts(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -42,7 +42,7 @@ def _explain(reading: Reading, piece: Piece, mesh: PieceMesh, changes: NDArray) 
     candidates = reading.candidates
     local = np.full(candidates.n_vertices, -1)
     local[piece.vertices] = np.arange(piece.n_vertices)
-    inside = np.logical_and.reduceat(local[candidates.vertices] >= 0, candidates.offsets[:-1])
+    inside = np.logical_and.reduceat(local[candidates.cells.vertices] >= 0, candidates.cells.offsets[:-1])
     chosen = inside & (candidates.size <= _LONGEST)
     z = mesh.z - mesh.z.mean()
     z = z / np.abs(z).max()

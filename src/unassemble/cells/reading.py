@@ -119,9 +119,9 @@ def _fans(candidates: Candidates, labels: NDArray, shift: NDArray) -> tuple[NDAr
     size = candidates.size[cells]
     cell = np.repeat(cells, size - 2)
     step = np.arange(len(cell)) - np.repeat(np.cumsum(size - 2) - (size - 2), size - 2) + 1
-    start, length = candidates.offsets[cell], candidates.size[cell]
+    start, length = candidates.cells.offsets[cell], candidates.size[cell]
     corner = (shift[cell][:, None] + np.column_stack([np.zeros_like(step), step, step + 1])) % length[:, None]
-    return candidates.vertices[start[:, None] + corner], cell, step < length - 2
+    return candidates.cells.vertices[start[:, None] + corner], cell, step < length - 2
 
 
 def fans_of(candidates: Candidates, labels: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -1,7 +1,8 @@
 """From the sparsity graph to faces, orientation, boundary loops and pieces; no coordinates here."""
 
 from .numbering import Numbering, local_numbering
-from .recognise import recognise
+from .polygons import Polygons
+from .recognise import components, recognise, surfaces
 from .surface import Piece, Topology
 
-__all__ = ["Numbering", "Piece", "Topology", "local_numbering", "recognise"]
+__all__ = ["Numbering", "Piece", "Polygons", "Topology", "components", "local_numbering", "recognise", "surfaces"]

@@ -49,7 +49,7 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
         Pairs i < j in lexicographic order; at least one.
     """
     cycles = short_faces(n, edges)
-    seen = []
+    seen: list[NDArray] = []
     for drawing in _drawings(n, edges, cycles):
         faces = _fingerprint(drawing)
         if not any(np.array_equal(faces, other) for other in seen):

@@ -180,8 +180,10 @@ def fan(cycles: NDArray) -> NDArray[np.int64]:
 def _oriented(n: int, edges: NDArray, cycles: list[NDArray]) -> list[NDArray]:
     """Turn cycles so that neighbours run along common edges in opposite directions, as far as that is possible."""
     # Fans of triangles, glued along edges of the graph and, within a cycle, along its diagonals.
-    triangles, opposite, first = [], [], []
-    n_edges = len(edges)
+    triangles: list[NDArray] = []
+    opposite: list[NDArray] = []
+    first: list[NDArray] = []
+    n_edges, n_triangles = len(edges), 0
     for c in cycles:
         t = fan(c)
         ends = np.stack([t[:, :, [1, 2]], t[:, :, [2, 0]], t[:, :, [0, 1]]], axis=2)
@@ -190,7 +192,8 @@ def _oriented(n: int, edges: NDArray, cycles: list[NDArray]) -> list[NDArray]:
         facing[:, :-1, 1] = diagonal
         facing[:, 1:, 2] = diagonal
         n_edges += diagonal.size
-        first.append(sum(map(len, triangles)) + np.arange(len(c)) * (c.shape[1] - 2))
+        first.append(n_triangles + np.arange(len(c)) * (c.shape[1] - 2))
+        n_triangles += len(c) * (c.shape[1] - 2)
         triangles.append(t.reshape(-1, 3))
         opposite.append(facing.reshape(-1, 3))
     if not first:

@@ -66,24 +66,24 @@ def surfaces(n: int, edges: NDArray, numbering: Numbering | None = None) -> Topo
     n, edges, numbering
         As for :func:`recognise`.
     """
-    whole = numbering or Numbering(np.arange(n), np.arange(len(edges)), edges)
-    pieces: list[Piece] = []
-    try:
-        found = triangulated(n, whole.edges)
-        parts = [whole] if found is not None else components(n, edges)
-    except NotPlanarError:
-        parts = components(n, edges)
-    for part in parts:
-        if len(parts) > 1 or part is not whole:
-            try:
-                found = triangulated(len(part.vertices), part.edges)
-            except NotPlanarError:
-                continue
-        pieces += [
-            replace(p, vertices=part.vertices[p.vertices], edge_rows=part.edge_rows[p.edge_rows]) for p in found or ()
-        ]
+    pieces = _surfaces_of(numbering or Numbering(np.arange(n), np.arange(len(edges)), edges))
+    if pieces is None:
+        pieces = [piece for part in components(n, edges) for piece in _surfaces_of(part) or ()]
     pieces.sort(key=lambda piece: int(piece.vertices.min()))
     return Topology(n, edges, tuple(pieces), "3-cycles")
+
+
+def _surfaces_of(part: Numbering) -> list[Piece] | None:
+    try:
+        pieces = triangulated(len(part.vertices), part.edges)
+    except NotPlanarError:
+        return None
+    return None if pieces is None else [in_whole(piece, part) for piece in pieces]
+
+
+def in_whole(piece: Piece, part: Numbering) -> Piece:
+    """A piece of a part of the graph, in the numbering of the whole."""
+    return replace(piece, vertices=part.vertices[piece.vertices], edge_rows=part.edge_rows[piece.edge_rows])
 
 
 def components(n: int, edges: NDArray) -> list[Numbering]:
@@ -111,9 +111,7 @@ def _recognise_numbered(n: int, edges: NDArray, parts: list[Numbering]) -> Topol
             failures.append(_renumbered(error, where, part.vertices))
             continue
         method = found.method if len(parts) == 1 else method
-        pieces += [
-            replace(p, vertices=part.vertices[p.vertices], edge_rows=part.edge_rows[p.edge_rows]) for p in found.pieces
-        ]
+        pieces += [in_whole(piece, part) for piece in found.pieces]
     if not pieces:
         raise failures[0]
     pieces.sort(key=lambda piece: int(piece.vertices.min()))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .polygons import Polygons
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +86,10 @@ class Topology:
         How the faces were found: ``"3-cycles"`` or ``"embedding"``.
     failures : tuple of str
         Why connected components of the graph have no mesh, where others have one.
+    vanished : (k,) int64
+        Rows of `edges` that the matrix does not have: sides of the pieces' triangles on which the entry is zero.
+    polygons : Polygons
+        Cells with more than three vertices, whose diagonals are among those.
     """
 
     n_vertices: int
@@ -91,6 +97,8 @@ class Topology:
     pieces: tuple[Piece, ...]
     method: str
     failures: tuple[str, ...] = ()
+    vanished: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    polygons: Polygons = field(default_factory=Polygons.none)
 
     @cached_property
     def multiplicity(self) -> NDArray[np.int64]:

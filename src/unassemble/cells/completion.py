@@ -1,0 +1,171 @@
+"""Parts of a matrix whose triangles do not explain it, read anew: vanished entries put back, holes left open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse import csgraph
+
+from ..errors import GeometryError, RecoveryError
+from ..matrix import OperatorMatrix
+from ..planar.cotangent import edge_weights
+from ..planar.piece import PieceMesh
+from ..topology import Numbering, Piece, Polygons, Topology, components, recognise
+from .reading import FITS, Reading, row_sizes
+from .search import read_cells
+
+_BETTER = 0.3  # a reading that does not fit replaces the triangles only if its misfit is below this times theirs
+
+Outcome = PieceMesh | RecoveryError
+"""Positions of a piece, or why there are none."""
+
+Solved = list[tuple[Piece, Outcome]]
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """What components of the graph were found to be; rows of edges are left as they are."""
+
+    pieces: Solved
+    vanished: NDArray[np.int64]
+    polygons: Polygons
+
+
+def completed(
+    matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome]
+) -> tuple[OperatorMatrix, Topology, list[Outcome]]:
+    """Read every component again that has nonzero entries on no triangle, or entries that do not fit.
+
+    Parameters
+    ----------
+    matrix : OperatorMatrix
+    topology : Topology
+        Surfaces of 3-cycles; see :func:`unassemble.topology.surfaces`.
+    meshes : list of PieceMesh or RecoveryError
+        Positions of its pieces, or why there are none.
+
+    Returns
+    -------
+    matrix : OperatorMatrix
+        With the vanished entries of the cells' triangles as zeros.
+    topology : Topology
+        Of that matrix; components of which nothing can be made are among its failures.
+    meshes : list of PieceMesh or RecoveryError
+        Unpolished positions.
+
+    Raises
+    ------
+    RecoveryError
+        If no component has cells. Where nothing is in doubt the arguments come back.
+    """
+    misfit = misfits(matrix, topology, meshes)
+    label = _component(matrix)
+    wrong = misfit > FITS
+    doubtful = np.zeros(matrix.n, dtype=bool)
+    doubtful[label[matrix.edges[wrong, 0]]] = True
+    if not doubtful.any() or _like_noise(misfit):
+        return matrix, topology, meshes
+    solved: Solved = list(zip(topology.pieces, meshes, strict=True))
+    kept = [item for item in solved if not doubtful[label[item[0].vertices[0]]]]
+    parts = [_Part(kept, np.empty((0, 2), np.int64), Polygons.none())]
+    failures: list[RecoveryError] = []
+    for numbering in components(matrix.n, matrix.edges):
+        here = label[numbering.vertices[0]]
+        if not doubtful[here]:
+            continue
+        own = [item for item in solved if label[item[0].vertices[0]] == here]
+        try:
+            parts.append(_read_again(matrix, numbering, own, misfit[numbering.edge_rows]))
+        except RecoveryError as error:
+            failures.append(error)
+    if not any(part.pieces for part in parts):
+        raise failures[0]
+    return _merged(matrix, topology, parts, tuple(map(str, failures)))
+
+
+def misfits(matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome]) -> NDArray[np.float64]:
+    """(e,) difference between entry and re-assembled entry, relative to the rows, at most 1; 1 on edges of no piece."""
+    misfit = np.where(matrix.entries != 0, 1.0, 0.0)
+    size = row_sizes(matrix.n, matrix.edges, matrix.entries)
+    for piece, mesh in zip(topology.pieces, meshes, strict=True):
+        if isinstance(mesh, PieceMesh):
+            rows = piece.edge_rows
+            with np.errstate(all="ignore"):  # flat triangles fit nothing
+                gap = np.abs(mesh.scale * edge_weights(piece, mesh.z) + matrix.entries[rows]) / size[rows]
+            misfit[rows] = np.where(gap < 1, gap, 1.0)
+    return misfit
+
+
+def _like_noise(misfit: NDArray) -> bool:
+    """Small everywhere and spread evenly: errors of the entries, not wrong cells."""
+    size = float(np.sqrt(np.mean(misfit**2)))
+    return size < 1e-2 and float(misfit.max()) < 12 * size
+
+
+def _component(matrix: OperatorMatrix) -> NDArray[np.int64]:
+    """(n,) label of the connected component of each row."""
+    graph = sp.coo_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
+    return csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def _read_again(matrix: OperatorMatrix, numbering: Numbering, own: Solved, misfit: NDArray) -> _Part:
+    """One component: the reading that fits, or the triangles that there were, or the best reading."""
+    weights = -matrix.entries[numbering.edge_rows]
+    reading = read_cells(len(numbering.vertices), numbering.edges, weights)
+    before = float(np.sqrt(np.mean(misfit**2)))
+    if reading is not None and (reading.fits or reading.size < _BETTER * before):
+        return _part(matrix, numbering, reading)
+    if own:
+        return _Part(own, np.empty((0, 2), np.int64), Polygons.none())
+    recognise(len(numbering.vertices), numbering.edges)  # says what is wrong with the graph, if that is it
+    raise GeometryError(
+        f"no cells on the graph of row {numbering.vertices.min()} fit the entries: they belong to no planar mesh"
+    )
+
+
+def _part(matrix: OperatorMatrix, numbering: Numbering, reading: Reading) -> _Part:
+    """A reading in the numbering of the matrix."""
+    vertices = numbering.vertices
+    pieces: Solved = [
+        (replace(piece, vertices=vertices[piece.vertices]), mesh or GeometryError("no map fits the entries of a piece"))
+        for piece, mesh in zip(reading.pieces, reading.meshes, strict=True)
+    ]
+    pairs = np.sort(vertices[reading.edges], axis=1)
+    added = ~np.isin(_keys(matrix.n, pairs), _keys(matrix.n, matrix.edges))
+    cells = reading.candidates.cells
+    return _Part(pieces, pairs[added], cells.chosen(reading.labels & (cells.size > 3), vertices))
+
+
+def _merged(
+    matrix: OperatorMatrix, topology: Topology, parts: list[_Part], failures: tuple[str, ...]
+) -> tuple[OperatorMatrix, Topology, list[Outcome]]:
+    """All parts on one list of edges."""
+    n = matrix.n
+    given = _keys(n, matrix.edges)
+    keys = np.union1d(given, _keys(n, np.concatenate([part.vanished for part in parts])))
+    edges = np.column_stack([keys // n, keys % n])
+    entries = np.zeros(len(keys))
+    old = np.searchsorted(keys, given)
+    entries[old] = matrix.entries
+    solved = sorted((item for part in parts for item in part.pieces), key=lambda item: int(item[0].vertices.min()))
+    pieces = tuple(
+        replace(piece, edge_rows=np.searchsorted(keys, _keys(n, piece.vertices[piece.edges]))) for piece, _ in solved
+    )
+    whole = replace(
+        topology,
+        edges=edges,
+        pieces=pieces,
+        method="the numbers",
+        failures=(*topology.failures, *failures),
+        vanished=np.delete(np.arange(len(keys)), old),
+        polygons=Polygons.joined([part.polygons for part in parts]),
+    )
+    return replace(matrix, edges=edges, entries=entries), whole, [mesh for _, mesh in solved]
+
+
+def _keys(n: int, pairs: NDArray) -> NDArray[np.int64]:
+    """i n + j for pairs of vertices, i < j."""
+    return pairs.min(axis=1, initial=n) * n + pairs.max(axis=1, initial=0)

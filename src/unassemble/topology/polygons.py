@@ -1,0 +1,66 @@
+"""Many polygons in two arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Polygons:
+    """Cycles of vertices.
+
+    Attributes
+    ----------
+    offsets : (count + 1,) int64
+    vertices : (offsets[-1],) int64
+        Polygon k is ``vertices[offsets[k]:offsets[k + 1]]``, in running order.
+    """
+
+    offsets: NDArray[np.int64]
+    vertices: NDArray[np.int64]
+
+    @classmethod
+    def none(cls) -> Polygons:
+        """No polygons."""
+        return cls(np.zeros(1, np.int64), np.empty(0, np.int64))
+
+    @classmethod
+    def joined(cls, parts: list[Polygons]) -> Polygons:
+        """The polygons of all parts."""
+        size = np.concatenate([np.empty(0, np.int64), *(part.size for part in parts)])
+        vertices = np.concatenate([np.empty(0, np.int64), *(part.vertices for part in parts)])
+        return cls(np.append(0, np.cumsum(size)), vertices)
+
+    @property
+    def count(self) -> int:
+        """Number of polygons."""
+        return len(self.offsets) - 1
+
+    @property
+    def size(self) -> NDArray[np.int64]:
+        """(count,) number of vertices of each."""
+        return np.diff(self.offsets)
+
+    def chosen(self, which: NDArray[np.bool_], number: NDArray) -> Polygons:
+        """Some of the polygons, with vertex v called ``number[v]``."""
+        size = self.size
+        return Polygons(np.append(0, np.cumsum(size[which])), number[self.vertices[np.repeat(which, size)]])
+
+    def counter_clockwise(self, points: NDArray) -> Polygons:
+        """The same polygons, each in the order in which its area is positive.
+
+        Parameters
+        ----------
+        points : (n, 2) float64
+        """
+        size = self.size
+        owner = np.repeat(np.arange(self.count), size)
+        place = np.arange(len(self.vertices)) - self.offsets[owner]
+        following = self.offsets[owner] + (place + 1) % size[owner]
+        x, y = (points[self.vertices] - points[self.vertices[self.offsets[owner]]]).T
+        area = np.bincount(owner, x * y[following] - y * x[following], self.count)
+        backwards = self.offsets[owner] + size[owner] - 1 - place
+        return Polygons(self.offsets, self.vertices[np.where(area[owner] < 0, backwards, np.arange(len(owner)))])
