@@ -68,3 +68,38 @@ def two_pieces(apart: float = 0.0) -> Recovery:
         node_status=np.zeros(2 * n, dtype=np.int8),
         n_holes=4,
     )
+
+
+def solid(kind: str) -> Recovery:
+    """Two cells, or one, of any kind on the corners of a box or of two squares, as of an elasticity matrix."""
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64)
+    flat = np.vstack([square, square + [2, 0.5]])
+    box = np.column_stack([np.vstack([square, square]), np.repeat([0.0, 1.25], 4)])
+    names = {"triangle": "triangles", "quad": "quads", "tetra": "tetrahedra", "hexahedron": "hexahedra"}
+    cells = {
+        "triangle": [[0, 1, 2], [4, 6, 7]],
+        "quad": [[0, 1, 2, 3], [4, 5, 6, 7]],
+        "tetra": [[0, 1, 3, 4], [1, 2, 3, 6]],
+        "hexahedron": [[0, 1, 2, 3, 4, 5, 6, 7]],
+    }
+    points = flat if kind in ("triangle", "quad") else box
+    d = points.shape[1]
+    fields: dict[str, Any] = {"triangles": np.empty((0, 3), np.int64), names[kind]: np.array(cells[kind])}
+    return Recovery(
+        **fields,
+        points=points,
+        component=np.zeros(8, np.int64),
+        hinges=np.empty(0, np.int64),
+        scale=np.array([0.5]),
+        boundary=np.empty((0, 2), np.int64),
+        boundary_offsets=np.zeros(1, np.int64),
+        node_status=np.zeros(8, np.int8),
+        status="certified",
+        reason="the matrix re-assembled on the elements is the given one",
+        operator="elasticity",
+        backward_error=1e-15,
+        node_of_row=np.repeat(np.arange(8), d),
+        direction_of_row=np.tile(np.arange(d), 8),
+        numbering="interleaved",
+        poisson_ratio=0.25,
+    )

@@ -6,6 +6,7 @@ import importlib.util
 import re
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -13,13 +14,15 @@ import meshio
 import numpy as np
 import pytest
 
-from handmade import lake, with_loose_row
+from handmade import lake, solid, with_loose_row
 from unassemble.errors import FormatError, OutputError
 from unassemble.export import check_output, save, to_meshio
 from unassemble.formats import FORMATS, MeshFormat
 from unassemble.recovery import Recovery
 
-WORKING = [suffix for suffix, f in FORMATS.items() if f.name and f.keeps_rows and not f.cannot]
+WORKING = [
+    suffix for suffix, f in FORMATS.items() if "triangle" in f.cells and f.name and f.keeps_rows and not f.cannot
+]
 CANNOT = [suffix for suffix, f in FORMATS.items() if f.cannot]
 
 
@@ -121,12 +124,58 @@ def test_every_extension_of_meshio_is_known():
 
 
 @pytest.mark.parametrize("suffix", CANNOT)
-def test_formats_without_triangles_are_refused_at_the_door(suffix, tmp_path):
+def test_formats_of_two_files_or_none_are_refused_at_the_door(suffix, tmp_path):
     path = tmp_path / f"mesh{suffix}"
     for attempt in (lambda: check_output(path), lambda: save(lake(), path)):
         with pytest.raises(FormatError, match=re.escape(suffix)):
             attempt()
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("kind", ["triangle", "quad", "tetra", "hexahedron"])
+@pytest.mark.parametrize("suffix", [suffix for suffix, f in FORMATS.items() if f.name and not f.cannot])
+def test_every_format_holds_the_cells_of_vector_valued_matrices_or_refuses(suffix, kind, tmp_path, capfd):
+    mesh_format = available(suffix)
+    recovery = solid(kind)
+    path = tmp_path / f"mesh{suffix}"
+    if kind not in mesh_format.cells:
+        with pytest.raises(FormatError, match=f"cells of kind {kind}"):
+            save(recovery, path)
+        assert not list(tmp_path.iterdir())
+        return
+    save(recovery, path)
+    assert capfd.readouterr() == ("", "")
+    if not mesh_format.keeps_rows:
+        return
+    mesh = read(path, mesh_format)
+    points = mesh.points[:, : recovery.dim]
+    np.testing.assert_allclose(points, recovery.points, rtol=tolerance(mesh_format), atol=0)
+    (cells,) = mesh.cells
+    assert cells.type == kind
+    np.testing.assert_array_equal(cells.data, recovery.cells[kind])
+    if mesh_format.data == "all":
+        np.testing.assert_array_equal(np.ravel(mesh.point_data["row_y"]), 1 + recovery.dim * np.arange(8))
+
+
+def test_nodes_without_cells_are_points(tmp_path):
+    recovery = replace(solid("tetra"), tetrahedra=np.empty((0, 4), np.int64))
+    save(recovery, tmp_path / "mesh.vtu")
+    (cells,) = meshio.read(tmp_path / "mesh.vtu").cells
+    assert cells.type == "vertex"
+    assert len(cells.data) == 8
+    with pytest.raises(FormatError, match="nodes without cells"):
+        save(recovery, tmp_path / "mesh.stl")
+
+
+def test_npz_of_vector_valued_matrices(tmp_path):
+    recovery = solid("hexahedron")
+    save(recovery, tmp_path / "mesh.npz")
+    with np.load(tmp_path / "mesh.npz") as content:
+        shared = {"points", "component", "hinges", "scale", "node_status"}
+        assert set(content) == shared | {"hexahedra", "node_of_row", "direction_of_row"}
+        for name in content:
+            assert content[name].dtype == getattr(recovery, name).dtype
+        assert content["node_status"].dtype == np.int8
 
 
 def test_a_missing_package_is_named(monkeypatch, tmp_path):

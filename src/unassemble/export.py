@@ -1,4 +1,4 @@
-"""Write a recovered mesh: ``.npz`` for programs, or any format of meshio that holds planar triangles."""
+"""Write a recovered mesh: ``.npz`` for programs, or any format of meshio."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def check_output(path: str | os.PathLike[str]) -> None:
     OutputError
         If the extension is unknown or the file cannot be written.
     FormatError
-        If the format cannot hold a planar mesh.
+        If the format can hold no mesh of ours.
     """
     format_of(path)
     check_target(path)
@@ -41,8 +41,9 @@ def check_output(path: str | os.PathLike[str]) -> None:
 def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
     """Write a recovered mesh, whole or not at all; the extension names the format.
 
-    ``.npz`` holds ``points``, ``triangles``, ``component``, ``hinges``, ``scale`` and ``node_status``. Other formats
-    are those of meshio (:mod:`unassemble.formats`).
+    ``.npz`` holds ``points``, cells (``triangles``, ``quads``, ``tetrahedra``, ``hexahedra``), ``component``,
+    ``hinges``, ``scale``, ``node_status`` and, of vector-valued matrices, ``node_of_row`` and ``direction_of_row``.
+    Other formats are those of meshio (:mod:`unassemble.formats`).
 
     Parameters
     ----------
@@ -69,18 +70,23 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
 def arrays(recovery: Recovery) -> dict[str, Any]:
     """What the ``.npz`` holds, by key; what there is nothing of has no key."""
     content: dict[str, Any] = {"points": recovery.points}
-    if recovery.n_cells:
-        content["triangles"] = recovery.triangles
+    for name in ("triangles", "quads", "tetrahedra", "hexahedra"):
+        if len(getattr(recovery, name)):
+            content[name] = getattr(recovery, name)
     content |= {"component": recovery.component, "hinges": recovery.hinges, "scale": recovery.scale}
     content["node_status"] = recovery.node_status
+    if recovery.vector_valued:
+        content |= {"node_of_row": recovery.node_of_row, "direction_of_row": recovery.direction_of_row}
     return content
 
 
 def to_meshio(recovery: Recovery) -> meshio.Mesh:
     """The mesh for meshio, in space (z = 0), since most formats know no other points.
 
-    Point data, all scalar: ``row`` of the matrix, ``component``, ``boundary`` (1 on boundary edges, else 0), and
-    where present ``node_status``, ``standard_deviation_x`` and ``standard_deviation_y``.
+    Point data, all scalar: ``row`` of the matrix, ``component``, ``boundary`` (1 on the outside of the mesh, else 0),
+    and where present ``node_status``, ``standard_deviation_x`` and ``standard_deviation_y``. Of vector-valued
+    matrices there are ``row_x``, ``row_y`` and ``row_z`` instead of ``row``, with -1 for unknowns that the matrix
+    lacks. Nodes without cells are cells of kind ``vertex``, so that they show.
     """
     return _mesh(recovery, 3, _point_data(recovery))
 
@@ -88,17 +94,21 @@ def to_meshio(recovery: Recovery) -> meshio.Mesh:
 def _mesh(recovery: Recovery, dimension: int, point_data: dict[str, NDArray]) -> meshio.Mesh:
     import meshio
 
-    points = np.zeros((recovery.n_points, dimension))
+    points = np.zeros((recovery.n_points, max(dimension, recovery.dim)))
     points[:, : recovery.points.shape[1]] = recovery.points
-    return meshio.Mesh(points, [("triangle", recovery.triangles)], point_data=point_data)
+    return meshio.Mesh(points, list(_cells(recovery).items()), point_data=point_data)
+
+
+def _cells(recovery: Recovery) -> dict[str, NDArray[np.int64]]:
+    """Cells by kind; where the elements of a vector-valued matrix are not known, its nodes."""
+    if recovery.n_cells or not recovery.vector_valued:
+        return recovery.cells or {"triangle": recovery.triangles}
+    return {"vertex": np.flatnonzero(recovery.node_status == 0)[:, None]}
 
 
 def _point_data(recovery: Recovery) -> dict[str, NDArray]:
-    data: dict[str, NDArray] = {
-        "row": np.arange(recovery.n_points),
-        "component": recovery.component,
-        "boundary": _boundary_flag(recovery),
-    }
+    data: dict[str, NDArray] = _rows(recovery)
+    data |= {"component": recovery.component, "boundary": _boundary_flag(recovery)}
     if recovery.node_status.any():
         data["node_status"] = recovery.node_status.astype(np.int64)
     if recovery.standard_deviations is not None:
@@ -107,18 +117,40 @@ def _point_data(recovery: Recovery) -> dict[str, NDArray]:
     return data
 
 
+def _rows(recovery: Recovery) -> dict[str, NDArray]:
+    """Matrix rows of each point, by direction where it has several."""
+    node, direction = recovery.node_of_row, recovery.direction_of_row
+    if node is None or direction is None:
+        return {"row": np.arange(recovery.n_points)}
+    rows = np.full((direction.max() + 1, recovery.n_points), -1)
+    rows[direction, node] = np.arange(len(node))
+    return {f"row_{name}": row for name, row in zip("xyz", rows, strict=False)}
+
+
 def _boundary_flag(recovery: Recovery) -> NDArray[np.int64]:
     flag = np.zeros(recovery.n_points, dtype=np.int64)
     flag[recovery.boundary] = 1
+    if recovery.dim == 3:
+        from .elasticity.surface import outer_facets
+
+        for kind, cells in recovery.cells.items():
+            flag[outer_facets(kind, cells)] = 1
     return flag
 
 
 def _check_content(recovery: Recovery, suffix: str, mesh_format: MeshFormat) -> None:
+    if not mesh_format.name:
+        return
+    kinds = set(_cells(recovery)) - mesh_format.cells
+    if kinds:
+        what = "nodes without cells" if kinds == {"vertex"} else f"cells of kind {', '.join(sorted(kinds))}"
+        raise FormatError(f"the format {suffix} cannot hold {what}: write .npz or .vtu")
     missing = int(np.count_nonzero(recovery.node_status))
     if missing and mesh_format.keeps_rows and not mesh_format.undetermined:
+        rows = "nodes, the first being node" if recovery.vector_valued else "rows, the first being row"
         raise FormatError(
             f"the format {suffix} cannot hold points without coordinates, and the matrix determines none for "
-            f"{missing} rows, the first being row {int(np.argmax(recovery.node_status))}: write .npz or .vtu"
+            f"{missing} {rows} {int(np.argmax(recovery.node_status))}: write .npz or .vtu"
         )
     if not (recovery.n_cells or mesh_format.keeps_rows):
         raise FormatError(f"the format {suffix} holds triangles only, and there are none")
@@ -138,7 +170,8 @@ def _mesh_for(recovery: Recovery, mesh_format: MeshFormat) -> meshio.Mesh:
         mesh.points = _rounded(mesh.points, mesh_format.digits or 16)
     if mesh_format.name == "ply":  # readers other than meshio's know integers of at most 32 bits
         mesh.point_data = {name: _short(values) for name, values in mesh.point_data.items()}
-        mesh.cells[0].data = _short(mesh.cells[0].data)
+        for block in mesh.cells:
+            block.data = _short(block.data)
     return mesh
 
 

@@ -11,17 +11,25 @@ from typing import Any
 
 from .errors import FormatError, OutputError
 
+_FLAT = frozenset({"triangle", "quad"})
+_SOLID = frozenset({"tetra", "hexahedron"})
+_CELLS = _FLAT | _SOLID
+_ALL = _CELLS | {"vertex"}
+_TRIANGLES = frozenset({"triangle"})
+
 
 @dataclass(frozen=True)
 class MeshFormat:
-    """How a planar mesh of triangles goes into one file format.
+    """How a mesh goes into one file format.
 
     Attributes
     ----------
     name : str
         The format's name in meshio; empty for our own ``.npz``.
     dimension : {2, 3}
-        Coordinates of each point. Where the format attaches meaning to it, a planar mesh has 2.
+        Coordinates of each point of a planar mesh. Where the format attaches meaning to it, that has 2.
+    cells : frozenset of str
+        Kinds of cells, by meshio's names, that it holds in meshio's hands; ``"vertex"`` for bare points.
     data : {"all", "boundary", "none"}
         Point data that it takes along; ``"boundary"``: one integer label, which marks the boundary.
     undetermined : bool
@@ -35,11 +43,12 @@ class MeshFormat:
     needs : str
         A package that meshio needs for it and does not bring along.
     cannot : str
-        Why the format cannot hold a planar mesh; empty where it can.
+        Why the format can hold no mesh of ours; empty where it can.
     """
 
     name: str
     dimension: int = 3
+    cells: frozenset[str] = _ALL
     data: str = "all"
     undetermined: bool = False
     keeps_rows: bool = True
@@ -49,7 +58,7 @@ class MeshFormat:
     cannot: str = ""
 
 
-_NO_TRIANGLES = "meshio writes only {} to it, and the mesh is made of triangles"
+_TWO_FILES = "it is two files that belong together"
 _NOT_COMPRESSED = "meshio writes it without compressing: write {} and compress that"
 
 # XML inside the one file: heavy data in a side file could not be renamed into place together with it.
@@ -60,16 +69,16 @@ _EXODUS = MeshFormat("exodus", dimension=2, undetermined=True, needs="netCDF4")
 _NASTRAN = MeshFormat("nastran", data="none", digits=11)
 _PERMAS = MeshFormat("permas", data="none")
 _NETGEN = MeshFormat("netgen", data="none")
-_TECPLOT = MeshFormat("tecplot", dimension=2)
-_TETGEN = MeshFormat("tetgen", cannot=_NO_TRIANGLES.format("tetrahedra"))
-_UGRID = MeshFormat("ugrid", data="none", undetermined=True)
-_UGRID_SINGLE = MeshFormat("ugrid", data="none", undetermined=True, digits=7)
+_TECPLOT = MeshFormat("tecplot", dimension=2, cells=_CELLS)
+_TETGEN = MeshFormat("tetgen", cannot=_TWO_FILES)
+_UGRID = MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True)
+_UGRID_SINGLE = MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True, digits=7)
 
 FORMATS: Mapping[str, MeshFormat] = {
     ".npz": MeshFormat("", dimension=2, undetermined=True),
     ".avs": MeshFormat("avsucd"),
     ".bdf": _NASTRAN,
-    ".cgns": MeshFormat("cgns", cannot=_NO_TRIANGLES.format("tetrahedra")),
+    ".cgns": MeshFormat("cgns", cells=frozenset({"tetra"}), data="none", needs="h5py"),
     ".dat": _TECPLOT,
     ".dato": _PERMAS,
     ".dato.gz": MeshFormat("permas", cannot=_NOT_COMPRESSED.format(".dato")),
@@ -77,30 +86,35 @@ FORMATS: Mapping[str, MeshFormat] = {
     ".ele": _TETGEN,
     ".ex2": _EXODUS,
     ".exo": _EXODUS,
-    ".f3grid": MeshFormat("flac3d", cannot=_NO_TRIANGLES.format("cells with a volume")),
+    ".f3grid": MeshFormat("flac3d", cells=_SOLID, data="none"),
     ".fem": _NASTRAN,
-    ".h5m": MeshFormat("h5m", undetermined=True, needs="h5py"),
+    ".h5m": MeshFormat("h5m", cells=frozenset({"triangle", "tetra"}), undetermined=True, needs="h5py"),
     ".hmf": MeshFormat("hmf", undetermined=True, needs="h5py"),
-    ".inp": MeshFormat("abaqus", data="none"),
+    ".inp": MeshFormat("abaqus", cells=_CELLS, data="none"),
     ".mdpa": MeshFormat("mdpa", data="none"),
     ".med": MeshFormat("med", dimension=2, undetermined=True, needs="h5py"),
-    ".mesh": MeshFormat("medit", dimension=2, data="boundary"),
-    ".meshb": MeshFormat("medit", dimension=2, data="boundary", undetermined=True),
+    ".mesh": MeshFormat("medit", dimension=2, cells=_CELLS, data="boundary"),
+    ".meshb": MeshFormat("medit", dimension=2, cells=_CELLS, data="boundary", undetermined=True),
     ".msh": MeshFormat("gmsh", undetermined=True),  # Gmsh, not ANSYS, which shares the extension
     ".nas": _NASTRAN,
     ".node": _TETGEN,
-    ".obj": MeshFormat("obj", data="none"),
-    ".off": MeshFormat("off", data="none"),
-    ".ply": MeshFormat("ply", undetermined=True),
+    ".obj": MeshFormat("obj", cells=_FLAT, data="none"),
+    ".off": MeshFormat("off", cells=_TRIANGLES, data="none"),
+    ".ply": MeshFormat("ply", cells=_FLAT | {"vertex"}, undetermined=True),
     ".post": _PERMAS,
     ".post.gz": MeshFormat("permas", cannot=_NOT_COMPRESSED.format(".post")),
-    ".stl": MeshFormat("stl", data="none", keeps_rows=False),
-    ".su2": MeshFormat("su2", dimension=2, data="none"),
+    ".stl": MeshFormat("stl", cells=_TRIANGLES, data="none", keeps_rows=False),
+    ".su2": MeshFormat("su2", dimension=2, cells=_CELLS, data="none"),
     ".svg": MeshFormat(
-        "svg", dimension=2, data="none", keeps_rows=False, options={"float_fmt": ".12g", "image_width": None}
+        "svg",
+        dimension=2,
+        cells=_FLAT,
+        data="none",
+        keeps_rows=False,
+        options={"float_fmt": ".12g", "image_width": None},
     ),
     ".tec": _TECPLOT,
-    ".ugrid": MeshFormat("ugrid", data="none", digits=7),
+    ".ugrid": MeshFormat("ugrid", cells=_CELLS, data="none", digits=7),
     # Binary variants of UGRID are told by a second extension: byte order, Fortran records, size of numbers.
     **{f".{kind}.ugrid": _UGRID for kind in ("b8l", "b8", "lb8l", "lb8", "r8", "lr8")},
     **{f".{kind}.ugrid": _UGRID_SINGLE for kind in ("b4", "lb4", "r4", "lr4")},
@@ -108,9 +122,9 @@ FORMATS: Mapping[str, MeshFormat] = {
     ".vol.gz": _NETGEN,
     ".vtk": MeshFormat("vtk", undetermined=True),
     ".vtu": MeshFormat("vtu", undetermined=True),
-    ".wkt": MeshFormat("wkt", data="none", keeps_rows=False),
+    ".wkt": MeshFormat("wkt", cells=_TRIANGLES, data="none", keeps_rows=False),
     ".xdmf": _XDMF,
-    ".xml": MeshFormat("dolfin-xml", dimension=2, data="none"),
+    ".xml": MeshFormat("dolfin-xml", dimension=2, cells=frozenset({"triangle", "tetra"}), data="none"),
     ".xmf": _XDMF,
 }
 
@@ -123,7 +137,7 @@ def format_of(path: str | os.PathLike[str]) -> tuple[str, MeshFormat]:
     OutputError
         If the extension is unknown, or its writer not installed.
     FormatError
-        If the format has no place for planar triangles.
+        If the format has no place for any mesh of ours.
     """
     name = PurePath(path).name.lower()
     fitting = [suffix for suffix in FORMATS if name.endswith(suffix) and name != suffix]
@@ -134,7 +148,7 @@ def format_of(path: str | os.PathLike[str]) -> tuple[str, MeshFormat]:
     suffix = max(fitting, key=len)
     mesh_format = FORMATS[suffix]
     if mesh_format.cannot:
-        raise FormatError(f"the format {suffix} cannot hold the mesh: {mesh_format.cannot} (.vtu, for one, holds it)")
+        raise FormatError(f"the format {suffix} cannot hold a mesh: {mesh_format.cannot} (.vtu, for one, can)")
     if mesh_format.needs and find_spec(mesh_format.needs) is None:
         raise OutputError(f"the format {suffix} needs the package {mesh_format.needs}: pip install {mesh_format.needs}")
     return suffix, mesh_format

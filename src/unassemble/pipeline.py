@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import logging
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
 from os import PathLike
 from typing import Any
 
@@ -14,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import certify as certificates
-from .errors import InputError
+from .clock import Clock
+from .errors import InputError, RecoveryError
 from .joined import JoinedMesh
 from .linalg import AnalysisAhead, factorisation
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, read_matrix
-from .placement import Anchor, Direction, Placement
+from .operators import OPERATORS, VectorReading, asked_for, refuse, second_reading, vector_valued
+from .placement import Direction, Placement
 from .planar.deviations import coordinate_covariances
 from .planar.hinges import join
 from .planar.pencil import pencil_pattern
@@ -28,8 +26,6 @@ from .recovery import Recovery
 from .solving import solve
 from .topology import Polygons, Topology, local_numbering, surfaces
 from .verdict import verdict
-
-_log = logging.getLogger(__name__)
 
 
 def recover(
@@ -41,28 +37,34 @@ def recover(
     scale: float | None = None,
     noise: float | None = None,
     drop_zeros: float | None = None,
-    anchors: Sequence[Anchor] | None = None,
+    anchors: Sequence[Any] | None = None,
     tensor: tuple[float, float, float] | None = None,
     direction: Direction | None = None,
     handed: str | None = None,
     standard_deviations: bool = False,
     triangulate: bool = False,
+    block_size: int | None = None,
+    numbering: Any = None,
+    cells: bool = True,
     variable: str | None = None,
     threads: int | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Recovery:
-    """Recover the planar triangle mesh of A = c L + D.
+    """Recover the mesh that a matrix was assembled on.
 
-    L is the stiffness matrix of the Laplacian with linear elements and natural boundary conditions, c any
-    nonzero number and D any diagonal matrix, both unknown.
+    Scalar: A = c L + D, where L is the stiffness matrix of the Laplacian with linear elements on triangles in the
+    plane and natural boundary conditions, c any nonzero number and D any diagonal matrix, both unknown.
+    Vector-valued: isotropic linear elasticity in the plane or in space, with supports; see
+    :func:`unassemble.elasticity.recover_elasticity`.
 
     Parameters
     ----------
     A : sparse matrix or array, ndarray, path, or "-"
         A matrix; or a file with one: Matrix Market, scipy's ``.npz``, ``.mat``; ``"-"`` reads Matrix Market from
         standard input. Explicit zeros are structure.
-    operator : {"auto", "laplacian"}
-        Which operator A belongs to.
+    operator : {"auto", "laplacian", "elasticity"}
+        Which operator A belongs to. ``"auto"`` reads planar meshes as scalar, and matrices whose graph is none but
+        whose rows form nodes of two or three unknowns as elasticity.
     method : {None, "conformal", "angles"}
         How positions are found: by the conformal null vector, the default, or by the 2002 paper's equations for angles.
     refine : bool
@@ -76,8 +78,9 @@ def recover(
     drop_zeros : float, optional
         Forget stored entries of at most this times the largest off-diagonal entry of their row and of their
         transpose's.
-    anchors : sequence of (row, x, y), optional
-        Known positions. Two fix the similarity of their piece, a third, not in line, the mirror image.
+    anchors : sequence of (row, x, y) or (row, x, y, z), optional
+        Known positions. Two fix the similarity of their piece, a third, not in line, the mirror image. Elasticity
+        knows its axes: two fix all.
     tensor : (kxx, kxy, kyy), optional
         A belongs to div(K grad) with this constant K; needs an orientation.
     direction : (row, row, degrees), optional
@@ -89,6 +92,12 @@ def recover(
     triangulate : bool
         Divide cells of more than three vertices into triangles; the vertices lie on a circle, so that every division
         is a Delaunay triangulation and the matrix does not prefer one.
+    block_size : {2, 3}, optional
+        Vector-valued matrices: unknowns per node; found where it is not given.
+    numbering : {"interleaved", "by component"} or (node_of_row, direction_of_row), optional
+        Vector-valued matrices: how the unknowns stand; found where it is not given.
+    cells : bool
+        Vector-valued matrices: look for elements too, not for coordinates only.
     variable : str, optional
         Name of the variable in a ``.mat`` file.
     threads : int, optional
@@ -123,16 +132,21 @@ def recover(
     >>> square.status, len(square.triangles), float(round(square.scale[0], 12))
     ('certified', 2, 1.0)
     """
-    _check_options(operator, method, scale, noise)
-    clock = _Clock(progress)
+    _check_options(operator, method, scale, noise, vector=block_size is not None or numbering is not None)
+    clock = Clock(progress)
     with clock("read"):
         matrix = A if _is_matrix(A) else read_matrix(A, variable=variable)
     with clock("check"):
         checked = check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
-    placement = Placement.checked(checked.n, anchors, tensor, direction, handed)
-    with thread_limit(threads):
+    scalar_only = {
+        "method": method, "scale": scale, "noise": noise, "tensor": tensor, "direction": direction,
+        "handed": handed, "standard_deviations": standard_deviations,
+    }  # fmt: skip
+
+    def scalar(part: OperatorMatrix, known: Sequence[Any] | None) -> Recovery:
+        placement = Placement.checked(part.n, known, tensor, direction, handed)
         return _recover(
-            checked,
+            part,
             placement,
             clock,
             method or "conformal",
@@ -144,10 +158,41 @@ def recover(
             triangulate,
         )
 
+    def vector(reading: VectorReading) -> Recovery:
+        from .elasticity.serving import serve
 
-def _check_options(operator: str, method: str | None, scale: float | None, noise: float | None) -> None:
-    if operator not in ("auto", "laplacian"):
-        raise InputError(f"the operator {operator!r} is not available in this version: use 'auto' or 'laplacian'")
+        refuse(**scalar_only)
+        return serve(checked, reading.numbering, clock, anchors=anchors, choice=reading.why, cells=cells, scalar=scalar)
+
+    with thread_limit(threads):
+        if operator == "elasticity" or block_size is not None or numbering is not None:
+            refuse(**scalar_only)
+            with clock("numbering"):
+                reading = asked_for(checked, block_size, numbering)
+            return vector(reading)
+        at_sight = vector_valued(checked) if operator == "auto" else None
+        if at_sight is not None:
+            return vector(at_sight)
+        try:
+            return scalar(checked, anchors)
+        except RecoveryError as error:
+            second = second_reading(checked) if operator == "auto" else None
+            if second is None:
+                raise
+            try:
+                return vector(second)
+            except RecoveryError:
+                raise error from None
+
+
+def _check_options(
+    operator: str, method: str | None, scale: float | None, noise: float | None, *, vector: bool
+) -> None:
+    if operator not in OPERATORS:
+        known = " or ".join(map(repr, OPERATORS))
+        raise InputError(f"the operator {operator!r} is not available in this version: use {known}")
+    if vector and operator == "laplacian":
+        raise InputError("block size and numbering belong to vector-valued matrices, not to the operator 'laplacian'")
     if method not in (None, "conformal", "angles"):
         raise InputError(f"the method {method!r} is not available in this version: use 'conformal' or 'angles'")
     if scale is not None and not (np.isfinite(scale) and scale != 0):
@@ -163,7 +208,7 @@ def _is_matrix(A: Any) -> bool:
 def _recover(
     stored: OperatorMatrix,
     placement: Placement,
-    clock: _Clock,
+    clock: Clock,
     method: str,
     refine: bool,
     scale: float | None,
@@ -317,20 +362,3 @@ def _deviations(
         )
         result[piece.vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     return result
-
-
-@dataclass
-class _Clock:
-    """Seconds by stage; tells a listener as each begins."""
-
-    listener: Callable[[str], None] | None
-    timings: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def __call__(self, stage: str) -> Iterator[None]:
-        if self.listener:
-            self.listener(stage)
-        start = time.perf_counter()
-        yield
-        self.timings[stage] = time.perf_counter() - start
-        _log.info("%s: %.3g s", stage, self.timings[stage])

@@ -14,30 +14,34 @@ if TYPE_CHECKING:
     import meshio
     from matplotlib.figure import Figure
 
+    from .elasticity.results import Evidence
+
+
+def _no_cells(corners: int) -> NDArray[np.int64]:
+    return np.empty((0, corners), np.int64)
+
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
-    """A mesh recovered from a matrix.
+    """A mesh recovered from a matrix, scalar or vector-valued.
 
     Attributes
     ----------
-    points : (n, 2) float64
-        Coordinates; row i belongs to matrix row i. NaN where the matrix determines none.
+    points : (n, 2) or (n, 3) float64
+        Coordinates; row i belongs to matrix row i, or to node i of a vector-valued matrix, whose nodes are numbered
+        by their first row. NaN where the matrix determines none.
     triangles : (m, 3) int64
         Cells, rows of `points`, counter-clockwise.
-    polygons_offsets : (polygons + 1,) int64
-    polygons_data : (polygons_offsets[-1],) int64
-        Cells that the matrix leaves undivided, counter-clockwise: polygon k is
-        ``polygons_data[polygons_offsets[k]:polygons_offsets[k + 1]]``.
     component : (n,) int64
         Edge-connected piece of each point, -1 for points of no cell; a vertex shared by pieces carries the lowest
         label.
     hinges : (k,) int64
         Vertices shared by several pieces.
     scale : (number of pieces,) float64
-        The factor c of each piece in A = c L + D.
+        The factor c of each piece in A = c L + D. For elasticity the mean shear modulus of the piece's cells, on the
+        mesh as it is given here; NaN where no cells are recognised.
     boundary : (b, 2) int64
-        Directed boundary edges with the mesh on their left, loop by loop in running order.
+        Directed boundary edges with the mesh on their left, loop by loop in running order; none in space.
     boundary_offsets : (loops + 1,) int64
         Loop k is ``boundary[boundary_offsets[k]:boundary_offsets[k + 1]]``.
     node_status : (n,) int8
@@ -46,10 +50,12 @@ class Recovery:
     reason : str
         Why, in one sentence.
     operator : str
-        ``"laplacian"``, or ``"anisotropic laplacian"`` where a tensor was undone.
+        ``"laplacian"``, or ``"anisotropic laplacian"`` where a tensor was undone; ``"elasticity"``, or ``"vector
+        laplacian"`` where the directions of a vector-valued matrix are not coupled.
     backward_error : float
         Largest difference between an off-diagonal entry and the re-assembled one, relative to the
-        largest off-diagonal entry of its row.
+        largest off-diagonal entry of its row. For elasticity whose cells are not recognised the largest residual of
+        a valid identity, relative to the size of its row.
     n_holes : int or None
         Bounded boundary loops, over all pieces.
     timings : mapping of str to float
@@ -63,12 +69,29 @@ class Recovery:
         One standard deviation of each coordinate, on request.
     chi_square : mapping or None
         With noise: ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``.
+    quads, tetrahedra, hexahedra : (m, 4), (m, 4), (m, 8) int64
+        Further cells, in meshio's order and positively oriented; empty where there are none.
+    node_of_row, direction_of_row : (N,) int64 or None
+        Vector-valued matrices: node and direction of each matrix row.
+    numbering : str
+        Vector-valued matrices: how the unknowns stand, ``"interleaved"``, ``"by component"``, ``"pattern"`` (in no
+        order, found by the pattern) or ``"given"``.
+    choice : str
+        Why the matrix was taken for this operator's, where that was not asked for.
+    poisson_ratio : float or None
+        Elasticity, where it is one number; that of plane strain in the plane.
+    lame : (n_cells, 2) float64
+        Elasticity: lambda and mu of each cell, as in `scale`.
+    evidence : tuple of Evidence
+        Elasticity: the null space of each piece's identities; see :class:`unassemble.elasticity.Evidence`.
+    polygons_offsets : (polygons + 1,) int64
+    polygons_data : (polygons_offsets[-1],) int64
+        Cells that the matrix leaves undivided, counter-clockwise: polygon k is
+        ``polygons_data[polygons_offsets[k]:polygons_offsets[k + 1]]``.
     """
 
     points: NDArray[np.float64]
     triangles: NDArray[np.int64]
-    polygons_offsets: NDArray[np.int64]
-    polygons_data: NDArray[np.int64]
     component: NDArray[np.int64]
     hinges: NDArray[np.int64]
     scale: NDArray[np.float64]
@@ -86,6 +109,18 @@ class Recovery:
     worst_misfits: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     standard_deviations: NDArray[np.float64] | None = None
     chi_square: Mapping[str, float] | None = None
+    quads: NDArray[np.int64] = field(default_factory=lambda: _no_cells(4))
+    tetrahedra: NDArray[np.int64] = field(default_factory=lambda: _no_cells(4))
+    hexahedra: NDArray[np.int64] = field(default_factory=lambda: _no_cells(8))
+    node_of_row: NDArray[np.int64] | None = None
+    direction_of_row: NDArray[np.int64] | None = None
+    numbering: str = ""
+    choice: str = ""
+    poisson_ratio: float | None = None
+    lame: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    evidence: tuple[Evidence, ...] = ()
+    polygons_offsets: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
+    polygons_data: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 
     @property
     def certified(self) -> bool:
@@ -100,17 +135,53 @@ class Recovery:
     @property
     def n_cells(self) -> int:
         """Number of cells of all kinds."""
-        return len(self.triangles) + self.n_polygons
+        return sum(map(len, self.cells.values())) + self.n_polygons
 
     @property
     def n_polygons(self) -> int:
-        """Number of cells with more than three vertices."""
+        """Number of cells that the matrix leaves undivided."""
         return len(self.polygons_offsets) - 1
+
+    @property
+    def cells(self) -> dict[str, NDArray[np.int64]]:
+        """Cells of each kind that occurs, by meshio's names; polygons are not among them."""
+        kinds = {
+            "triangle": self.triangles,
+            "quad": self.quads,
+            "tetra": self.tetrahedra,
+            "hexahedron": self.hexahedra,
+        }
+        return {kind: cells for kind, cells in kinds.items() if len(cells)}
+
+    @property
+    def dim(self) -> int:
+        """Dimension of space."""
+        return self.points.shape[1]
+
+    @property
+    def vector_valued(self) -> bool:
+        """Whether the matrix has several rows per node."""
+        return self.node_of_row is not None
 
     @property
     def n_components(self) -> int:
         """Number of edge-connected pieces."""
         return len(self.scale)
+
+    def rigid_body_modes(self) -> NDArray[np.float64]:
+        """Near-null space of a vector-valued matrix, (N, 3) or (N, 6), rows as in the matrix: PyAMG's ``B``.
+
+        Translations, then rotations; nodes without coordinates get translations only. The directions of a vector
+        Laplacian are not coupled: it has translations only, (N, 2) or (N, 3).
+
+        Raises
+        ------
+        InputError
+            If the matrix is scalar.
+        """
+        from .elasticity.modes import modes_of
+
+        return modes_of(self)
 
     def report(self) -> dict[str, Any]:
         """Everything but the mesh, ready for JSON; see :mod:`unassemble.report`."""

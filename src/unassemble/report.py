@@ -6,6 +6,7 @@ import json
 import math
 import os
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,8 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
     Keys: ``status``, ``reason``, ``operator``, ``n_points``, ``n_cells``, ``n_components``, ``n_holes``, ``scale`` (one
     for each piece), ``backward_error``, ``timings`` (seconds by stage), ``warnings``; further ``n_hinges``,
     ``n_undetermined``, ``n_boundary_edges``, ``worst_entries`` (``row``, ``column``, ``misfit``, worst first),
-    ``chi_square``, ``largest_standard_deviation`` and ``version``.
+    ``chi_square``, ``largest_standard_deviation`` and ``version``. Vector-valued matrices have those of
+    :func:`_vector_facts` too.
     """
     return _plain(
         {
@@ -49,11 +51,35 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
                 {"row": i, "column": j, "misfit": misfit}
                 for (i, j), misfit in zip(recovery.worst_entries, recovery.worst_misfits, strict=True)
             ],
+            **(_vector_facts(recovery) if recovery.vector_valued else {}),
             "timings": recovery.timings,
             "warnings": recovery.warnings,
             "version": __version__,
         }
     )
+
+
+def _vector_facts(recovery: Recovery) -> dict[str, Any]:
+    """What only vector-valued matrices have.
+
+    ``dimension`` of space, ``block_size``, ``numbering``, ``operator_choice`` (why, if nobody said), ``cells`` (number
+    by kind), ``poisson_ratio``, and for each piece in ``evidence`` the dimension of the null space, the singular value
+    of the coordinates and that of the best field that is none of them.
+    """
+    return {
+        "dimension": recovery.dim,
+        "block_size": _block_size(recovery),
+        "numbering": recovery.numbering,
+        "operator_choice": recovery.choice,
+        "cells": {kind: len(cells) for kind, cells in recovery.cells.items()},
+        "poisson_ratio": recovery.poisson_ratio,
+        "evidence": [asdict(one) for one in recovery.evidence],
+    }
+
+
+def _block_size(recovery: Recovery) -> int:
+    direction = recovery.direction_of_row
+    return 1 if direction is None else int(direction.max()) + 1
 
 
 def failure_report(error: UnassembleError) -> dict[str, Any]:
@@ -108,22 +134,65 @@ def summary(recovery: Recovery) -> str:
 
 def _rows(recovery: Recovery) -> list[tuple[str, str]]:
     rows = [
-        ("operator", recovery.operator),
+        ("operator", _operator(recovery)),
+        *([("chosen since", recovery.choice)] if recovery.choice else []),
         ("points", _points(recovery)),
-        ("triangles", f"{recovery.n_cells:,}"),
+        *_cell_rows(recovery),
         ("pieces", _pieces(recovery)),
     ]
     if recovery.n_holes is not None:
         rows.append(("holes", f"{recovery.n_holes:,}"))
-    rows += [("scale c", scale_text(recovery)), ("backward error", f"{recovery.backward_error:.1e}")]
+    if recovery.operator == "elasticity":
+        rows += _elastic_rows(recovery)
+    else:
+        rows.append(("scale c", scale_text(recovery)))
+    rows.append(("backward error", f"{recovery.backward_error:.1e}"))
     deviation = _largest_deviation(recovery)
     if deviation is not None:
         rows.append(("std deviation", f"at most {deviation:.1e} in a coordinate"))
-    if recovery.status == "uncertified":
+    if recovery.status == "uncertified" and len(recovery.worst_entries):
         rows += [("worst fit", line) for line in _worst(recovery)]
     if recovery.timings:
         rows.append(("time", _timings(recovery.timings)))
     return rows + [("note", warning) for warning in recovery.warnings]
+
+
+def _operator(recovery: Recovery) -> str:
+    if not recovery.vector_valued:
+        return recovery.operator
+    return f"{recovery.operator}, {_block_size(recovery)} unknowns per node, {numbering_text(recovery)}"
+
+
+def numbering_text(recovery: Recovery) -> str:
+    """How the unknowns of a vector-valued matrix stand, in words."""
+    words = {"pattern": "in an order found by the pattern", "given": "in the given order"}
+    return words.get(recovery.numbering, recovery.numbering)
+
+
+_KINDS = {"triangle": "triangles", "quad": "quadrilaterals", "tetra": "tetrahedra", "hexahedron": "hexahedra"}
+
+
+def cells_text(recovery: Recovery) -> list[tuple[str, int]]:
+    """Kinds of cells and their numbers; triangles, if there are none, of scalar matrices."""
+    known = [(_KINDS[kind], len(cells)) for kind, cells in recovery.cells.items()]
+    return known or [("cells" if recovery.vector_valued else "triangles", 0)]
+
+
+def _cell_rows(recovery: Recovery) -> list[tuple[str, str]]:
+    return [(kind, f"{count:,}" if count or kind != "cells" else "none recognised") for kind, count in
+            cells_text(recovery)]  # fmt: skip
+
+
+def _elastic_rows(recovery: Recovery) -> list[tuple[str, str]]:
+    rows = []
+    if recovery.poisson_ratio is not None:
+        rows.append(("Poisson's ratio", f"{recovery.poisson_ratio:.10g}"))
+    if np.isfinite(recovery.scale).any():
+        rows.append(("shear modulus", scale_text(recovery)))
+    for one in recovery.evidence[:_SHOWN]:
+        text = f"dimension {one.null_dimension}, residual {one.residual:.1e}, next {one.gap:.1e}"
+        rows.append(("null space", text))
+    return rows
 
 
 def _points(recovery: Recovery) -> str:
@@ -138,7 +207,8 @@ def _pieces(recovery: Recovery) -> str:
 
 def scale_text(recovery: Recovery, digits: int = 10) -> str:
     """The factor c, or the range of those of all pieces."""
-    low, high = (float(f(recovery.scale)) if len(recovery.scale) else math.nan for f in (np.min, np.max))
+    known = recovery.scale[np.isfinite(recovery.scale)]
+    low, high = (float(f(known)) if len(known) else math.nan for f in (np.min, np.max))
     # Pieces of one matrix mostly share c, up to rounding.
     return f"{low:.{digits}g}" if high - low <= 1e-9 * abs(low) else f"{low:.{digits}g} to {high:.{digits}g}"
 

@@ -15,7 +15,7 @@ from unassemble.elasticity import (
     save_petsc_vec,
     scalar_parts,
 )  # fmt: skip
-from unassemble.errors import GeometryError, OutputError
+from unassemble.errors import FormatError, GeometryError
 
 
 @skfem.BilinearForm
@@ -114,5 +114,5 @@ def test_exports(tmp_path):
 
     assert np.array_equal(mmread(tmp_path / "x.mtx"), points)
     points[2] = np.nan
-    with pytest.raises(OutputError, match="node 2"):
+    with pytest.raises(FormatError, match="node 2"):
         save_petsc_vec(tmp_path / "y.bin", points)

@@ -7,6 +7,7 @@ import click
 from .._version import __version__
 from .demonstrate import demo
 from .inspecting import inspect
+from .modal import modes
 from .papering import paper
 from .recovering import recover
 from .status import CommandLine
@@ -31,5 +32,6 @@ def main() -> None:
 
 main.add_command(recover)
 main.add_command(inspect)
+main.add_command(modes)
 main.add_command(demo)
 main.add_command(paper)

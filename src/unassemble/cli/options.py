@@ -28,3 +28,28 @@ def matrix_options(command: _Command) -> _Command:
     ):
         command = decorate(command)
     return command
+
+
+def nodes_options(command: _Command) -> _Command:
+    """How the rows of a vector-valued matrix form nodes, where it is known."""
+    for decorate in (
+        click.option(
+            "--numbering",
+            type=click.Choice(["interleaved", "component"]),
+            help="Vector-valued matrices: order of the unknowns, node by node or component by component; found "
+            "where it is not given.",
+        ),
+        click.option(
+            "--block-size",
+            type=click.Choice(["2", "3"]),
+            callback=lambda ctx, param, value: value and int(value),
+            help="Vector-valued matrices: unknowns per node; found where it is not given.",
+        ),
+    ):
+        command = decorate(command)
+    return command
+
+
+def spelled_numbering(word: str | None) -> str | None:
+    """The library's name of a numbering."""
+    return "by component" if word == "component" else word

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import matrix_options
+from .options import matrix_options, nodes_options, spelled_numbering
 from .status import CERTIFIED, UNCERTIFIED, say
 from .values import Number, Numbers, OptionalTolerance, check_anchors, check_orientation, check_tensor
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..progress import StageDisplay
     from ..recovery import Recovery
 
-_LATER_OPERATORS = ("elasticity", "surface")
+_LATER_OPERATORS = ("surface",)
 _LATER_METHODS = ("metric",)
 
 
@@ -33,9 +33,13 @@ class _Files:
 
 @click.command(cls=OptionalTolerance)
 @matrix_options
+@nodes_options
 @click.option("-o", "--output", "out", metavar="OUT", required=True, help="The mesh: .npz, or any format of meshio.")
 @click.option(
-    "--operator", type=click.Choice(["auto", "laplacian", *_LATER_OPERATORS]), default="auto", show_default=True
+    "--operator",
+    type=click.Choice(["auto", "laplacian", "elasticity", *_LATER_OPERATORS]),
+    default="auto",
+    show_default=True,
 )
 @click.option(
     "--method", type=click.Choice(["conformal", "angles", *_LATER_METHODS]), help="The default picks the best."
@@ -51,7 +55,7 @@ class _Files:
 @click.option(
     "--anchor",
     "anchors",
-    type=Numbers("ROW,X,Y"),
+    type=Numbers("ROW,X,Y[,Z]"),
     multiple=True,
     callback=check_anchors,
     help="A known position, repeatable: two fix a similarity, a third, not in line, the mirror image.",
@@ -73,13 +77,17 @@ class _Files:
 @click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads of the linear algebra libraries.")
 @click.option("--quiet", is_flag=True, help="Print nothing but errors.")
 def recover(matrix: str, out: str, report: str | None, plot: str | None, quiet: bool, **options: Any) -> int:
-    """Recover the planar mesh of MATRIX = c L + D and write it to OUT.
+    """Recover the mesh of MATRIX and write it to OUT.
+
+    MATRIX belongs to the Laplacian on a planar mesh of triangles, c L + D, or to isotropic elasticity in the plane or
+    in space.
 
     MATRIX is Matrix Market (also .gz), scipy's .npz or MATLAB's .mat; - reads Matrix Market from standard input.
     Rows count from 0.
     """
     _check_available(options.pop("realise"), options["operator"], options["method"])
     check_orientation(options["tensor"], options["anchors"], options["direction"], options["handed"])
+    options["numbering"] = spelled_numbering(options["numbering"])
     files = _Files(matrix, out, report, plot)
     _check_files(files)
     options["refine"] = not options.pop("no_refine")

@@ -73,25 +73,25 @@ class Numbers(click.ParamType):
     Parameters
     ----------
     form : str
-        As in the help text, ``ROW,X,Y`` for one: each ROW is a matrix row, counted from 0.
+        As in the help text, ``ROW,X,Y[,Z]`` for one: each ROW is a matrix row, counted from 0; what stands in
+        brackets may be left out.
     """
 
     def __init__(self, form: str):
         self.name = self._form = form
-        self._parts = form.split(",")
+        self._parts = form.replace("[", "").replace("]", "").split(",")
+        self._least = len(form.split("[")[0].split(","))
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[Any, ...]:
         """Read a word."""
         if isinstance(value, tuple):
             return value
         words = value.split(",")
-        if len(words) == 4 and self._form == "ROW,X,Y":
-            self.fail("a Z coordinate is for surfaces in space, which are not available in this version", param, ctx)
-        if len(words) != len(self._parts):
+        if not self._least <= len(words) <= len(self._parts):
             self.fail(f"{value!r} is not of the form {self._form}", param, ctx)
         return tuple(
             self._row(word, param, ctx) if part == "ROW" else self._number(word, param, ctx)
-            for part, word in zip(self._parts, words, strict=True)
+            for part, word in zip(self._parts, words, strict=False)
         )
 
     def _row(self, word: str, param: click.Parameter | None, ctx: click.Context | None) -> int:
@@ -114,10 +114,10 @@ class Numbers(click.ParamType):
 
 
 def check_anchors(
-    ctx: click.Context, param: click.Parameter, anchors: tuple[tuple[int, float, float], ...]
-) -> tuple[tuple[int, float, float], ...]:
+    ctx: click.Context, param: click.Parameter, anchors: tuple[tuple[Any, ...], ...]
+) -> tuple[tuple[Any, ...], ...]:
     """Refuse a row that is anchored twice."""
-    rows = [row for row, _, _ in anchors]
+    rows = [anchor[0] for anchor in anchors]
     twice = next((row for k, row in enumerate(rows) if row in rows[:k]), None)
     if twice is not None:
         raise click.BadParameter(f"row {twice} is anchored twice", ctx, param)
@@ -136,9 +136,7 @@ def check_tensor(
     return tensor
 
 
-def check_orientation(
-    tensor: Any, anchors: tuple[tuple[int, float, float], ...], direction: Any, handed: str | None
-) -> None:
+def check_orientation(tensor: Any, anchors: tuple[tuple[Any, ...], ...], direction: Any, handed: str | None) -> None:
     """Refuse a tensor whose axes are not known, and a side of no line.
 
     Raises
@@ -156,11 +154,11 @@ def check_orientation(
         )
 
 
-def spans_plane(anchors: tuple[tuple[int, float, float], ...]) -> bool:
+def spans_plane(anchors: tuple[tuple[Any, ...], ...]) -> bool:
     """Whether known positions are not all on one line."""
     if len(anchors) < 3:
         return False
-    _, x0, y0 = anchors[0]
-    arms = [(x - x0, y - y0) for _, x, y in anchors[1:]]
+    _, x0, y0 = anchors[0][:3]
+    arms = [(x - x0, y - y0) for _, x, y, *_ in anchors[1:]]
     u, v = max(arms, key=lambda arm: math.hypot(*arm))
     return max(abs(u * y - v * x) for x, y in arms) > 1e-9 * (u * u + v * v)

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from os import PathLike
-from pathlib import Path
+from os import PathLike, fspath
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.io
 from numpy.typing import NDArray
 
-from ..errors import OutputError
+from ..errors import FormatError, InputError, OutputError
+from ..files import check_target, whole_file
 from .nodal import determined
+
+if TYPE_CHECKING:
+    from ..recovery import Recovery
 
 _VEC_CLASS_ID = 1211214
 
@@ -31,9 +36,8 @@ def rigid_body_modes(
     Returns
     -------
     (N, 3) or (N, 6) float64
-        Translations, then rotations, row by row of the matrix. Rotations about the centroid, each column of norm
-        sqrt(N / d)
-        or so, so that none swamps another.
+        Translations, then rotations, row by row of the matrix. Rotations are about the centroid, each column of norm
+        sqrt(N / d) or so, so that none swamps another.
     """
     d = points.shape[1]
     known = determined(points)
@@ -50,6 +54,41 @@ def rigid_body_modes(
     return modes
 
 
+def modes_of(recovery: Recovery) -> NDArray[np.float64]:
+    """Near-null space of a recovered vector-valued matrix; see :meth:`unassemble.Recovery.rigid_body_modes`."""
+    node, direction = recovery.node_of_row, recovery.direction_of_row
+    if node is None or direction is None:
+        raise InputError("a scalar matrix has no rigid-body modes: its near-null space is that of the constants")
+    if recovery.operator == "elasticity":
+        return rigid_body_modes(recovery.points, node, direction)
+    return (direction[:, None] == np.arange(direction.max() + 1)).astype(np.float64)
+
+
+def save_modes(path: str | PathLike[str], modes: NDArray[np.float64]) -> None:
+    """Write a near-null space as numpy's ``.npy``, or as a dense Matrix Market ``.mtx`` (AMGCL's ``-N``).
+
+    Raises
+    ------
+    OutputError
+        If the name ends otherwise, or the file cannot be written.
+    """
+    suffix = check_modes(path)
+    with whole_file(path, suffix) as draft:
+        if suffix == ".npy":
+            np.save(draft, modes)
+        else:
+            _write_dense(draft, modes)
+
+
+def check_modes(path: str | PathLike[str]) -> str:
+    """Find out, before long work, whether modes can be written; returns the extension."""
+    suffix = PurePath(path).suffix.lower()
+    if suffix not in (".npy", ".mtx"):
+        raise OutputError(f"rigid-body modes are a .npy or .mtx file, not {fspath(path)!r}")
+    check_target(path)
+    return suffix
+
+
 def save_petsc_vec(path: str | PathLike[str], points: NDArray[np.float64]) -> None:
     """Write coordinates as a Vec in PETSc's binary format, node by node, for ``PCSetCoordinates``.
 
@@ -57,20 +96,27 @@ def save_petsc_vec(path: str | PathLike[str], points: NDArray[np.float64]) -> No
     """
     values = _determined(points).ravel()
     header = np.array([_VEC_CLASS_ID, len(values)], dtype=">i4")
-    Path(path).write_bytes(header.tobytes() + values.astype(">f8").tobytes())
+    with whole_file(path, ".petsc") as draft:
+        draft.write_bytes(header.tobytes() + values.astype(">f8").tobytes())
 
 
 def save_amgcl_coordinates(path: str | PathLike[str], points: NDArray[np.float64]) -> None:
     """Write coordinates as a dense Matrix Market array of n rows and d columns, for AMGCL's ``-C``."""
-    with Path(path).open("wb") as file:
-        scipy.io.mmwrite(file, _determined(points), precision=17, symmetry="general")
+    values = _determined(points)
+    with whole_file(path, ".mtx") as draft:
+        _write_dense(draft, values)
+
+
+def _write_dense(path: Path, values: NDArray[np.float64]) -> None:
+    with path.open("wb") as file:  # a name would be completed, a file is not
+        scipy.io.mmwrite(file, values, precision=17, symmetry="general")
 
 
 def _determined(points: NDArray[np.float64]) -> NDArray[np.float64]:
     loose = np.flatnonzero(~determined(points))
     if len(loose):
-        raise OutputError(
-            f"node {loose[0]} and {len(loose) - 1} more have no coordinates, and this format has no way to say so; "
-            "write the .npz, or fill them in first"
+        raise FormatError(
+            f"node {loose[0]} and {len(loose) - 1} more have no coordinates, and this format has no way to say so: "
+            "write the .npz, or the modes, in which these nodes have translations only"
         )
     return points

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from time import perf_counter
-
 import numpy as np
 import scipy.sparse as sp
 
-from ..errors import GeometryError, MatrixError
+from ..clock import Clock
+from ..errors import GeometryError
+from ..matrix import check_matrix
 from .cells import Cells, no_cells, recognise_cells
 from .certificate import largest_residual
 from .material import poisson_ratio
@@ -21,13 +21,17 @@ CERTIFIED = 1e-9
 
 def scalar_parts(matrix: sp.csr_array, *, block_size: int | None = None) -> ScalarParts | None:
     """Take a vector Laplacian apart; None for matrices that couple directions or have no nodes of several unknowns."""
-    numbering = find_numbering(sp.csr_array(matrix), block_size)
-    nodal = nodal_matrix(sp.csr_array(matrix), numbering)
-    if not uncoupled(nodal):
-        return None
+    matrix = sp.csr_array(matrix)
+    numbering = find_numbering(matrix, block_size)
+    nodal = nodal_matrix(matrix, numbering)
+    return parts_of(matrix, nodal, numbering) if uncoupled(nodal) else None
+
+
+def parts_of(matrix: sp.csr_array, nodal: NodalMatrix, numbering: Numbering) -> ScalarParts:
+    """The scalar matrices of uncoupled directions."""
     nodes = tuple(np.flatnonzero(nodal.row_of[:, a] >= 0) for a in range(nodal.dim))
     rows = [nodal.row_of[here, a] for a, here in enumerate(nodes)]
-    return ScalarParts(tuple(sp.csr_array(matrix)[r][:, r] for r in rows), nodes, numbering)
+    return ScalarParts(tuple(sp.csr_array(matrix[r][:, r]) for r in rows), nodes, numbering)
 
 
 def recover_elasticity(
@@ -56,35 +60,44 @@ def recover_elasticity(
     Raises
     ------
     MatrixError
-        If the matrix is not symmetric.
+        If the matrix is not square, symmetric and finite.
     RecoveryError
         If it is no elasticity matrix, or determines nothing.
     """
-    clock = _Clock()
-    matrix = sp.csr_array(matrix, dtype=np.float64)
-    _check(matrix)
-    numbering = numbering or find_numbering(matrix, block_size)
-    nodal = nodal_matrix(matrix, numbering)
+    clock = Clock()
+    with clock("check"):
+        whole = check_matrix(matrix).csr()
+    with clock("numbering"):
+        numbering = numbering or find_numbering(whole, block_size)
+        nodal = nodal_matrix(whole, numbering)
     if uncoupled(nodal):
         raise GeometryError(
             "the directions are not coupled: these are scalar matrices side by side; recover one of them by itself"
         )
-    clock.lap("numbering")
-    solution = solve(nodal, patch)
-    clock.lap("null space")
+    return place_nodes(nodal, numbering, clock, cells=cells, patch=patch)
+
+
+def place_nodes(
+    nodal: NodalMatrix, numbering: Numbering, clock: Clock, *, cells: bool = True, patch: int | None = None
+) -> ElasticityRecovery:
+    """The recovery once the nodes are known: null space, certificate, cells; see :func:`recover_elasticity`."""
+    with clock("null space"):
+        solution = solve(nodal, patch)
     return _describe(nodal, numbering, solution, clock, cells)
 
 
 def _describe(
-    nodal: NodalMatrix, numbering: Numbering, solution: Solution, clock: _Clock, want_cells: bool
+    nodal: NodalMatrix, numbering: Numbering, solution: Solution, clock: Clock, want_cells: bool
 ) -> ElasticityRecovery:
     """Certificate, material, cells and the sentences that go with them."""
     points = solution.points
-    error = largest_residual(nodal, solution.valid, points, solution.ratio)
-    ratio = poisson_ratio(nodal, solution.valid, points) if error < 1e-6 else None
-    clock.lap("certificate")
-    found = recognise_cells(nodal, points) if want_cells and error < 1e-6 else no_cells(nodal.dim)
-    clock.lap("cells")
+    with clock("certify"):
+        error = largest_residual(nodal, solution.valid, points, solution.ratio)
+        ratio = poisson_ratio(nodal, solution.valid, points) if error < 1e-6 else None
+    found = no_cells(nodal.dim)
+    if want_cells and error < 1e-6:
+        with clock("cells"):
+            found = recognise_cells(nodal, points)
     backward = found.backward_error if found.recognised else error
     status, reason = _verdict(solution, error, found, numbering)
     loose = ~determined(points)
@@ -95,7 +108,7 @@ def _describe(
         warnings.append("Poisson's ratio, read off the nodes that determine it, was used to determine others")
     return ElasticityRecovery(
         points, numbering.node_of_row, numbering.direction_of_row, np.asarray(loose, dtype=np.int8), solution.component,
-        solution.evidence, ratio, found, backward, status, reason, numbering.kind, tuple(warnings), clock.seconds,
+        solution.evidence, ratio, found, backward, status, reason, numbering.kind, tuple(warnings), clock.timings,
     )  # fmt: skip
 
 
@@ -130,32 +143,3 @@ def _verdict(solution: Solution, error: float, found: Cells, numbering: Numberin
     if error <= CERTIFIED:
         return "certified", "the valid identities hold to rounding, and only translations and scale satisfy them"
     return "uncertified", f"the largest residual of a valid identity is {error:.1e}"
-
-
-def _check(matrix: sp.csr_array) -> None:
-    if matrix.shape[0] != matrix.shape[1]:
-        raise MatrixError(f"the matrix has {matrix.shape[0]} rows and {matrix.shape[1]} columns; it must be square")
-    if not np.isfinite(matrix.data).all():
-        raise MatrixError("the matrix has entries that are not finite")
-    off = abs(matrix - matrix.T)
-    scale = abs(matrix).max(axis=1).toarray().ravel()
-    worst = off.tocoo()
-    bad = np.flatnonzero(worst.data > 1e-8 * scale[worst.row])
-    if len(bad):
-        at = bad[0]
-        raise MatrixError(
-            f"entry ({worst.row[at]}, {worst.col[at]}) differs from its transpose's; it must be symmetric"
-        )
-
-
-class _Clock:
-    """Seconds by stage."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self._last = perf_counter()
-
-    def lap(self, name: str) -> None:
-        now = perf_counter()
-        self.seconds[name] = now - self._last
-        self._last = now

@@ -20,6 +20,11 @@ class UpperTriangle:
     indices : (nnz,) int32
         Columns, increasing within a row and starting with the diagonal, which is always stored.
     indptr : (n + 1,) int32
+
+    Raises
+    ------
+    ValueError
+        If a row does not start with its diagonal: PARDISO would crash on it.
     """
 
     data: NDArray
@@ -30,6 +35,19 @@ class UpperTriangle:
         # PARDISO reads these arrays as they lie in memory: anything but 32-bit integers would crash it.
         for name in ("indices", "indptr"):
             object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=np.int32))
+        self._check_diagonal()
+
+    def _check_diagonal(self) -> None:
+        start = self.indptr[:-1]
+        if len(self.indices):
+            first = self.indices[np.minimum(start, len(self.indices) - 1)]
+            wrong = (first != np.arange(self.n)) | (start == self.indptr[1:])
+        else:
+            wrong = np.ones(self.n, dtype=bool)
+        if wrong.any():
+            raise ValueError(
+                f"row {int(np.argmax(wrong))} of the upper triangle does not start with its diagonal entry"
+            )
 
     @property
     def n(self) -> int:

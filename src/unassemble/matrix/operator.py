@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 
@@ -41,6 +42,14 @@ class OperatorMatrix:
     def row_size(self) -> NDArray[np.float64]:
         """(n,) largest absolute off-diagonal entry of each row."""
         return row_sizes(self.n, self.edges, np.abs(self.entries))
+
+    def csr(self) -> sp.csr_array:
+        """Both triangles and the diagonal, all of it stored."""
+        i, j = self.edges.astype(np.int32).T
+        own = np.arange(self.n, dtype=np.int32)
+        entries = np.concatenate([self.entries, self.entries, self.diagonal])
+        place = (np.concatenate([i, j, own]), np.concatenate([j, i, own]))
+        return sp.coo_array((entries, place), shape=(self.n, self.n)).tocsr()
 
 
 def row_sizes(n: int, edges: NDArray[np.int64], magnitudes: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,0 +1,79 @@
+"""Known positions: one fixes the translation of its piece, two its size and sign."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+Anchors = tuple[NDArray[np.int64], NDArray[np.float64]]
+
+
+def checked_anchors(anchors: Sequence[Any] | None, node_of_row: NDArray[np.int64], d: int) -> Anchors:
+    """Nodes (k,) and known positions (k, d) of anchors (row, x, y) or (row, x, y, z).
+
+    Raises
+    ------
+    InputError
+        For rows that do not exist or belong to one node, and positions of another dimension.
+    """
+    anchors = list(anchors or ())
+    try:
+        rows = [operator.index(one[0]) for one in anchors]
+        places = [tuple(float(x) for x in one[1:]) for one in anchors]
+    except (TypeError, ValueError, IndexError) as error:
+        raise InputError("anchors are a row, a whole number, and coordinates") from error
+    for row, place in zip(rows, places, strict=True):
+        if not 0 <= row < len(node_of_row):
+            raise InputError(f"row {row} is not in the matrix: its rows count from 0 to {len(node_of_row) - 1}")
+        if len(place) != d or not np.isfinite(place).all():
+            raise InputError(f"the anchor of row {row} needs {d} finite coordinates: the matrix belongs to {d}D")
+    nodes = node_of_row[rows] if rows else np.empty(0, np.int64)
+    for k, node in enumerate(nodes):
+        if node in nodes[:k]:
+            other = rows[int(np.argmax(nodes[:k] == node))]
+            raise InputError(f"rows {other} and {rows[k]} belong to one node: anchor one of them")
+    return np.asarray(nodes), np.asarray(places, dtype=np.float64).reshape(-1, d)
+
+
+def anchored(
+    points: NDArray[np.float64], component: NDArray[np.int64], n_pieces: int, anchors: Anchors
+) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
+    """Move pieces to their anchors; the axes are the matrix's own and stay.
+
+    Returns
+    -------
+    points : (n, d) float64
+    factor : (n_pieces,) float64
+        By which each piece was enlarged; negative where it was reflected in a point, NaN where the size is by
+        convention.
+    notes : list of str
+    """
+    nodes, places = anchors
+    points, factor, notes = points.copy(), np.full(n_pieces, np.nan), []
+    lost = nodes[component[nodes] < 0]
+    if len(lost):
+        notes.append(f"the anchored nodes {', '.join(map(str, lost))} are not determined and were not used")
+    for piece in np.unique(component[nodes]):
+        if piece < 0:
+            continue
+        here = component[nodes] == piece
+        body = component == piece
+        found, wanted = points[nodes[here]], places[here]
+        x, y = found - found.mean(axis=0), wanted - wanted.mean(axis=0)
+        if here.sum() > 1:
+            size = float((x * y).sum() / (x * x).sum())
+            if size == 0:
+                raise InputError("the anchors lie in one point, or across the line between their nodes")
+            factor[piece] = size
+            points[body] *= size
+        points[body] += wanted.mean(axis=0) - points[nodes[here]].mean(axis=0)
+        misfit = float(np.linalg.norm(points[nodes[here]] - wanted, axis=1).max())
+        if here.sum() > 1 and misfit > 1e-6 * np.linalg.norm(y, axis=1).max():
+            notes.append(f"the anchors do not fit the mesh: one is missed by {misfit:.3g}")
+    return points, factor, notes

@@ -1,0 +1,174 @@
+"""Vector-valued matrices served as every other: what was asked for in, one Recovery out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..clock import Clock
+from ..errors import RecoveryError
+from ..matrix import OperatorMatrix, check_matrix
+from ..recovery import Recovery
+from .anchoring import anchored, checked_anchors
+from .nodal import nodal_matrix, uncoupled
+from .recover import parts_of, place_nodes
+from .results import ElasticityRecovery, ScalarParts
+from .surface import boundary_loops
+from .unknowns import Numbering
+
+_MESHIO = {"triangles": "triangle", "quads": "quad", "tetrahedra": "tetra", "hexahedra": "hexahedron"}
+_SAME = 1e-12  # relative difference up to which the matrices of two directions are one
+
+Scalar = Callable[[OperatorMatrix, Sequence[Any]], Recovery]
+
+
+def serve(
+    matrix: OperatorMatrix,
+    numbering: Numbering,
+    clock: Clock,
+    *,
+    anchors: Sequence[Any] | None,
+    choice: str,
+    cells: bool,
+    scalar: Scalar,
+) -> Recovery:
+    """Recover a vector-valued matrix whose numbering is known.
+
+    Parameters
+    ----------
+    matrix : OperatorMatrix
+    numbering : Numbering
+    clock : Clock
+    anchors : sequence of (row, x, y) or (row, x, y, z), optional
+    choice : str
+        Why the matrix was taken for a vector-valued one.
+    cells : bool
+        Look for elements too.
+    scalar : callable
+        Recovers a scalar matrix with anchors, for directions that are not coupled.
+    """
+    with clock("numbering"):
+        whole = matrix.csr()
+        nodal = nodal_matrix(whole, numbering)
+    if uncoupled(nodal):
+        parts = parts_of(whole, nodal, numbering)
+        return replace(_vector_laplacian(parts, matrix, anchors, scalar), choice=choice, timings=clock.timings)
+    known = checked_anchors(anchors, numbering.node_of_row, numbering.block_size)
+    del whole
+    found = place_nodes(nodal, numbering, clock, cells=cells)
+    points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
+    lame, scale = _in_units(found, factor)
+    fields: dict[str, Any] = {"triangles": np.empty((0, 3), np.int64), found.cells.kind: found.cells.cells}
+    fields.pop("", None)
+    boundary, offsets = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
+    if found.cells.recognised and nodal.dim == 2:
+        boundary, offsets = boundary_loops(_MESHIO[found.cells.kind], found.cells.cells)
+    if np.isnan(factor).any():
+        notes.append("the sign of the scale is free: with a mesh its point reflection fits the matrix as well")
+    return Recovery(
+        **fields,
+        points=points,
+        component=found.component,
+        hinges=np.empty(0, np.int64),
+        scale=scale,
+        boundary=boundary,
+        boundary_offsets=offsets,
+        node_status=found.node_status,
+        status=found.status,
+        reason=found.reason,
+        operator="elasticity",
+        backward_error=found.backward_error,
+        timings=clock.timings,
+        warnings=(*matrix.warnings, *found.warnings, *notes),
+        node_of_row=found.node_of_row,
+        direction_of_row=found.direction_of_row,
+        numbering=found.numbering,
+        choice=choice,
+        poisson_ratio=found.poisson_ratio,
+        lame=lame,
+        evidence=found.evidence,
+    )
+
+
+def _in_units(found: ElasticityRecovery, factor: NDArray) -> tuple[NDArray, NDArray]:
+    """Lame coefficients of the cells, and the mean shear modulus of each piece, for the size that it was given.
+
+    Entries go like the modulus times length to the power d - 2.
+    """
+    d = found.points.shape[1]
+    pieces = len(found.evidence)
+    scale = np.full(pieces, np.nan)
+    if not found.cells.recognised:
+        return np.empty((0, 2)), scale
+    piece = found.component[found.cells.cells[:, 0]]
+    lame = found.cells.lame / np.where(np.isnan(factor), 1.0, np.abs(factor))[piece, None] ** (d - 2)
+    count = np.bincount(piece, minlength=pieces)
+    some = count > 0
+    scale[some] = np.bincount(piece, lame[:, 1], pieces)[some] / count[some]
+    return lame, scale
+
+
+def _vector_laplacian(
+    parts: ScalarParts, matrix: OperatorMatrix, anchors: Sequence[Any] | None, scalar: Scalar
+) -> Recovery:
+    """Each direction as the scalar matrix that it is; the mesh is that of the direction with most nodes."""
+    numbering = parts.numbering
+    lead = int(np.argmax([len(nodes) for nodes in parts.nodes]))
+    nodes = parts.nodes[lead]
+    place = np.full(numbering.n_nodes, -1)
+    place[nodes] = np.arange(len(nodes))
+    known = [(int(place[numbering.node_of_row[row]]), *where) for row, *where in anchors or ()]
+    try:
+        mesh = scalar(check_matrix(parts.matrices[lead]), known)
+        others = [
+            scalar(check_matrix(part), ())
+            for k, part in enumerate(parts.matrices)
+            if k != lead and not _same(part, parts.matrices[lead])
+        ]
+    except RecoveryError as error:
+        raise type(error)(f"the directions are not coupled (a vector Laplacian), and of one: {error}") from error
+    worst = max([mesh, *others], key=lambda one: (not one.certified, one.backward_error))
+    n = numbering.n_nodes
+    points, component = np.full((n, 2), np.nan), np.full(n, -1)
+    points[nodes], component[nodes] = mesh.points, mesh.component
+    status = np.ones(n, np.int8)
+    status[nodes] = mesh.node_status
+    notes = ["the directions are not coupled: each was treated as a scalar matrix"]
+    if others:
+        notes.append("the directions have different matrices; the mesh is that of the one with most nodes")
+    return replace(
+        mesh,
+        points=points,
+        triangles=nodes[mesh.triangles],
+        component=component,
+        hinges=nodes[mesh.hinges],
+        boundary=nodes[mesh.boundary],
+        node_status=status,
+        worst_entries=numbering_rows(parts, lead)[mesh.worst_entries],
+        status=worst.status,
+        reason=worst.reason,
+        backward_error=worst.backward_error,
+        operator="vector laplacian",
+        warnings=(*matrix.warnings, *mesh.warnings, *notes),
+        node_of_row=numbering.node_of_row,
+        direction_of_row=numbering.direction_of_row,
+        numbering=numbering.kind,
+    )
+
+
+def numbering_rows(parts: ScalarParts, direction: int) -> NDArray[np.int64]:
+    """Matrix row of each row of a direction's scalar matrix."""
+    numbering = parts.numbering
+    row_of = np.full(numbering.n_nodes, -1)
+    rows = np.flatnonzero((numbering.direction_of_row == direction) & ~numbering.identity_row)
+    row_of[numbering.node_of_row[rows]] = rows
+    return row_of[parts.nodes[direction]]
+
+
+def _same(one: sp.csr_array, other: sp.csr_array) -> bool:
+    return one.shape == other.shape and bool(abs(one - other).max() <= _SAME * abs(other).max())

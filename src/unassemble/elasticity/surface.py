@@ -1,0 +1,50 @@
+"""The outside of a mesh: facets that belong to one cell only."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..topology.boundary import loops
+
+# Facets of a positively oriented cell in meshio's order, each seen counter-clockwise from outside.
+_FACETS = {
+    "triangle": [(0, 1), (1, 2), (2, 0)],
+    "quad": [(0, 1), (1, 2), (2, 3), (3, 0)],
+    "tetra": [(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)],
+    "hexahedron": [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
+}
+
+
+def outer_facets(kind: str, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(f, k) facets that no other cell shares.
+
+    Parameters
+    ----------
+    kind : {"triangle", "quad", "tetra", "hexahedron"}
+    cells : (m, corners) int64
+    """
+    corners = np.array(_FACETS[kind])
+    facets = cells[:, corners].reshape(-1, corners.shape[1])
+    _, which, count = np.unique(np.sort(facets, axis=1), axis=0, return_inverse=True, return_counts=True)
+    return facets[count[which.ravel()] == 1]
+
+
+def boundary_loops(kind: str, cells: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Directed boundary edges of planar cells loop by loop, and where each loop begins.
+
+    Where loops touch in a vertex they are taken apart, or joined, as the order of the cells has it.
+
+    Returns
+    -------
+    boundary : (b, 2) int64
+    offsets : (loops + 1,) int64
+    """
+    edges = outer_facets(kind, cells)
+    if not len(edges):
+        return edges.reshape(0, 2), np.zeros(1, np.int64)
+    successor = np.empty(len(edges), np.int64)
+    # As many edges leave a vertex as enter it.
+    successor[np.argsort(edges[:, 1], kind="stable")] = np.argsort(edges[:, 0], kind="stable")
+    loop, order = loops(successor)
+    return edges[order], np.append(np.flatnonzero(np.diff(loop[order], prepend=-1)), len(order)).astype(np.int64)

@@ -1,0 +1,132 @@
+"""Which operator a matrix belongs to, where that is not said."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import InputError, RecoveryError
+from .matrix import OperatorMatrix
+
+if TYPE_CHECKING:
+    from .elasticity import Numbering
+
+OPERATORS = ("auto", "laplacian", "elasticity")
+NUMBERINGS = ("interleaved", "by component")
+_ANNIHILATED = 0.05  # share of rows and directions that annihilate constants; in scalar matrices there are none
+_COMMON = 0.8  # how far the rows of a node couple to the same nodes
+
+
+@dataclass(frozen=True)
+class VectorReading:
+    """A matrix read as vector-valued.
+
+    Attributes
+    ----------
+    numbering : Numbering
+    why : str
+        What speaks for it; empty where the caller asked for it.
+    """
+
+    numbering: Numbering
+    why: str
+
+
+def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) -> VectorReading:
+    """Find the nodes of a matrix that is said to be vector-valued.
+
+    Parameters
+    ----------
+    matrix : OperatorMatrix
+    block_size : int, optional
+    numbering : {None, "interleaved", "by component"} or (node_of_row, direction_of_row)
+
+    Raises
+    ------
+    InputError
+        For numberings that do not fit the matrix.
+    RecoveryError
+        If no numbering makes rows annihilate translations.
+    """
+    from .elasticity.unknowns import find_numbering, given_numbering, regular_numbering
+
+    whole = matrix.csr()
+    if numbering is None:
+        return VectorReading(find_numbering(whole, block_size), "")
+    if isinstance(numbering, str):
+        if numbering not in NUMBERINGS:
+            raise InputError(f"the numbering is {' or '.join(map(repr, NUMBERINGS))}, not {numbering!r}")
+        return VectorReading(regular_numbering(whole, numbering, block_size), "")
+    try:
+        node, direction = numbering
+    except (TypeError, ValueError) as error:
+        raise InputError("a numbering is two arrays: the node and the direction of each row") from error
+    found = given_numbering(whole, node, direction)
+    if block_size not in (None, found.block_size):
+        raise InputError(f"the numbering has {found.block_size} directions, and the block size is {block_size}")
+    return VectorReading(found, "")
+
+
+def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
+    """Read a matrix as vector-valued if its graph says at first sight that it is no planar mesh, but blocks of nodes.
+
+    Costs next to nothing where the graph may be planar.
+    """
+    crowded = matrix.n >= 3 and len(matrix.edges) > 3 * matrix.n - 6
+    if not crowded and not _twins_interleaved(matrix):
+        return None
+    from .elasticity.unknowns import numbering_at_sight
+
+    found = numbering_at_sight(matrix.csr())
+    if found is None or found.share < _ANNIHILATED or found.common < _COMMON:
+        return None
+    graph = "the graph has more edges than a planar one can have" if crowded else "no even row is coupled to an odd one"
+    return VectorReading(found, f"{graph}, and {_evidence(found)}")
+
+
+def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
+    """Read a matrix as vector-valued after it turned out not to be a planar mesh; None where little speaks for it."""
+    from .elasticity.unknowns import find_numbering
+
+    try:
+        found = find_numbering(matrix.csr())
+    except RecoveryError:
+        return None
+    if found.share < _ANNIHILATED or found.common < _COMMON:
+        return None
+    return VectorReading(found, f"it is no planar mesh, and {_evidence(found)}")
+
+
+def refuse(**options: Any) -> None:
+    """Refuse options that only scalar matrices have.
+
+    Raises
+    ------
+    InputError
+    """
+    for name, value in options.items():
+        if value is not None and value is not False:
+            raise InputError(f"the option {name.replace('_', '-')} is for scalar matrices, and this one is read as "
+                             "vector-valued: leave it out, or choose the operator 'laplacian'")  # fmt: skip
+
+
+def _evidence(found: Numbering) -> str:
+    order = {"pattern": "in no regular order"}.get(found.kind, found.kind)
+    return (
+        f"its rows form {found.n_nodes} nodes with {found.block_size} unknowns each, {order}, whose sums by direction "
+        f"vanish in {100 * found.share:.0f} % of the cases"
+    )
+
+
+def _twins_interleaved(matrix: OperatorMatrix) -> bool:
+    """Whether rows 2k and 2k + 1 are never coupled across and carry the same numbers: a vector Laplacian."""
+    i, j = matrix.edges.T
+    if matrix.n % 2 or matrix.n < 6 or ((i ^ j) & 1).any():
+        return False
+    even = (i & 1) == 0
+    pairs = matrix.edges // 2
+    if not np.array_equal(pairs[even], pairs[~even]):
+        return False
+    return bool(np.abs(matrix.entries[even] - matrix.entries[~even]).max() <= 1e-12 * np.abs(matrix.entries).max())
