@@ -41,9 +41,11 @@ def check_output(path: str | os.PathLike[str]) -> None:
 def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
     """Write a recovered mesh, whole or not at all; the extension names the format.
 
-    ``.npz`` holds ``points``, cells (``triangles``, ``quads``, ``tetrahedra``, ``hexahedra``), ``component``,
+    ``.npz`` holds ``points``, cells (``triangles``, ``quads``, ``tetrahedra``, ``hexahedra``, ``polygons_offsets`` and
+    ``polygons_data``), ``component``,
     ``hinges``, ``scale``, ``node_status`` and, of vector-valued matrices, ``node_of_row`` and ``direction_of_row``.
-    Other formats are those of meshio (:mod:`unassemble.formats`).
+    Other formats are those of meshio (:mod:`unassemble.formats`); of these ``.vtu`` holds polygons, the others get
+    them divided into triangles.
 
     Parameters
     ----------
@@ -73,6 +75,8 @@ def arrays(recovery: Recovery) -> dict[str, Any]:
     for name in ("triangles", "quads", "tetrahedra", "hexahedra"):
         if len(getattr(recovery, name)):
             content[name] = getattr(recovery, name)
+    if recovery.n_polygons:
+        content |= {"polygons_offsets": recovery.polygons_offsets, "polygons_data": recovery.polygons_data}
     content |= {"component": recovery.component, "hinges": recovery.hinges, "scale": recovery.scale}
     content["node_status"] = recovery.node_status
     if recovery.vector_valued:
@@ -86,24 +90,39 @@ def to_meshio(recovery: Recovery) -> meshio.Mesh:
     Point data, all scalar: ``row`` of the matrix, ``component``, ``boundary`` (1 on the outside of the mesh, else 0),
     and where present ``node_status``, ``standard_deviation_x`` and ``standard_deviation_y``. Of vector-valued
     matrices there are ``row_x``, ``row_y`` and ``row_z`` instead of ``row``, with -1 for unknowns that the matrix
-    lacks. Nodes without cells are cells of kind ``vertex``, so that they show.
+    lacks. Nodes without cells are cells of kind ``vertex``, so that they show. Undivided cells are blocks of kind
+    ``polygon``, one for each number of vertices.
     """
-    return _mesh(recovery, 3, _point_data(recovery))
+    return _mesh(recovery, 3, _point_data(recovery), polygons=True)
 
 
-def _mesh(recovery: Recovery, dimension: int, point_data: dict[str, NDArray]) -> meshio.Mesh:
+def _mesh(recovery: Recovery, dimension: int, point_data: dict[str, NDArray], *, polygons: bool = False) -> meshio.Mesh:
     import meshio
 
     points = np.zeros((recovery.n_points, max(dimension, recovery.dim)))
     points[:, : recovery.points.shape[1]] = recovery.points
-    return meshio.Mesh(points, list(_cells(recovery).items()), point_data=point_data)
+    if polygons and recovery.n_polygons:
+        blocks = [*recovery.cells.items(), *(("polygon", same) for same in _by_size(recovery))]
+    else:
+        blocks = list(_cells(recovery).items())
+    return meshio.Mesh(points, blocks, point_data=point_data)
 
 
 def _cells(recovery: Recovery) -> dict[str, NDArray[np.int64]]:
-    """Cells by kind; where the elements of a vector-valued matrix are not known, its nodes."""
+    """Cells by kind, polygons divided; where the elements of a vector-valued matrix are not known, its nodes."""
+    if recovery.n_polygons:
+        return {"triangle": recovery.divided()[0]}
     if recovery.n_cells or not recovery.vector_valued:
         return recovery.cells or {"triangle": recovery.triangles}
     return {"vertex": np.flatnonzero(recovery.node_status == 0)[:, None]}
+
+
+def _by_size(recovery: Recovery) -> list[NDArray[np.int64]]:
+    """Polygons as (m, k) arrays, one for each number of vertices."""
+    size = np.diff(recovery.polygons_offsets)
+    return [
+        recovery.polygons_data[recovery.polygons_offsets[:-1][size == k, None] + np.arange(k)] for k in np.unique(size)
+    ]
 
 
 def _point_data(recovery: Recovery) -> dict[str, NDArray]:
@@ -163,7 +182,7 @@ def _mesh_for(recovery: Recovery, mesh_format: MeshFormat) -> meshio.Mesh:
         data = _point_data(recovery)
     elif mesh_format.data == "boundary":
         data = {f"{mesh_format.name}:ref": _boundary_flag(recovery)}
-    mesh = _mesh(recovery, mesh_format.dimension, data)
+    mesh = _mesh(recovery, mesh_format.dimension, data, polygons=mesh_format.polygons)
     if not mesh_format.keeps_rows:  # points of no triangle have no place, and NaN would spoil bounding boxes
         mesh.points[np.isnan(mesh.points)] = 0
     if mesh_format.name == "nastran":

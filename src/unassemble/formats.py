@@ -30,6 +30,8 @@ class MeshFormat:
         Coordinates of each point of a planar mesh. Where the format attaches meaning to it, that has 2.
     cells : frozenset of str
         Kinds of cells, by meshio's names, that it holds in meshio's hands; ``"vertex"`` for bare points.
+    polygons : bool
+        Whether it holds cells of any number of vertices.
     data : {"all", "boundary", "none"}
         Point data that it takes along; ``"boundary"``: one integer label, which marks the boundary.
     undetermined : bool
@@ -49,6 +51,7 @@ class MeshFormat:
     name: str
     dimension: int = 3
     cells: frozenset[str] = _ALL
+    polygons: bool = False
     data: str = "all"
     undetermined: bool = False
     keeps_rows: bool = True
@@ -121,7 +124,7 @@ FORMATS: Mapping[str, MeshFormat] = {
     ".vol": _NETGEN,
     ".vol.gz": _NETGEN,
     ".vtk": MeshFormat("vtk", undetermined=True),
-    ".vtu": MeshFormat("vtu", undetermined=True),
+    ".vtu": MeshFormat("vtu", polygons=True, undetermined=True),
     ".wkt": MeshFormat("wkt", cells=_TRIANGLES, data="none", keeps_rows=False),
     ".xdmf": _XDMF,
     ".xml": MeshFormat("dolfin-xml", dimension=2, cells=frozenset({"triangle", "tetra"}), data="none"),

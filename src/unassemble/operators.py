@@ -90,6 +90,8 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     """Read a matrix as vector-valued after it turned out not to be a planar mesh; None where little speaks for it."""
     from .elasticity.unknowns import find_numbering
 
+    if not matrix.diagonal.all():  # every unknown of an elastic body has a stiffness
+        return None
     try:
         found = find_numbering(matrix.csr())
     except RecoveryError:

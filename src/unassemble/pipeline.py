@@ -181,7 +181,7 @@ def recover(
                 raise
             try:
                 return vector(second)
-            except RecoveryError:
+            except (RecoveryError, InputError):  # options may be for scalar matrices only
                 raise error from None
 
 

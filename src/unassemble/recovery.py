@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .topology.polygons import Polygons
+
 if TYPE_CHECKING:
     import meshio
     from matplotlib.figure import Figure
@@ -152,6 +154,18 @@ class Recovery:
             "hexahedron": self.hexahedra,
         }
         return {kind: cells for kind, cells in kinds.items() if len(cells)}
+
+    def divided(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Triangles, with the polygons in fans.
+
+        Returns
+        -------
+        triangles : (m, 3) int64
+        outline : (m, 3) bool
+            False for sides, from each corner to the next, that are diagonals of polygons.
+        """
+        fans, outline = Polygons(self.polygons_offsets, self.polygons_data).fans()
+        return np.concatenate([self.triangles, fans]), np.concatenate([np.ones(self.triangles.shape, bool), outline])
 
     @property
     def dim(self) -> int:

@@ -26,7 +26,7 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
     """Everything but the mesh, made of what JSON knows; numbers that are not finite become None.
 
     Keys: ``status``, ``reason``, ``operator``, ``n_points``, ``n_cells``, ``n_components``, ``n_holes``, ``scale`` (one
-    for each piece), ``backward_error``, ``timings`` (seconds by stage), ``warnings``; further ``n_hinges``,
+    for each piece), ``backward_error``, ``timings`` (seconds by stage), ``warnings``; further ``n_polygons`` (cells that the matrix leaves undivided), ``n_hinges``,
     ``n_undetermined``, ``n_boundary_edges``, ``worst_entries`` (``row``, ``column``, ``misfit``, worst first),
     ``chi_square``, ``largest_standard_deviation`` and ``version``. Vector-valued matrices have those of
     :func:`_vector_facts` too.
@@ -38,6 +38,7 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
             "operator": recovery.operator,
             "n_points": recovery.n_points,
             "n_cells": recovery.n_cells,
+            "n_polygons": recovery.n_polygons,
             "n_components": recovery.n_components,
             "n_holes": recovery.n_holes,
             "n_hinges": len(recovery.hinges),
@@ -175,6 +176,8 @@ _KINDS = {"triangle": "triangles", "quad": "quadrilaterals", "tetra": "tetrahedr
 def cells_text(recovery: Recovery) -> list[tuple[str, int]]:
     """Kinds of cells and their numbers; triangles, if there are none, of scalar matrices."""
     known = [(_KINDS[kind], len(cells)) for kind, cells in recovery.cells.items()]
+    if recovery.n_polygons:
+        known.append(("polygons", recovery.n_polygons))
     return known or [("cells" if recovery.vector_valued else "triangles", 0)]
 
 

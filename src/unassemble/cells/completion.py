@@ -13,7 +13,7 @@ from ..errors import GeometryError, RecoveryError
 from ..matrix import OperatorMatrix
 from ..planar.cotangent import edge_weights
 from ..planar.piece import PieceMesh
-from ..topology import Numbering, Piece, Polygons, Topology, components, recognise
+from ..topology import Numbering, Piece, Polygons, Topology, components, located, recognise
 from .reading import FITS, Reading, row_sizes
 from .search import read_cells
 
@@ -72,7 +72,8 @@ def completed(
     kept = [item for item in solved if not doubtful[label[item[0].vertices[0]]]]
     parts = [_Part(kept, np.empty((0, 2), np.int64), Polygons.none())]
     failures: list[RecoveryError] = []
-    for numbering in components(matrix.n, matrix.edges):
+    numberings = components(matrix.n, matrix.edges)
+    for numbering in numberings:
         here = label[numbering.vertices[0]]
         if not doubtful[here]:
             continue
@@ -80,7 +81,7 @@ def completed(
         try:
             parts.append(_read_again(matrix, numbering, own, misfit[numbering.edge_rows]))
         except RecoveryError as error:
-            failures.append(error)
+            failures.append(located(error, numbering, named=len(numberings) > 1))
     if not any(part.pieces for part in parts):
         raise failures[0]
     return _merged(matrix, topology, parts, tuple(map(str, failures)))
@@ -121,9 +122,7 @@ def _read_again(matrix: OperatorMatrix, numbering: Numbering, own: Solved, misfi
     if own:
         return _Part(own, np.empty((0, 2), np.int64), Polygons.none())
     recognise(len(numbering.vertices), numbering.edges)  # says what is wrong with the graph, if that is it
-    raise GeometryError(
-        f"no cells on the graph of row {numbering.vertices.min()} fit the entries: they belong to no planar mesh"
-    )
+    raise GeometryError("no choice of cells and holes on the graph fits the entries: they belong to no planar mesh")
 
 
 def _part(matrix: OperatorMatrix, numbering: Numbering, reading: Reading) -> _Part:

@@ -71,6 +71,7 @@ class _Files:
 )
 @click.option("--handed", type=click.Choice(["left", "right"]), help="Side of that line on which the centroid lies.")
 @click.option("--realise", is_flag=True, help="Surfaces: coordinates in space (not available in this version).")
+@click.option("--triangulate", is_flag=True, help="Divide cells that the matrix leaves undivided.")
 @click.option("--standard-deviations", is_flag=True, help="Error bars of the coordinates.")
 @click.option("--report", metavar="FILE", help="Write a report: .json.")
 @click.option("--plot", metavar="FILE", help="Write a picture: .png, .svg or .pdf.")

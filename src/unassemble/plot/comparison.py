@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..report import cells_text
 from . import style
 from .canvas import check_plot, footer, header, panels, write_figure
 from .mesh import draw_mesh, extent, outer_loops
@@ -43,9 +44,9 @@ def plot_comparison(true_points: ArrayLike, recovery: Recovery, path: str | os.P
     if truth.shape != recovery.points.shape:
         raise InputError(f"the true points have the shape {truth.shape}, the recovered {recovery.points.shape}")
     aligned = align(recovery.points, truth, recovery.component)
-    figure, axes = panels([extent(truth, recovery.triangles)] * 2)
-    mesh = recovery.triangles, recovery.boundary, recovery.boundary_offsets
-    outer = outer_loops(recovery.points, *mesh[1:])  # in the frame in which cells are counter-clockwise
+    mesh = *recovery.divided(), recovery.boundary, recovery.boundary_offsets
+    figure, axes = panels([extent(truth, mesh[0])] * 2)
+    outer = outer_loops(recovery.points, *mesh[2:])  # in the frame in which cells are counter-clockwise
     handles = []
     for ax, points, name in zip(axes, (truth, aligned), ("true", "recovered"), strict=True):
         handles = draw_mesh(ax, points, *mesh, outer)
@@ -85,7 +86,9 @@ def _fit(points: NDArray, truth: NDArray) -> NDArray:
 
 
 def _words(recovery: Recovery, error: float) -> tuple[str, str]:
-    sizes = f"{recovery.n_points:,} points  ·  {recovery.n_cells:,} triangles"
+    sizes = "  ·  ".join(
+        [f"{recovery.n_points:,} points", *(f"{count:,} {kind}" for kind, count in cells_text(recovery))]
+    )
     return (
         f"{recovery.status}, largest error {error:.1e} of the diameter",
         f"{sizes}  ·  backward error {recovery.backward_error:.1e}",

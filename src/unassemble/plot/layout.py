@@ -26,6 +26,9 @@ class Drawing:
     ----------
     points : (k, 2) float64
     triangles : (m, 3) int64
+        Polygons divided.
+    outline : (m, 3) bool
+        Sides, from each corner to the next, that are none of their diagonals.
     boundary : (b, 2) int64
     offsets : (loops + 1,) int64
     hinges : (h,) int64
@@ -35,6 +38,7 @@ class Drawing:
 
     points: NDArray[np.float64]
     triangles: NDArray[np.int64]
+    outline: NDArray[np.bool_]
     boundary: NDArray[np.int64]
     offsets: NDArray[np.int64]
     hinges: NDArray[np.int64]
@@ -47,9 +51,11 @@ def drawing_of(recovery: Recovery) -> Drawing:
     Pieces of which any two overlap are shifted side by side; pieces that meet in hinges are kept together unless
     they overlap each other. Where nothing overlaps, as with known positions, all stay where they are.
     """
+    triangles, outline = recovery.divided()
     drawing = Drawing(
         recovery.points,
-        recovery.triangles,
+        triangles,
+        outline,
         recovery.boundary,
         recovery.boundary_offsets,
         recovery.hinges,
@@ -57,10 +63,11 @@ def drawing_of(recovery: Recovery) -> Drawing:
     )
     if recovery.n_components < 2:
         return drawing
-    pieces = apart(recovery) if len(recovery.hinges) else together(recovery)
+    pieces = apart(recovery, triangles) if len(recovery.hinges) else together(recovery, triangles)
     renumbered = Drawing(
         recovery.points[pieces.vertices],
         pieces.triangles,
+        outline,
         pieces.boundary,
         recovery.boundary_offsets,
         pieces.hinges,

@@ -21,7 +21,13 @@ _MOST_VECTOR_LINES = 20_000
 
 
 def draw_mesh(
-    ax: Axes, points: NDArray, triangles: NDArray, boundary: NDArray, offsets: NDArray, outer: NDArray
+    ax: Axes,
+    points: NDArray,
+    triangles: NDArray,
+    outline: NDArray,
+    boundary: NDArray,
+    offsets: NDArray,
+    outer: NDArray,
 ) -> list[Line2D]:
     """Draw a mesh; handles for a legend come back.
 
@@ -32,6 +38,8 @@ def draw_mesh(
     points : (n, 2) float64
     triangles : (m, 3) int64
         Neighbours run along a common edge in opposite directions.
+    outline : (m, 3) bool
+        Sides, from each corner to the next, that are drawn.
     boundary, offsets
         As in :class:`unassemble.Recovery`.
     outer : (loops,) bool
@@ -41,7 +49,9 @@ def draw_mesh(
 
     tail = triangles.ravel()
     head = triangles[:, [1, 2, 0]].ravel()
-    once = tail < head  # neighbours run along their edge in opposite directions; boundary edges come by themselves
+    once = (
+        tail < head
+    ) & outline.ravel()  # neighbours run along their edge in opposite directions; boundary edges come by themselves
     start, stop = points[tail[once]], points[head[once]]
     if not len(start):
         return []

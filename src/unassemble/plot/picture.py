@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..report import scale_text
+from ..report import cells_text, scale_text
 from . import style
 from .canvas import check_plot, footer, header, panels, write_figure
 from .layout import drawing_of
@@ -40,7 +40,9 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     drawing = drawing_of(recovery)
     outer = outer_loops(drawing.points, drawing.boundary, drawing.offsets)
     figure, (ax,) = panels([extent(drawing.points, drawing.triangles)])
-    handles = draw_mesh(ax, drawing.points, drawing.triangles, drawing.boundary, drawing.offsets, outer)
+    handles = draw_mesh(
+        ax, drawing.points, drawing.triangles, drawing.outline, drawing.boundary, drawing.offsets, outer
+    )
     handles += draw_hinges(ax, drawing.points, drawing.hinges, len(recovery.hinges))
     if not recovery.certified:
         handles += draw_worst(ax, drawing.points, drawing.pairs)
@@ -53,7 +55,7 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
 
 def details(recovery: Recovery) -> str:
     """Sizes, factor and certificate in one line."""
-    parts = [f"{recovery.n_points:,} points", f"{recovery.n_cells:,} triangles"]
+    parts = [f"{recovery.n_points:,} points", *(f"{count:,} {kind}" for kind, count in cells_text(recovery))]
     if recovery.n_components > 1:
         parts.append(f"{recovery.n_components:,} pieces")
     missing = int(np.count_nonzero(recovery.node_status))

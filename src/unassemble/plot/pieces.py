@@ -49,22 +49,22 @@ class Pieces:
         return self.piece[self.triangles[:, 0]]
 
 
-def together(recovery: Recovery) -> Pieces:
+def together(recovery: Recovery, triangles: NDArray) -> Pieces:
     """The pieces of a mesh without hinges: nothing is renumbered."""
     return Pieces(
         np.arange(recovery.n_points),
         recovery.component,
         np.arange(recovery.n_components),
-        recovery.triangles,
+        triangles,
         recovery.boundary,
         recovery.hinges,
         recovery.worst_entries,
     )
 
 
-def apart(recovery: Recovery) -> Pieces:
+def apart(recovery: Recovery, triangles: NDArray) -> Pieces:
     """The pieces of a mesh with hinges, each of which becomes one vertex for each of its pieces."""
-    n, triangles = recovery.n_points, recovery.triangles
+    n = recovery.n_points
     tail, head = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
     half_edges = tail * n + head
     order = np.argsort(half_edges)

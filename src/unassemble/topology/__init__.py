@@ -2,7 +2,17 @@
 
 from .numbering import Numbering, local_numbering
 from .polygons import Polygons
-from .recognise import components, recognise, surfaces
+from .recognise import components, located, recognise, surfaces
 from .surface import Piece, Topology
 
-__all__ = ["Numbering", "Piece", "Polygons", "Topology", "components", "local_numbering", "recognise", "surfaces"]
+__all__ = [
+    "Numbering",
+    "Piece",
+    "Polygons",
+    "Topology",
+    "components",
+    "local_numbering",
+    "located",
+    "recognise",
+    "surfaces",
+]

@@ -179,6 +179,8 @@ def fan(cycles: NDArray) -> NDArray[np.int64]:
 
 def _oriented(n: int, edges: NDArray, cycles: list[NDArray]) -> list[NDArray]:
     """Turn cycles so that neighbours run along common edges in opposite directions, as far as that is possible."""
+    if not sum(map(len, cycles)):
+        return cycles
     # Fans of triangles, glued along edges of the graph and, within a cycle, along its diagonals.
     triangles: list[NDArray] = []
     opposite: list[NDArray] = []
@@ -196,8 +198,6 @@ def _oriented(n: int, edges: NDArray, cycles: list[NDArray]) -> list[NDArray]:
         n_triangles += len(c) * (c.shape[1] - 2)
         triangles.append(t.reshape(-1, 3))
         opposite.append(facing.reshape(-1, 3))
-    if not first:
-        return []
     gluing = glue(n_edges, np.concatenate(opposite))
     flip, _, _ = orient(np.concatenate(triangles), gluing)
     return [np.where(flip[rows][:, None], c[:, ::-1], c) for rows, c in zip(first, cycles, strict=True)]

@@ -49,6 +49,24 @@ class Polygons:
         size = self.size
         return Polygons(np.append(0, np.cumsum(size[which])), number[self.vertices[np.repeat(which, size)]])
 
+    def fans(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Triangles about the first vertex of each polygon.
+
+        Returns
+        -------
+        triangles : (m, 3) int64
+        outline : (m, 3) bool
+            Whether the side from each corner to the next belongs to the polygon; the others are diagonals.
+        """
+        size = self.size - 2
+        owner = np.repeat(np.arange(self.count), size)
+        step = np.arange(len(owner)) - np.repeat(np.cumsum(size) - size, size) + 1
+        start = self.offsets[owner]
+        triangles = np.column_stack(
+            [self.vertices[start], self.vertices[start + step], self.vertices[start + step + 1]]
+        )
+        return triangles, np.column_stack([step == 1, np.ones(len(step), bool), step == size[owner]])
+
     def counter_clockwise(self, points: NDArray) -> Polygons:
         """The same polygons, each in the order in which its area is positive.
 

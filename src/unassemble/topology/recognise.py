@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from ..errors import NotPlanarError, TopologyError
+from ..errors import NotPlanarError, RecoveryError, TopologyError
 from . import planarity
 from .boundary import boundary_corners, following, loops
 from .cycles import three_cycles
@@ -101,14 +101,13 @@ def components(n: int, edges: NDArray) -> list[Numbering]:
 def _recognise_numbered(n: int, edges: NDArray, parts: list[Numbering]) -> Topology:
     """Parts of the graph one by one, in the numbering of each; an error where none has a mesh."""
     pieces: list[Piece] = []
-    failures: list[NotPlanarError | TopologyError] = []
+    failures: list[RecoveryError] = []
     method = "component by component"
     for part in parts:
-        where = f"in the component of row {part.vertices.min()} ({len(part.vertices)} rows): " if len(parts) > 1 else ""
         try:
             found = _recognise_whole(len(part.vertices), part.edges)
         except (NotPlanarError, TopologyError) as error:
-            failures.append(_renumbered(error, where, part.vertices))
+            failures.append(located(error, part, named=len(parts) > 1))
             continue
         method = found.method if len(parts) == 1 else method
         pieces += [in_whole(piece, part) for piece in found.pieces]
@@ -118,13 +117,13 @@ def _recognise_numbered(n: int, edges: NDArray, parts: list[Numbering]) -> Topol
     return Topology(n, edges, tuple(pieces), method, tuple(map(str, failures)))
 
 
-def _renumbered(error: NotPlanarError | TopologyError, where: str, vertices: NDArray) -> NotPlanarError | TopologyError:
-    """The same error in the numbering of the whole."""
+def located(error: RecoveryError, part: Numbering, *, named: bool) -> RecoveryError:
+    """The same error in the numbering of the whole, on demand with the place of its part of the graph."""
+    where = f"in the component of row {part.vertices.min()} ({len(part.vertices)} rows): " if named else ""
     if isinstance(error, NotPlanarError):
-        return _not_planar_witness(
-            where, error.why, tuple((int(vertices[a]), int(vertices[b])) for a, b in error.witness)
-        )
-    return TopologyError(where + str(error))
+        witness = tuple((int(part.vertices[a]), int(part.vertices[b])) for a, b in error.witness)
+        return _not_planar_witness(where, error.why, witness)
+    return type(error)(where + str(error))
 
 
 def triangulated(n: int, edges: NDArray) -> tuple[Piece, ...] | None:
