@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import certify as certificates
+from .cells import exchanges
 from .clock import Clock
 from .errors import InputError, RecoveryError
 from .joined import JoinedMesh
@@ -25,7 +26,7 @@ from .planar.piece import PieceMesh
 from .recovery import Recovery
 from .solving import solve
 from .topology import Polygons, Topology, local_numbering, surfaces
-from .verdict import verdict
+from .verdict import ambiguous, verdict
 
 
 def recover(
@@ -257,6 +258,18 @@ def _recover(
             deviations = _deviations(topology, placement, placed, meshes, sigma, scale is None)
     chi_square = certificates.chi_square_verdict(certificate.differences, noise, freedom) if noise else None
     status, reason = verdict(topology, certificate, chi_square, matrix)
+    if status == "certified" and len(topology.vanished) > (topology.polygons.size - 3).sum():
+        z = mesh.points @ [1, 1j]
+        others = exchanges(
+            stored,
+            mesh.triangles[~mesh.in_polygon],
+            mesh.polygons,
+            placement.tensor.to_laplacian(z) if placement.tensor else z,
+            stretch * mesh.scale[np.maximum(mesh.component, 0)],
+            scale_known=scale is not None,
+        )
+        if others:
+            status, reason = ambiguous(others, certificate)
     worst, misfits = certificate.worst() if status == "uncertified" else certificate.worst(0)
     polygons = Polygons.none() if triangulate else mesh.polygons
     return Recovery(

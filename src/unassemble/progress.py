@@ -17,7 +17,7 @@ _SENTENCES = {
     "null space": "solving for coordinates",
     "cells": "recognising elements",
     "conformal": "solving for positions",
-    "cells": "telling cells from holes",
+    "faces": "telling cells from holes",
     "polish": "polishing",
     "place": "placing pieces",
     "certify": "assembling the matrix again",

@@ -26,7 +26,8 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
     """Everything but the mesh, made of what JSON knows; numbers that are not finite become None.
 
     Keys: ``status``, ``reason``, ``operator``, ``n_points``, ``n_cells``, ``n_components``, ``n_holes``, ``scale`` (one
-    for each piece), ``backward_error``, ``timings`` (seconds by stage), ``warnings``; further ``n_polygons`` (cells that the matrix leaves undivided), ``n_hinges``,
+    for each piece), ``backward_error``, ``timings`` (seconds by stage), ``warnings``; further ``n_polygons``
+    (cells that the matrix leaves undivided), ``n_hinges``,
     ``n_undetermined``, ``n_boundary_edges``, ``worst_entries`` (``row``, ``column``, ``misfit``, worst first),
     ``chi_square``, ``largest_standard_deviation`` and ``version``. Vector-valued matrices have those of
     :func:`_vector_facts` too.

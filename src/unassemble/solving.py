@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from numpy.typing import NDArray
 
-from .cells import Outcome, completed
+from .cells import Outcome, completed, in_doubt
 from .errors import GeometryError, RecoveryError, SolverError
 from .linalg import Factorisation, UpperTriangle, factorisation
 from .matrix import OperatorMatrix
@@ -54,12 +54,13 @@ def solve(
 
     with clock(method):
         outcomes = [start(piece) for piece in topology.pieces]
-    with clock("cells"):
-        matrix, complete, outcomes = completed(matrix, topology, outcomes)
-        # The search leaves c free, stops early and knows one method.
-        if complete is not topology and (scale is not None or not refine or method != "conformal"):
-            outcomes = [start(piece) for piece in complete.pieces]
-        topology = complete
+    doubtful = in_doubt(matrix, topology, outcomes)
+    if doubtful.any():
+        with clock("faces"):
+            matrix, topology, outcomes = completed(matrix, topology, outcomes, doubtful)
+            # The search leaves c free, stops early and knows one method.
+            if scale is not None or not refine or method != "conformal":
+                outcomes = [start(piece) for piece in topology.pieces]
     topology, meshes = _successes(topology, outcomes)
     if refine:
         with clock("polish"):

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from .cells import Exchange
 from .certify import CERTIFIED, CONFIDENCE, Certificate
 from .matrix import OperatorMatrix
 from .topology import Topology
@@ -37,6 +38,21 @@ def verdict(
         f"the re-assembled matrix differs, most in the entry of rows {i} and {j} (by {misfit:.1e} of the row's "
         f"largest; {CERTIFIED:g} is allowed)",
     )
+
+
+def ambiguous(others: list[Exchange], certificate: Certificate) -> tuple[str, str]:
+    """The status and reason of a mesh that fits, where others do as well."""
+    first = others[0]
+    more = f"; and likewise in {len(others) - 1} more places" if len(others) > 1 else ""
+    return "uncertified", (
+        f"the mesh gives the matrix back to {certificate.backward_error:.1e}, but so does another: the rows "
+        f"{_words(first.found)}, joined to {_words(first.around)}, can as well stand in the order "
+        f"{_words(first.other)}{more}"
+    )
+
+
+def _words(rows: tuple[int, ...]) -> str:
+    return ", ".join(map(str, rows))
 
 
 def _with_noise(test: Mapping[str, float]) -> tuple[str, str]:

@@ -3,7 +3,8 @@
 Where entries vanish the graph alone does not tell: see the page on theory in the documentation.
 """
 
-from .completion import Outcome, completed
+from .ambiguity import Exchange, exchanges
+from .completion import Outcome, completed, in_doubt
 from .search import read_cells
 
-__all__ = ["Outcome", "completed", "read_cells"]
+__all__ = ["Exchange", "Outcome", "completed", "exchanges", "in_doubt", "read_cells"]

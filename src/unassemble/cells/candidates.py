@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse import csgraph
 
 from ..topology import Polygons
 from ..topology.faces import FaceComplex
@@ -73,6 +75,7 @@ class Candidates:
         number = np.full(len(blocks.size), -1)
         number[faces] = np.arange(len(faces))
         excess = vertex_excess(blocks, angles)[whole.head[corners]]
+        belief = np.where(_in_strips(whole, corners), 1.0, 0.5 - np.abs(excess) / np.pi)
         return cls(
             n_vertices=drawing.n_vertices,
             edges=drawing.edges,
@@ -81,10 +84,10 @@ class Candidates:
             sides=np.concatenate(
                 [
                     np.column_stack([number[blocks.face[blocks.order[chosen]]], blocks.order[chosen]]),
-                    _corner_sides(whole, corners, len(faces)),
+                    _corner_sides(whole, corners, len(faces), outside[blocks.face]),
                 ]
             ),
-            belief=np.r_[1 - np.abs(sums[faces] / np.pi - 1), 0.5 - np.abs(excess) / np.pi],
+            belief=np.r_[1 - np.abs(sums[faces] / np.pi - 1), belief],
             first=np.r_[(blocks.size <= _SHORT)[faces] & ~outer[faces], np.zeros(len(corners), bool)],
             outer=np.r_[outer[faces], np.zeros(len(corners), bool)],
             corner=np.r_[np.zeros(len(faces), bool), np.ones(len(corners), bool)],
@@ -190,15 +193,36 @@ def _open_corners(whole: FaceComplex, outside: NDArray[np.bool_]) -> NDArray[np.
     return half[(a != c) & ~joined]
 
 
-def _corner_sides(whole: FaceComplex, corners: NDArray, first: int) -> NDArray[np.int64]:
+def _in_strips(whole: FaceComplex, corners: NDArray) -> NDArray[np.bool_]:
+    """Corners of the one reading of paths that hang on a graph, or are one: strips of triangles.
+
+    Every vertex inside such a path has a right angle, on alternating sides. Which side is the left one is told by
+    the distance from a root.
+    """
+    bridge = whole.face == whole.face[np.arange(len(whole.face)) ^ 1]
+    lone = np.bincount(whole.tail, minlength=whole.n_vertices)[whole.head[corners]] == 2
+    inside = lone & bridge[corners] & bridge[whole.successor[corners]]
+    if not inside.any():
+        return inside
+    n = whole.n_vertices
+    graph = sp.coo_array((np.ones(len(whole.edges)), whole.edges.T), shape=(n, n)).tocsr()
+    # One root for each component, or parts without one would have no distance.
+    _, root = np.unique(csgraph.connected_components(graph, directed=False)[1], return_index=True)
+    depth = csgraph.dijkstra(graph, directed=False, indices=root, unweighted=True, min_only=True).astype(np.int64)
+    outwards = depth[whole.tail[corners]] < depth[whole.head[corners]]
+    return inside & (outwards == (depth[whole.head[corners]] % 2 == 0))
+
+
+def _corner_sides(whole: FaceComplex, corners: NDArray, first: int, outside: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Pairs (candidate, half-edge) of what each corner takes up.
 
-    Where nothing else meets at b, a cell on the far side of both edges would contain the vanished edge as a diagonal:
-    the corner takes up the far sides as well.
+    Where nothing else meets at b, a face on the far side of both edges would contain the vanished edge as a diagonal:
+    the corner takes up the far sides as well, if they belong to such a face.
     """
     number = first + np.arange(len(corners))
     follower = whole.successor[corners]
     lone = np.bincount(whole.tail, minlength=whole.n_vertices)[whole.head[corners]] == 2
+    lone &= ~outside[corners ^ 1]
     near = np.column_stack([np.r_[number, number], np.r_[corners, follower]])
     far = np.column_stack([np.r_[number[lone], number[lone]], np.r_[corners[lone] ^ 1, follower[lone] ^ 1]])
     return np.concatenate([near, far])

@@ -34,10 +34,24 @@ class _Part:
     polygons: Polygons
 
 
+def in_doubt(matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome]) -> NDArray[np.bool_]:
+    """(n,) rows of components with nonzero entries on no triangle, or entries that do not fit.
+
+    A misfit that is small and spread evenly is that of errors in the entries, and raises no doubt.
+    """
+    misfit = _misfits(matrix, topology, meshes)
+    doubtful = np.zeros(matrix.n, dtype=bool)
+    if not _like_noise(misfit):
+        label = _component(matrix)
+        doubtful[label[matrix.edges[misfit > FITS, 0]]] = True
+        doubtful = doubtful[label]
+    return doubtful
+
+
 def completed(
-    matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome]
+    matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome], doubtful: NDArray[np.bool_]
 ) -> tuple[OperatorMatrix, Topology, list[Outcome]]:
-    """Read every component again that has nonzero entries on no triangle, or entries that do not fit.
+    """Read every doubtful component again.
 
     Parameters
     ----------
@@ -46,6 +60,8 @@ def completed(
         Surfaces of 3-cycles; see :func:`unassemble.topology.surfaces`.
     meshes : list of PieceMesh or RecoveryError
         Positions of its pieces, or why there are none.
+    doubtful : (n,) bool
+        See :func:`in_doubt`.
 
     Returns
     -------
@@ -59,25 +75,20 @@ def completed(
     Raises
     ------
     RecoveryError
-        If no component has cells. Where nothing is in doubt the arguments come back.
+        If no component has cells.
     """
-    misfit = misfits(matrix, topology, meshes)
+    misfit = _misfits(matrix, topology, meshes)
     label = _component(matrix)
-    wrong = misfit > FITS
-    doubtful = np.zeros(matrix.n, dtype=bool)
-    doubtful[label[matrix.edges[wrong, 0]]] = True
-    if not doubtful.any() or _like_noise(misfit):
-        return matrix, topology, meshes
     solved: Solved = list(zip(topology.pieces, meshes, strict=True))
-    kept = [item for item in solved if not doubtful[label[item[0].vertices[0]]]]
+    kept = [item for item in solved if not doubtful[item[0].vertices[0]]]
     parts = [_Part(kept, np.empty((0, 2), np.int64), Polygons.none())]
     failures: list[RecoveryError] = []
     numberings = components(matrix.n, matrix.edges)
     for numbering in numberings:
-        here = label[numbering.vertices[0]]
-        if not doubtful[here]:
+        first = numbering.vertices[0]
+        if not doubtful[first]:
             continue
-        own = [item for item in solved if label[item[0].vertices[0]] == here]
+        own = [item for item in solved if label[item[0].vertices[0]] == label[first]]
         try:
             parts.append(_read_again(matrix, numbering, own, misfit[numbering.edge_rows]))
         except RecoveryError as error:
@@ -87,7 +98,7 @@ def completed(
     return _merged(matrix, topology, parts, tuple(map(str, failures)))
 
 
-def misfits(matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome]) -> NDArray[np.float64]:
+def _misfits(matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome]) -> NDArray[np.float64]:
     """(e,) difference between entry and re-assembled entry, relative to the rows, at most 1; 1 on edges of no piece."""
     misfit = np.where(matrix.entries != 0, 1.0, 0.0)
     size = row_sizes(matrix.n, matrix.edges, matrix.entries)
@@ -119,9 +130,10 @@ def _read_again(matrix: OperatorMatrix, numbering: Numbering, own: Solved, misfi
     before = float(np.sqrt(np.mean(misfit**2)))
     if reading is not None and (reading.fits or reading.size < _BETTER * before):
         return _part(matrix, numbering, reading)
+    if reading is None or not own:
+        recognise(len(numbering.vertices), numbering.edges)  # says what is wrong with the graph, if that is it
     if own:
         return _Part(own, np.empty((0, 2), np.int64), Polygons.none())
-    recognise(len(numbering.vertices), numbering.edges)  # says what is wrong with the graph, if that is it
     raise GeometryError("no choice of cells and holes on the graph fits the entries: they belong to no planar mesh")
 
 
