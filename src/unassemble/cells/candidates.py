@@ -17,7 +17,7 @@ from .angles import face_sums, shared_angles, vertex_excess
 
 _SHORT = 4  # faces of so many edges are cells unless the numbers say otherwise
 _FULL = 1.3 * np.pi  # angle sum below which a face may be a cell
-_INNER = -0.35 * np.pi  # angle excess above which a vertex may be an inner one
+_INNER = (-0.35 * np.pi, -0.55 * np.pi)  # angle excess above which a vertex may be an inner one
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,11 +113,11 @@ class Candidates:
     def starts(self) -> Iterator[NDArray[np.bool_]]:
         """Readings to begin with, the likeliest first."""
         by_angles = ~self.corner & (self.belief > 2 - _FULL / np.pi) & (self.size > 3)
-        corners = self.corner & (self.belief > 0.5 + _INNER / np.pi)
+        corners = [self.corner & (self.belief > 0.5 + excess / np.pi) for excess in _INNER]
         faces = (self.first, (self.first & (self.size == 3)) | (by_angles & ~self.outer))
         seen = set()
         for chosen in faces:
-            for extra in (corners, np.zeros_like(corners)):
+            for extra in (*corners, np.zeros_like(self.corner)):
                 labels = self.covering(self.compatible(np.where(chosen | extra, 1 + self.belief, -np.inf)), self.belief)
                 if labels.tobytes() not in seen:
                     seen.add(labels.tobytes())

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from ..errors import GeometryError, SolverError
 from ..planar.conformal import conformal_map
 from ..planar.cotangent import edge_weights
+from ..planar.hinges import gap
 from ..planar.piece import PieceMesh
-from ..topology import Piece
+from ..topology import Piece, Topology
 from ..topology.recognise import planar_pieces
 from .candidates import Candidates
 
@@ -72,6 +73,7 @@ class Reading:
                 with np.errstate(all="ignore"):  # flat triangles fit nothing
                     gap = np.abs(mesh.scale * edge_weights(piece, mesh.z) - weights[rows]) / size[rows]
                 misfit[rows] = np.where(gap < 1, gap, 1.0)
+        _add_discord(n, edges, pieces, meshes, misfit)
         return cls(candidates, labels, edges, weights, pieces, tuple(meshes), misfit)
 
     @property
@@ -88,6 +90,26 @@ class Reading:
     def like_noise(self) -> bool:
         """Whether the misfit is small and spread evenly, as errors of the entries are and wrong cells are not."""
         return bool(len(self.pieces)) and self.size < 1e-2 and float(self.misfit.max()) < 12 * self.size
+
+
+def _add_discord(
+    n: int, edges: NDArray, pieces: tuple[Piece, ...], meshes: list[PieceMesh | None], misfit: NDArray
+) -> None:
+    """Raise the misfit where pieces do not go together: another scale, or rings of pieces that do not close.
+
+    Small pieces by themselves fit nearly everything.
+    """
+    solved = [(piece, mesh) for piece, mesh in zip(pieces, meshes, strict=True) if mesh]
+    if len(solved) < 2:
+        return
+    scale = max(solved, key=lambda item: item[0].n_vertices)[1].scale
+    for piece, mesh in solved:
+        rows = piece.edge_rows
+        misfit[rows] = np.maximum(misfit[rows], min(abs(mesh.scale / scale - 1), 1.0))
+    topology = Topology(n, edges, tuple(piece for piece, _ in solved), "")
+    left = gap(topology, [mesh.z / np.abs(mesh.z).max() for _, mesh in solved])
+    at_hinges = np.isin(edges, topology.hinges).any(axis=1)
+    misfit[at_hinges] = np.maximum(misfit[at_hinges], min(left, 1.0))
 
 
 def triangulation(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterator
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..topology.embedding import face_complexes
@@ -16,10 +17,11 @@ from .reading import Reading
 _log = logging.getLogger(__name__)
 
 _PATIENCE = 6  # leaps without an improvement
-_SOLVES = 80
+_SOLVES = 150
 _CLEAR = 0.35  # a label that is to change by so much is turned over
 _SINGLES = 8
-_EXCHANGES = 24
+_EXCHANGES = 48
+_LIKELY = 100  # candidates that take part in exchanges
 
 
 def read_cells(n: int, edges: NDArray, weights: NDArray) -> Reading | None:
@@ -41,16 +43,15 @@ def read_cells(n: int, edges: NDArray, weights: NDArray) -> Reading | None:
     best: Reading | None = None
     for drawing in face_complexes(n, edges):
         candidates = Candidates.of(drawing, weights)
-        own: Reading | None = None
+        starts = []
         for labels in candidates.starts():
-            own = _better(own, Reading.of(candidates, labels))
-            if own.fits:
-                return own
-        if own is not None and not own.like_noise:
-            own = _repaired(own)
-        best = _better(best, own) if own is not None else best
-        if best is not None and (best.fits or best.like_noise):
-            return best
+            starts.append(Reading.of(candidates, labels))
+            if starts[-1].fits:
+                return starts[-1]
+        for start in sorted(starts, key=lambda reading: reading.size):
+            best = _better(best, start if start.like_noise else _repaired(start))
+            if best.fits:
+                return best
     return best if best is not None and best.pieces else None
 
 
@@ -115,15 +116,16 @@ def _proposals(reading: Reading, changes: NDArray) -> Iterator[NDArray[np.bool_]
 
 
 def _exchanges(reading: Reading, gain: NDArray) -> NDArray[np.int64]:
-    """(k, 2) a cell and an empty candidate across an edge of it: a hole that is to move on by one face."""
-    cell, half = reading.candidates.sides.T
-    order = np.argsort(half)
-    cell, half = cell[order], half[order]
-    here = np.flatnonzero(half % 2 == 0)
-    there = np.minimum(np.searchsorted(half, half[here] + 1), len(half) - 1)
-    met = half[there] == half[here] + 1
-    pairs = np.column_stack([cell[here[met]], cell[there[met]]])
-    pairs = pairs[reading.labels[pairs].sum(axis=1) == 1]
+    """(k, 2) a cell and an empty candidate that share a vertex: a hole that is to move."""
+    cells, labels = reading.candidates.cells, reading.labels
+    owner = np.repeat(np.arange(cells.count), cells.size)
+    incidence = sp.csr_array(
+        (np.ones(len(owner)), (owner, cells.vertices)), shape=(cells.count, reading.candidates.n_vertices)
+    )
+    by_gain = np.argsort(-gain, kind="stable")
+    full, empty = (by_gain[which[by_gain]][:_LIKELY] for which in (labels, ~labels & ~reading.candidates.corner))
+    touching = (incidence[full] @ incidence[empty].T).tocoo()
+    pairs = np.column_stack([full[touching.row], empty[touching.col]])
     return pairs[np.argsort(-gain[pairs].sum(axis=1), kind="stable")[:_EXCHANGES]]
 
 

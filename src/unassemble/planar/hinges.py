@@ -10,6 +10,8 @@ from scipy.sparse.linalg import lsqr
 
 from ..topology import Topology
 
+_CLOSED = 1e-6  # distance at shared vertices, relative to the largest piece, below which rings count as closed
+_MOST_IMAGES = 100  # pieces; above, mirror images are left as they are
 _DENSE = 500  # pieces; above, an iterative least-squares solution
 
 
@@ -18,7 +20,7 @@ def join(topology: Topology, positions: list[NDArray], known: NDArray | None = N
 
     With turn t_p and shift s_p of piece p, t_p z_p + s_p = t_q z_q + s_q at every shared vertex; of all
     solutions the one nearest to t = 1. Where the pieces form a tree that is t = 1 exactly, and each keeps its own
-    frame; where they close rings the matrix itself fixes, or restricts, their relative turns.
+    frame; where they close rings the matrix itself fixes, or restricts, their relative turns and mirror images.
 
     Parameters
     ----------
@@ -34,6 +36,42 @@ def join(topology: Topology, positions: list[NDArray], known: NDArray | None = N
     n = len(positions)
     known = np.zeros(n, dtype=np.int64) if known is None else known
     held = _held(_groups(topology), known)
+    positions = _matching_images(topology, positions, held)
+    joined, _ = _joined(topology, positions, held)
+    return joined
+
+
+def gap(topology: Topology, positions: list[NDArray]) -> float:
+    """How far apart the pieces stay at shared vertices when they are joined, relative to the largest piece."""
+    if not len(topology.hinges):
+        return 0.0
+    held = _held(_groups(topology), np.zeros(len(positions), dtype=np.int64))
+    return _joined(topology, _matching_images(topology, positions, held), held)[1]
+
+
+def _matching_images(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> list[NDArray]:
+    """Mirror images of pieces in rings that let these close, found by turning over one piece after the other."""
+    shared = sum(np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces)
+    rings = shared - len(topology.hinges) - (len(positions) - len(np.unique(_groups(topology))))
+    if rings <= 0 or len(positions) > _MOST_IMAGES:
+        return positions
+    best = _joined(topology, positions, held)[1]
+    while best > _CLOSED:
+        trials = []
+        for piece in np.flatnonzero(~held):
+            turned = list(positions)
+            turned[piece] = np.conj(turned[piece])
+            trials.append((_joined(topology, turned, held)[1], turned))
+        lowest, turned = min(trials, key=lambda trial: trial[0], default=(np.inf, positions))
+        if not lowest < 0.999 * best:
+            break
+        best, positions = lowest, turned
+    return positions
+
+
+def _joined(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> tuple[list[NDArray], float]:
+    """Least-squares similarities, and the largest distance that they leave at a shared vertex."""
+    n = len(positions)
     rows, columns, values, rhs = _equations(topology, positions)
     # Unknowns are t - 1 and s; the least-norm solution keeps turns near 1. Shifts are scaled to matter little.
     extent = max(float(np.abs(z).max()) for z in positions)
@@ -44,7 +82,8 @@ def join(topology: Topology, positions: list[NDArray], known: NDArray | None = N
     else:
         solution = lsqr(system, rhs, atol=1e-15, btol=1e-15, iter_lim=20 * n + 1000)[0]
     turn, shift = 1 + (weight * solution)[:n], (weight * solution)[n:]
-    return [turn[p] * z + shift[p] for p, z in enumerate(positions)]
+    left = np.abs(system @ solution - rhs).max(initial=0.0) / extent
+    return [turn[p] * z + shift[p] for p, z in enumerate(positions)], float(left)
 
 
 def _held(group: NDArray, known: NDArray) -> NDArray[np.bool_]:
