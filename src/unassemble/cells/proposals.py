@@ -1,0 +1,88 @@
+"""Which labels to turn over next.
+
+Two things speak for a change: the linear explanation of the misfit (see :mod:`unassemble.cells.evidence`), which is
+right from afar, and the misfit itself, which gathers around the last wrong cells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .reading import Reading
+
+_CLEAR = 0.35  # a label that is to change by so much is turned over
+_SINGLES = 8
+_EXCHANGES = 24
+_LIKELY = 100  # cells that take part in exchanges
+
+
+def proposals(reading: Reading, changes: NDArray) -> Iterator[NDArray[np.bool_]]:
+    """Labels to try: all clear changes together, single ones, exchanges of a cell and a hole; each once.
+
+    Parameters
+    ----------
+    reading : Reading
+    changes : (cells,) float64
+        Of the labels, from the linear explanation; 0 where nothing is known.
+    """
+    gain = np.where(reading.labels, -changes, changes)
+    top = float(gain.max(initial=0.0))
+    nearby = _misfit_nearby(reading)
+    clear = np.empty(0, np.int64)
+    if top > 0:
+        clear = np.flatnonzero(gain >= (max(_CLEAR, 0.6 * top) if top > _CLEAR else 0.7 * top))
+    seen = {reading.labels.tobytes()}
+    for turned in (clear, *_singles(reading, gain, nearby), *_exchanges(reading, gain, nearby)):
+        labels = _turned(reading, changes, turned)
+        if labels.tobytes() not in seen:
+            seen.add(labels.tobytes())
+            yield labels
+
+
+def _misfit_nearby(reading: Reading) -> NDArray[np.float64]:
+    """(cells,) mean over the vertices of the squared misfits on edges that meet there."""
+    cells = reading.candidates.cells
+    at_vertex = np.zeros(reading.candidates.n_vertices)
+    np.add.at(at_vertex, reading.edges.ravel(), np.repeat(reading.misfit**2, 2))
+    owner = np.repeat(np.arange(cells.count), cells.size)
+    return np.bincount(owner, at_vertex[cells.vertices], cells.count) / cells.size
+
+
+def _singles(reading: Reading, gain: NDArray, nearby: NDArray) -> Iterator[NDArray[np.int64]]:
+    faces = np.where(reading.candidates.corner | reading.candidates.outer, 0.0, nearby)
+    by_gain = np.argsort(-gain, kind="stable")[:_SINGLES]
+    by_misfit = np.argsort(-faces, kind="stable")[:_SINGLES]
+    for one, other in zip(by_gain, by_misfit, strict=True):
+        yield np.array([one])
+        yield np.array([other])
+
+
+def _exchanges(reading: Reading, gain: NDArray, nearby: NDArray) -> Iterator[NDArray[np.int64]]:
+    """A cell and an empty candidate that share a vertex: a hole that is to move."""
+    cells, labels = reading.candidates.cells, reading.labels
+    owner = np.repeat(np.arange(cells.count), cells.size)
+    incidence = sp.csr_array(
+        (np.ones(len(owner)), (owner, cells.vertices)), shape=(cells.count, reading.candidates.n_vertices)
+    )
+    for score in (nearby, gain):
+        order = np.argsort(-score, kind="stable")
+        full, empty = (order[which[order]][:_LIKELY] for which in (labels, ~labels & ~reading.candidates.corner))
+        touching = (incidence[full] @ incidence[empty].T).tocoo()
+        pairs = np.column_stack([full[touching.row], empty[touching.col]])
+        yield from pairs[np.argsort(-score[pairs].sum(axis=1), kind="stable")[:_EXCHANGES]]
+
+
+def _turned(reading: Reading, changes: NDArray, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """The labels with some turned over; what stands in the way of a new cell goes, bare edges get a cell again."""
+    candidates, labels = reading.candidates, reading.labels
+    turned = np.zeros(len(labels), dtype=bool)
+    turned[rows] = True
+    value = np.where(labels, 1.0, -np.inf)
+    value[turned] = np.where(labels[turned], -np.inf, 2.0 + changes[turned])
+    chosen = candidates.compatible(value)
+    fallback = np.where(changes != 0, labels + changes, candidates.belief) - 10.0 * (turned & labels)
+    return candidates.covering(chosen, fallback)
