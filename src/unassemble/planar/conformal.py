@@ -198,34 +198,33 @@ class _Search:
         factor = self._factor = self._factor or self._analyse(matrix)
         factor.factorise(matrix)
         self.factorisations += 1
-        basis: list[NDArray] = []
-        energy_images: list[NDArray] = []
-        area_images: list[NDArray] = []
+        n_steps = steps or self._options.krylov_steps
+        basis = np.empty((n_steps, len(z)), dtype=np.complex128)
+        energy, area = np.zeros((2, n_steps, n_steps), dtype=np.complex128)  # the forms on the basis, upper triangles
+        y = np.empty(0)
         c, spread = np.inf, 1.0
-        for _ in range(steps or self._options.krylov_steps):
+        for k in range(n_steps):
             z = np.append(factor.solve(self._pencil.area_form(z)[:-1]), 0)
             self.solves += 1
             size = np.linalg.norm(z)
             for _ in range(2):
-                for u in basis:
-                    z = z - np.vdot(u, z) * u
+                z = z - _products(basis[:k], z) @ basis[:k]
             left = np.linalg.norm(z)
             if not left > 1e-13 * size:  # the space is invariant
                 spread = 0.0
                 break
-            z = z / left
-            basis.append(z)
-            energy_images.append(self._pencil.energy_form(z))
-            area_images.append(self._pencil.area_form(z))
-            previous, (c, y) = c, _ritz(basis, energy_images, area_images)
+            basis[k] = z = z / left
+            m = k + 1
+            energy[:m, k] = _products(basis[:m], self._pencil.energy_form(z))
+            area[:m, k] = _products(basis[:m], self._pencil.area_form(z))
+            previous, (c, y) = c, _ritz(energy[:m, :m], area[:m, :m])
             spread = abs(previous / c - 1) if np.isfinite(previous) else 1.0
             if spread < 1e-15:
                 break
-        if not basis:
+        if not len(y):
             raise GeometryError("no map has positive area: the entries, or the given scale, fit no mesh on this graph")
-        z = sum(coefficient * u for coefficient, u in zip(y, basis, strict=True))
         _log.debug("shift %.12g: c = %.16g, last change %.1e", shift, c, spread)
-        return z, c, spread
+        return y @ basis[: len(y)], c, spread
 
     def corrected(self, z: NDArray, c: float) -> NDArray:
         """One step of inverse iteration on a correction of z, with the last factorisation.
@@ -239,14 +238,16 @@ class _Search:
         return z - np.append(self._factor.solve(residual[:-1]), 0)
 
 
-def _ritz(basis: list[NDArray], energy_images: list[NDArray], area_images: list[NDArray]) -> tuple[float, NDArray]:
-    """Least quotient energy / area, over positive areas, in the span of a basis."""
-    w = np.array(basis)
-    energy = w.conj() @ np.array(energy_images).T
-    area = w.conj() @ np.array(area_images).T
+def _products(basis: NDArray, z: NDArray) -> NDArray:
+    """u* z of each row u of a basis; the rows stay where they are, which are long."""
+    return (basis @ z.conj()).conj()
+
+
+def _ritz(energy: NDArray, area: NDArray) -> tuple[float, NDArray]:
+    """Least quotient energy / area, over positive areas, for the upper triangles of Hermitian (k, k) forms."""
     # With its indefinite side on the left the pencil is regular: 1/c is the greatest eigenvalue.
     try:
-        inverse, vectors = scipy.linalg.eigh((area + area.conj().T) / 2, (energy + energy.conj().T) / 2)
+        inverse, vectors = scipy.linalg.eigh(area, energy, lower=False)
     except (np.linalg.LinAlgError, ValueError) as error:
         # Not positive definite, or not even finite: the Dirichlet energy of a mesh is neither.
         raise GeometryError("the entries do not make a positive energy: they belong to no planar mesh") from error
