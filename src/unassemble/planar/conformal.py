@@ -151,14 +151,15 @@ def conformal_map(
         spread = None
     if spread is None:
         z, c, spread = search.at(options.first_shift, _smooth_start(piece))
-    converged = False
+    converged = near = False
     while search.factorisations < options.max_factorisations:
         distance = min(max(4 * spread, options.margin), 0.3)
         z, c, spread = search.at(c * (1 - distance), z)
-        converged = distance <= (1e-9 if sharp else 1e-5) and spread < 1e-12
+        near = distance <= 1e-9
+        converged = (near or (distance <= 1e-5 and not sharp)) and spread < 1e-12
         if converged:
             break
-    if sharp:
+    if near:
         z = search.corrected(z, c)
     _log.debug("scale %.16g after %d factorisations, %d solves", c * unit, search.factorisations, search.solves)
     return ConformalMap(z, float(c * unit), search.factorisations, search.solves, converged)
