@@ -1,6 +1,6 @@
 """Planar recovery in units of one direct solve with the same matrix, by stage, with growth and memory.
 
-    python benchmarks/planar.py [--sizes 10000,100000,1000000] [--repeat 3] [--only CASE] [--output FILE.json]
+    python benchmarks/planar.py [--sizes 10000,100000,1000000] [--repeat 3] [--only CASE] [--keep FOLDER] [--output FILE.json]
 
 Every case runs in a process of its own, so that its peak memory is its own. The unit is PARDISO's
 (or SuperLU's) analysis, Cholesky factorisation and one solve of the same Laplacian with one vertex held. The
@@ -32,6 +32,7 @@ def main() -> None:
     parser.add_argument("--sizes", default="10000,100000,1000000")
     parser.add_argument("--repeat", type=int, default=3)
     parser.add_argument("--only", choices=CASES[1:], action="append", help="measure this case; may be repeated")
+    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep the matrices there, and use those kept")
     parser.add_argument("--output", type=Path)
     parser.add_argument("--case", choices=CASES, help=argparse.SUPPRESS)
     parser.add_argument("--folder", type=Path, help=argparse.SUPPRESS)
@@ -41,30 +42,38 @@ def main() -> None:
         return
     sizes = [int(float(size)) for size in arguments.sizes.split(",")]
     cases = [case for case in CASES if case == CASES[0] or case in (arguments.only or CASES)]
-    results = [run_size(size, arguments.repeat, cases) for size in sizes]
+    results = [run_size(size, arguments.repeat, cases, arguments.keep) for size in sizes]
     print_growth(results)
     if arguments.output:
         arguments.output.write_text(json.dumps(results, indent=1) + "\n")
 
 
-def run_size(size: int, repeat: int, cases: list[str]) -> dict:
+def run_size(size: int, repeat: int, cases: list[str], keep: Path | None) -> dict:
     """Cases at one size, taking turns."""
-    from meshes import irregular_mesh, laplacian
-
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        points, triangles = irregular_mesh(size)
-        for c, file in ((1.0, "plain"), (-3.7e4, "scaled")):
-            matrix, true = laplacian(points, triangles, c)
-            sp.save_npz(folder / f"{file}.npz", matrix, compressed=False)
-            np.save(folder / "true.npy", true)
+        folder = keep / str(size) if keep else Path(name)
+        if not (folder / "true.npy").exists():
+            write_matrices(size, folder)
+        vertices = len(np.load(folder / "true.npy", mmap_mode="r"))
         runs: dict[str, list[dict]] = {case: [] for case in cases}
         for _ in range(repeat):
             for case in cases:
                 runs[case].append(in_own_process(case, folder))
-    result = {"vertices": len(points), "cases": {case: summarise(runs[case]) for case in cases}}
+    result = {"vertices": vertices, "cases": {case: summarise(runs[case]) for case in cases}}
     print_table(result)
     return result
+
+
+def write_matrices(size: int, folder: Path) -> None:
+    """L and a multiple of it, and the true positions."""
+    from meshes import irregular_mesh, laplacian
+
+    folder.mkdir(parents=True, exist_ok=True)
+    points, triangles = irregular_mesh(size)
+    for c, file in ((1.0, "plain"), (-3.7e4, "scaled")):
+        matrix, true = laplacian(points, triangles, c)
+        sp.save_npz(folder / f"{file}.npz", matrix, compressed=False)
+    np.save(folder / "true.npy", true)
 
 
 def in_own_process(case: str, folder: Path) -> dict:
