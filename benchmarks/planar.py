@@ -1,6 +1,6 @@
 """Planar recovery in units of one direct solve with the same matrix, by stage, with growth and memory.
 
-    python benchmarks/planar.py [--sizes 10000,100000,1000000] [--repeat 3] [--only CASE] [--keep FOLDER] [--output FILE.json]
+    python benchmarks/planar.py [--sizes 10000,100000,1000000] [--repeat 3] [--only CASE] [--output FILE.json]
 
 Every case runs in a process of its own, so that its peak memory is its own. The unit is PARDISO's
 (or SuperLU's) analysis, Cholesky factorisation and one solve of the same Laplacian with one vertex held. The
