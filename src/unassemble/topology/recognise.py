@@ -85,7 +85,7 @@ def _recognise_numbered(n: int, edges: NDArray, parts: list[Numbering]) -> Topol
         pieces += [
             replace(p, vertices=part.vertices[p.vertices], edge_rows=part.edge_rows[p.edge_rows]) for p in found.pieces
         ]
-    if not pieces:
+    if len(failures) == len(parts):
         raise failures[0]
     pieces.sort(key=lambda piece: int(piece.vertices.min()))
     return Topology(n, edges, tuple(pieces), method, tuple(map(str, failures)))
