@@ -164,7 +164,8 @@ def _recover(
     with clock("topology"):
         numbering = local_numbering(matrix.n, matrix.edges)
         analyse: AnalysisAhead | None = None
-        if method == "conformal":  # most matrices are those of a single piece, and its pencil has their pattern
+        # Most matrices are those of a single piece, and its pencil has their pattern. Others may be large and dense.
+        if method == "conformal" and len(matrix.edges) < 3 * matrix.n:
             analyse = AnalysisAhead(pencil_pattern(matrix.n, numbering.edges), threads)
         topology = recognise(matrix.n, matrix.edges, numbering)
     topology, meshes = solve(
