@@ -1,6 +1,6 @@
 """Planar recovery in units of one direct solve with the same matrix, by stage, with growth and memory.
 
-    python benchmarks/planar.py [--sizes 10000,100000,1000000] [--repeat 3] [--output FILE.json]
+    python benchmarks/planar.py [--sizes 10000,100000,1000000] [--repeat 3] [--only CASE] [--output FILE.json]
 
 Every case runs in a process of its own, so that its peak memory is its own. The unit is PARDISO's
 (or SuperLU's) analysis, Cholesky factorisation and one solve of the same Laplacian with one vertex held. The
@@ -31,6 +31,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sizes", default="10000,100000,1000000")
     parser.add_argument("--repeat", type=int, default=3)
+    parser.add_argument("--only", choices=CASES[1:], action="append", help="measure this case; may be repeated")
+    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep the matrices there, and use those kept")
     parser.add_argument("--output", type=Path)
     parser.add_argument("--case", choices=CASES, help=argparse.SUPPRESS)
     parser.add_argument("--folder", type=Path, help=argparse.SUPPRESS)
@@ -39,30 +41,39 @@ def main() -> None:
         print(json.dumps(measure(arguments.case, arguments.folder)))
         return
     sizes = [int(float(size)) for size in arguments.sizes.split(",")]
-    results = [run_size(size, arguments.repeat) for size in sizes]
+    cases = [case for case in CASES if case == CASES[0] or case in (arguments.only or CASES)]
+    results = [run_size(size, arguments.repeat, cases, arguments.keep) for size in sizes]
     print_growth(results)
     if arguments.output:
         arguments.output.write_text(json.dumps(results, indent=1) + "\n")
 
 
-def run_size(size: int, repeat: int) -> dict:
-    """All cases at one size, taking turns."""
-    from meshes import irregular_mesh, laplacian
-
+def run_size(size: int, repeat: int, cases: list[str], keep: Path | None) -> dict:
+    """Cases at one size, taking turns."""
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        points, triangles = irregular_mesh(size)
-        for c, file in ((1.0, "plain"), (-3.7e4, "scaled")):
-            matrix, true = laplacian(points, triangles, c)
-            sp.save_npz(folder / f"{file}.npz", matrix, compressed=False)
-            np.save(folder / "true.npy", true)
-        runs: dict[str, list[dict]] = {case: [] for case in CASES}
+        folder = keep / str(size) if keep else Path(name)
+        if not (folder / "true.npy").exists():
+            write_matrices(size, folder)
+        vertices = len(np.load(folder / "true.npy", mmap_mode="r"))
+        runs: dict[str, list[dict]] = {case: [] for case in cases}
         for _ in range(repeat):
-            for case in CASES:
+            for case in cases:
                 runs[case].append(in_own_process(case, folder))
-    result = {"vertices": len(points), "cases": {case: summarise(runs[case]) for case in CASES}}
+    result = {"vertices": vertices, "cases": {case: summarise(runs[case]) for case in cases}}
     print_table(result)
     return result
+
+
+def write_matrices(size: int, folder: Path) -> None:
+    """L and a multiple of it, and the true positions."""
+    from meshes import irregular_mesh, laplacian
+
+    folder.mkdir(parents=True, exist_ok=True)
+    points, triangles = irregular_mesh(size)
+    for c, file in ((1.0, "plain"), (-3.7e4, "scaled")):
+        matrix, true = laplacian(points, triangles, c)
+        sp.save_npz(folder / f"{file}.npz", matrix, compressed=False)
+    np.save(folder / "true.npy", true)
 
 
 def in_own_process(case: str, folder: Path) -> dict:
@@ -195,7 +206,7 @@ def print_growth(results: list[dict]) -> None:
         return
     vertices = np.log([result["vertices"] for result in results])
     print("\ngrowth of time as a power of the number of vertices (least squares; largest between neighbours)")
-    for case in CASES:
+    for case in results[0]["cases"]:
         seconds = np.log([result["cases"][case]["seconds"] for result in results])
         slope = np.polyfit(vertices, seconds, 1)[0]
         steps = np.diff(seconds) / np.diff(vertices)

@@ -42,8 +42,8 @@ class Certificate:
 
     def worst(self, count: int = 10) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """The entries above the bound that fit worst, worst first."""
-        order = np.argsort(-self.misfits, kind="stable")[:count]
-        order = order[self.misfits[order] > CERTIFIED]
+        above = np.flatnonzero(self.misfits > CERTIFIED)
+        order = above[np.argsort(-self.misfits[above], kind="stable")][:count]
         return self.pairs[order], self.misfits[order]
 
 
@@ -102,8 +102,8 @@ def _assemble(
     n = len(points)
     kxx, kxy, kyy = tensor or (1.0, 0.0, 1.0)
     corners = [np.ascontiguousarray(column) for column in triangles.T]
-    x, y = (np.ascontiguousarray(column) for column in points.T)
-    sides = [(x[b] - x[a], y[b] - y[a]) for a, b in (corners[1:], corners[2::-2], corners[:2])]
+    at = [points[corner] for corner in corners]
+    sides = [(b - a).T for a, b in (at[1:], at[2::-2], at[:2])]
     ends, values = [], []
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a flat triangle certifies nothing
         weight = factor / (2 * np.abs(sides[0][0] * sides[1][1] - sides[0][1] * sides[1][0]))

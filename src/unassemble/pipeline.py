@@ -224,7 +224,8 @@ def _recover(
     with clock("topology"):
         numbering = local_numbering(stored.n, stored.edges)
         analyse: AnalysisAhead | None = None
-        if method == "conformal":  # most matrices are those of a single piece, and its pencil has their pattern
+        # Most matrices are those of a single piece, and its pencil has their pattern. Others may be large and dense.
+        if method == "conformal" and len(stored.edges) < 3 * stored.n:
             analyse = AnalysisAhead(pencil_pattern(stored.n, numbering.edges), threads)
         topology = surfaces(stored.n, stored.edges, numbering)
     matrix, topology, meshes = solve(

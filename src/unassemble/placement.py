@@ -143,6 +143,8 @@ class Placement:
         rows = np.array([row for row, _, _ in self.anchors], dtype=np.int64)
         targets = np.array([complex(x, y) for _, x, y in self.anchors], dtype=np.complex128)
         here = np.isin(rows, piece.vertices)
+        if not here.any():
+            return rows[here], targets[here]
         return piece.local(rows[here]), targets[here]
 
     def _by_anchors(self, piece: Piece, z: NDArray, rows: NDArray, targets: NDArray) -> tuple[NDArray, list[str]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 
@@ -29,7 +29,7 @@ class AnalysisAhead:
         self._pattern = pattern
         self._thread_count = thread_count
         executor = ThreadPoolExecutor(1, "analysis")
-        self._pending = executor.submit(self._analyse)
+        self._pending: Future[Factorisation] | None = executor.submit(self._analyse)
         executor.shutdown(wait=False)
 
     def _analyse(self) -> Factorisation:
@@ -37,10 +37,11 @@ class AnalysisAhead:
             return factorisation(self._pattern)
 
     def __call__(self, matrix: UpperTriangle) -> Factorisation:
-        """Analyse the pattern of a Hermitian matrix; for one caller only."""
+        """Analyse the pattern of a Hermitian matrix."""
         same = (
             matrix.data.dtype == self._pattern.data.dtype
             and np.array_equal(matrix.indptr, self._pattern.indptr)
             and np.array_equal(matrix.indices, self._pattern.indices)
         )
-        return self._pending.result() if same else factorisation(matrix)
+        pending, self._pending = self._pending, None  # whoever has the factorisation decides how long it lives
+        return pending.result() if pending and same else factorisation(matrix)

@@ -20,12 +20,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
 from ..linalg import Factorisation, UpperTriangle, factorisation
 from ..topology import Piece
+from .krylov import ShiftedSearch
 from .pencil import ConformalPencil
 
 _log = logging.getLogger(__name__)
@@ -137,11 +137,11 @@ def conformal_map(
             "the entries of a piece, or they and the given scale, differ by so many orders of magnitude "
             "that no triangles could have them"
         )
-    search = _Search(ConformalPencil(piece, relative), analyse, options)
+    search = ShiftedSearch(ConformalPencil(piece, relative), analyse, options.krylov_steps)
     z = _smooth_start(piece)
     known = scale if scale is not None else 1.0
     if scale is not None or abs(known / unit - 1) < 0.3:
-        z, c, _ = search.near(known / unit, z)
+        z, c, _ = search.at(known / unit * (1 - options.margin), z, steps=2)
         # The quotient is stationary, and accurate to some hundred roundings at any size.
         if scale is not None or abs(c * unit / known - 1) < 1e-13:
             z = search.corrected(z, c)
@@ -151,108 +151,18 @@ def conformal_map(
         spread = None
     if spread is None:
         z, c, spread = search.at(options.first_shift, _smooth_start(piece))
-    converged = False
+    converged = near = False
     while search.factorisations < options.max_factorisations:
         distance = min(max(4 * spread, options.margin), 0.3)
         z, c, spread = search.at(c * (1 - distance), z)
-        converged = distance <= (1e-9 if sharp else 1e-5) and spread < 1e-12
+        near = distance <= 1e-9
+        converged = (near or (distance <= 1e-5 and not sharp)) and spread < 1e-12
         if converged:
             break
-    if sharp:
+    if near:
         z = search.corrected(z, c)
     _log.debug("scale %.16g after %d factorisations, %d solves", c * unit, search.factorisations, search.solves)
     return ConformalMap(z, float(c * unit), search.factorisations, search.solves, converged)
-
-
-class _Search:
-    """Shift-and-invert Krylov steps on the pencil, in units in which c is near 1."""
-
-    def __init__(
-        self,
-        pencil: ConformalPencil,
-        analyse: Callable[[UpperTriangle], Factorisation],
-        options: ConformalOptions,
-    ):
-        self._pencil = pencil
-        self._analyse = analyse
-        self._options = options
-        self._factor: Factorisation | None = None
-        self.factorisations = 0
-        self.solves = 0
-
-    def near(self, scale: float, z: NDArray) -> tuple[NDArray, float, float]:
-        """From a shift just below a value that may be c itself."""
-        return self.at(scale * (1 - self._options.margin), z, steps=2)
-
-    def at(self, shift: float, z: NDArray, steps: int | None = None) -> tuple[NDArray, float, float]:
-        """Rayleigh-Ritz over the Krylov space of M(shift)^-1 T from z.
-
-        Returns
-        -------
-        z : (n,) complex128
-        c : float
-        spread : float
-            Relative change of c in the last step.
-        """
-        matrix = self._pencil.matrix(shift)
-        factor = self._factor = self._factor or self._analyse(matrix)
-        factor.factorise(matrix)
-        self.factorisations += 1
-        basis: list[NDArray] = []
-        energy_images: list[NDArray] = []
-        area_images: list[NDArray] = []
-        c, spread = np.inf, 1.0
-        for _ in range(steps or self._options.krylov_steps):
-            z = np.append(factor.solve(self._pencil.area_form(z)[:-1]), 0)
-            self.solves += 1
-            size = np.linalg.norm(z)
-            for _ in range(2):
-                for u in basis:
-                    z = z - np.vdot(u, z) * u
-            left = np.linalg.norm(z)
-            if not left > 1e-13 * size:  # the space is invariant
-                spread = 0.0
-                break
-            z = z / left
-            basis.append(z)
-            energy_images.append(self._pencil.energy_form(z))
-            area_images.append(self._pencil.area_form(z))
-            previous, (c, y) = c, _ritz(basis, energy_images, area_images)
-            spread = abs(previous / c - 1) if np.isfinite(previous) else 1.0
-            if spread < 1e-15:
-                break
-        if not basis:
-            raise GeometryError("no map has positive area: the entries, or the given scale, fit no mesh on this graph")
-        z = sum(coefficient * u for coefficient, u in zip(y, basis, strict=True))
-        _log.debug("shift %.12g: c = %.16g, last change %.1e", shift, c, spread)
-        return z, c, spread
-
-    def corrected(self, z: NDArray, c: float) -> NDArray:
-        """One step of inverse iteration on a correction of z, with the last factorisation.
-
-        The solves round relative to the extent of the mesh, and all that they round adds up in the row of the pinned
-        vertex, which they leave out. The residual is accurate relative to edges, and so is what this leaves.
-        """
-        residual = self._pencil.energy_form(z) - c * self._pencil.area_form(z)
-        assert self._factor is not None
-        self.solves += 1
-        return z - np.append(self._factor.solve(residual[:-1]), 0)
-
-
-def _ritz(basis: list[NDArray], energy_images: list[NDArray], area_images: list[NDArray]) -> tuple[float, NDArray]:
-    """Least quotient energy / area, over positive areas, in the span of a basis."""
-    w = np.array(basis)
-    energy = w.conj() @ np.array(energy_images).T
-    area = w.conj() @ np.array(area_images).T
-    # With its indefinite side on the left the pencil is regular: 1/c is the greatest eigenvalue.
-    try:
-        inverse, vectors = scipy.linalg.eigh((area + area.conj().T) / 2, (energy + energy.conj().T) / 2)
-    except (np.linalg.LinAlgError, ValueError) as error:
-        # Not positive definite, or not even finite: the Dirichlet energy of a mesh is neither.
-        raise GeometryError("the entries do not make a positive energy: they belong to no planar mesh") from error
-    if inverse[-1] <= 0:
-        raise GeometryError("no map has positive area: the entries, or the given scale, fit no mesh on this graph")
-    return float(1 / inverse[-1]), vectors[:, -1]
 
 
 def _smooth_start(piece: Piece) -> NDArray:

@@ -1,4 +1,8 @@
-"""Cotangent weights of a drawn mesh and their derivatives (paper, equations 1 and 2)."""
+"""Cotangent weights of a drawn mesh and their derivatives (paper, equations 1 and 2).
+
+Everything is computed edge by edge from its stencil: tail t, head h and the apexes a, b of the triangles on its left
+and right. The angle at the left apex lies between t - a and h - a, that at the right one between h - b and t - b.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +12,26 @@ from numpy.typing import NDArray
 from ..topology import Piece
 
 
-def _legs(piece: Piece, z: NDArray) -> tuple[NDArray, NDArray]:
-    """Sides u = a - c, w = b - c that leave each corner c, as complex (m, 3)."""
-    at = z[piece.triangles]
-    return at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at
+def _sides(piece: Piece, z: NDArray) -> tuple[tuple[NDArray, NDArray], tuple[NDArray, NDArray]]:
+    """Sides u, w that leave the left apex and the right one of each edge, counter-clockwise; (e,) complex each."""
+    tail, head, left, right = z[piece.stencil]
+    return (tail - left, head - left), (head - right, tail - right)
+
+
+def _halved(piece: Piece, left: NDArray, right: NDArray) -> NDArray:
+    """Half the sum over both sides of each edge; on the boundary there is no right one."""
+    return (left + np.where(piece.inner, right, 0)) / 2
+
+
+def _cotangent(u: NDArray, w: NDArray) -> NDArray[np.float64]:
+    product = np.conj(u) * w
+    return product.real / product.imag
 
 
 def edge_weights(piece: Piece, z: NDArray) -> NDArray[np.float64]:
     """w_e: half the sum of the cotangents that face each edge (e,), for positions z (n,) complex."""
-    u, w = _legs(piece, z)
-    product = np.conj(u) * w
-    cotangent = (product.real / product.imag).ravel()
-    first, second = piece.facing.T
-    return (cotangent[first] + np.where(second >= 0, cotangent[second], 0.0)) / 2
+    left, right = _sides(piece, z)
+    return _halved(piece, _cotangent(*left), _cotangent(*right))
 
 
 def weight_roundings(piece: Piece, z: NDArray) -> NDArray[np.float64]:
@@ -29,52 +40,37 @@ def weight_roundings(piece: Piece, z: NDArray) -> NDArray[np.float64]:
     A cotangent is a quotient of products of sides, so its error is about 1 / sin(gamma), far from
     uniform where there are slivers.
     """
-    u, w = _legs(piece, z)
-    inverse_sine = (np.abs(u) * np.abs(w) / np.abs((np.conj(u) * w).imag)).ravel()
-    first, second = piece.facing.T
-    return (inverse_sine[first] + np.where(second >= 0, inverse_sine[second], 0.0)) / 2
+    left, right = (1 / np.abs(_sine(u, w)) for u, w in _sides(piece, z))
+    return _halved(piece, left, right)
 
 
-def corner_gradients(piece: Piece, z: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Half the cotangent at each corner and how it changes as the ends of the facing edge move.
-
-    From gamma = arg(w / u) at the corner between sides u and w,
-    d cot(gamma) = -Im(dw / w - du / u) / sin(gamma)^2.
-
-    Returns
-    -------
-    to_tail, to_head : (m, 3) complex128
-        g with d cot / 2 = Re(g dz) for the tail and head of the edge facing the corner; the corner itself
-        has minus their sum.
-    cotangent : (m, 3) float64
-    """
-    u, w = _legs(piece, z)
-    product = np.conj(u) * w
-    factor = 0.5j * (np.abs(u) * np.abs(w) / product.imag) ** 2
-    return -factor / u, factor / w, product.real / product.imag
+def _sine(u: NDArray, w: NDArray) -> NDArray[np.float64]:
+    return (np.conj(u) * w).imag / (np.abs(u) * np.abs(w))
 
 
-def weight_gradient(piece: Piece, z: NDArray) -> tuple[NDArray[np.int64], NDArray[np.complex128]]:
-    """Derivative of the weights: dw_e = Re sum_k g_ek dz_(v_ek).
+def corner_gradients(u: NDArray, w: NDArray) -> tuple[NDArray, NDArray]:
+    """How half the cotangent of the angle between sides u and w of a corner changes as their other ends move.
+
+    From gamma = arg(w / u), d cot(gamma) = -Im(dw / w - du / u) / sin(gamma)^2.
 
     Returns
     -------
-    vertices : (e, 4) int64
-        Tail, head and apex in the edge's first triangle, apex in its second (on the boundary the first again).
-    g : (e, 4) complex128
-        Zero in the last column on the boundary.
+    at_u, at_w : complex128, of the shape of u
+        g with d cot / 2 = Re(g dz) for the ends of u and w; the corner itself has minus their sum.
     """
-    to_tail, to_head, _ = (part.ravel() for part in corner_gradients(piece, z))
-    first, second = piece.facing.T
-    inner = second >= 0
-    second = np.where(inner, second, first)
-    flat = piece.triangles.ravel()
-    tail = flat[3 * (first // 3) + (first + 1) % 3]
-    head = flat[3 * (first // 3) + (first + 2) % 3]
-    # The second triangle runs along the edge from head to tail.
-    g_tail = to_tail[first] + np.where(inner, to_head[second], 0)
-    g_head = to_head[first] + np.where(inner, to_tail[second], 0)
-    g_first = -(to_tail + to_head)[first]
-    g_second = np.where(inner, -(to_tail + to_head)[second], 0)
-    vertices = np.column_stack([tail, head, flat[first], flat[second]])
-    return vertices, np.column_stack([g_tail, g_head, g_first, g_second])
+    factor = 0.5j / _sine(u, w) ** 2
+    return -factor / u, factor / w
+
+
+def weight_gradient(piece: Piece, z: NDArray) -> NDArray[np.complex128]:
+    """Derivative of the weights: dw_e = Re sum_k g_ke dz_(v_ke) over the vertices v_ke of ``piece.stencil``.
+
+    Returns
+    -------
+    (4, e) complex128
+        Zero in the last row on the boundary.
+    """
+    left, right = _sides(piece, z)
+    tail, head = corner_gradients(*left)
+    head_right, tail_right = (np.where(piece.inner, g, 0) for g in corner_gradients(*right))
+    return np.stack([tail + tail_right, head + head_right, -(tail + head), -(tail_right + head_right)])

@@ -47,7 +47,7 @@ def canonical_frame(z: NDArray, edges: NDArray) -> tuple[Similarity, str | None]
     spread = float((np.abs(d) ** 2).sum())
     axis = np.exp(-0.5j * np.angle(second)) if abs(second) > 0 else 1.0
     x, y = (axis * d).real, (axis * d).imag
-    third = [float((t**3).sum()) for t in (x, y)]
+    third = [float((t * t * t).sum()) for t in (x, y)]  # a power would take ten times as long
     sure = [abs(m) > _TIE * float((np.abs(t) ** 3).sum()) for m, t in zip(third, (x, y), strict=True)]
     flip_x, flip_y = third[0] < 0, third[1] < 0
     turn = axis / size * (-1 if flip_x else 1)

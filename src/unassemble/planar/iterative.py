@@ -37,6 +37,9 @@ class IterativeNormalEquations:
     jacobian : WeightJacobian
     z : (n,) complex128
         The positions of the Jacobian, triangles counter-clockwise.
+    weights : (e,) float64, optional
+        Where the scale is fitted as well: the direction in which it moves the weights. The solution is then the best
+        displacement together with the best scale, for misfits that have no component along this direction.
     tolerance : float
         Reduction of the error's energy norm.
     max_iterations : int
@@ -47,11 +50,13 @@ class IterativeNormalEquations:
         piece: Piece,
         jacobian: WeightJacobian,
         z: NDArray,
+        weights: NDArray | None = None,
         *,
         tolerance: float = 1e-5,
         max_iterations: int = 400,
     ):
         self._forward = jacobian.matrix.tocsr()
+        self._scaling = None if weights is None else weights / np.linalg.norm(weights)
         self._gauge = np.linalg.qr(np.column_stack([np.ones(len(z)), z - z.mean()]))[0]
         energy = _weighted_energy(piece, z, jacobian.spread)
         self._factor = factorisation(energy)
@@ -82,7 +87,10 @@ class IterativeNormalEquations:
         self._factor.release()
 
     def _apply(self, d: NDArray) -> NDArray:
-        return (self._forward.T @ (self._forward @ d.view(np.float64))).view(np.complex128)
+        change = self._forward @ d.view(np.float64)
+        if self._scaling is not None:
+            change -= self._scaling * (self._scaling @ change)
+        return (self._forward.T @ change).view(np.complex128)
 
     def _precondition(self, residual: NDArray) -> NDArray:
         return self._project(np.append(self._factor.solve(residual[:-1]), 0))
@@ -97,19 +105,21 @@ def _weighted_energy(piece: Piece, z: NDArray, spread: NDArray) -> UpperTriangle
     L_t and T_t are the triangle's Laplacian and signed area; a_t makes the trace of its term that of its share of J'J
     for complex-linear displacements.
     """
-    to_tail, to_head, cotangent = corner_gradients(piece, z)
+    at = z[piece.triangles]
+    u, w = at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at
+    at_u, at_w = corner_gradients(u, w)
+    product = np.conj(u) * w
+    cotangent = product.real / product.imag
     trace = cotangent.sum(axis=1) / 2
-    gradients = np.abs(to_tail) ** 2 + np.abs(to_head) ** 2 + np.abs(to_tail + to_head) ** 2
+    gradients = np.abs(at_u) ** 2 + np.abs(at_w) ** 2 + np.abs(at_u + at_w) ** 2
     weight = (gradients / spread[piece.opposite] ** 2).sum(axis=1) / 2 / trace
     # Each corner contributes to the edge that faces it, run through from tail to head.
-    share = weight[:, None] * cotangent / 4
-    area = np.repeat(weight[:, None], 3, axis=1) * _BELOW_ONE / 4
-    first, second = piece.facing.T
-    flat = piece.triangles.ravel()
-    upwards = flat[3 * (first // 3) + (first + 1) % 3] < flat[3 * (first // 3) + (first + 2) % 3]
-    inner = second >= 0
-    real = share.ravel()[first] + np.where(inner, share.ravel()[second], 0)
-    turn = area.ravel()[first] - np.where(inner, area.ravel()[second], 0)
+    share = (weight[:, None] * cotangent / 4).ravel()
+    area = weight * _BELOW_ONE / 4
+    left, right = piece.facing.T
+    real = share[left] + np.where(piece.inner, share[right], 0)
+    turn = area[left // 3] - np.where(piece.inner, area[right // 3], 0)
+    upwards = piece.stencil[0] < piece.stencil[1]
     off_diagonal = -real + 1j * np.where(upwards, turn, -turn)
     diagonal = np.bincount(piece.edges.ravel(), np.repeat(real, 2), piece.n_vertices)
     kept = piece.edges[:, 1] < piece.n_vertices - 1

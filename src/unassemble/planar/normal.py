@@ -25,23 +25,29 @@ class WeightJacobian:
 
     def __init__(self, piece: Piece, z: NDArray, spread: NDArray | None = None):
         self.n = piece.n_vertices
-        vertices, g = weight_gradient(piece, z)
-        e = len(vertices)
-        self.spread = np.ones(e) if spread is None else spread
-        g /= self.spread[:, None]
-        blocks = np.stack([g.real, -g.imag], axis=-1).reshape(-1, 1, 2)
-        self.matrix = sp.bsr_array(
-            (blocks, vertices.ravel().astype(np.int32), np.arange(0, 4 * e + 1, 4, dtype=np.int32)),
-            shape=(e, 2 * self.n),
-        )
+        self.spread = np.ones(len(piece.edges)) if spread is None else spread
+        self._vertices = piece.stencil
+        self._gradient = weight_gradient(piece, z) / self.spread
+
+    @property
+    def matrix(self) -> sp.bsr_array:
+        """(e, 2 n) in blocks of x and y."""
+        e = len(self.spread)
+        blocks = np.stack([self._gradient.real.T, -self._gradient.imag.T], axis=-1).reshape(-1, 1, 2)
+        vertices = self._vertices.T.astype(np.int32).ravel()
+        return sp.bsr_array((blocks, vertices, np.arange(0, 4 * e + 1, 4, dtype=np.int32)), shape=(e, 2 * self.n))
 
     def forward(self, displacement: NDArray) -> NDArray:
         """J d for d (n,) complex: (e,) real."""
-        return self.matrix @ displacement.view(np.float64)
+        return np.einsum("ke,ke->e", self._gradient, displacement[self._vertices]).real
 
     def transpose(self, change: NDArray) -> NDArray:
         """J' r for r (e,) real: (n,) complex, x in the real part and y in the imaginary one."""
-        return (self.matrix.T @ change).view(np.complex128)
+        result = np.zeros(self.n, dtype=np.complex128)
+        for g, v in zip(self._gradient, self._vertices, strict=True):
+            result.real += np.bincount(v, g.real * change, self.n)
+            result.imag -= np.bincount(v, g.imag * change, self.n)
+        return result
 
 
 class NormalEquations:

@@ -102,20 +102,19 @@ def polish(
     spread = weight_roundings(piece, z) if rounding else np.ones(len(weights))
     problem = _Problem(piece, weights, spread, scale)
     fit = problem.at(z)
-    system: _GaussNewton | None = None
+    system: _DirectStep | _IterativeStep | None = None
     factorisations, steps, length, converged = 0, 0, np.inf, False
     while steps < options.max_steps and not converged:
         jacobian = WeightJacobian(piece, fit.z, spread)
         fresh = system is None
         if system is None:
-            equations: NormalEquations | IterativeNormalEquations
+            fitted = fit.weights if scale is None else None
             if len(z) <= options.direct_limit:
-                equations = NormalEquations(jacobian, pins)
+                system = _DirectStep(jacobian, NormalEquations(jacobian, pins), fitted)
             else:
-                equations = IterativeNormalEquations(piece, jacobian, fit.z)
-            system = _GaussNewton(jacobian, equations, fit.weights, free_scale=scale is None)
+                system = _IterativeStep(IterativeNormalEquations(piece, jacobian, fit.z, fitted))
             factorisations += 1
-        move = system.step(jacobian, fit.misfit)
+        move = system(jacobian, fit.misfit)
         previous, length = length, float(np.abs(move).max())
         slow = length > options.contraction * previous
         if slow and length > options.rounding and not fresh:
@@ -181,32 +180,40 @@ def _downhill(problem: _Problem, fit: _Fit, move: NDArray) -> _Fit | None:
     return None
 
 
-class _GaussNewton:
+class _DirectStep:
     """Steps of the linearised problem min |J d + g w - r| over displacements d and log-scale g."""
 
-    def __init__(
-        self,
-        jacobian: WeightJacobian,
-        equations: NormalEquations | IterativeNormalEquations,
-        weights: NDArray,
-        *,
-        free_scale: bool,
-    ):
+    def __init__(self, jacobian: WeightJacobian, equations: NormalEquations, weights: NDArray | None):
         self._equations = equations
-        self._weights = weights if free_scale else None
-        if free_scale:
+        self._weights = weights  # None where the scale is known
+        if weights is not None:
             self._slope = jacobian.transpose(weights)
             self._response = self._equations.solve(self._slope)
             # What J cannot explain of w; zero would mean that c and the shape are confounded.
             self._complement = float(weights @ weights) - _dot(self._slope, self._response)
 
-    def step(self, jacobian: WeightJacobian, misfit: NDArray) -> NDArray:
+    def __call__(self, jacobian: WeightJacobian, misfit: NDArray) -> NDArray:
         """Displacement d (n,) complex; the scale follows from it by least squares."""
         move = self._equations.solve(jacobian.transpose(misfit))
         if self._weights is None or self._complement <= 0:
             return move
         log_scale = (float(self._weights @ misfit) - _dot(self._slope, move)) / self._complement
         return move - log_scale * self._response
+
+    def release(self) -> None:
+        """Give the memory of the factor back."""
+        self._equations.release()
+
+
+class _IterativeStep:
+    """The same steps: conjugate gradients take the scale along."""
+
+    def __init__(self, equations: IterativeNormalEquations):
+        self._equations = equations
+
+    def __call__(self, jacobian: WeightJacobian, misfit: NDArray) -> NDArray:
+        """Displacement d (n,) complex; the best scale has left nothing of w in the misfit."""
+        return self._equations.solve(jacobian.transpose(misfit))
 
     def release(self) -> None:
         """Give the memory of the factor back."""

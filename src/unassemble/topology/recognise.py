@@ -111,7 +111,7 @@ def _recognise_numbered(n: int, edges: NDArray, parts: list[Numbering]) -> Topol
             continue
         method = found.method if len(parts) == 1 else method
         pieces += [in_whole(piece, part) for piece in found.pieces]
-    if not pieces:
+    if len(failures) == len(parts):
         raise failures[0]
     pieces.sort(key=lambda piece: int(piece.vertices.min()))
     return Topology(n, edges, tuple(pieces), method, tuple(map(str, failures)))

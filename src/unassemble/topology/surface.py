@@ -55,6 +55,23 @@ class Piece:
         return order[np.searchsorted(self.vertices, rows, sorter=order)]
 
     @property
+    def inner(self) -> NDArray[np.bool_]:
+        """(e,) edges with a triangle on both sides."""
+        return self.facing[:, 1] >= 0
+
+    @cached_property
+    def stencil(self) -> NDArray[np.int64]:
+        """(4, e) tail, head and left apex of each edge as its first triangle has them, and its right apex.
+
+        On the boundary the left apex stands in for the right one.
+        """
+        left = self.facing[:, 0]
+        flat = self.triangles.ravel()
+        triangle, position = np.divmod(left, 3)
+        tail, head = (flat[3 * triangle + (position + turn) % 3] for turn in (1, 2))
+        return np.stack([tail, head, flat[left], flat[np.where(self.inner, self.facing[:, 1], left)]])
+
+    @property
     def n_loops(self) -> int:
         """Number of boundary loops, the outer one included; loops that touch in a vertex may count as one."""
         return len(self.loop_offsets) - 1
