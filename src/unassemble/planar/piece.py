@@ -9,8 +9,13 @@ from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..topology import Piece
+from .cautious import cautious_polish, count_flipped
 from .conformal import conformal_map
-from .polish import polish
+from .cotangent import weight_roundings
+from .polish import PolishedMesh, polish
+
+_CAUTIOUS_LIMIT = 200_000
+"""Most vertices for which a polish that fails is tried again with a factorisation in every step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,10 +45,22 @@ def positions(piece: Piece, weights: NDArray, *, scale: float | None, sharp: boo
 def refined(piece: Piece, weights: NDArray, mesh: PieceMesh, *, scale: float | None, rounding: bool) -> PieceMesh:
     """Gauss-Newton polish; where it cannot be done the mesh stays as it is, with a note."""
     try:
-        found = polish(piece, weights, mesh.z, scale=scale, rounding=rounding)
+        found = _polished(piece, weights, mesh, scale=scale, rounding=rounding)
     except SolverError as error:
         return PieceMesh(mesh.z, mesh.scale, (*mesh.notes, f"no polish: {error}"))
     if not (np.isfinite(found.z).all() and np.isfinite(found.scale)):
         return PieceMesh(mesh.z, mesh.scale, (*mesh.notes, "the polish did not stay finite and was left out"))
     notes = () if found.converged else ("the polish did not converge",)
     return PieceMesh(found.z, found.scale, (*mesh.notes, *notes))
+
+
+def _polished(piece: Piece, weights: NDArray, mesh: PieceMesh, *, scale: float | None, rounding: bool) -> PolishedMesh:
+    """By the chord iteration; where it fails, by small steps from the better of start and result."""
+    found = polish(piece, weights, mesh.z, scale=scale, rounding=rounding)
+    finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
+    if (finite and found.converged and not count_flipped(piece, found.z)) or piece.n_vertices > _CAUTIOUS_LIMIT:
+        return found
+    spread = weight_roundings(piece, mesh.z) if rounding else np.ones(len(weights))
+    start = found.z if finite and count_flipped(piece, found.z) <= count_flipped(piece, mesh.z) else mesh.z
+    again = cautious_polish(piece, weights, start, spread, scale=scale)
+    return again if again.residual < found.residual or not finite else found
