@@ -52,13 +52,19 @@ class Recovery:
         Seconds by stage.
     warnings : tuple of str
     worst_entries : (k, 2) int64
-        Rows and columns of the entries that fit worst, worst first; empty where all fit.
+        Rows and columns of the entries that fit worst, the suspects first, then the others, worst first; empty where
+        all fit.
     worst_misfits : (k,) float64
         Their misfit, as in `backward_error`.
     standard_deviations : (n, 2) float64 or None
         One standard deviation of each coordinate, on request.
     chi_square : mapping or None
-        With noise: ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``.
+        With noise: ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``, ``largest``, ``largest_p_value``; see
+        :func:`unassemble.certify.chi_square_verdict`.
+    estimated_noise : float or None
+        Standard deviation of independent errors of the entries that would leave the misfit found.
+    suspects : (k, 2) int64
+        Entries that the mesh would fit the others far better without, the gravest first.
     """
 
     points: NDArray[np.float64]
@@ -80,6 +86,8 @@ class Recovery:
     worst_misfits: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     standard_deviations: NDArray[np.float64] | None = None
     chi_square: Mapping[str, float] | None = None
+    estimated_noise: float | None = None
+    suspects: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), np.int64))
 
     @property
     def certified(self) -> bool:

@@ -27,7 +27,8 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
     Keys: ``status``, ``reason``, ``operator``, ``n_points``, ``n_cells``, ``n_components``, ``n_holes``, ``scale`` (one
     for each piece), ``backward_error``, ``timings`` (seconds by stage), ``warnings``; further ``n_hinges``,
     ``n_undetermined``, ``n_boundary_edges``, ``worst_entries`` (``row``, ``column``, ``misfit``, worst first),
-    ``chi_square``, ``largest_standard_deviation`` and ``version``.
+    ``suspects`` (``row``, ``column``), ``chi_square``, ``estimated_noise``, ``largest_standard_deviation`` and
+    ``version``.
     """
     return _plain(
         {
@@ -44,11 +45,13 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
             "scale": recovery.scale,
             "backward_error": recovery.backward_error,
             "chi_square": recovery.chi_square,
+            "estimated_noise": recovery.estimated_noise,
             "largest_standard_deviation": _largest_deviation(recovery),
             "worst_entries": [
                 {"row": i, "column": j, "misfit": misfit}
                 for (i, j), misfit in zip(recovery.worst_entries, recovery.worst_misfits, strict=True)
             ],
+            "suspects": [{"row": i, "column": j} for i, j in recovery.suspects],
             "timings": recovery.timings,
             "warnings": recovery.warnings,
             "version": __version__,
@@ -116,6 +119,8 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
     if recovery.n_holes is not None:
         rows.append(("holes", f"{recovery.n_holes:,}"))
     rows += [("scale c", scale_text(recovery)), ("backward error", f"{recovery.backward_error:.1e}")]
+    if recovery.estimated_noise is not None and recovery.backward_error > 1e-12:
+        rows.append(("noise", f"the misfit is that of a standard deviation of {recovery.estimated_noise:.1e}"))
     deviation = _largest_deviation(recovery)
     if deviation is not None:
         rows.append(("std deviation", f"at most {deviation:.1e} in a coordinate"))

@@ -43,9 +43,9 @@ def cautious_polish(
     piece: Piece,
     weights: NDArray,
     z: NDArray,
-    spread: NDArray,
     *,
     scale: float | None = None,
+    spread: NDArray | None = None,
     options: CautiousOptions | None = None,
 ) -> PolishedMesh:
     """Maximum-likelihood mesh from a distant start.
@@ -55,12 +55,13 @@ def cautious_polish(
     piece : Piece
     weights : (e,) float64
     z : (n,) complex128
-    spread : (e,) float64
-        Standard deviations of the weights, up to a common factor.
     scale : float, optional
+    spread : (e,) float64, optional
+        As for the polish.
     options : CautiousOptions, optional
     """
     options = options or CautiousOptions()
+    spread = np.ones(len(weights)) if spread is None else spread
     extent = np.abs(z - z.mean()).max()
     z = (z - z.mean()) / extent
     pins = distant_pair(z)

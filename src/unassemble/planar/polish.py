@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..topology import Piece
-from .cotangent import edge_weights, weight_roundings
+from .cotangent import edge_weights
 from .iterative import IterativeNormalEquations
 from .normal import NormalEquations, WeightJacobian, distant_pair
 
@@ -80,7 +80,7 @@ def polish(
     z: NDArray,
     *,
     scale: float | None = None,
-    rounding: bool = True,
+    spread: NDArray | None = None,
     options: PolishOptions | None = None,
 ) -> PolishedMesh:
     """Improve positions to the level that the entries allow.
@@ -94,16 +94,16 @@ def polish(
         Start, for instance of :func:`~unassemble.planar.conformal.conformal_map`.
     scale : float, optional
         c, where it is known; otherwise it is fitted.
-    rounding : bool
-        Whether errors are those of assembly in floating-point arithmetic, larger where there are slivers; otherwise
-        they are taken to be of one size.
+    spread : (e,) float64, optional
+        Standard deviations of the errors of a up to a common factor, for instance
+        :func:`~unassemble.planar.cotangent.weight_roundings`; of one size by default.
     options : PolishOptions, optional
     """
     options = options or PolishOptions()
     extent = np.abs(z - z.mean()).max()
     z = (z - z.mean()) / extent
     pins = distant_pair(z)
-    spread = weight_roundings(piece, z) if rounding else np.ones(len(weights))
+    spread = np.ones(len(weights)) if spread is None else spread
     problem = Problem(piece, weights, spread, scale)
     fit = problem.at(z)
     system: GaussNewton | None = None
