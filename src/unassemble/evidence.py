@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .certify import Certificate
 from .errors import SolverError
 from .matrix import OperatorMatrix
-from .planar.cotangent import edge_weights
+from .planar.cotangent import edge_weights, weight_roundings
 from .planar.piece import PieceMesh
 from .planar.suspects import find_suspects
 from .topology import Topology
@@ -18,7 +18,7 @@ from .topology import Topology
 _SUSPECT_LIMIT = 200_000
 """Most vertices of a piece that is searched for wrong entries: that takes a factorisation of its own."""
 _CERTAIN = np.log(1e-6)
-_ROUNDING = 1e-12
+_ROUNDING = 1e-11
 """Misfits up to this, where errors are as large as rounding makes them, prove nothing."""
 _SAMPLE = 2000
 
@@ -58,11 +58,17 @@ def weigh(
     *,
     free_scale: bool,
     search: bool,
+    rounding: bool,
 ) -> Evidence:
-    """Evidence on a finished mesh; wrong entries are looked for if `search`."""
-    noise = float(np.linalg.norm(certificate.differences)) / np.sqrt(freedom) if freedom > 0 else None
-    suspects, certain = _suspects(topology, matrix, meshes, free_scale) if search and freedom > 1 else (NONE, False)
-    return Evidence(noise, _digits(matrix, certificate), suspects, certain)
+    """Evidence on a finished mesh; wrong entries are looked for if `search`.
+
+    With `rounding`, errors of the size that rounding has where there are slivers do not stand out.
+    """
+    noise = _norm(certificate.differences) / float(np.sqrt(freedom)) if freedom > 0 else None
+    suspects, certain = NONE, False
+    if search and freedom > 1:
+        suspects, certain = _suspects(topology, matrix, meshes, free_scale=free_scale, rounding=rounding)
+    return Evidence(noise, _digits(matrix, certificate) if search else None, suspects, certain)
 
 
 def pooled_noise(topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], freedom: int) -> float:
@@ -70,20 +76,27 @@ def pooled_noise(topology: Topology, matrix: OperatorMatrix, meshes: list[PieceM
     norms = []
     for piece, mesh in zip(topology.pieces, meshes, strict=True):
         misfit = matrix.entries[piece.edge_rows] + mesh.scale * edge_weights(piece, mesh.z)
-        norms.append(np.linalg.norm(misfit if mesh.spread is None else misfit / mesh.spread))
-    return float(np.linalg.norm(norms)) / float(np.sqrt(max(freedom, 1)))
+        norms.append(_norm(misfit if mesh.spread is None else misfit / mesh.spread))
+    return _norm(np.array(norms)) / float(np.sqrt(max(freedom, 1)))
+
+
+def _norm(values: NDArray) -> float:
+    """Root of the sum of squares, none of which may overflow."""
+    largest = float(np.abs(values).max(initial=0.0))
+    return largest * float(np.linalg.norm(values / largest)) if 0 < largest < np.inf else largest
 
 
 def _suspects(
-    topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], free_scale: bool
+    topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], *, free_scale: bool, rounding: bool
 ) -> tuple[NDArray[np.int64], bool]:
     pairs, certain = [], False
     for piece, mesh in zip(topology.pieces, meshes, strict=True):
         if piece.n_vertices > _SUSPECT_LIMIT:
             continue
         weights = -matrix.entries[piece.edge_rows]
+        spread = weight_roundings(piece, mesh.z) if rounding else None
         try:
-            found = find_suspects(piece, weights, mesh.z, mesh.scale, mesh.spread, free_scale=free_scale)
+            found = find_suspects(piece, weights, mesh.z, mesh.scale, spread, free_scale=free_scale)
         except SolverError:  # flat triangles: nothing can be told apart there
             continue
         if found.log_p < _CERTAIN:
@@ -100,7 +113,9 @@ def _digits(matrix: OperatorMatrix, certificate: Certificate) -> str | None:
     size = np.abs(entries)
     difference = np.abs(certificate.differences)
     sample = entries[:: max(1, len(entries) // _SAMPLE)]
-    if np.array_equal(sample, sample.astype(np.float32)):
+    with np.errstate(over="ignore", under="ignore"):
+        single = np.array_equal(sample, sample.astype(np.float32))
+    if single:
         name, unit = "numbers of single precision", size * 2.0**-24
     else:
         count = next((d for d in range(3, 13) if _has_digits(sample, d)), None)

@@ -178,7 +178,16 @@ def _recover(
         # A misfit at rounding level, or one that noise explains, hides no wrong entry.
         search = not passes(certificate, chi_square, factors)
         search |= noise is None and certificate.backward_error > certificates.SUSPICIOUS
-        evidence = weigh(topology, matrix, meshes, certificate, freedom, free_scale=scale is None, search=search)
+        evidence = weigh(
+            topology,
+            matrix,
+            meshes,
+            certificate,
+            freedom,
+            free_scale=scale is None,
+            search=search,
+            rounding=noise is None,
+        )
     deviations = None
     if standard_deviations:
         with clock("deviations"):

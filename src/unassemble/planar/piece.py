@@ -87,8 +87,8 @@ def _is_uniform_noise(piece: Piece, weights: NDArray, found: PolishedMesh, sprea
 
     Both likelihoods are at their greatest over the common factor.
     """
-    misfit = weights - found.scale * edge_weights(piece, found.z)
-    even, uneven = (float(np.sqrt(np.mean(r**2))) for r in (misfit, misfit / spread))
-    if not (np.isfinite(uneven) and uneven > _ROUNDING * abs(found.scale)):
+    misfit = weights / found.scale - edge_weights(piece, found.z)
+    even, uneven = (float(np.linalg.norm(r)) / np.sqrt(len(r)) for r in (misfit, misfit / spread))
+    if not (np.isfinite(uneven) and uneven > _ROUNDING):
         return False
     return bool(np.log(even) < np.log(uneven) + np.mean(np.log(spread)))
