@@ -34,6 +34,8 @@ class Evidence:
         there are no more entries than unknowns.
     digits : str or None
         The precision that entries are stored with, if it explains the misfit.
+    rounding : float
+        Standard deviation of the rounding errors of the largest entries at that precision.
     suspects : (k, 2) int64
         Entries without which the mesh would fit the others far better.
     certain : bool
@@ -42,6 +44,7 @@ class Evidence:
 
     noise: float | None
     digits: str | None
+    rounding: float
     suspects: NDArray[np.int64]
     certain: bool
 
@@ -68,7 +71,8 @@ def weigh(
     suspects, certain = NONE, False
     if search and freedom > 1:
         suspects, certain = _suspects(topology, matrix, meshes, free_scale=free_scale, rounding=rounding)
-    return Evidence(noise, _digits(matrix, certificate) if search else None, suspects, certain)
+    digits, size = _digits(matrix, certificate) if search else (None, 0.0)
+    return Evidence(noise, digits, size, suspects, certain)
 
 
 def pooled_noise(topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], freedom: int) -> float:
@@ -105,11 +109,11 @@ def _suspects(
     return (np.concatenate(pairs) if pairs else NONE), certain
 
 
-def _digits(matrix: OperatorMatrix, certificate: Certificate) -> str | None:
+def _digits(matrix: OperatorMatrix, certificate: Certificate) -> tuple[str | None, float]:
     """Entries of single precision or of few decimal digits, if no misfit is beyond that."""
     entries = matrix.entries
     if len(certificate.pairs) != len(entries):
-        return None
+        return None, 0.0
     size = np.abs(entries)
     difference = np.abs(certificate.differences)
     sample = entries[:: max(1, len(entries) // _SAMPLE)]
@@ -120,7 +124,7 @@ def _digits(matrix: OperatorMatrix, certificate: Certificate) -> str | None:
     else:
         count = next((d for d in range(3, 13) if _has_digits(sample, d)), None)
         if count is None:
-            return None
+            return None, 0.0
         with np.errstate(divide="ignore"):
             leading = np.floor(np.log10(np.where(size > 0, size, 1.0)))
         name, unit = f"numbers of {count} digits", 0.5 * 10.0 ** (leading - count + 1)
@@ -129,7 +133,8 @@ def _digits(matrix: OperatorMatrix, certificate: Certificate) -> str | None:
     for end in matrix.edges.T:
         np.maximum.at(near, end, unit)
     bound = np.maximum(near[matrix.edges[:, 0]], near[matrix.edges[:, 1]])
-    return name if np.all(difference <= 2 * bound) else None
+    # An error between -u and u, evenly distributed, has the standard deviation u / sqrt(3).
+    return (name, float(unit.max() / np.sqrt(3))) if np.all(difference <= 2 * bound) else (None, 0.0)
 
 
 def _has_digits(values: NDArray, count: int) -> bool:

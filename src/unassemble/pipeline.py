@@ -177,7 +177,7 @@ def _recover(
         factors = np.array([m.scale for m in meshes])
         # A misfit at rounding level, or one that noise explains, hides no wrong entry.
         search = not passes(certificate, chi_square, factors)
-        search |= noise is None and certificate.backward_error > certificates.SUSPICIOUS
+        search |= (noise is None or freedom <= 0) and certificate.backward_error > certificates.SUSPICIOUS
         evidence = weigh(
             topology,
             matrix,

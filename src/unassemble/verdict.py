@@ -17,8 +17,9 @@ def passes(certificate: Certificate, chi_square: Mapping[str, float] | None, sca
     """Whether the numbers alone would do for a certificate."""
     if len(certificate.flipped):
         return False
-    if not chi_square or not chi_square["degrees_of_freedom"] > 0:
+    if not _tested(certificate, chi_square, scale):
         return certificate.backward_error <= CERTIFIED
+    assert chi_square is not None
     return min(chi_square["p_value"], chi_square["largest_p_value"]) >= CONFIDENCE and not _drowned(chi_square, scale)
 
 
@@ -42,7 +43,7 @@ def verdict(
         Stages that did not converge.
     """
     good = passes(certificate, chi_square, scale)
-    if chi_square and chi_square["degrees_of_freedom"] > 0:
+    if chi_square and _tested(certificate, chi_square, scale):
         return ("certified" if good else "uncertified"), _with_noise(
             chi_square, certificate, topology, evidence, scale, notes
         )
@@ -70,14 +71,20 @@ def _misfit(
     if evidence.digits and not evidence.certain:
         return (
             f"the entries are {evidence.digits}, and the re-assembled matrix differs by no more than that, at most by "
-            f"{misfit:.1e} of a row's largest ({CERTIFIED:g} is allowed): give the noise, here about "
-            f"{evidence.noise or 0:.2g}, to have it tested"
+            f"{misfit:.1e} of a row's largest ({CERTIFIED:g} is allowed): give it as noise, {evidence.rounding:.2g} "
+            "for the largest entries, to have it tested"
         )
     differs = (
         f"the re-assembled matrix differs, most in the entry of rows {i} and {j} (by {misfit:.1e} of the row's "
         f"largest; {CERTIFIED:g} is allowed)"
     )
     return differs + _culprits(evidence) + _like_noise(certificate, evidence) + _because(notes)
+
+
+def _rounded(evidence: Evidence) -> str:
+    if not evidence.digits:
+        return ""
+    return f"; the entries are {evidence.digits}, and the largest have rounding errors of {evidence.rounding:.2g}"
 
 
 def _culprits(evidence: Evidence) -> str:
@@ -109,6 +116,13 @@ def _turned_over(topology: Topology, certificate: Certificate) -> str:
     k = len(certificate.flipped)
     which = "1 triangle is" if k == 1 else f"{k} triangles are"
     return f"{which} flat or turned over, the first that of rows {rows}"
+
+
+def _tested(certificate: Certificate, chi_square: Mapping[str, float] | None, scale: NDArray) -> bool:
+    """Whether noise is what decides: there is something to test, and no exact fit makes too large a noise harmless."""
+    if not chi_square or not chi_square["degrees_of_freedom"] > 0:
+        return False
+    return not (_drowned(chi_square, scale) and certificate.backward_error <= CERTIFIED)
 
 
 def _drowned(test: Mapping[str, float], scale: NDArray) -> bool:
@@ -144,5 +158,5 @@ def _with_noise(
         return (
             f"the entry of rows {i} and {j} is off by {test['largest']:.1f} standard deviations of the noise, "
             f"{sigma:.3g}, more than the largest of {len(certificate.pairs)} would be{_culprits(evidence)}"
-        )
+        ) + _rounded(evidence)
     return f"noise of standard deviation {sigma:.3g} explains the misfit {figures}"
