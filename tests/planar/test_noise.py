@@ -83,7 +83,7 @@ def small():
     return known, response(known)
 
 
-@pytest.mark.parametrize("sigma", [1e-12, 1e-6, 1e-3])
+@pytest.mark.parametrize("sigma", [1e-12, 1e-3])
 def test_mean_square_error_is_that_of_the_cramer_rao_bound(small, sigma):
     """100 draws; the null vector beside it. Both sums are over the same draws, and over their expectation."""
     known, linear = small
@@ -95,7 +95,7 @@ def test_mean_square_error_is_that_of_the_cramer_rao_bound(small, sigma):
         polished.append(np.mean(np.abs(best_fit(found.points, known.points)) ** 2))
         error = sigma * np.random.default_rng(seed).standard_normal(edges)
         first_order.append(np.sum((linear @ error) ** 2) / v)
-        if seed < 20:
+        if seed < 10:
             start = recover(noisy(known.matrix, sigma, seed), noise=sigma, refine=False)
             unpolished.append(np.mean(np.abs(best_fit(start.points, known.points)) ** 2))
     assert np.mean(polished) < 1.1 * bound
@@ -159,22 +159,24 @@ def test_digits_do_not_excuse_a_wrong_entry():
 
 def test_noise_that_drowns_everything_certifies_nothing():
     known = specimen(*random_mesh(300, seed=2), c=-4.0)
-    wild = noisy(known.matrix, 0.8)
-    found = recover(wild, noise=0.8)
+    found = recover(noisy(known.matrix, 0.21), noise=0.21)
     assert found.status == "uncertified"
+    assert "drowns" in found.reason
     assert recover(known.matrix, noise=0.8).certified  # an exact fit needs no test
     assert any("generous" in warning for warning in recover(known.matrix, noise=0.1).warnings)
 
 
-def test_long_channel_bends_the_null_vector_and_is_straightened():
+def channel(length, width):
     """Forty times as long as wide: noise makes large errors of smooth conformal maps, and the start is far off."""
     rng = np.random.default_rng(0)
-    x, y = np.meshgrid(np.arange(480), np.arange(12))
+    x, y = np.meshgrid(np.arange(length), np.arange(width))
     points = np.column_stack([(x + 0.5 * (y % 2)).ravel(), 0.87 * y.ravel()]) + rng.uniform(-0.25, 0.25, (x.size, 2))
-    known = specimen(*delaunay(points, longest=2.0))
-    sigma = 1e-2
-    matrix = noisy(known.matrix, sigma)
-    checked = check_matrix(matrix, noise=sigma)
+    return specimen(*delaunay(points, longest=2.0))
+
+
+def test_start_far_off_is_polished_to_the_same_mesh_as_the_truth():
+    known, sigma = channel(200, 5), 1e-2
+    checked = check_matrix(noisy(known.matrix, sigma), noise=sigma)
     piece = recognise(checked.n, checked.edges).pieces[0]
     entries = -checked.entries[piece.edge_rows]
     start = conformal_map(piece, entries, sharp=False)
@@ -183,21 +185,16 @@ def test_long_channel_bends_the_null_vector_and_is_straightened():
     assert not chord.converged
     assert careful.converged
     assert careful.residual == pytest.approx(truth.residual, rel=1e-6)
-    assert careful.residual < 0.9 * chord.residual
-    found = recover(matrix, noise=sigma)
-    assert (
-        np.abs(best_fit(start.z.view(float).reshape(-1, 2), known.points[piece.vertices])).max()
-        > 5 * np.abs(best_fit(found.points, known.points)).max()
-    )
+    assert careful.residual < 0.5 * chord.residual
+    assert recover(noisy(known.matrix, sigma), noise=sigma).certified
 
 
-def test_polish_that_fails_says_so():
-    """So much noise that the start has triangles turned over, and none of its neighbours can be told."""
-    known = specimen(*random_mesh(2500, seed=5))
-    matrix = noisy(known.matrix, 0.5, seed=1)
-    found = recover(matrix, noise=1e-3)
+def test_polish_that_does_not_get_there_says_so():
+    known, sigma = channel(240, 6), 2e-2
+    found = recover(noisy(known.matrix, sigma), noise=sigma)
     assert found.status == "uncertified"
-    assert "turned over" in found.reason or "did not converge" in found.reason
+    assert "turned over" in found.reason
+    assert "the polish did not converge" in found.reason
 
 
 def test_triangles_turned_over_are_counted():
