@@ -1,6 +1,6 @@
 """Mean square error of recovered meshes over the Cramer-Rao bound, from repeated draws of noise.
 
-python benchmarks/noise.py [--sizes 620,5600,54500] [--sigmas 1e-12,1e-9,1e-6,1e-4,1e-3] [--draws 100,100,10]
+python benchmarks/noise.py [--sizes 500,5000,50000] [--sigmas 1e-12,1e-9,1e-6,1e-4,1e-3] [--draws 100,100,10]
                            [--output FILE.json] [--figure FILE.png] [--from FILE.json] [--channels]
 
 Each draw adds independent normal errors of standard deviation sigma to the entries of one triangle of the Laplacian
@@ -42,7 +42,7 @@ EXACT, SAMPLES = 3000, 400
 def main() -> None:
     """Measure, print, draw."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sizes", default="620,5600,54500")
+    parser.add_argument("--sizes", default="500,5000,50000")
     parser.add_argument("--sigmas", default="1e-12,1e-9,1e-6,1e-4,1e-3")
     parser.add_argument("--draws", default="100,100,10", help="for each size")
     parser.add_argument("--output", type=Path)

@@ -86,8 +86,9 @@ def test_two_entries_swapped(first, second, refine):
         return
     assert found.status == "uncertified"
     assert len(found.worst_entries)
-    if refine:  # a null vector spreads the misfit
-        assert set(map(int, found.worst_entries[0])) <= neighbourhood(KNOWN.triangles, (*a, *b))
+    if refine:  # a null vector spreads the misfit; large changes are not always the first to be named
+        near = neighbourhood(KNOWN.triangles, (*a, *b))
+        assert any(set(pair) <= near for pair in found.worst_entries.tolist())
 
 
 def test_two_entries_far_apart_are_both_named():

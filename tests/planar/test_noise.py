@@ -91,7 +91,7 @@ def test_mean_square_error_is_that_of_the_cramer_rao_bound(small, sigma):
     bound = sigma**2 * np.sum(linear**2) / v
     polished, unpolished, first_order = [], [], []
     for seed in range(100):
-        found = recover(noisy(known.matrix, sigma, seed), noise=sigma)
+        found = recover(noisy(known.matrix, sigma, seed), noise=sigma, threads=1)
         polished.append(np.mean(np.abs(best_fit(found.points, known.points)) ** 2))
         error = sigma * np.random.default_rng(seed).standard_normal(edges)
         first_order.append(np.sum((linear @ error) ** 2) / v)
