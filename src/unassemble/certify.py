@@ -14,8 +14,14 @@ from numpy.typing import NDArray
 CERTIFIED = 1e-9
 """Largest backward error of a certified mesh."""
 
+SUSPICIOUS = 1e-12
+"""Backward error above which a mesh is certified only if no few entries carry the misfit."""
+
 CONFIDENCE = 1e-3
 """Least p-value of a mesh certified in the presence of noise."""
+
+LARGEST_NOISE = 0.05
+"""Largest noise, relative to c, that is tested: an angle is then known to about as many radians."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,17 +39,32 @@ class Certificate:
         Their differences, relative in the same way.
     differences : (k,) float64
         Their differences, re-assembled minus given.
+    flipped : (f,) int64
+        Triangles that are flat or turned over: a mesh with any of them is not a planar one.
     """
 
     backward_error: float
     pairs: NDArray[np.int64]
     misfits: NDArray[np.float64]
     differences: NDArray[np.float64]
+    flipped: NDArray[np.int64]
 
-    def worst(self, count: int = 10) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """The entries above the bound that fit worst, worst first."""
-        above = np.flatnonzero(self.misfits > CERTIFIED)
-        order = above[np.argsort(-self.misfits[above], kind="stable")][:count]
+    def worst(
+        self, count: int = 10, *, noise: float | None = None, first: NDArray | None = None
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """The entries that fit worst, worst first, and their misfits.
+
+        Those above the bound, by misfit relative to the row; or, for noise of that standard deviation, those off by
+        more than three of them, by difference. Pairs `first`, (k, 2) with i < j, come before all others.
+        """
+        size = self.misfits if noise is None else np.abs(self.differences)
+        above = np.flatnonzero(size > (CERTIFIED if noise is None else 3 * noise))
+        order = above[np.argsort(-size[above], kind="stable")][:count]
+        if first is not None and len(first):
+            n = int(self.pairs.max()) + 1
+            key = self.pairs[:, 0] * n + self.pairs[:, 1]  # ascending
+            leading = np.searchsorted(key, first[:, 0] * n + first[:, 1])
+            order = np.concatenate([leading, order[~np.isin(order, leading)]])[:count]
         return self.pairs[order], self.misfits[order]
 
 
@@ -88,7 +109,13 @@ def certify(
     with np.errstate(divide="ignore", invalid="ignore"):
         misfits = np.where(difference == 0, 0.0, np.abs(difference) / reference)
     misfits = np.where(np.isnan(misfits), np.inf, misfits)
-    return Certificate(float(misfits.max(initial=0.0)), pairs, misfits, difference)
+    return Certificate(float(misfits.max(initial=0.0)), pairs, misfits, difference, _flipped(points, triangles))
+
+
+def _flipped(points: NDArray, triangles: NDArray) -> NDArray[np.int64]:
+    a, b, c = points[triangles].transpose(1, 2, 0)
+    (ux, uy), (wx, wy) = b - a, c - a
+    return np.flatnonzero(~(ux * wy - uy * wx > 0))
 
 
 def _assemble(
@@ -119,7 +146,11 @@ def _assemble(
 
 
 def chi_square_verdict(differences: NDArray, sigma: float, freedom: int) -> dict[str, float]:
-    """Test of the misfit against independent Gaussian noise of standard deviation sigma in every entry.
+    """Tests of the misfit against independent Gaussian noise of standard deviation sigma in every entry.
+
+    The sum of squares has a chi-square distribution; but on a large mesh it does not notice a single wrong entry. So
+    the largest misfit is tested as well. No misfit varies more than the noise itself, so that the normal tail, times
+    the number of entries, bounds its p-value.
 
     Parameters
     ----------
@@ -128,10 +159,24 @@ def chi_square_verdict(differences: NDArray, sigma: float, freedom: int) -> dict
     sigma : float
     freedom : int
         Entries less fitted unknowns.
+
+    Returns
+    -------
+    dict
+        ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``; ``largest`` misfit in standard deviations and its
+        ``largest_p_value``.
     """
-    from scipy.stats import chi2
+    from scipy.stats import chi2, norm
 
     with np.errstate(over="ignore"):
         statistic = float(np.sum((differences / sigma) ** 2))
-    p_value = float(chi2.sf(statistic, freedom)) if freedom > 0 and np.isfinite(statistic) else 0.0
-    return {"statistic": statistic, "degrees_of_freedom": float(freedom), "p_value": p_value, "sigma": sigma}
+        largest = float(np.abs(differences).max(initial=0.0) / sigma)
+    finite = freedom > 0 and np.isfinite(statistic)
+    return {
+        "statistic": statistic,
+        "degrees_of_freedom": float(freedom),
+        "p_value": float(chi2.sf(statistic, freedom)) if finite else 0.0,
+        "sigma": sigma,
+        "largest": largest,
+        "largest_p_value": min(1.0, float(2 * len(differences) * norm.sf(largest))) if finite else 0.0,
+    }

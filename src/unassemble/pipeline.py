@@ -13,6 +13,7 @@ from . import certify as certificates
 from .cells import exchanges
 from .clock import Clock
 from .errors import InputError, RecoveryError
+from .evidence import pooled_noise, weigh
 from .joined import JoinedMesh
 from .linalg import AnalysisAhead, factorisation
 from .linalg import threads as thread_limit
@@ -26,7 +27,7 @@ from .planar.piece import PieceMesh
 from .recovery import Recovery
 from .solving import solve
 from .topology import Polygons, Topology, local_numbering, surfaces
-from .verdict import ambiguous, verdict
+from .verdict import ambiguous, passes, verdict
 
 
 def recover(
@@ -250,15 +251,29 @@ def _recover(
             mesh.scale[mesh.triangle_piece],
             (placement.tensor.kxx, placement.tensor.kxy, placement.tensor.kyy) if placement.tensor else None,
         )
-    freedom = _freedom(topology, scale)
+        freedom = _freedom(topology, scale)
+        chi_square = certificates.chi_square_verdict(certificate.differences, noise, freedom) if noise else None
+        factors = np.array([m.scale for m in meshes])
+        # A misfit at rounding level, or one that noise explains, hides no wrong entry.
+        search = not passes(certificate, chi_square, factors)
+        search |= (noise is None or freedom <= 0) and certificate.backward_error > certificates.SUSPICIOUS
+        evidence = weigh(
+            topology,
+            matrix,
+            meshes,
+            certificate,
+            freedom,
+            free_scale=scale is None,
+            search=search,
+            rounding=noise is None,
+        )
     deviations = None
     if standard_deviations:
         with clock("deviations"):
-            # The norm, unlike a sum of squares, does not overflow.
-            sigma = noise or float(np.linalg.norm(certificate.differences)) / np.sqrt(max(freedom, 1))
+            sigma = noise or pooled_noise(topology, matrix, meshes, freedom)
             deviations = _deviations(topology, placement, placed, meshes, sigma, scale is None)
-    chi_square = certificates.chi_square_verdict(certificate.differences, noise, freedom) if noise else None
-    status, reason = verdict(topology, certificate, chi_square, matrix)
+    trouble = [note for m in meshes for note in m.notes]
+    status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble)
     if status == "certified" and len(topology.vanished) > (topology.polygons.size - 3).sum():
         z = mesh.points @ [1, 1j]
         others = exchanges(
@@ -271,7 +286,9 @@ def _recover(
         )
         if others:
             status, reason = ambiguous(others, certificate)
-    worst, misfits = certificate.worst() if status == "uncertified" else certificate.worst(0)
+    worst, misfits = certificate.worst(10 if status == "uncertified" else 0, noise=noise, first=evidence.suspects)
+    if chi_square and evidence.noise is not None and evidence.noise < 0.5 * chi_square["sigma"]:
+        notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
     polygons = Polygons.none() if triangulate else mesh.polygons
     return Recovery(
         points=mesh.points,
@@ -295,6 +312,8 @@ def _recover(
         worst_misfits=misfits,
         standard_deviations=deviations,
         chi_square=chi_square,
+        estimated_noise=evidence.noise,
+        suspects=evidence.suspects,
     )
 
 
@@ -373,6 +392,7 @@ def _deviations(
             sigma=sigma / abs(mesh.scale),
             free_scale=free_scale,
             stretch=tensor.root if tensor else None,
+            spread=mesh.spread,
         )
         result[piece.vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     return result

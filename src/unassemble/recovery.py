@@ -64,13 +64,15 @@ class Recovery:
         Seconds by stage.
     warnings : tuple of str
     worst_entries : (k, 2) int64
-        Rows and columns of the entries that fit worst, worst first; empty where all fit.
+        Rows and columns of the entries that fit worst, the suspects first, then the others, worst first; empty where
+        all fit.
     worst_misfits : (k,) float64
         Their misfit, as in `backward_error`.
     standard_deviations : (n, 2) float64 or None
         One standard deviation of each coordinate, on request.
     chi_square : mapping or None
-        With noise: ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``.
+        With noise: ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``, ``largest``, ``largest_p_value``; see
+        :func:`unassemble.certify.chi_square_verdict`.
     quads, tetrahedra, hexahedra : (m, 4), (m, 4), (m, 8) int64
         Further cells, in meshio's order and positively oriented; empty where there are none.
     node_of_row, direction_of_row : (N,) int64 or None
@@ -90,6 +92,10 @@ class Recovery:
     polygons_data : (polygons_offsets[-1],) int64
         Cells that the matrix leaves undivided, counter-clockwise: polygon k is
         ``polygons_data[polygons_offsets[k]:polygons_offsets[k + 1]]``.
+    estimated_noise : float or None
+        Standard deviation of independent errors of the entries that would leave the misfit found.
+    suspects : (k, 2) int64
+        Entries that the mesh would fit the others far better without, the gravest first.
     """
 
     points: NDArray[np.float64]
@@ -123,6 +129,8 @@ class Recovery:
     evidence: tuple[Evidence, ...] = ()
     polygons_offsets: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
     polygons_data: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    estimated_noise: float | None = None
+    suspects: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), np.int64))
 
     @property
     def certified(self) -> bool:

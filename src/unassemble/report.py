@@ -29,8 +29,8 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
     for each piece), ``backward_error``, ``timings`` (seconds by stage), ``warnings``; further ``n_polygons``
     (cells that the matrix leaves undivided), ``n_hinges``,
     ``n_undetermined``, ``n_boundary_edges``, ``worst_entries`` (``row``, ``column``, ``misfit``, worst first),
-    ``chi_square``, ``largest_standard_deviation`` and ``version``. Vector-valued matrices have those of
-    :func:`_vector_facts` too.
+    ``suspects`` (``row``, ``column``), ``chi_square``, ``estimated_noise``, ``largest_standard_deviation`` and
+    ``version``. Vector-valued matrices have those of :func:`_vector_facts` too.
     """
     return _plain(
         {
@@ -48,11 +48,13 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
             "scale": recovery.scale,
             "backward_error": recovery.backward_error,
             "chi_square": recovery.chi_square,
+            "estimated_noise": recovery.estimated_noise,
             "largest_standard_deviation": _largest_deviation(recovery),
             "worst_entries": [
                 {"row": i, "column": j, "misfit": misfit}
                 for (i, j), misfit in zip(recovery.worst_entries, recovery.worst_misfits, strict=True)
             ],
+            "suspects": [{"row": i, "column": j} for i, j in recovery.suspects],
             **(_vector_facts(recovery) if recovery.vector_valued else {}),
             "timings": recovery.timings,
             "warnings": recovery.warnings,
@@ -149,6 +151,8 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
     else:
         rows.append(("scale c", scale_text(recovery)))
     rows.append(("backward error", f"{recovery.backward_error:.1e}"))
+    if recovery.estimated_noise is not None and recovery.backward_error > 1e-12:
+        rows.append(("noise", f"the misfit is that of a standard deviation of {recovery.estimated_noise:.1e}"))
     deviation = _largest_deviation(recovery)
     if deviation is not None:
         rows.append(("std deviation", f"at most {deviation:.1e} in a coordinate"))

@@ -2,42 +2,84 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .cells import Exchange
-from .certify import CERTIFIED, CONFIDENCE, Certificate
+from .certify import CERTIFIED, CONFIDENCE, LARGEST_NOISE, Certificate
+from .evidence import Evidence
 from .matrix import OperatorMatrix
 from .topology import Topology
 
 
+def passes(certificate: Certificate, chi_square: Mapping[str, float] | None, scale: NDArray) -> bool:
+    """Whether the numbers alone would do for a certificate."""
+    if len(certificate.flipped):
+        return False
+    if not _tested(certificate, chi_square, scale):
+        return certificate.backward_error <= CERTIFIED
+    assert chi_square is not None
+    return min(chi_square["p_value"], chi_square["largest_p_value"]) >= CONFIDENCE and not _drowned(chi_square, scale)
+
+
 def verdict(
-    topology: Topology, certificate: Certificate, chi_square: Mapping[str, float] | None, matrix: OperatorMatrix
+    topology: Topology,
+    certificate: Certificate,
+    chi_square: Mapping[str, float] | None,
+    matrix: OperatorMatrix,
+    evidence: Evidence,
+    scale: NDArray,
+    notes: Sequence[str] = (),
 ) -> tuple[str, str]:
-    """``"certified"`` or ``"uncertified"``, and why."""
-    if chi_square and chi_square["degrees_of_freedom"] > 0:
-        return _with_noise(chi_square)
+    """``"certified"`` or ``"uncertified"``, and why.
+
+    Parameters
+    ----------
+    topology, certificate, chi_square, matrix, evidence
+    scale : (number of pieces,) float64
+        c of each piece, the factor of the Laplacian.
+    notes : sequence of str
+        Stages that did not converge.
+    """
+    good = passes(certificate, chi_square, scale)
+    if chi_square and _tested(certificate, chi_square, scale):
+        return ("certified" if good else "uncertified"), _with_noise(
+            chi_square, certificate, topology, evidence, scale, notes
+        )
     error = certificate.backward_error
-    if error <= CERTIFIED:
+    if good and not evidence.certain:
         return "certified", f"the operator re-assembled on this mesh gives the matrix back to {error:.1e}"
+    return "uncertified", _misfit(topology, certificate, matrix, evidence, notes)
+
+
+def _misfit(
+    topology: Topology, certificate: Certificate, matrix: OperatorMatrix, evidence: Evidence, notes: Sequence[str]
+) -> str:
+    """What does not fit, the gravest first."""
     if topology.failures:
-        return "uncertified", f"{len(topology.failures)} part of the matrix has no mesh: {topology.failures[0]}"
+        return f"{len(topology.failures)} part of the matrix has no mesh: {topology.failures[0]}"
     bare = topology.bare_edges[matrix.entries[topology.bare_edges] != 0]
     if len(bare):
         i, j = topology.edges[bare[0]]
-        return (
-            "uncertified",
-            f"{len(bare)} nonzero entries belong to no triangle, the first between rows {i} and {j}",
-        )
-    if not np.isfinite(error):
-        return "uncertified", "the mesh has triangles that are flat, or points that are not finite"
+        return f"{len(bare)} nonzero entries belong to no triangle, the first between rows {i} and {j}"
+    if not np.isfinite(certificate.backward_error):
+        return "the mesh has triangles that are flat, or points that are not finite"
+    if len(certificate.flipped):
+        return _turned_over(topology, certificate) + _because(notes)
     (i, j), misfit = certificate.pairs[certificate.misfits.argmax()], certificate.misfits.max()
-    return (
-        "uncertified",
+    if evidence.digits and not evidence.certain:
+        return (
+            f"the entries are {evidence.digits}, and the re-assembled matrix differs by no more than that, at most by "
+            f"{misfit:.1e} of a row's largest ({CERTIFIED:g} is allowed): give it as noise, {evidence.rounding:.2g} "
+            "for the largest entries, to have it tested"
+        )
+    differs = (
         f"the re-assembled matrix differs, most in the entry of rows {i} and {j} (by {misfit:.1e} of the row's "
-        f"largest; {CERTIFIED:g} is allowed)",
+        f"largest; {CERTIFIED:g} is allowed)"
     )
+    return differs + _culprits(evidence) + _like_noise(certificate, evidence) + _because(notes)
 
 
 def ambiguous(others: list[Exchange], certificate: Certificate) -> tuple[str, str]:
@@ -55,11 +97,82 @@ def _words(rows: tuple[int, ...]) -> str:
     return ", ".join(map(str, rows))
 
 
-def _with_noise(test: Mapping[str, float]) -> tuple[str, str]:
+def _rounded(evidence: Evidence) -> str:
+    if not evidence.digits:
+        return ""
+    return f"; the entries are {evidence.digits}, and the largest have rounding errors of {evidence.rounding:.2g}"
+
+
+def _culprits(evidence: Evidence) -> str:
+    if not len(evidence.suspects):
+        return ""
+    k, (i, j) = len(evidence.suspects), evidence.suspects[0]
+    if k == 1:
+        return f"; the entry of rows {i} and {j} stands out: the mesh would fit the others far better without it"
+    return f"; {k} entries stand out, first that of rows {i} and {j}: the mesh would fit the others far better without"
+
+
+def _like_noise(certificate: Certificate, evidence: Evidence) -> str:
+    """The remark that the misfit is small and nowhere concentrated."""
+    size = np.abs(certificate.differences)
+    if len(evidence.suspects) or not evidence.noise or not certificate.backward_error < 1e-2:
+        return ""
+    if len(size) < 50 or size.max() > 8 * np.sqrt(np.mean(size**2)):
+        return ""
+    return f"; the misfit looks like noise of standard deviation {evidence.noise:.2g} in the entries"
+
+
+def _because(notes: Sequence[str]) -> str:
+    return "; " + "; ".join(notes) if notes else ""
+
+
+def _turned_over(topology: Topology, certificate: Certificate) -> str:
+    triangles = np.concatenate([piece.vertices[piece.triangles] for piece in topology.pieces])
+    rows = ", ".join(map(str, np.sort(triangles[certificate.flipped[0]])))
+    k = len(certificate.flipped)
+    which = "1 triangle is" if k == 1 else f"{k} triangles are"
+    return f"{which} flat or turned over, the first that of rows {rows}"
+
+
+def _tested(certificate: Certificate, chi_square: Mapping[str, float] | None, scale: NDArray) -> bool:
+    """Whether noise is what decides: there is something to test, and no exact fit makes too large a noise harmless."""
+    if not chi_square or not chi_square["degrees_of_freedom"] > 0:
+        return False
+    return not (_drowned(chi_square, scale) and certificate.backward_error <= CERTIFIED)
+
+
+def _drowned(test: Mapping[str, float], scale: NDArray) -> bool:
+    return test["sigma"] > LARGEST_NOISE * float(np.abs(scale).min())
+
+
+def _with_noise(
+    test: Mapping[str, float],
+    certificate: Certificate,
+    topology: Topology,
+    evidence: Evidence,
+    scale: NDArray,
+    notes: Sequence[str],
+) -> str:
+    sigma = test["sigma"]
     figures = (
         f"(chi-square {test['statistic']:.4g} with {test['degrees_of_freedom']:.0f} degrees of freedom, "
         f"p = {test['p_value']:.3g})"
     )
-    if test["p_value"] >= CONFIDENCE:
-        return "certified", f"noise of standard deviation {test['sigma']:.3g} explains the misfit {figures}"
-    return "uncertified", f"the misfit is more than noise of standard deviation {test['sigma']:.3g} explains {figures}"
+    if _drowned(test, scale):
+        limit = LARGEST_NOISE * float(np.abs(scale).min())
+        return (
+            f"noise of standard deviation {sigma:.3g} drowns the cotangents, and almost any mesh would pass: the "
+            f"test is worth something up to {limit:.2g}, {LARGEST_NOISE:g} times the scale"
+        )
+    if len(certificate.flipped):
+        return _turned_over(topology, certificate) + _because(notes)
+    if test["p_value"] < CONFIDENCE:
+        more = f"the misfit is more than noise of standard deviation {sigma:.3g} explains {figures}"
+        return more + _culprits(evidence) + _because(notes)
+    if test["largest_p_value"] < CONFIDENCE:
+        i, j = certificate.pairs[np.abs(certificate.differences).argmax()]
+        return (
+            f"the entry of rows {i} and {j} is off by {test['largest']:.1f} standard deviations of the noise, "
+            f"{sigma:.3g}, more than the largest of {len(certificate.pairs)} would be{_culprits(evidence)}"
+        ) + _rounded(evidence)
+    return f"noise of standard deviation {sigma:.3g} explains the misfit {figures}"

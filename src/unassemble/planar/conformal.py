@@ -166,13 +166,16 @@ def conformal_map(
 
 
 def _smooth_start(piece: Piece) -> NDArray:
-    """An ellipse on the longest boundary loop, smooth and of positive area, and a little noise everywhere.
+    """An ellipse on each boundary loop, smooth and of positive area, and a little noise everywhere.
 
-    The ellipse has both senses of rotation: which one belongs to the mesh depends on whether the
-    loop is the outer one or a hole. The noise breaks symmetries that would hide the answer from every Krylov space.
+    An ellipse has both senses of rotation: which one belongs to the mesh depends on whether the loop is the outer one
+    or a hole. Without the ellipses on other loops than the longest, the inversion of a ring would hide the ring from
+    the Krylov space. The noise breaks symmetries that would hide the answer from every such space.
     """
     z = 0.01 * np.random.default_rng(0).standard_normal((piece.n_vertices, 2)).view(np.complex128).ravel()
-    loop = piece.longest_loop
-    angle = 2 * np.pi * np.arange(len(loop)) / len(loop)
-    z[loop] += np.exp(1j * angle) + 0.5 * np.exp(-1j * angle)
+    length = np.diff(piece.loop_offsets)
+    place = np.arange(len(piece.boundary)) - np.repeat(piece.loop_offsets[:-1], length)
+    angle = 2 * np.pi * place / np.repeat(length, length)
+    size = np.repeat(length / length.max(), length)
+    np.add.at(z, piece.boundary[:, 0], size * (np.exp(1j * angle) + 0.5 * np.exp(-1j * angle)))
     return z

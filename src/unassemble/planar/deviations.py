@@ -17,7 +17,13 @@ _BLOCK = 64
 
 
 def coordinate_covariances(
-    piece: Piece, z: NDArray, *, sigma: float, free_scale: bool, stretch: NDArray | None = None
+    piece: Piece,
+    z: NDArray,
+    *,
+    sigma: float,
+    free_scale: bool,
+    stretch: NDArray | None = None,
+    spread: NDArray | None = None,
 ) -> NDArray[np.float64]:
     """Covariance of each vertex for independent noise of standard deviation sigma in the weights.
 
@@ -37,14 +43,16 @@ def coordinate_covariances(
         Whether c was fitted as well.
     stretch : (2, 2) float64, optional
         Linear map from that frame to the one in which covariances are wanted.
+    spread : (e,) float64, optional
+        Standard deviations of the weights relative to `sigma`, for which z is the least-squares estimate.
 
     Returns
     -------
     (n, 2, 2) float64
     """
-    jacobian = WeightJacobian(piece, z)
+    jacobian = WeightJacobian(piece, z, spread)
     equations = NormalEquations(jacobian, distant_pair(z))
-    weights = edge_weights(piece, z)
+    weights = edge_weights(piece, z) / jacobian.spread
     slope = jacobian.transpose(weights)
     response = equations.solve(slope)
     complement = float(weights @ weights) - float(np.vdot(slope, response).real)

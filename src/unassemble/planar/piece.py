@@ -11,8 +11,15 @@ from numpy.typing import NDArray
 from ..errors import SolverError
 from ..linalg import Factorisation, UpperTriangle
 from ..topology import Piece
+from .cautious import cautious_polish, count_flipped
 from .conformal import conformal_map
-from .polish import polish
+from .cotangent import edge_weights, weight_roundings
+from .polish import PolishedMesh, polish
+
+_ROUNDING = 1e-12
+"""Errors of the weights that may be rounding."""
+_CAUTIOUS_LIMIT = 200_000
+"""Most vertices for which a polish that fails is tried again with a factorisation in every step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,11 +32,15 @@ class PieceMesh:
     scale : float
     notes : tuple of str
         Stages that did not converge.
+    spread : (e,) float64 or None
+        Standard deviations of the entries' errors, up to a common factor, for which z is the least-squares solution;
+        all equal by default.
     """
 
     z: NDArray[np.complex128]
     scale: float
     notes: tuple[str, ...] = ()
+    spread: NDArray[np.float64] | None = None
 
 
 def positions(
@@ -47,12 +58,46 @@ def positions(
 
 
 def refined(piece: Piece, weights: NDArray, mesh: PieceMesh, *, scale: float | None, rounding: bool) -> PieceMesh:
-    """Gauss-Newton polish; where it cannot be done the mesh stays as it is, with a note."""
+    """Gauss-Newton polish; where it cannot be done the mesh stays as it is, with a note.
+
+    With `rounding`, errors are taken to be those of assembly in floating-point arithmetic, unless the misfit is beyond
+    that and more likely to be noise of one size.
+    """
+    spread = weight_roundings(piece, mesh.z) if rounding else None
     try:
-        found = polish(piece, weights, mesh.z, scale=scale, rounding=rounding)
+        found = _polished(piece, weights, mesh.z, scale, spread)
+        if spread is not None and _is_uniform_noise(piece, weights, found, spread):
+            spread = None
+            found = _polished(piece, weights, found.z, scale, spread)
     except SolverError as error:
         return PieceMesh(mesh.z, mesh.scale, (*mesh.notes, f"no polish: {error}"))
     if not (np.isfinite(found.z).all() and np.isfinite(found.scale)):
         return PieceMesh(mesh.z, mesh.scale, (*mesh.notes, "the polish did not stay finite and was left out"))
     notes = () if found.converged else ("the polish did not converge",)
-    return PieceMesh(found.z, found.scale, (*mesh.notes, *notes))
+    return PieceMesh(found.z, found.scale, (*mesh.notes, *notes), spread)
+
+
+def _polished(
+    piece: Piece, weights: NDArray, start: NDArray, scale: float | None, spread: NDArray | None
+) -> PolishedMesh:
+    """By the chord iteration; where it fails, by small steps from the better of start and result."""
+    found = polish(piece, weights, start, scale=scale, spread=spread)
+    finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
+    flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
+    if (found.converged and not flipped) or piece.n_vertices > _CAUTIOUS_LIMIT:
+        return found
+    nearest = found.z if flipped <= count_flipped(piece, start) else start
+    again = cautious_polish(piece, weights, nearest, scale=scale, spread=spread)
+    return again if again.residual < found.residual or not finite else found
+
+
+def _is_uniform_noise(piece: Piece, weights: NDArray, found: PolishedMesh, spread: NDArray) -> bool:
+    """Whether the misfit is beyond rounding, and normal errors of one size are likelier than those of sizes `spread`.
+
+    Both likelihoods are at their greatest over the common factor.
+    """
+    misfit = weights / found.scale - edge_weights(piece, found.z)
+    even, uneven = (float(np.linalg.norm(r)) / np.sqrt(len(r)) for r in (misfit, misfit / spread))
+    if not (np.isfinite(uneven) and uneven > _ROUNDING):
+        return False
+    return bool(np.log(even) < np.log(uneven) + np.mean(np.log(spread)))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..topology import Piece
-from .cotangent import edge_weights, weight_roundings
+from .cotangent import edge_weights
 from .iterative import IterativeNormalEquations
 from .normal import NormalEquations, WeightJacobian, distant_pair
 
@@ -35,6 +35,9 @@ class PolishOptions:
         Below this a step that does not contract is taken for rounding.
     contraction : float
         A step longer than this times the one before asks for a new factorisation.
+    settled : float
+        The iteration also ends when a step changes the fitted weights by less than this times the noise that the misfit
+        shows: the mesh then moves by as small a part of its error bars.
     direct_limit : int
         Up to this many vertices J'J is factorised; above, conjugate gradients take a tenth of the memory.
     """
@@ -44,6 +47,7 @@ class PolishOptions:
     tolerance: float = 5e-16
     rounding: float = 1e-10
     contraction: float = 0.2
+    settled: float = 1e-3
     direct_limit: int = 1_500_000
 
 
@@ -76,7 +80,7 @@ def polish(
     z: NDArray,
     *,
     scale: float | None = None,
-    rounding: bool = True,
+    spread: NDArray | None = None,
     options: PolishOptions | None = None,
 ) -> PolishedMesh:
     """Improve positions to the level that the entries allow.
@@ -90,19 +94,19 @@ def polish(
         Start, for instance of :func:`~unassemble.planar.conformal.conformal_map`.
     scale : float, optional
         c, where it is known; otherwise it is fitted.
-    rounding : bool
-        Whether errors are those of assembly in floating-point arithmetic, larger where there are slivers; otherwise
-        they are taken to be of one size.
+    spread : (e,) float64, optional
+        Standard deviations of the errors of a up to a common factor, for instance
+        :func:`~unassemble.planar.cotangent.weight_roundings`; of one size by default.
     options : PolishOptions, optional
     """
     options = options or PolishOptions()
     extent = np.abs(z - z.mean()).max()
     z = (z - z.mean()) / extent
     pins = distant_pair(z)
-    spread = weight_roundings(piece, z) if rounding else np.ones(len(weights))
-    problem = _Problem(piece, weights, spread, scale)
+    spread = np.ones(len(weights)) if spread is None else spread
+    problem = Problem(piece, weights, spread, scale)
     fit = problem.at(z)
-    system: _DirectStep | _IterativeStep | None = None
+    system: GaussNewton | IterativeGaussNewton | None = None
     factorisations, steps, length, converged = 0, 0, np.inf, False
     while steps < options.max_steps and not converged:
         jacobian = WeightJacobian(piece, fit.z, spread)
@@ -110,9 +114,9 @@ def polish(
         if system is None:
             fitted = fit.weights if scale is None else None
             if len(z) <= options.direct_limit:
-                system = _DirectStep(jacobian, NormalEquations(jacobian, pins), fitted)
+                system = GaussNewton(jacobian, NormalEquations(jacobian, pins), fitted)
             else:
-                system = _IterativeStep(IterativeNormalEquations(piece, jacobian, fit.z, fitted))
+                system = IterativeGaussNewton(IterativeNormalEquations(piece, jacobian, fit.z, fitted))
             factorisations += 1
         move = system(jacobian, fit.misfit)
         previous, length = length, float(np.abs(move).max())
@@ -123,23 +127,24 @@ def polish(
             system.release()
             system, length = None, np.inf
             continue
-        better = _downhill(problem, fit, move)
+        better = downhill(problem, fit, move)
         steps += 1
         _log.debug("polish step %d: length %.1e, misfit %.3e", steps, length, fit.norm)
         # Expect the next step to shrink by the root of the last ratio: a chord iteration's first gain is its best. A
         # step that does not shrink, or does not lower the misfit, is rounding, or the end is not the mesh.
         coming = length * (np.sqrt(min(length / previous, 1.0)) if np.isfinite(previous) else 1.0)
         converged = coming <= options.tolerance or ((slow or better is None) and length <= options.rounding)
+        converged = converged or float(np.linalg.norm(jacobian.forward(move))) <= options.settled * fit.noise
         if better is None and not converged:
             break
         fit = better or fit
     if system is not None:
         system.release()
-    return PolishedMesh(fit.z * extent, fit.scale, fit.norm * abs(fit.scale), steps, factorisations, converged)
+    return PolishedMesh(fit.z * extent, fit.scale, fit.norm, steps, factorisations, converged)
 
 
 @dataclass(frozen=True, eq=False)
-class _Fit:
+class Fit:
     """A mesh held against the matrix; weights and misfit a / c - w are divided by their standard deviations."""
 
     z: NDArray[np.complex128]
@@ -149,12 +154,17 @@ class _Fit:
 
     @property
     def norm(self) -> float:
-        """Root of the sum of squares of the misfit."""
-        return float(np.linalg.norm(self.misfit))
+        """Root of the sum of squares of a - c w: what is minimised, while that of a / c - w falls as c grows."""
+        return float(np.linalg.norm(self.misfit)) * abs(self.scale)
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of noise in the weights that would leave this misfit."""
+        return float(np.linalg.norm(self.misfit)) / np.sqrt(max(len(self.misfit) - 2 * len(self.z) + 3, 1))
 
 
 @dataclass(frozen=True, eq=False)
-class _Problem:
+class Problem:
     """What is to be fitted."""
 
     piece: Piece
@@ -162,17 +172,17 @@ class _Problem:
     spread: NDArray[np.float64]
     scale: float | None
 
-    def at(self, z: NDArray) -> _Fit:
+    def at(self, z: NDArray) -> Fit:
         """The fit of positions z, with the best c where none is given."""
         with np.errstate(divide="ignore", invalid="ignore"):  # a flat triangle makes the misfit infinite
             w, a = edge_weights(self.piece, z) / self.spread, self.weights / self.spread
             c = float(w @ a / (w @ w)) if self.scale is None else self.scale
-            return _Fit(z, c, w, a / c - w)
+            return Fit(z, c, w, a / c - w)
 
 
-def _downhill(problem: _Problem, fit: _Fit, move: NDArray) -> _Fit | None:
+def downhill(problem: Problem, fit: Fit, move: NDArray) -> Fit | None:
     """The longest of the step, its half, its quarter, ... that does not raise the misfit."""
-    rounding = 1e-14 * float(np.linalg.norm(fit.weights))
+    rounding = 1e-14 * abs(fit.scale) * float(np.linalg.norm(fit.weights))
     for halvings in range(12):
         trial = problem.at(fit.z + move * 0.5**halvings)
         if trial.norm <= fit.norm + rounding:
@@ -180,7 +190,7 @@ def _downhill(problem: _Problem, fit: _Fit, move: NDArray) -> _Fit | None:
     return None
 
 
-class _DirectStep:
+class GaussNewton:
     """Steps of the linearised problem min |J d + g w - r| over displacements d and log-scale g."""
 
     def __init__(self, jacobian: WeightJacobian, equations: NormalEquations, weights: NDArray | None):
@@ -205,7 +215,7 @@ class _DirectStep:
         self._equations.release()
 
 
-class _IterativeStep:
+class IterativeGaussNewton:
     """The same steps: conjugate gradients take the scale along."""
 
     def __init__(self, equations: IterativeNormalEquations):

@@ -1,0 +1,105 @@
+"""Gauss-Newton far from the solution: a new factorisation for each step, and no triangle turned over on the way.
+
+For starts that noise has bent too far for the chord iteration of :mod:`~unassemble.planar.polish`. Cotangents
+have poles where triangles are flat, so a step that turns a triangle over may lower the misfit and still lead away:
+steps are cut short before that.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..topology import Piece
+from .normal import NormalEquations, WeightJacobian, distant_pair
+from .polish import GaussNewton, PolishedMesh, Problem, downhill
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class CautiousOptions:
+    """Settings of the iteration.
+
+    Attributes
+    ----------
+    max_steps : int
+        Each with a factorisation.
+    least_area : float
+        What a step must leave of the area of every triangle, relative.
+    settled : float
+        As in :class:`~unassemble.planar.polish.PolishOptions`.
+    """
+
+    max_steps: int = 40
+    least_area: float = 0.1
+    settled: float = 1e-3
+
+
+def cautious_polish(
+    piece: Piece,
+    weights: NDArray,
+    z: NDArray,
+    *,
+    scale: float | None = None,
+    spread: NDArray | None = None,
+    options: CautiousOptions | None = None,
+) -> PolishedMesh:
+    """Maximum-likelihood mesh from a distant start.
+
+    Parameters
+    ----------
+    piece : Piece
+    weights : (e,) float64
+    z : (n,) complex128
+    scale : float, optional
+    spread : (e,) float64, optional
+        As for the polish.
+    options : CautiousOptions, optional
+    """
+    options = options or CautiousOptions()
+    spread = np.ones(len(weights)) if spread is None else spread
+    extent = np.abs(z - z.mean()).max()
+    z = (z - z.mean()) / extent
+    pins = distant_pair(z)
+    problem = Problem(piece, weights, spread, scale)
+    fit, steps, converged = problem.at(z), 0, False
+    while steps < options.max_steps and not converged:
+        jacobian = WeightJacobian(piece, fit.z, spread)
+        system = GaussNewton(jacobian, NormalEquations(jacobian, pins), fit.weights if scale is None else None)
+        move = system(jacobian, fit.misfit)
+        system.release()
+        steps += 1
+        converged = float(np.linalg.norm(jacobian.forward(move))) <= options.settled * fit.noise
+        share = _allowed(piece, fit.z, move, options.least_area)
+        better = downhill(problem, fit, share * move)
+        _log.debug("cautious step %d: share %.1e, misfit %.3e", steps, share, fit.norm)
+        if better is None:
+            break
+        fit = better
+    return PolishedMesh(fit.z * extent, fit.scale, fit.norm, steps, steps, converged)
+
+
+def signed_areas(piece: Piece, z: NDArray) -> NDArray[np.float64]:
+    """Twice the area of each triangle (m,), positive for the orientation that prevails."""
+    a, b, c = z[piece.triangles].T
+    areas = (np.conj(b - a) * (c - a)).imag
+    return areas if areas.sum() >= 0 else -areas
+
+
+def count_flipped(piece: Piece, z: NDArray) -> int:
+    """Number of triangles that are flat, or turned over relative to the others."""
+    return int(np.count_nonzero(~(signed_areas(piece, z) > 0)))
+
+
+def _allowed(piece: Piece, z: NDArray, move: NDArray, least_area: float) -> float:
+    """The first of 1, 1/2, 1/4, ... of a step that leaves triangles that much of their areas."""
+    before = signed_areas(piece, z)
+    upright = before > 0
+    share = 1.0
+    while share > 1e-4 and (signed_areas(piece, z + share * move) < least_area * before)[upright].any():
+        share /= 2
+    return share
