@@ -355,3 +355,13 @@ def test_modes_of_nodes_without_coordinates(work, one_sentence):
     assert result.exit_code == 4
     assert "no coordinates" in one_sentence(result)
     assert not {"C.npy", "x.petsc"} & work.files()
+
+
+@pytest.mark.parametrize("mesh", [skfem.MeshQuad, skfem.MeshHex])
+def test_halves_of_a_scalar_mesh_are_no_directions(mesh):
+    """Each half of a grid annihilates constants in itself, which means nothing."""
+    element = {skfem.MeshQuad: skfem.ElementQuad1, skfem.MeshHex: skfem.ElementHex1}[mesh]()
+    axes = (np.linspace(0, 1, 10),) * element.dim
+    matrix = skfem.models.poisson.laplace.assemble(skfem.Basis(mesh.init_tensor(*axes), element))
+    with pytest.raises(NotPlanarError):
+        recover(matrix)

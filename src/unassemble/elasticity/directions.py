@@ -17,7 +17,9 @@ _STARTS = 8
 _SETTLED = 0.05  # energy, relative to the trace, of directions that need no further start
 
 
-def find_directions(matrix: sp.csr_array, group: NDArray, identity: NDArray, d: int) -> NDArray[np.int64]:
+def find_directions(
+    matrix: sp.csr_array, group: NDArray, identity: NDArray, d: int, *, starts: int | None = None
+) -> NDArray[np.int64]:
     """Direction of each row.
 
     Parameters
@@ -27,6 +29,8 @@ def find_directions(matrix: sp.csr_array, group: NDArray, identity: NDArray, d: 
         Rows of one group belong to one node; at most d each. Nodes may be spread over several groups.
     identity : (N,) bool
     d : int
+    starts : int, optional
+        Places to start from, at most.
 
     Returns
     -------
@@ -39,7 +43,7 @@ def find_directions(matrix: sp.csr_array, group: NDArray, identity: NDArray, d: 
     members = [order[start[size == k][:, None] + np.arange(k)] for k in range(1, d + 1)]
     search = _Search(matrix, group, members, identity, d)
     best: tuple[float, NDArray] | None = None
-    for known in _starts(members, len(group), d):
+    for known in _starts(members, len(group), d)[:starts]:
         direction = search.complete(known)
         energy = search.energy(direction)
         if best is None or energy < best[0] - 1e-9:  # equally good names of axes: the first start keeps the order

@@ -45,7 +45,9 @@ class UpperTriangle:
         else:
             wrong = np.ones(self.n, dtype=bool)
         if wrong.any():
-            raise ValueError(f"row {int(np.argmax(wrong))} of the upper triangle does not start with its diagonal entry")
+            raise ValueError(
+                f"row {int(np.argmax(wrong))} of the upper triangle does not start with its diagonal entry"
+            )
 
     @property
     def n(self) -> int:
