@@ -7,6 +7,7 @@ import scipy.sparse as sp
 
 from ..clock import Clock
 from ..errors import GeometryError
+from ..linalg import blas_threads
 from ..matrix import check_matrix
 from .cells import Cells, no_cells, recognise_cells
 from .certificate import largest_residual
@@ -70,6 +71,7 @@ def recover_elasticity(
     with clock("numbering"):
         numbering = numbering or find_numbering(whole, block_size)
         nodal = nodal_matrix(whole, numbering)
+    del whole
     if uncoupled(nodal):
         raise GeometryError(
             "the directions are not coupled: these are scalar matrices side by side; recover one of them by itself"
@@ -81,7 +83,7 @@ def place_nodes(
     nodal: NodalMatrix, numbering: Numbering, clock: Clock, *, cells: bool = True, patch: int | None = None
 ) -> ElasticityRecovery:
     """The recovery once the nodes are known: null space, certificate, cells; see :func:`recover_elasticity`."""
-    with clock("null space"):
+    with clock("null space"), blas_threads(1):
         solution = solve(nodal, patch)
     return _describe(nodal, numbering, solution, clock, cells)
 

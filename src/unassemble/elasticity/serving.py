@@ -58,8 +58,8 @@ def serve(
     if uncoupled(nodal):
         parts = parts_of(whole, nodal, numbering)
         return replace(_vector_laplacian(parts, matrix, anchors, scalar), choice=choice, timings=clock.timings)
-    known = checked_anchors(anchors, numbering.node_of_row, numbering.block_size)
     del whole
+    known = checked_anchors(anchors, numbering.node_of_row, numbering.block_size)
     found = place_nodes(nodal, numbering, clock, cells=cells)
     points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
     lame, scale = _in_units(found, factor)

@@ -1,7 +1,7 @@
 """Sparse linear algebra behind one small interface."""
 
 from .factorisation import Factorisation, backend, factorisation
-from .threads import threads
+from .threads import blas_threads, threads
 from .upper import UpperTriangle, upper_from_edges
 
-__all__ = ["Factorisation", "UpperTriangle", "backend", "factorisation", "threads", "upper_from_edges"]
+__all__ = ["Factorisation", "UpperTriangle", "backend", "blas_threads", "factorisation", "threads", "upper_from_edges"]
