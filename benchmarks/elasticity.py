@@ -1,12 +1,10 @@
 """Coordinates from elasticity matrices: time and memory beside PyAMG's, and growth with the number of nodes.
 
 Run ``python benchmarks/elasticity.py``; options ``--sizes 10 15 31`` (vertices per edge of the cube), ``--kinds
-tet-p1 hex-q1``.
-Each case is a cube clamped and eliminated on one face, inner vertices moved at random, homogeneous material,
-assembled by
-scikit-fem. The peer is PyAMG's smoothed aggregation with conjugate gradients to 1e-8 on the same matrix, without
-coordinates:
-once with its defaults on the scalar matrix, once with the block size.
+tet-p1 hex-q1``, ``--peers plain block true recovered``. Each case is a cube clamped and eliminated on one face, inner
+vertices moved at random, homogeneous material, assembled by scikit-fem. The peer is PyAMG's smoothed aggregation with
+conjugate gradients to 1e-8 on the same matrix: with its defaults on the scalar matrix, with the block size, and with
+true and recovered rigid-body modes.
 """
 
 from __future__ import annotations
@@ -93,6 +91,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--sizes", nargs="+", type=int, default=[10, 15, 22, 31])
     parser.add_argument("--kinds", nargs="+", default=["tet-p1", "hex-q1"])
+    parser.add_argument("--peers", nargs="+", default=["plain", "block", "true", "recovered"])
     parser.add_argument("--one", nargs="+")
     chosen = parser.parse_args()
     if chosen.one:
@@ -105,7 +104,7 @@ def main() -> None:
                 path = Path(folder) / "case.npz"
                 assemble(kind, size, path)
                 mine = in_process("--one", "recover", str(path))
-                peers = {name: in_process("--one", name, str(path)) for name in ("plain", "block", "true", "recovered")}
+                peers = {name: in_process("--one", name, str(path)) for name in chosen.peers}
             print(
                 f"{kind} {mine['nodes']:7d} nodes: coordinates {mine['seconds']:6.2f} s {mine['memory']:6.0f} MiB, "
                 f"error {mine['error']:.0e}, {mine['status']}; PyAMG "

@@ -12,6 +12,7 @@ from scipy.sparse import csgraph
 
 from .errors import GeometryError, NotPlanarError, TopologyError
 from .matrix import OperatorMatrix, load
+from .operators import VectorReading, vector_valued
 from .planar.conformal import estimate_scale
 from .topology import Piece, Topology, recognise
 
@@ -54,6 +55,14 @@ class Inspection:
     mixed_signs : tuple of int
         Rows, the first in each piece, in which c would have the other sign than in most of the piece.
     warnings : tuple of str
+    block_size : int
+        Unknowns per node, 1 for a scalar matrix.
+    n_nodes : int
+        Nodes of a vector-valued matrix, else 0.
+    numbering : str
+        How its unknowns stand; empty for a scalar matrix.
+    coupled : bool
+        Whether its directions are coupled.
     """
 
     n_rows: int
@@ -77,10 +86,17 @@ class Inspection:
     scale: NDArray[np.float64]
     mixed_signs: tuple[int, ...]
     warnings: tuple[str, ...]
+    block_size: int = 1
+    n_nodes: int = 0
+    numbering: str = ""
+    coupled: bool = True
 
     @property
     def operator(self) -> str:
         """The operator that the matrix likely belongs to, or why none."""
+        if self.n_nodes:
+            kind = "elasticity, if the material is isotropic" if self.coupled else "laplacian in each direction"
+            return f"vector-valued, {self.block_size} components, {self.numbering}: {kind}"
         if self.obstacle:
             return "none that this version knows"
         if self.mixed_signs:
@@ -90,6 +106,13 @@ class Inspection:
     @property
     def recoverable(self) -> str:
         """What :func:`unassemble.recover` can make of the matrix."""
+        if self.n_nodes and self.coupled:
+            return (
+                f"coordinates of {_count(self.n_nodes, 'node')} in {self.block_size}D, up to position and size, and "
+                "elements that the matrix re-assembles from"
+            )
+        if self.n_nodes:
+            return "what each direction's scalar matrix holds"
         if not self.planar:
             return "nothing: the graph is not that of a mesh in the plane"
         if self.obstacle:
@@ -140,6 +163,9 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
     """
     matrix = A if isinstance(A, OperatorMatrix) else load(A, variable=variable, drop_zeros=drop_zeros)
     facts = _matrix_facts(matrix)
+    vector = vector_valued(matrix)
+    if vector is not None:
+        return Inspection(**facts, **_no_mesh(vector.why, False, ()), **_nodes_facts(matrix, vector))
     try:
         topology = recognise(matrix.n, matrix.edges)
     except (NotPlanarError, TopologyError) as error:
@@ -176,6 +202,19 @@ def _no_mesh(obstacle: str, planar: bool, witness: tuple[tuple[int, int], ...]) 
         "obstacle": obstacle,
         "scale": np.empty(0),
         "mixed_signs": (),
+    }
+
+
+def _nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]:
+    from .elasticity.nodal import nodal_matrix, uncoupled
+
+    found = vector.numbering
+    words = {"pattern": "in an order found by the pattern"}
+    return {
+        "block_size": found.block_size,
+        "n_nodes": found.n_nodes,
+        "numbering": words.get(found.kind, found.kind),
+        "coupled": not uncoupled(nodal_matrix(matrix.csr(), found)),
     }
 
 
@@ -221,6 +260,9 @@ def _lines(facts: Inspection) -> list[tuple[str, str]]:
         ("row sums", _row_sums(facts)),
         ("planar", _planar(facts)),
     ]
+    if facts.n_nodes:
+        nodes = f"{facts.n_nodes:,} nodes with {facts.block_size} unknowns each, {facts.numbering}"
+        lines.append(("nodes", nodes))
     if not facts.obstacle:
         lines += [("mesh", _mesh(facts)), ("holes", f"{facts.n_holes:,}"), ("pieces", _pieces(facts))]
         lines.append(("scale c", _scale(facts)))
@@ -242,12 +284,14 @@ def _row_sums(facts: Inspection) -> str:
     if facts.n_zero_sums == used:
         return "zero"
     where = f"zero in {facts.n_zero_sums:,} of {used:,} rows only" if facts.n_zero_sums else "not zero"
-    return f"{where}, so a diagonal was added"
+    return where if facts.n_nodes else f"{where}, so a diagonal was added"
 
 
 def _planar(facts: Inspection) -> str:
     if facts.planar:
         return "yes"
+    if facts.n_nodes:
+        return "not looked for, since the rows form nodes of several unknowns"
     shown = ", ".join(f"{i}-{j}" for i, j in facts.witness[:12]) + (", ..." if len(facts.witness) > 12 else "")
     return f"no: the edges {shown} form a subdivision of K5 or K3,3"
 

@@ -88,15 +88,17 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
 
 def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     """Read a matrix as vector-valued after it turned out not to be a planar mesh; None where little speaks for it."""
+    from .elasticity.sampling import promising
     from .elasticity.unknowns import find_numbering
 
     if not matrix.diagonal.all():  # every unknown of an elastic body has a stiffness
         return None
+    whole = matrix.csr()
     try:
-        found = find_numbering(matrix.csr())
+        found = find_numbering(whole) if promising(whole, (3, 2)) else None
     except RecoveryError:
         return None
-    if found.share < _ANNIHILATED or found.common < _COMMON:
+    if found is None or found.share < _ANNIHILATED or found.common < _COMMON:
         return None
     return VectorReading(found, f"it is no planar mesh, and {_evidence(found)}")
 

@@ -355,3 +355,50 @@ def test_modes_of_nodes_without_coordinates(work, one_sentence):
     assert result.exit_code == 4
     assert "no coordinates" in one_sentence(result)
     assert not {"C.npy", "x.petsc"} & work.files()
+
+
+@pytest.mark.parametrize("mesh", [skfem.MeshQuad, skfem.MeshHex])
+def test_halves_of_a_scalar_mesh_are_no_directions(mesh):
+    """Each half of a grid annihilates constants in itself, which means nothing."""
+    element = {skfem.MeshQuad: skfem.ElementQuad1, skfem.MeshHex: skfem.ElementHex1}[mesh]()
+    axes = (np.linspace(0, 1, 10),) * element.dim
+    matrix = skfem.models.poisson.laplace.assemble(skfem.Basis(mesh.init_tensor(*axes), element))
+    with pytest.raises(NotPlanarError):
+        recover(matrix)
+
+
+def test_inspect(work):
+    given = body("tet-p1")
+    matrix, nodes = clamped(given)
+    work.write("E.mtx", matrix)
+    result = work.run("inspect", "E.mtx")
+    assert result.exit_code == 0
+    assert "vector-valued, 3 components, interleaved: elasticity" in result.stdout
+    facts = json.loads(work.run("inspect", "--json", "E.mtx").stdout)
+    assert facts["n_nodes"] == len(nodes)
+    assert facts["block_size"] == 3
+    assert facts["coupled"]
+    assert json.loads(work.run("inspect", "--json", "A.mtx").stdout)["block_size"] == 1
+
+
+@pytest.mark.parametrize("kind", [*CELLS, "tri-p2"])
+def test_pictures(work, kind):
+    given = body(kind) if kind in CELLS else stiffness(kind, box(kind, (5, 6)))
+    matrix = sp.block_diag([given.matrix, given.matrix], format="csr") if kind == "hex-q1" else given.matrix
+    work.write("E.mtx", matrix)
+    assert work.recover("--plot", "p.png", "--plot", "p.svg", matrix="E.mtx").exit_code == 0
+    text = Path("p.svg").read_text()
+    drawn = {"tet-p1": "tetrahedra", "hex-q1": "hexahedra", "quad-q1": "quadrilaterals", "tri-p1": "triangles"}
+    figure = recover(matrix).plot()
+    (ax,) = figure.axes
+    assert "<svg" in text
+    if kind not in CELLS:
+        assert len(ax.lines[0].get_xdata()) == len(given.points)
+        return
+    assert any(drawn[kind] in label.get_text() for label in figure.texts)
+    facets = sum(len(collection.get_paths()) for collection in ax.collections[:1])
+    counts = [c - 1 for c in ((7, 8) if kind in FLAT else (4, 5, 5))]
+    if kind == "hex-q1":  # three of the six sides of a box face the eye
+        assert facets == 2 * (counts[0] * counts[1] + counts[0] * counts[2] + counts[1] * counts[2])
+    if kind == "quad-q1":
+        assert facets == counts[0] * counts[1]

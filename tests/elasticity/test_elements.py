@@ -84,3 +84,12 @@ def test_poisson_ratio_near_one_half_loses_digits():
     assert found.certified
     assert error(found.points, given.points) < 1e-10
     assert found.poisson_ratio == pytest.approx(nu, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["tri-p2", "tet-p2"])
+def test_quadratic_cells_are_not_taken_for_many_linear_ones(kind):
+    """The stiffness of a quadratic triangle is a combination of those of overlapping linear ones."""
+    given = case(kind, 0.2, varying=False)
+    found = recover_elasticity(given.matrix)
+    assert found.certified
+    assert not found.cells.recognised

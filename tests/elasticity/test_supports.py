@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from assembled import (
+    ELEMENTS,
     box,
     error,
     heterogeneous,
@@ -119,6 +120,33 @@ def test_rollers_eliminated(kind, order):
     truth = np.empty((len(found.points), d))
     truth[found.node_of_row] = given.points[rows // d]
     assert error(found.points, truth) < 1e-10
+
+
+def wing():
+    """Thin and graded: where cells are flat, entries hardly tell directions apart."""
+    mesh = ELEMENTS["tri-p1"][0].init_tensor(np.linspace(0, 1, 41), np.linspace(-1, 1, 9))
+    x, y = mesh.p
+    thickness = 0.19 * (1.1 - x) * np.sqrt(x + 0.02)
+    return stiffness("tri-p1", type(mesh)(np.stack([x, 0.1 * np.sin(np.pi * x) + thickness * y]), mesh.t))
+
+
+def test_regions_that_were_labelled_from_different_sides_are_reconciled():
+    given = wing()
+    rows = np.random.default_rng(0).permutation(2 * len(given.points))
+    found = recover_elasticity(given.matrix[rows][:, rows])
+    assert found.certified
+    assert len(found.evidence) == 1
+    assert found.cells.n_cells == len(given.cells)
+    assert len(np.unique(np.column_stack([found.direction_of_row, rows % 2]), axis=0)) == 2
+
+
+def test_directions_that_contradict_each_other_are_not_certified(monkeypatch):
+    monkeypatch.setattr("unassemble.elasticity.directions._exchanged", lambda search, matrix, group, found, d: found)
+    given = wing()
+    rows = np.random.default_rng(0).permutation(2 * len(given.points))
+    found = recover_elasticity(given.matrix[rows][:, rows])
+    assert found.status == "uncertified"
+    assert "contradiction" in found.reason
 
 
 def test_given_numbering_is_used():

@@ -26,7 +26,9 @@ from .nodal import NodalMatrix
 
 _log = logging.getLogger(__name__)
 _PATCH = {2: 6000, 3: 1900}  # rows per chart: larger ones cost more to factorise, smaller ones overlap more
-_MOST = 64  # fields of the whole body to look for
+_MOST = 64  # fields of the whole body to look for, at most
+_LEAST = 8
+_SOFT = 1e-6  # least squares of fields beyond which they are stiff
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,13 +141,16 @@ def _lowest(form: NDArray, count: int) -> NDArray:
     """Eigenvectors of the least eigenvalues of a positive semidefinite form, by inverse iteration."""
     n = len(form)
     if n <= 4 * count:
-        return np.asarray(scipy.linalg.eigh(form)[1][:, :count])
+        values, v = scipy.linalg.eigh(form)
+        return np.asarray(v[:, : max(int((values[:count] < _SOFT).sum()) + 1, min(_LEAST, count))])
     factor = scipy.linalg.cho_factor(form + 1e-13 * np.eye(n))
     x = np.random.default_rng(0).standard_normal((n, count))
     for _ in range(4):
         x = np.linalg.qr(scipy.linalg.cho_solve(factor, x))[0]
-    _, v = scipy.linalg.eigh(x.T @ form @ x)
-    return np.asarray(x @ v)
+    values, v = scipy.linalg.eigh(x.T @ form @ x)
+    # The stiff rest says nothing but where it begins.
+    kept = max(int((values < _SOFT).sum()) + 1, min(_LEAST, count))
+    return np.asarray(x @ v[:, :kept])
 
 
 def _measured(

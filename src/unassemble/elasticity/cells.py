@@ -15,11 +15,14 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..linalg import threads
 from .cliques import Graph, boxes, ordered_boxes, simplices
 from .elements import element_blocks
 from .nodal import NodalMatrix, determined, valid_pairs
+from .surface import tiles
 
 _KINDS = {2: ("triangles", "quads"), 3: ("tetrahedra", "hexahedra")}
+MESHIO = {"triangles": "triangle", "quads": "quad", "tetrahedra": "tetra", "hexahedra": "hexahedron"}
 _FITS = 1e-9
 _EMPTY = 1e-7  # of the largest coefficient; candidates below carry no material
 _LINEAR = {2: 8, 3: 20}  # blocks per row, at most, in meshes of linear simplices; others have too many cliques to try
@@ -131,15 +134,25 @@ def _fit(nodal: NodalMatrix, points: NDArray, cells: NDArray, order: int, entrie
     weight = np.sqrt(np.asarray(operator.power(2).sum(axis=0)).ravel())
     seen = weight > 0
     scaled = operator[:, np.flatnonzero(seen)] @ sp.diags_array(1 / weight[seen])
-    answer = sp.linalg.lsmr(scaled, target, atol=1e-15, btol=1e-15, conlim=0, maxiter=600)[0]
+    with threads(1):  # its many short vectors are not worth waking threads for
+        answer = sp.linalg.lsmr(scaled, target, atol=1e-15, btol=1e-15, conlim=0, maxiter=600)[0]
     lame = np.zeros(2 * len(cells))
     lame[seen] = answer / weight[seen]
     error = float(np.abs(operator @ lame - target).max())
     pairs = lame.reshape(-1, 2)
     carries = np.abs(pairs).max(axis=1) > _EMPTY * np.abs(pairs).max()
-    if not error <= _FITS:
+    if not error <= _FITS or not _are_elements(kind, cells[carries], pairs[carries]):
         return no_cells(d)
     return Cells(kind, cells[carries], pairs[carries], error)
+
+
+def _are_elements(kind: str, cells: NDArray[np.int64], lame: NDArray[np.float64]) -> bool:
+    """Whether cells have shear moduli of one sign and do not overlap; made-up ones do one or the other.
+
+    A quadratic triangle, for one, is a combination of small linear ones and a large one with a negative modulus.
+    """
+    mu = lame[:, 1]
+    return bool((mu > 0).all() or (mu < 0).all()) and tiles(MESHIO[kind], cells)
 
 
 def _assembly(nodal: NodalMatrix, points: NDArray, cells: NDArray, order: int, entries: _Entries) -> sp.csr_array:

@@ -45,6 +45,12 @@ def split(group: NDArray[np.int64], d: int) -> NDArray[np.int64]:
     return by_first_row(split)
 
 
+def possible_nodes(group: NDArray[np.int64], d: int) -> list[NDArray[np.int64]]:
+    """Labels of rows to start a search from: rows of the same pattern as nodes, if these are not too large; none."""
+    whole = group if np.bincount(group).max() <= d else split(group, d)
+    return [*([whole] if np.bincount(whole).max() <= d else []), np.arange(len(group))]
+
+
 def coupled_in_common(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> float:
     """How far the rows of one node couple to the same nodes: 1 if all do, about 1 / d if their nodes are made up."""
     n = node.max() + 1

@@ -7,6 +7,7 @@ import scipy.sparse as sp
 
 from ..clock import Clock
 from ..errors import GeometryError
+from ..linalg import blas_threads
 from ..matrix import check_matrix
 from .cells import Cells, no_cells, recognise_cells
 from .certificate import largest_residual
@@ -70,6 +71,7 @@ def recover_elasticity(
     with clock("numbering"):
         numbering = numbering or find_numbering(whole, block_size)
         nodal = nodal_matrix(whole, numbering)
+    del whole
     if uncoupled(nodal):
         raise GeometryError(
             "the directions are not coupled: these are scalar matrices side by side; recover one of them by itself"
@@ -81,7 +83,7 @@ def place_nodes(
     nodal: NodalMatrix, numbering: Numbering, clock: Clock, *, cells: bool = True, patch: int | None = None
 ) -> ElasticityRecovery:
     """The recovery once the nodes are known: null space, certificate, cells; see :func:`recover_elasticity`."""
-    with clock("null space"):
+    with clock("null space"), blas_threads(1):
         solution = solve(nodal, patch)
     return _describe(nodal, numbering, solution, clock, cells)
 
@@ -99,7 +101,7 @@ def _describe(
         with clock("cells"):
             found = recognise_cells(nodal, points)
     backward = found.backward_error if found.recognised else error
-    status, reason = _verdict(solution, error, found, numbering)
+    status, reason = _verdict(nodal, solution, error, found, numbering)
     loose = ~determined(points)
     warnings = list(solution.warnings)
     if loose.any():
@@ -118,7 +120,9 @@ _FREEDOMS = {
 }
 
 
-def _verdict(solution: Solution, error: float, found: Cells, numbering: Numbering) -> tuple[str, str]:
+def _verdict(
+    nodal: NodalMatrix, solution: Solution, error: float, found: Cells, numbering: Numbering
+) -> tuple[str, str]:
     remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
     if remaining:
         return "uncertified", f"the null space is larger than it should be: {remaining[0]}"
@@ -133,6 +137,11 @@ def _verdict(solution: Solution, error: float, found: Cells, numbering: Numberin
             "supports leave too few rows that are surely whole; rows whose entries add up to zero were taken for "
             "whole, which they need not be"
         )
+    if numbering.kind == "pattern" and _torn(nodal, solution):
+        return "uncertified", (
+            "which direction each row belongs to was inferred from the entries, and not without contradiction: coupled "
+            "nodes came out as separate pieces; give the numbering if it is known"
+        )
     if found.recognised and found.backward_error <= CERTIFIED:
         return "certified", f"the matrix re-assembled on the {found.n_cells} elements is the given one"
     if numbering.kind == "pattern" and numbering.incomplete:
@@ -143,3 +152,12 @@ def _verdict(solution: Solution, error: float, found: Cells, numbering: Numberin
     if error <= CERTIFIED:
         return "certified", "the valid identities hold to rounding, and only translations and scale satisfy them"
     return "uncertified", f"the largest residual of a valid identity is {error:.1e}"
+
+
+def _torn(nodal: NodalMatrix, solution: Solution) -> bool:
+    """Whether nodes of different pieces are connected through the matrix."""
+    graph = sp.csr_array((np.ones(len(nodal.indices), np.int8), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2)
+    label = sp.csgraph.connected_components(graph, directed=False)[1]
+    known = solution.component >= 0
+    pairs = np.unique(np.column_stack([label, solution.component])[known], axis=0)
+    return len(np.unique(pairs[:, 0])) < len(pairs)

@@ -15,13 +15,13 @@ from ..errors import RecoveryError
 from ..matrix import OperatorMatrix, check_matrix
 from ..recovery import Recovery
 from .anchoring import anchored, checked_anchors
+from .cells import MESHIO
 from .nodal import nodal_matrix, uncoupled
 from .recover import parts_of, place_nodes
 from .results import ElasticityRecovery, ScalarParts
 from .surface import boundary_loops
 from .unknowns import Numbering
 
-_MESHIO = {"triangles": "triangle", "quads": "quad", "tetrahedra": "tetra", "hexahedra": "hexahedron"}
 _SAME = 1e-12  # relative difference up to which the matrices of two directions are one
 
 Scalar = Callable[[OperatorMatrix, Sequence[Any]], Recovery]
@@ -58,8 +58,8 @@ def serve(
     if uncoupled(nodal):
         parts = parts_of(whole, nodal, numbering)
         return replace(_vector_laplacian(parts, matrix, anchors, scalar), choice=choice, timings=clock.timings)
-    known = checked_anchors(anchors, numbering.node_of_row, numbering.block_size)
     del whole
+    known = checked_anchors(anchors, numbering.node_of_row, numbering.block_size)
     found = place_nodes(nodal, numbering, clock, cells=cells)
     points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
     lame, scale = _in_units(found, factor)
@@ -67,7 +67,7 @@ def serve(
     fields.pop("", None)
     boundary, offsets = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
     if found.cells.recognised and nodal.dim == 2:
-        boundary, offsets = boundary_loops(_MESHIO[found.cells.kind], found.cells.cells)
+        boundary, offsets = boundary_loops(MESHIO[found.cells.kind], found.cells.cells)
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: with a mesh its point reflection fits the matrix as well")
     return Recovery(

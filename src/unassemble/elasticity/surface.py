@@ -30,6 +30,19 @@ def outer_facets(kind: str, cells: NDArray[np.int64]) -> NDArray[np.int64]:
     return facets[count[which.ravel()] == 1]
 
 
+def tiles(kind: str, cells: NDArray[np.int64]) -> bool:
+    """Whether positively oriented cells lie side by side: any facet bounds one from each side at most.
+
+    Cells made up to explain entries overlap: several small triangles in a quadratic one, for example.
+    """
+    corners = np.array(_FACETS[kind])
+    facets = cells[:, corners].reshape(-1, corners.shape[1])
+    if facets.shape[1] > 2:  # start with the least node: the order of the others then tells the side, as an edge's does
+        start = facets.argmin(axis=1)[:, None]
+        facets = np.take_along_axis(facets, (start + np.arange(facets.shape[1])) % facets.shape[1], axis=1)
+    return len(np.unique(facets, axis=0)) == len(facets)
+
+
 def boundary_loops(kind: str, cells: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Directed boundary edges of planar cells loop by loop, and where each loop begins.
 

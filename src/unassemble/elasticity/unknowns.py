@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, RecoveryError
 from .directions import find_directions, nodes_by_neighbours
-from .grouping import by_first_row, coupled_in_common, same_pattern, split
+from .grouping import by_first_row, coupled_in_common, possible_nodes, same_pattern
 
 _ROUNDING = 1e-9
 _ROUNDS = 4
+_FEW = 4  # places to start from where a glance is all that a matrix gets
 _KINDS = ("interleaved", "by component")
 _ORDERLY = 0.8  # rows of made-up nodes couple to common nodes less than this
 
@@ -103,12 +104,13 @@ def numbering_at_sight(matrix: sp.csr_array) -> Numbering | None:
     if best is not None and best.share > 0 and best.common > _ORDERLY:
         return best
     group = same_pattern(matrix, identity)
-    size = np.bincount(group)[group]
-    twins = max(np.count_nonzero(size % d == 0) for d in (2, 3))
-    try:
-        return find_numbering(matrix) if 2 * twins > len(group) else None
-    except RecoveryError:
-        return None
+    twins = [d for d in (3, 2) if 2 * np.count_nonzero(np.bincount(group)[group] == d) > len(group)]
+    found = []
+    for d in twins:
+        direction = find_directions(matrix, group, identity, d, starts=_FEW) if np.bincount(group).max() <= d else None
+        if direction is not None:
+            found.append(_measured(matrix, identity, group, direction, d))
+    return max(found, key=_quality, default=None)
 
 
 def regular_numbering(matrix: sp.csr_array, kind: str, block_size: int | None = None) -> Numbering:
@@ -157,9 +159,7 @@ def _searched(matrix: sp.csr_array, identity: NDArray, sizes: tuple[int, ...]) -
     group = same_pattern(matrix, identity)
     found = []
     for d in (d for d in sizes if d <= len(group)):
-        whole = group if np.bincount(group).max() <= d else split(group, d)
-        starts = [whole] if np.bincount(whole).max() <= d else []
-        for start in [*starts, np.arange(len(group))]:
+        for start in possible_nodes(group, d):
             node = start
             for _ in range(_ROUNDS):  # directions tell nodes apart, and nodes help to find directions
                 direction = find_directions(matrix, node, identity, d)
@@ -173,7 +173,7 @@ def _searched(matrix: sp.csr_array, identity: NDArray, sizes: tuple[int, ...]) -
 
 
 def _measured(matrix: sp.csr_array, identity: NDArray, node: NDArray, direction: NDArray, d: int) -> Numbering:
-    share, common = _share(matrix, identity, direction, d), coupled_in_common(matrix, node, direction)
+    share, common = _share(matrix, identity, direction, d, searched=True), coupled_in_common(matrix, node, direction)
     return Numbering(d, node, direction, identity, "pattern", share, common)
 
 
@@ -196,8 +196,13 @@ def _regular(matrix: sp.csr_array, identity: NDArray, d: int, kind: str, *, chec
     return Numbering(d, node, direction, identity, kind, _share(matrix, identity, direction, d), common)
 
 
-def _share(matrix: sp.csr_array, identity: NDArray, direction: NDArray, d: int) -> float:
-    """Share of pairs (row, direction) that annihilate constants. Rows that annihilate all at once count only."""
+def _share(matrix: sp.csr_array, identity: NDArray, direction: NDArray, d: int, *, searched: bool = False) -> float:
+    """Share of pairs (row, direction) that annihilate constants.
+
+    Only rows count that annihilate their own direction and another one to which they do couple: sums of nothing are
+    no evidence. Where no row couples to another direction, as in vector Laplacians, none needs to, unless the
+    directions are the result of a search, which would find any halves of any mesh.
+    """
     live = ~identity
     if not live.any():
         return 0.0
@@ -207,6 +212,10 @@ def _share(matrix: sp.csr_array, identity: NDArray, direction: NDArray, d: int) 
     size = np.asarray(off).ravel()[live]
     zero = np.abs(matrix @ ones)[live] <= _ROUNDING * size[:, None]
     own = zero[np.arange(len(size)), direction[live]]
+    other = np.arange(d) != direction[live][:, None]
+    coupled = other & ((abs(matrix) @ ones)[live] > _ROUNDING * size[:, None])
+    if searched or coupled.any():
+        own &= (zero & coupled).any(axis=1)
     return float((zero & own[:, None]).mean())
 
 
@@ -229,5 +238,5 @@ def given_numbering(matrix: sp.csr_array, node_of_row: NDArray, direction_of_row
     if len(np.unique(node * d + direction)) < order:
         raise InputError("two rows have the same node and direction")
     identity = _uncoupled_rows(matrix)
-    share, common = _share(matrix, identity, direction, d), coupled_in_common(matrix, node, direction)
+    share, common = _share(matrix, identity, direction, d, searched=True), coupled_in_common(matrix, node, direction)
     return Numbering(d, node, direction, identity, "given", share, common)

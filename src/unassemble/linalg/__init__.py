@@ -2,7 +2,16 @@
 
 from .ahead import AnalysisAhead
 from .factorisation import Factorisation, backend, factorisation
-from .threads import threads
+from .threads import blas_threads, threads
 from .upper import UpperTriangle, upper_from_edges
 
-__all__ = ["AnalysisAhead", "Factorisation", "UpperTriangle", "backend", "factorisation", "threads", "upper_from_edges"]
+__all__ = [
+    "AnalysisAhead",
+    "Factorisation",
+    "UpperTriangle",
+    "backend",
+    "blas_threads",
+    "factorisation",
+    "threads",
+    "upper_from_edges",
+]

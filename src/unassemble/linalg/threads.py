@@ -19,3 +19,12 @@ def threads(count: int | None) -> AbstractContextManager[Any]:
         raise InputError(f"the number of threads is at least 1, not {count}")
     backend()  # loads MKL, so that the limit reaches it
     return threadpool_limits(count)
+
+
+def blas_threads(count: int) -> AbstractContextManager[Any]:
+    """Within this context numpy's and scipy's own BLAS use `count` threads; PARDISO keeps its.
+
+    Panels of a dozen columns gain little from threads, and lose much where other work keeps a core busy: threads wait
+    for each other many times per factorisation.
+    """
+    return threadpool_limits({"libopenblas": count, "libscipy_openblas": count, "openblas": count})

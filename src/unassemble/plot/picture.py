@@ -9,6 +9,7 @@ import numpy as np
 
 from ..report import cells_text, scale_text
 from . import style
+from .body import plot_body
 from .canvas import check_plot, footer, header, panels, write_figure
 from .layout import drawing_of
 from .mesh import draw_hinges, draw_mesh, draw_worst, extent, outer_loops
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
 def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None) -> Figure:
     """Draw a recovered mesh: cells, outer boundary, holes, hinges, and what fits worst if uncertified.
 
-    Pieces whose frames overlap are drawn side by side. Points without coordinates are left out.
+    Pieces whose frames overlap are drawn side by side. Points without coordinates are left out. Of bodies in space
+    the outer surface is drawn, shaded.
 
     Parameters
     ----------
@@ -37,6 +39,11 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     """
     if path is not None:
         check_plot(path)
+    if recovery.operator == "elasticity":
+        figure = plot_body(recovery, recovery.status, details(recovery))
+        if path is not None:
+            write_figure(figure, path)
+        return figure
     drawing = drawing_of(recovery)
     outer = outer_loops(drawing.points, drawing.boundary, drawing.offsets)
     figure, (ax,) = panels([extent(drawing.points, drawing.triangles)])
@@ -61,6 +68,9 @@ def details(recovery: Recovery) -> str:
     missing = int(np.count_nonzero(recovery.node_status))
     if missing:
         parts.append(f"{missing:,} not determined")
-    parts.append(f"c = {scale_text(recovery, 6)}")
+    if recovery.operator != "elasticity":
+        parts.append(f"c = {scale_text(recovery, 6)}")
+    elif recovery.poisson_ratio is not None:
+        parts.append(f"Poisson's ratio {recovery.poisson_ratio:.6g}")
     parts.append(f"backward error {recovery.backward_error:.1e}")
     return "  ·  ".join(parts)
