@@ -67,20 +67,31 @@ def cautious_polish(
     pins = distant_pair(z)
     problem = Problem(piece, weights, spread, scale)
     fit, steps, converged = problem.at(z), 0, False
+    history: list[tuple[float, float]] = []
     while steps < options.max_steps and not converged:
         jacobian = WeightJacobian(piece, fit.z, spread)
         system = GaussNewton(jacobian, NormalEquations(jacobian, pins), fit.weights if scale is None else None)
         move = system(jacobian, fit.misfit)
         system.release()
         steps += 1
-        converged = float(np.linalg.norm(jacobian.forward(move))) <= options.settled * fit.noise
+        change = float(np.linalg.norm(jacobian.forward(move)))
+        converged = change <= options.settled * fit.noise
+        history.append((fit.norm, change))
         share = _allowed(piece, fit.z, move, options.least_area)
         better = downhill(problem, fit, share * move)
         _log.debug("cautious step %d: share %.1e, misfit %.3e", steps, share, fit.norm)
-        if better is None:
+        if better is None or (not converged and _stalled(history)):
             break
         fit = better
     return PolishedMesh(fit.z * extent, fit.scale, fit.norm, steps, steps, converged)
+
+
+def _stalled(history: list[tuple[float, float]], steps: int = 6) -> bool:
+    """Whether in so many steps neither the misfit fell by a thousandth nor the steps became half as large."""
+    if len(history) <= steps:
+        return False
+    (before, long), (now, short) = history[-steps - 1], history[-1]
+    return now > 0.999 * before and short > 0.5 * long
 
 
 def signed_areas(piece: Piece, z: NDArray) -> NDArray[np.float64]:
