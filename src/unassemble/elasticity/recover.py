@@ -104,6 +104,11 @@ def _describe(
     status, reason = _verdict(nodal, solution, error, found, numbering)
     loose = ~determined(points)
     warnings = list(solution.warnings)
+    if want_cells and not found.recognised:
+        warnings.append(
+            "no elements were recognised: looked for are linear triangles and tetrahedra in bodies of moderate size, "
+            "and bilinear quadrilaterals and trilinear hexahedra of one material each"
+        )
     if loose.any():
         warnings.append(f"{loose.sum()} of {nodal.n} nodes are tied to eliminated unknowns only and stay undetermined")
     if solution.ratio is not None:
