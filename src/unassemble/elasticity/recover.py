@@ -99,7 +99,7 @@ def _describe(
     found = no_cells(nodal.dim)
     if want_cells and error < 1e-6:
         with clock("cells"):
-            found = recognise_cells(nodal, points)
+            found = recognise_cells(nodal, points, None if ratio is None else 2 * ratio / (1 - 2 * ratio))
     backward = found.backward_error if found.recognised else error
     status, reason = _verdict(nodal, solution, error, found, numbering)
     loose = ~determined(points)
