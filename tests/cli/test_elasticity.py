@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 
@@ -402,3 +403,9 @@ def test_pictures(work, kind):
         assert facets == 2 * (counts[0] * counts[1] + counts[0] * counts[2] + counts[1] * counts[2])
     if kind == "quad-q1":
         assert facets == counts[0] * counts[1]
+
+
+def test_scalar_matrices_do_not_load_the_elasticity_room(work):
+    script = "import sys, unassemble; unassemble.recover('A.mtx'); print('unassemble.elasticity' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..linalg import threads
 from .cliques import Graph, boxes, ordered_boxes, simplices
 from .elements import element_blocks
+from .homogeneous import reassembled
 from .nodal import NodalMatrix, determined, valid_pairs
 from .surface import tiles
 
@@ -67,8 +68,10 @@ def no_cells(d: int) -> Cells:
     return Cells("", np.empty((0, d + 1), np.int64), np.empty((0, 2)), float("nan"))
 
 
-def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64]) -> Cells:
+def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: float | None = None) -> Cells:
     """Find linear simplices, or multilinear boxes, that re-assemble to the matrix.
+
+    With lambda / mu known to be one number, `ratio`, one material is tried first, which is quick.
 
     Entries between two nodes that both miss a neighbour are left out, since cells that lost a node to a support
     contribute to them. Cells all of whose entries are left out cannot be seen and are not reported.
@@ -86,12 +89,12 @@ def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64]) -> Cells:
     if len(box) and len(np.unique(box)) > 0.9 * known.sum() and len(box) < _MOST // 4:
         box = ordered_boxes(box, points)
         for order in (2, 3, 4, 1):
-            found = _fit(nodal, points, box, order, entries, _KINDS[d][1])
+            found = _fit(nodal, points, box, order, entries, _KINDS[d][1], ratio)
             if found.recognised:
                 return found
     if nodal.n * (2 if d == 2 else 8) > _MOST or pattern.nnz > nodal.n * _LINEAR[d]:
         return no_cells(d)
-    return _fit(nodal, points, _oriented(simplices(graph, d), points), 1, entries, _KINDS[d][0])
+    return _fit(nodal, points, _oriented(simplices(graph, d), points), 1, entries, _KINDS[d][0], ratio)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,11 +127,38 @@ def _oriented(cells: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[
     return cells
 
 
-def _fit(nodal: NodalMatrix, points: NDArray, cells: NDArray, order: int, entries: _Entries, kind: str) -> Cells:
-    """Least squares for the coefficients of all candidates."""
+def _homogeneous(
+    points: NDArray, cells: NDArray, order: int, entries: _Entries, kind: str, ratio: float
+) -> Cells | None:
+    """All candidates, of one material; None where they do not fit."""
+    blocks, seen = reassembled(points, cells, order, ratio, entries.key)
+    square = float((blocks * blocks).sum())
+    if not square:
+        return None
+    mu = float((blocks * entries.value).sum()) / square
+    error = float(np.abs((mu * blocks - entries.value) / entries.size[:, None, None]).max())
+    lame = np.tile([ratio * mu, mu], (int(seen.sum()), 1))
+    if not error <= _FITS or not _are_elements(kind, cells[seen], lame):
+        return None
+    return Cells(kind, cells[seen], lame, error)
+
+
+def _fit(
+    nodal: NodalMatrix,
+    points: NDArray,
+    cells: NDArray,
+    order: int,
+    entries: _Entries,
+    kind: str,
+    ratio: float | None,
+) -> Cells:
+    """One material, or least squares for the coefficients of all candidates."""
     d = nodal.dim
     if not len(cells) or not len(entries.key):
         return no_cells(d)
+    found = None if ratio is None else _homogeneous(points, cells, order, entries, kind, ratio)
+    if found is not None:
+        return found
     operator = _assembly(nodal, points, cells, order, entries)
     target = (entries.value / entries.size[:, None, None]).ravel()
     weight = np.sqrt(np.asarray(operator.power(2).sum(axis=0)).ravel())

@@ -99,11 +99,16 @@ def _describe(
     found = no_cells(nodal.dim)
     if want_cells and error < 1e-6:
         with clock("cells"):
-            found = recognise_cells(nodal, points)
+            found = recognise_cells(nodal, points, None if ratio is None else 2 * ratio / (1 - 2 * ratio))
     backward = found.backward_error if found.recognised else error
     status, reason = _verdict(nodal, solution, error, found, numbering)
     loose = ~determined(points)
     warnings = list(solution.warnings)
+    if want_cells and not found.recognised:
+        warnings.append(
+            "no elements were recognised: looked for are linear triangles and tetrahedra in bodies of moderate size, "
+            "and bilinear quadrilaterals and trilinear hexahedra of one material each"
+        )
     if loose.any():
         warnings.append(f"{loose.sum()} of {nodal.n} nodes are tied to eliminated unknowns only and stay undetermined")
     if solution.ratio is not None:
