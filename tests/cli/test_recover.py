@@ -165,6 +165,7 @@ def test_settings_reach_the_library(work, monkeypatch):
         "direction": None,
         "handed": "left",
         "standard_deviations": False,
+        "triangulate": False,
         "block_size": None,
         "numbering": None,
         "variable": None,

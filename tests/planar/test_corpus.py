@@ -7,15 +7,12 @@ from meshes import SHARED, largest_error, needs_shared, specimen, triangle_set
 from unassemble import recover
 
 MESHES = sorted((SHARED / "corpus" / "planar").glob("*.npz")) if SHARED.is_dir() else []
-TRIANGULAR_HOLES = {"thetis_japan_sea", "thetis_north_sea"}
 SLIVERS = {"meshpart_Tapir"}  # angles down to 0.002 degrees
 
 
 @needs_shared
 @pytest.mark.parametrize("path", MESHES, ids=lambda path: path.stem)
 def test_corpus_mesh_is_recovered(path):
-    if path.stem in TRIANGULAR_HOLES:
-        pytest.skip("a hole of three edges is taken for an element; see the test below")
     mesh = np.load(path)
     rng = np.random.default_rng(len(path.stem))
     for seed in range(2):
@@ -29,16 +26,6 @@ def test_corpus_mesh_is_recovered(path):
             rows = np.flatnonzero(found.component == label)
             error = largest_error(found.points[rows], known.points[rows])
             assert error <= (1e-9 if path.stem in SLIVERS else 1e-12)
-
-
-@needs_shared
-@pytest.mark.parametrize("name", sorted(TRIANGULAR_HOLES))
-def test_triangular_hole_is_never_certified(name):
-    mesh = np.load(SHARED / "corpus" / "planar" / f"{name}.npz")
-    found = recover(specimen(mesh["points"], mesh["triangles"]).matrix)
-    assert found.status == "uncertified"
-    assert found.backward_error > 1e-3
-    assert len(found.worst_entries)
 
 
 @needs_shared

@@ -17,7 +17,7 @@ from ..topology import Numbering, Piece, Polygons, Topology, components, located
 from .reading import FITS, Reading, row_sizes
 from .search import read_cells
 
-_BETTER = 0.3  # a reading that does not fit replaces the triangles only if its misfit is below this times theirs
+_BETTER = 0.1  # a reading that does not fit replaces the triangles only if its misfit is below this times theirs
 
 Outcome = PieceMesh | RecoveryError
 """Positions of a piece, or why there are none."""
