@@ -55,7 +55,9 @@ def test_grid(name):
     assert whole.n_polygons == 0
     assert len(whole.triangles) == len(triangles)
     ratio = np.linalg.norm(known.points[0] - known.points[1]) / np.linalg.norm(whole.points[0] - whole.points[1])
-    assert area(whole.points, whole.triangles) * ratio**2 == pytest.approx(area(known.points, known.triangles), rel=1e-9)
+    assert area(whole.points, whole.triangles) * ratio**2 == pytest.approx(
+        area(known.points, known.triangles), rel=1e-9
+    )
     # A triangle of the mesh is a cell, or part of one.
     size = np.diff(found.polygons_offsets)
     assert (size > 3).all()

@@ -9,15 +9,18 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from ..errors import GeometryError, RecoveryError
+from ..errors import GeometryError, RecoveryError, SolverError
 from ..matrix import OperatorMatrix
 from ..planar.cotangent import edge_weights
 from ..planar.piece import PieceMesh
+from ..planar.polish import PolishOptions, polish
 from ..topology import Numbering, Piece, Polygons, Topology, components, located, recognise
-from .reading import FITS, Reading, row_sizes
+from .reading import FITS, Reading, even, row_sizes
 from .search import read_cells
 
 _BETTER = 0.1  # a reading that does not fit replaces the triangles only if its misfit is below this times theirs
+
+_SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 
 Outcome = PieceMesh | RecoveryError
 """Positions of a piece, or why there are none."""
@@ -37,15 +40,34 @@ class _Part:
 def in_doubt(matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome]) -> NDArray[np.bool_]:
     """(n,) rows of components with nonzero entries on no triangle, or entries that do not fit.
 
-    A misfit that is small and spread evenly is that of errors in the entries, and raises no doubt.
+    A misfit that is small and spread evenly, at the latest after a short polish, is that of errors in the entries, and
+    raises no doubt.
     """
     misfit = _misfits(matrix, topology, meshes)
     doubtful = np.zeros(matrix.n, dtype=bool)
-    if not _like_noise(misfit):
-        label = _component(matrix)
-        doubtful[label[matrix.edges[misfit > FITS, 0]]] = True
-        doubtful = doubtful[label]
-    return doubtful
+    wrong = misfit > FITS
+    if not wrong.any() or even(misfit):
+        return doubtful
+    if len(topology.bare_edges) == 0 and even(_misfits(matrix, topology, _shortly_polished(matrix, topology, meshes))):
+        return doubtful
+    label = _component(matrix)
+    doubtful[label[matrix.edges[wrong, 0]]] = True
+    return doubtful[label]
+
+
+def _shortly_polished(matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome]) -> list[Outcome]:
+    polished: list[Outcome] = []
+    for piece, mesh in zip(topology.pieces, meshes, strict=True):
+        if isinstance(mesh, PieceMesh):
+            try:
+                found = polish(piece, -matrix.entries[piece.edge_rows], mesh.z, options=_SHORT)
+            except SolverError as error:
+                polished.append(error)
+                continue
+            polished.append(PieceMesh(found.z, found.scale))
+        else:
+            polished.append(mesh)
+    return polished
 
 
 def completed(
@@ -109,12 +131,6 @@ def _misfits(matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome]) 
                 gap = np.abs(mesh.scale * edge_weights(piece, mesh.z) + matrix.entries[rows]) / size[rows]
             misfit[rows] = np.where(gap < 1, gap, 1.0)
     return misfit
-
-
-def _like_noise(misfit: NDArray) -> bool:
-    """Small everywhere and spread evenly: errors of the entries, not wrong cells."""
-    size = float(np.sqrt(np.mean(misfit**2)))
-    return size < 1e-2 and float(misfit.max()) < 12 * size
 
 
 def _component(matrix: OperatorMatrix) -> NDArray[np.int64]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeometryError, SolverError
-from ..planar.conformal import conformal_map
+from ..planar.conformal import ConformalOptions, conformal_map
 from ..planar.cotangent import edge_weights
 from ..planar.hinges import gap
 from ..planar.piece import PieceMesh
@@ -19,6 +19,8 @@ from .candidates import Candidates
 
 FITS = 1e-6
 """Largest misfit, relative to the row, of a conformal solve with the right cells; the polish does the rest."""
+
+_OPTIONS = ConformalOptions(max_factorisations=4)  # what takes more has wrong cells
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +90,8 @@ class Reading:
 
     @property
     def like_noise(self) -> bool:
-        """Whether the misfit is small and spread evenly, as errors of the entries are and wrong cells are not."""
-        return bool(len(self.pieces)) and self.size < 1e-2 and float(self.misfit.max()) < 12 * self.size
+        """Whether the misfit is that of errors in the entries, see :func:`even`."""
+        return bool(len(self.pieces)) and self.size < 1e-3 and even(self.misfit)
 
 
 def _add_discord(
@@ -110,6 +112,15 @@ def _add_discord(
     left = gap(topology, [mesh.z / np.abs(mesh.z).max() for _, mesh in solved])
     at_hinges = np.isin(edges, topology.hinges).any(axis=1)
     misfit[at_hinges] = np.maximum(misfit[at_hinges], min(left, 1.0))
+
+
+def even(misfit: NDArray) -> bool:
+    """Whether a misfit is small and spread evenly, as that of errors in the entries is, and that of wrong cells is not.
+
+    Of normal errors half are above 0.67 times their root mean square.
+    """
+    size = float(np.sqrt(np.mean(misfit**2)))
+    return size < 0.03 and float(misfit.max()) < 8 * size and float(np.median(misfit)) > 0.3 * size
 
 
 def triangulation(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -168,7 +179,7 @@ def row_sizes(n: int, edges: NDArray, weights: NDArray) -> NDArray[np.float64]:
 
 def _solved(piece: Piece, weights: NDArray) -> PieceMesh | None:
     try:
-        found = conformal_map(piece, weights, sharp=False)
+        found = conformal_map(piece, weights, sharp=False, options=_OPTIONS)
     except (GeometryError, SolverError):
         return None
     return PieceMesh(found.z, found.scale) if np.isfinite(found.z).all() and found.scale else None

@@ -15,7 +15,8 @@ from .reading import Reading
 
 _log = logging.getLogger(__name__)
 
-_PATIENCE = 6  # leaps without an improvement
+_WORK = 1e5  # vertices times solves that small changes may take
+_PATIENCE = 6  # leaps without an improvement; fewer where they are long
 _SOLVES = 150
 
 
@@ -63,8 +64,9 @@ def _repaired(reading: Reading) -> Reading:
 def _leaps(reading: Reading) -> Reading:
     """All clear changes at once, uphill too: with many wrong cells the misfit of the way is no guide."""
     best, since_best = reading, 0
+    patience = np.clip(3e4 / reading.candidates.n_vertices, 2, _PATIENCE)
     seen = {reading.labels.tobytes()}
-    while reading.pieces and not reading.fits and since_best < _PATIENCE:
+    while reading.pieces and not reading.fits and since_best < patience:
         changes = np.nan_to_num(label_changes(reading))
         labels = next((x for x in proposals(reading, changes) if x.tobytes() not in seen), None)
         if labels is None:
@@ -79,13 +81,13 @@ def _leaps(reading: Reading) -> Reading:
 
 def _descent(reading: Reading) -> Reading:
     """Small changes, each of which lowers the misfit."""
-    solves = 0
-    while solves < _SOLVES and reading.pieces and not reading.fits:
+    solves, most = 0, int(np.clip(_WORK / reading.candidates.n_vertices, 5, _SOLVES))
+    while solves < most and reading.pieces and not reading.fits:
         changes = np.nan_to_num(label_changes(reading))
         for labels in proposals(reading, changes):
             trial = Reading.of(reading.candidates, labels)
             solves += 1
-            if trial.size < reading.size or solves == _SOLVES:
+            if trial.size < reading.size or solves == most:
                 break
         else:
             return reading
