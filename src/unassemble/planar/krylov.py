@@ -63,10 +63,10 @@ class ShiftedSearch:
         for k in range(n_steps):
             z = np.append(factor.solve(self._pencil.area_form(z)[:-1]), 0)
             self.solves += 1
-            size = np.linalg.norm(z)
+            size = _norm(z)
             for _ in range(2):
-                z = z - _products(basis[:k], z) @ basis[:k]
-            left = np.linalg.norm(z)
+                z = z - _combination(basis[:k], _products(basis[:k], z))
+            left = _norm(z)
             if not left > 1e-13 * size:  # the space is invariant
                 spread = 0.0
                 break
@@ -81,7 +81,7 @@ class ShiftedSearch:
         if not len(y):
             raise GeometryError("no map has positive area: the entries, or the given scale, fit no mesh on this graph")
         _log.debug("shift %.12g: c = %.16g, last change %.1e", shift, c, spread)
-        return y @ basis[: len(y)], c, spread
+        return _combination(basis[: len(y)], y), c, spread
 
     def corrected(self, z: NDArray, c: float) -> NDArray:
         """One step of inverse iteration on a correction of z, with the last factorisation.
@@ -96,8 +96,18 @@ class ShiftedSearch:
 
 
 def _products(basis: NDArray, z: NDArray) -> NDArray:
-    """u* z of each row u of a basis; the rows stay where they are, which are long."""
-    return (basis @ z.conj()).conj()
+    """u* z of each row u of a basis (k, n)."""
+    # No BLAS here: its threads would compete with those of the solver, which stay awake for a while.
+    return np.einsum("kn,n->k", basis, z.conj()).conj()
+
+
+def _norm(z: NDArray) -> float:
+    return float(np.sqrt(_products(z[None], z)[0].real))
+
+
+def _combination(basis: NDArray, coefficients: NDArray) -> NDArray:
+    """Sum of the rows of a basis times coefficients."""
+    return np.einsum("kn,k->n", basis, coefficients)
 
 
 def _ritz(energy: NDArray, area: NDArray) -> tuple[float, NDArray]:
