@@ -32,7 +32,7 @@ GRIDS = {
     "many holes": squares(holes(16, 16, *((1 + 2 * i, 1 + 2 * j, 1, 1) for i in range(7) for j in range(7)))),
     "long slit": squares(holes(14, 8, (2, 4, 10, 1))),
     "crossed squares": squares(holes(9, 9), crossed=True),
-    "crossed squares with holes": squares(holes(8, 8, (3, 3, 1, 1), (5, 1, 2, 2)), crossed=True),
+    "crossed squares with holes": squares(holes(9, 8, (3, 3, 1, 1), (5, 4, 2, 2)), crossed=True),
     "annulus": polar(4, 12, 0.5),
     "annulus around a regular polygon": polar(3, 24, 0.2),
     "half annulus": polar(4, 12, 0.5, whole=False),
@@ -79,17 +79,15 @@ def test_polygons_are_counter_clockwise_cells():
 
 
 @settings(max_examples=12, deadline=None)
-@given(st.integers(0, 10**6), st.booleans(), st.floats(0.3, 3))
-def test_random_grids(seed, crossed, width):
-    """Any set of squares that hang together by their sides; only where crossed are there rows that look alike."""
+@given(st.integers(0, 10**6), st.floats(0.3, 3))
+def test_random_grids(seed, width):
+    """Sets of rectangles that hang together by their sides."""
     rng = np.random.default_rng(seed)
     mask = rng.random((9, 8)) > 0.12
     mask[[0, -1]] = mask[:, [0, -1]] = True
     mask = _side_connected(mask)
-    known = forgotten(specimen(*squares(mask, width=1.0 if crossed else width, crossed=crossed), c=-2.0, seed=seed))
+    known = forgotten(specimen(*squares(mask, width=width), c=-2.0, seed=seed))
     found = recover(known.matrix)
-    if crossed and "can as well stand in the order" in found.reason:
-        return
     assert found.status == "certified", found.reason
     assert largest_error(found.points, known.points) <= 1e-11
 
@@ -149,18 +147,16 @@ def test_triangle_with_vertices_inside():
 
 
 def test_rows_that_can_change_places_are_named():
-    """A square on its own corner of a domain, with two rows that nothing tells apart."""
     star = np.array([[0.0, 0], [1, 0], [0, 2], [-3, 0], [0, -1.5]])
     triangles = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]])
     found = recover(forgotten(specimen(star, triangles)).matrix)
     assert found.status == "uncertified"
     assert "can as well stand in the order" in found.reason
     assert found.backward_error < 1e-12
-    known = recover(forgotten(specimen(star, triangles)).matrix, scale=1.0)
-    assert known.status == "certified"
-    mask = np.ones((5, 4), bool)
-    mask[0, 1] = mask[1, 0] = mask[0, 2] = mask[2, 0] = False
-    twins = recover(forgotten(specimen(*squares(mask, crossed=True))).matrix)
+    # Two crossed squares between the outside and a hole: each centre is joined to the same two corners.
+    twins = recover(forgotten(specimen(*squares(holes(8, 8, (5, 1, 2, 2)), crossed=True))).matrix)
+    assert twins.status == "uncertified"
+    assert "can as well stand in the order" in twins.reason
     assert twins.backward_error < 1e-12
 
 
