@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from .reading import Reading
 
 _CLEAR = 0.35  # a label that is to change by so much is turned over
+_HOPELESS = -0.3  # belief in a corner at a vertex that does not look like an inner one
 _SINGLES = 8
 _EXCHANGES = 24
 _LIKELY = 100  # cells that take part in exchanges
@@ -85,4 +86,6 @@ def _turned(reading: Reading, changes: NDArray, rows: NDArray[np.int64]) -> NDAr
     value[turned] = np.where(labels[turned], -np.inf, 2.0 + changes[turned])
     chosen = candidates.compatible(value)
     fallback = np.where(changes != 0, labels + changes, candidates.belief) - 10.0 * (turned & labels)
+    # A cell is rather kept than replaced by a corner that can be none.
+    fallback[candidates.corner & (candidates.belief < _HOPELESS)] -= 20.0
     return candidates.covering(chosen, fallback)
