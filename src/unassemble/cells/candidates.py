@@ -119,7 +119,7 @@ class Candidates:
         for chosen in faces:
             for extra in (*corners, np.zeros_like(self.corner)):
                 labels = self.covering(self.compatible(np.where(chosen | extra, 1 + self.belief, -np.inf)), self.belief)
-                if labels.tobytes() not in seen:
+                if labels.any() and labels.tobytes() not in seen:
                     seen.add(labels.tobytes())
                     yield labels
 
@@ -128,6 +128,8 @@ class Candidates:
 
         Rounds of local maxima: a candidate is taken if it beats all rivals that are still in play.
         """
+        if not self.count:
+            return np.zeros(0, dtype=bool)
         cell, start = self.conflicts[0][:, 0], self.conflicts[1]
         rank = np.empty(self.count, dtype=np.int64)
         # Ties in random order: in the order of numbers they would be settled one by one along a boundary.

@@ -144,7 +144,7 @@ def _read_again(matrix: OperatorMatrix, numbering: Numbering, own: Solved, misfi
     weights = -matrix.entries[numbering.edge_rows]
     reading = read_cells(len(numbering.vertices), numbering.edges, weights)
     before = float(np.sqrt(np.mean(misfit**2)))
-    if reading is not None and (reading.fits or reading.size < _BETTER * before):
+    if reading is not None and (reading.fits or (reading.size < _BETTER * before and reading.misfit.max() < 1)):
         return _part(matrix, numbering, reading)
     if reading is None or not own:
         recognise(len(numbering.vertices), numbering.edges)  # says what is wrong with the graph, if that is it

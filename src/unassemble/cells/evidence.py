@@ -100,6 +100,8 @@ def _response(reading: Reading, piece: Piece, z: NDArray, local: NDArray, chosen
 
 def _solve(normal: sp.csr_array, rhs: NDArray) -> NDArray | None:
     """Positive definite solve; None where the factorisation breaks down."""
+    if not np.isfinite(normal.data).all():  # flat triangles
+        return None
     upper = sp.triu(normal, format="csr")
     upper.sort_indices()
     matrix = UpperTriangle(upper.data, upper.indices, upper.indptr)

@@ -20,6 +20,7 @@ from .candidates import Candidates
 FITS = 1e-6
 """Largest misfit, relative to the row, of a conformal solve with the right cells; the polish does the rest."""
 
+_RIGHT_ANGLES = 4
 _OPTIONS = ConformalOptions(max_factorisations=4)  # what takes more has wrong cells
 
 
@@ -76,6 +77,7 @@ class Reading:
                     gap = np.abs(mesh.scale * edge_weights(piece, mesh.z) - weights[rows]) / size[rows]
                 misfit[rows] = np.where(gap < 1, gap, 1.0)
         _add_discord(n, edges, pieces, meshes, misfit)
+        misfit[np.isin(edges, _crowded(candidates, labels)).any(axis=1)] = 1.0
         return cls(candidates, labels, edges, weights, pieces, tuple(meshes), misfit)
 
     @property
@@ -92,6 +94,14 @@ class Reading:
     def like_noise(self) -> bool:
         """Whether the misfit is that of errors in the entries, see :func:`even`."""
         return bool(len(self.pieces)) and self.size < 1e-3 and even(self.misfit)
+
+
+def _crowded(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Vertices with more than four right angles: the mesh would wind around them more than once."""
+    apex = candidates.cells.vertices[candidates.cells.offsets[:-1] + 1]
+    return np.flatnonzero(
+        np.bincount(apex[labels & candidates.corner], minlength=candidates.n_vertices) > _RIGHT_ANGLES
+    )
 
 
 def _add_discord(

@@ -15,10 +15,11 @@ from .reading import Reading
 
 _log = logging.getLogger(__name__)
 
+_STARTS = 3  # readings to begin with that are worth repairing
 _WORK = 1e5  # vertices times solves that small changes may take
 _SUSPECT = 0.3  # change of the label of a lone triangular hole: it was 0.4 or more in all that were tried
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
-_SOLVES = 150
+_SOLVES = 80
 
 
 def read_cells(n: int, edges: NDArray, weights: NDArray) -> Reading | None:
@@ -45,9 +46,9 @@ def read_cells(n: int, edges: NDArray, weights: NDArray) -> Reading | None:
             starts.append(Reading.of(candidates, labels))
             if starts[-1].fits:
                 return starts[-1]
-        if _entries_are_to_blame(starts[0]):
+        if starts and _entries_are_to_blame(starts[0]):
             return _better(best, starts[0])
-        for start in sorted(starts, key=lambda reading: reading.size):
+        for start in sorted(starts, key=lambda reading: reading.size)[:_STARTS]:
             best = _better(best, start if start.like_noise else _repaired(start))
             if best.fits:
                 return best

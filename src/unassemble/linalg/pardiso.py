@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
+import threading
 from functools import cache
 
 import numpy as np
@@ -51,6 +52,11 @@ def available() -> bool:
     return True
 
 
+_ONE_AT_A_TIME = threading.RLock()  # two calls at once, even on matrices of their own, spoil memory
+_LARGEST = 1e30
+_SMALL = 1000  # rows; below, MKL's parallel ordering gains nothing, and has been seen to spoil memory
+
+
 class PardisoFactorisation:
     """Factorisation L D L* of a Hermitian matrix, real or complex.
 
@@ -72,11 +78,12 @@ class PardisoFactorisation:
         self._handle = np.zeros(64, dtype=np.int64)
         self._iparm = np.zeros(64, dtype=np.int32)
         self._iparm[0] = 1  # no defaults: all of iparm is set here
-        self._iparm[1] = 3  # nested dissection, in parallel
+        large = matrix.n >= _SMALL
+        self._iparm[1] = 3 if large else 2  # nested dissection, in parallel if that pays
         self._iparm[9] = 30  # never perturb a pivot: shifts next to an eigenvalue have small ones, rightly
         self._iparm[17] = -1  # count the entries of the factor
         self._iparm[20] = 1  # Bunch-Kaufman pivots; without them shifts next to an eigenvalue lose all digits
-        self._iparm[23] = 1  # two-level parallel factorisation: its solves take half the time on two cores
+        self._iparm[23] = int(large)  # two-level parallel factorisation: its solves take half the time on two cores
         self._iparm[34] = 1  # indices count from 0
         if matrix.block > 1:
             self._iparm[36] = matrix.block  # rows of square blocks
@@ -91,6 +98,9 @@ class PardisoFactorisation:
 
     def factorise(self, matrix: UpperTriangle) -> None:
         """Factorise a matrix with the analysed pattern."""
+        size = float(np.abs(matrix.data).max(initial=0.0))
+        if not size <= _LARGEST:  # on such numbers, and on those that are none, the library has been seen to spoil memory
+            raise SolverError(f"a matrix to be factorised has entries that are not finite, or as large as {size:.1e}")
         self._matrix = matrix
         self._call(_FACTORISE)
 
@@ -123,15 +133,16 @@ class PardisoFactorisation:
         n_rhs = 1 if rhs is None or rhs.ndim == 1 else rhs.shape[1]
         error = ctypes.c_int(0)
         data = np.ascontiguousarray(m.data, dtype=self._dtype)
-        _library().pardiso(
-            _pointer(self._handle), one, one,
-            ctypes.byref(ctypes.c_int(self._mtype)), ctypes.byref(ctypes.c_int(phase)),
-            ctypes.byref(ctypes.c_int(m.n)), _pointer(data), _pointer(m.indptr), _pointer(m.indices),
-            _pointer(unused), ctypes.byref(ctypes.c_int(n_rhs)), _pointer(self._iparm),
-            ctypes.byref(ctypes.c_int(0)),
-            _pointer(unused if rhs is None else rhs), _pointer(unused if solution is None else solution),
-            ctypes.byref(error),
-        )  # fmt: skip
+        with _ONE_AT_A_TIME:
+            _library().pardiso(
+                _pointer(self._handle), one, one,
+                ctypes.byref(ctypes.c_int(self._mtype)), ctypes.byref(ctypes.c_int(phase)),
+                ctypes.byref(ctypes.c_int(m.n)), _pointer(data), _pointer(m.indptr), _pointer(m.indices),
+                _pointer(unused), ctypes.byref(ctypes.c_int(n_rhs)), _pointer(self._iparm),
+                ctypes.byref(ctypes.c_int(0)),
+                _pointer(unused if rhs is None else rhs), _pointer(unused if solution is None else solution),
+                ctypes.byref(error),
+            )  # fmt: skip
         if error.value:
             if error.value == _OUT_OF_MEMORY:
                 raise MemoryError(f"PARDISO found too little memory to factorise a matrix of order {m.n * m.block}")

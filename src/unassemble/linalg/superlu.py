@@ -21,6 +21,8 @@ class SuperLUFactorisation:
 
     def factorise(self, matrix: UpperTriangle) -> None:
         """Factorise."""
+        if not np.isfinite(matrix.data).all():
+            raise SolverError("a matrix to be factorised has entries that are not finite")
         # Minimum degree on A + A' with diagonal pivots preferred: SuperLU users' guide, "symmetric mode".
         try:
             self._lu = splu(

@@ -28,6 +28,8 @@ from ..topology import Piece
 from .krylov import ShiftedSearch
 from .pencil import ConformalPencil
 
+_STEEPEST = 1e12  # weight in units of the scale, beyond that of any triangle in double precision
+
 _log = logging.getLogger(__name__)
 
 
@@ -132,7 +134,7 @@ def conformal_map(
     unit = estimate_scale(piece, weights)
     with np.errstate(over="ignore"):
         relative = weights / unit if unit else np.full_like(weights, np.inf)
-    if not np.isfinite(relative).all() or (scale is not None and not 1e-6 < abs(scale / unit) < 1e6):
+    if not np.abs(relative).max() < _STEEPEST or (scale is not None and not 1e-6 < abs(scale / unit) < 1e6):
         raise GeometryError(
             "the entries of a piece, or they and the given scale, differ by so many orders of magnitude "
             "that no triangles could have them"

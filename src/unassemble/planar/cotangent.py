@@ -40,7 +40,8 @@ def weight_roundings(piece: Piece, z: NDArray) -> NDArray[np.float64]:
     A cotangent is a quotient of products of sides, so its error is about 1 / sin(gamma), far from
     uniform where there are slivers.
     """
-    left, right = (1 / np.abs(_sine(u, w)) for u, w in _sides(piece, z))
+    with np.errstate(divide="ignore", invalid="ignore"):  # flat triangles
+        left, right = (1 / np.abs(_sine(u, w)) for u, w in _sides(piece, z))
     return _halved(piece, left, right)
 
 
@@ -68,9 +69,10 @@ def weight_gradient(piece: Piece, z: NDArray) -> NDArray[np.complex128]:
     Returns
     -------
     (4, e) complex128
-        Zero in the last row on the boundary.
+        Zero in the last row on the boundary; not finite at flat triangles.
     """
     left, right = _sides(piece, z)
-    tail, head = corner_gradients(*left)
-    head_right, tail_right = (np.where(piece.inner, g, 0) for g in corner_gradients(*right))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        tail, head = corner_gradients(*left)
+        head_right, tail_right = (np.where(piece.inner, g, 0) for g in corner_gradients(*right))
     return np.stack([tail + tail_right, head + head_right, -(tail + head), -(tail_right + head_right)])

@@ -63,6 +63,10 @@ def refined(piece: Piece, weights: NDArray, mesh: PieceMesh, *, scale: float | N
     With `rounding`, errors are taken to be those of assembly in floating-point arithmetic, unless the misfit is beyond
     that and more likely to be noise of one size.
     """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        flat = not np.isfinite(edge_weights(piece, mesh.z)).all()
+    if flat:
+        return PieceMesh(mesh.z, mesh.scale, (*mesh.notes, "no polish: triangles are flat"))
     spread = weight_roundings(piece, mesh.z) if rounding else None
     try:
         found = _polished(piece, weights, mesh.z, scale, spread)
