@@ -44,7 +44,7 @@ def test_scale_is_found_with_its_sign(c):
 def test_without_polish_errors_stay_at_the_level_of_edges(c):
     known = specimen(*random_mesh(20_000, seed=4), c=c, seed=2)
     found = recover(known.matrix, refine=False)
-    assert found.backward_error < 1e-12
+    assert found.backward_error < 5e-12
     assert largest_error(found.points, known.points) < 1e-11
 
 

@@ -15,7 +15,7 @@ from .reading import Reading
 
 _log = logging.getLogger(__name__)
 
-_STARTS = 3  # readings to begin with that are worth repairing
+_STARTS = 2  # readings to begin with that are worth repairing
 _WORK = 1e5  # vertices times solves that small changes may take
 _SUSPECT = 0.3  # change of the label of a lone triangular hole: it was 0.4 or more in all that were tried
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long

@@ -53,7 +53,7 @@ def available() -> bool:
 
 
 _ONE_AT_A_TIME = threading.RLock()  # two calls at once, even on matrices of their own, spoil memory
-_LARGEST = 1e30
+_LARGEST = 1e30  # with larger entries, and with what is no number, the library has been seen to spoil memory
 _SMALL = 1000  # rows; below, MKL's parallel ordering gains nothing, and has been seen to spoil memory
 
 
@@ -99,7 +99,7 @@ class PardisoFactorisation:
     def factorise(self, matrix: UpperTriangle) -> None:
         """Factorise a matrix with the analysed pattern."""
         size = float(np.abs(matrix.data).max(initial=0.0))
-        if not size <= _LARGEST:  # on such numbers, and on those that are none, the library has been seen to spoil memory
+        if not size <= _LARGEST:
             raise SolverError(f"a matrix to be factorised has entries that are not finite, or as large as {size:.1e}")
         self._matrix = matrix
         self._call(_FACTORISE)

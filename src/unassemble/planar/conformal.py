@@ -32,6 +32,9 @@ _STEEPEST = 1e12  # weight in units of the scale, beyond that of any triangle in
 
 _log = logging.getLogger(__name__)
 
+_FARTHEST = 1e-6
+"""Least ratio of a scale to its estimate, or of the estimate to it."""
+
 
 @dataclass(frozen=True)
 class ConformalOptions:
@@ -134,7 +137,9 @@ def conformal_map(
     unit = estimate_scale(piece, weights)
     with np.errstate(over="ignore"):
         relative = weights / unit if unit else np.full_like(weights, np.inf)
-    if not np.abs(relative).max() < _STEEPEST or (scale is not None and not 1e-6 < abs(scale / unit) < 1e6):
+    if not np.abs(relative).max() < _STEEPEST or (
+        scale is not None and not _FARTHEST < abs(scale / unit) < 1 / _FARTHEST
+    ):
         raise GeometryError(
             "the entries of a piece, or they and the given scale, differ by so many orders of magnitude "
             "that no triangles could have them"
@@ -153,6 +158,8 @@ def conformal_map(
         spread = None
     if spread is None:
         z, c, spread = search.at(options.first_shift, _smooth_start(piece))
+        if c < _FARTHEST:
+            raise GeometryError("some maps of positive area have no energy: the entries belong to no planar mesh")
     converged = near = False
     while search.factorisations < options.max_factorisations:
         distance = min(max(4 * spread, options.margin), 0.3)
