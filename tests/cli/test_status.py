@@ -57,8 +57,8 @@ BROKEN = {
     "nan": sp.coo_array(np.array([[2.0, np.nan, -1], [np.nan, 2, -1], [-1, -1, 2]])),
     "diagonal": sp.coo_array(np.eye(4)),
     "not planar": sp.coo_array(np.full((6, 6), -1.0)),
-    # A star of five: right angles at its centre, all that could explain it, have room for four.
-    "no triangle": sp.coo_array(-np.array([[0, 1, 1, 1, 1, 1], *([[1, 0, 0, 0, 0, 0]] * 5)], dtype=float)),
+    # A star of nine: right angles at its centre, all that could explain it, have room for four, and thus eight rows.
+    "no triangle": sp.coo_array(-np.array([[0] + [1] * 9, *([[1] + [0] * 9] * 9)], dtype=float)),
 }
 
 

@@ -252,7 +252,8 @@ def test_curved_surface_is_not_certified():
 
 
 def test_graph_without_triangles():
-    star = sp.coo_array((-np.ones(10), ([0] * 5 + [1, 2, 3, 4, 5], [1, 2, 3, 4, 5] + [0] * 5)), shape=(6, 6))
+    leaves = list(range(1, 10))  # four right angles at the centre have room for eight
+    star = sp.coo_array((-np.ones(18), ([0] * 9 + leaves, leaves + [0] * 9)), shape=(10, 10))
     with pytest.raises(TopologyError, match="no triangle"):
         recover(star)
 
