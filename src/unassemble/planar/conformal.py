@@ -28,6 +28,7 @@ from ..topology import Piece
 from .krylov import ShiftedSearch
 from .pencil import ConformalPencil
 
+_LEAST_SUM = 1e-10  # of the weights at a vertex, in units of the scale; at a corner of angle gamma it is gamma / 2
 _STEEPEST = 1e12  # weight in units of the scale, beyond that of any triangle in double precision
 
 _log = logging.getLogger(__name__)
@@ -144,6 +145,11 @@ def conformal_map(
             "the entries of a piece, or they and the given scale, differ by so many orders of magnitude "
             "that no triangles could have them"
         )
+    sums = np.bincount(piece.edges.ravel(), np.repeat(relative, 2), piece.n_vertices)
+    if not (sums > _LEAST_SUM).all():
+        # The energy of a hat function; without it the pencil may be singular, which PARDISO does not survive.
+        row = int(piece.vertices[np.argmin(sums)])
+        raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     search = ShiftedSearch(ConformalPencil(piece, relative), analyse, options.krylov_steps)
     z = _smooth_start(piece)
     known = scale if scale is not None else 1.0
