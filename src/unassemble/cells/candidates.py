@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..topology import Polygons
-from ..topology.faces import FaceComplex
+from ..topology.faces import FaceComplex, joined
 from .angles import face_sums, shared_angles, vertex_excess
 
 _SHORT = 4  # faces of so many edges are cells unless the numbers say otherwise
@@ -189,10 +189,7 @@ def _open_corners(whole: FaceComplex, outside: NDArray[np.bool_]) -> NDArray[np.
     """Half-edges a -> b that b -> c follows in an empty face, with a and c different and not joined."""
     half = np.flatnonzero(outside)
     a, c = whole.tail[half], whole.head[whole.successor[half]]
-    given = whole.edges[:, 0] * whole.n_vertices + whole.edges[:, 1]
-    key = np.minimum(a, c) * whole.n_vertices + np.maximum(a, c)
-    joined = given[np.minimum(np.searchsorted(given, key), len(given) - 1)] == key
-    return half[(a != c) & ~joined]
+    return half[(a != c) & ~joined(whole.n_vertices, whole.edges, a, c)]
 
 
 def _in_strips(whole: FaceComplex, corners: NDArray) -> NDArray[np.bool_]:

@@ -11,11 +11,10 @@ from scipy.sparse import csgraph
 
 from ..errors import GeometryError, RecoveryError, SolverError
 from ..matrix import OperatorMatrix
-from ..planar.cotangent import edge_weights
 from ..planar.piece import PieceMesh
 from ..planar.polish import PolishOptions, polish
 from ..topology import Numbering, Piece, Polygons, Topology, components, located, recognise
-from .reading import FITS, Reading, even, row_sizes
+from .reading import FITS, Reading, even, misfits
 from .search import read_cells
 
 _BETTER = 0.1  # a reading that does not fit replaces the triangles only if its misfit is below this times theirs
@@ -121,16 +120,10 @@ def completed(
 
 
 def _misfits(matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome]) -> NDArray[np.float64]:
-    """(e,) difference between entry and re-assembled entry, relative to the rows, at most 1; 1 on edges of no piece."""
-    misfit = np.where(matrix.entries != 0, 1.0, 0.0)
-    size = row_sizes(matrix.n, matrix.edges, matrix.entries)
-    for piece, mesh in zip(topology.pieces, meshes, strict=True):
-        if isinstance(mesh, PieceMesh):
-            rows = piece.edge_rows
-            with np.errstate(all="ignore"):  # flat triangles fit nothing
-                gap = np.abs(mesh.scale * edge_weights(piece, mesh.z) + matrix.entries[rows]) / size[rows]
-            misfit[rows] = np.where(gap < 1, gap, 1.0)
-    return misfit
+    """(e,) as :func:`unassemble.cells.reading.misfits`."""
+    outcomes = zip(topology.pieces, meshes, strict=True)
+    solved = [(piece, mesh) for piece, mesh in outcomes if isinstance(mesh, PieceMesh)]
+    return misfits(matrix.n, matrix.edges, -matrix.entries, solved)
 
 
 def _component(matrix: OperatorMatrix) -> NDArray[np.int64]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeometryError, SolverError
+from ..matrix.operator import row_sizes
 from ..planar.conformal import ConformalOptions, conformal_map
 from ..planar.cotangent import edge_weights
 from ..planar.hinges import gap
@@ -65,18 +66,10 @@ class Reading:
         weights = np.zeros(len(union))
         weights[np.searchsorted(union, given)] = candidates.weights
         pieces = planar_pieces(n, edges, triangles, np.searchsorted(union, key)) or ()
-        misfit = np.where(weights != 0, 1.0, 0.0)
-        size = row_sizes(n, edges, weights)
-        meshes: list[PieceMesh | None] = []
-        for piece in pieces:
-            mesh = _solved(piece, weights[piece.edge_rows])
-            meshes.append(mesh)
-            if mesh:
-                rows = piece.edge_rows
-                with np.errstate(all="ignore"):  # flat triangles fit nothing
-                    gap = np.abs(mesh.scale * edge_weights(piece, mesh.z) - weights[rows]) / size[rows]
-                misfit[rows] = np.where(gap < 1, gap, 1.0)
-        _add_discord(n, edges, pieces, meshes, misfit)
+        meshes = [_solved(piece, weights[piece.edge_rows]) for piece in pieces]
+        solved = [(piece, mesh) for piece, mesh in zip(pieces, meshes, strict=True) if mesh]
+        misfit = misfits(n, edges, weights, solved)
+        _add_discord(n, edges, solved, misfit)
         misfit[np.isin(edges, _crowded(candidates, labels)).any(axis=1)] = 1.0
         return cls(candidates, labels, edges, weights, pieces, tuple(meshes), misfit)
 
@@ -104,14 +97,24 @@ def _crowded(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[np.in
     )
 
 
-def _add_discord(
-    n: int, edges: NDArray, pieces: tuple[Piece, ...], meshes: list[PieceMesh | None], misfit: NDArray
-) -> None:
+def misfits(n: int, edges: NDArray, weights: NDArray, solved: list[tuple[Piece, PieceMesh]]) -> NDArray[np.float64]:
+    """(e,) |c w - a| relative to the smaller of both rows' largest entries, at most 1; 1 on edges of no piece."""
+    misfit = np.where(weights != 0, 1.0, 0.0)
+    size = row_sizes(n, edges, np.abs(weights))
+    for piece, mesh in solved:
+        rows = piece.edge_rows
+        smaller = size[edges[rows]].min(axis=1)
+        with np.errstate(all="ignore"):  # flat triangles fit nothing
+            left = np.abs(mesh.scale * edge_weights(piece, mesh.z) - weights[rows]) / smaller
+        misfit[rows] = np.where(left < 1, left, 1.0)
+    return misfit
+
+
+def _add_discord(n: int, edges: NDArray, solved: list[tuple[Piece, PieceMesh]], misfit: NDArray) -> None:
     """Raise the misfit where pieces do not go together: another scale, or rings of pieces that do not close.
 
     Small pieces by themselves fit nearly everything.
     """
-    solved = [(piece, mesh) for piece, mesh in zip(pieces, meshes, strict=True) if mesh]
     if len(solved) < 2:
         return
     scale = max(solved, key=lambda item: item[0].n_vertices)[1].scale
@@ -177,14 +180,6 @@ def _keys(n: int, triangles: NDArray) -> NDArray[np.int64]:
     """(m, 3) keys i n + j, i < j, of the edges facing the corners."""
     ends = triangles[:, [[1, 2], [2, 0], [0, 1]]]
     return ends.min(axis=2) * n + ends.max(axis=2)
-
-
-def row_sizes(n: int, edges: NDArray, weights: NDArray) -> NDArray[np.float64]:
-    """(e,) the smaller of the largest entries of both rows of each edge."""
-    largest = np.zeros(n)
-    for end in edges.T:
-        np.maximum.at(largest, end, np.abs(weights))
-    return largest[edges].min(axis=1)
 
 
 def _solved(piece: Piece, weights: NDArray) -> PieceMesh | None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from . import planarity
 from .cycles import three_cycles
-from .faces import FaceComplex, from_cycles, from_rotation, half_edges
+from .faces import FaceComplex, around, from_cycles, from_rotation
 from .separating import not_faces
 from .short_cycles import chordless_four_cycles
 
@@ -30,7 +30,7 @@ def short_faces(n: int, edges: NDArray) -> list[NDArray[np.int64]]:
         count = np.bincount(opposite.ravel(), minlength=len(edges))
     quads = chordless_four_cycles(n, edges, count < 2)
     if len(quads):
-        sides = half_edges(n, edges, quads.ravel(), np.roll(quads, -1, axis=1).ravel()).reshape(quads.shape) >> 1
+        sides = around(n, edges, quads) >> 1
         count = count + np.bincount(sides.ravel(), minlength=len(edges))
         quads = quads[(count[sides] <= 2).all(axis=1)]
     return [triangles, quads]
@@ -101,7 +101,7 @@ def _with_faces(n: int, edges: NDArray, cycles: list[NDArray]) -> tuple[NDArray,
     Each cycle gets a hub, and each of its edges a midpoint joined to the hub: the hub must lie on one side of the
     cycle, and all midpoints on its rim see it.
     """
-    sides = [half_edges(n, edges, c.ravel(), np.roll(c, -1, axis=1).ravel()).reshape(c.shape) >> 1 for c in cycles]
+    sides = [around(n, edges, c) >> 1 for c in cycles]
     rim = np.unique(np.concatenate([s.ravel() for s in sides]))
     midpoint = np.full(len(edges), -1)
     midpoint[rim] = n + np.arange(len(rim))

@@ -152,7 +152,7 @@ def from_cycles(n: int, edges: NDArray, cycles: list[NDArray]) -> FaceComplex | 
         than two, or the surfaces do not lie on spheres.
     """
     cycles = _oriented(n, edges, cycles)
-    sides = [half_edges(n, edges, c.ravel(), np.roll(c, -1, axis=1).ravel()).reshape(c.shape) for c in cycles]
+    sides = [around(n, edges, c) for c in cycles]
     used = np.bincount(np.concatenate([s.ravel() for s in sides]), minlength=2 * len(edges))
     bare = np.flatnonzero(~used.reshape(-1, 2).any(axis=1))
     if (used > 1).any() or not _hanging(n, edges)[bare].all():
@@ -169,6 +169,18 @@ def half_edges(n: int, edges: NDArray, tail: NDArray, head: NDArray) -> NDArray[
     """Half-edges from `tail` to `head`, which are joined by an edge."""
     key = np.minimum(tail, head) * n + np.maximum(tail, head)
     return 2 * np.searchsorted(edges[:, 0] * n + edges[:, 1], key) + (tail > head)
+
+
+def around(n: int, edges: NDArray, cycles: NDArray) -> NDArray[np.int64]:
+    """(m, k) half-edges along cycles (m, k), from each vertex to the next."""
+    return half_edges(n, edges, cycles.ravel(), np.roll(cycles, -1, axis=1).ravel()).reshape(cycles.shape)
+
+
+def joined(n: int, edges: NDArray, a: NDArray, b: NDArray) -> NDArray[np.bool_]:
+    """Whether vertices a and b are joined by an edge, pair by pair."""
+    given = edges[:, 0] * n + edges[:, 1]
+    key = np.minimum(a, b) * n + np.maximum(a, b)
+    return given[np.minimum(np.searchsorted(given, key), len(given) - 1)] == key
 
 
 def fan(cycles: NDArray) -> NDArray[np.int64]:

@@ -6,6 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .faces import joined
+
 
 def chordless_four_cycles(n: int, edges: NDArray, usable: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Cycles a-b-c-d of usable edges, with neither a-c nor b-d an edge.
@@ -54,11 +56,5 @@ def chordless_four_cycles(n: int, edges: NDArray, usable: NDArray[np.bool_]) -> 
         first = np.flatnonzero(key[step:] == key[:-step])
         found.append(np.column_stack([top[first], middle[first], end[first], middle[first + step]]))
     cycles = np.concatenate(found)
-    return cycles[~(_joined(n, edges, cycles[:, [0, 2]]) | _joined(n, edges, cycles[:, [1, 3]]))]
-
-
-def _joined(n: int, edges: NDArray, pairs: NDArray) -> NDArray[np.bool_]:
-    """Whether the vertices of each pair are joined by an edge."""
-    given = edges[:, 0] * n + edges[:, 1]
-    key = pairs.min(axis=1) * n + pairs.max(axis=1)
-    return given[np.minimum(np.searchsorted(given, key), len(given) - 1)] == key
+    a, b, c, d = cycles.T
+    return cycles[~(joined(n, edges, a, c) | joined(n, edges, b, d))]
