@@ -14,7 +14,6 @@ import scipy.io
 import scipy.sparse as sp
 import skfem
 import skfem.models.poisson
-from skfem.helpers import ddot, grad, sym_grad, trace
 
 from meshes import random_mesh
 from unassemble import InputError, NotPlanarError, recover
@@ -27,8 +26,10 @@ from assembled import (
     eliminated,
     error,
     on_plane,
+    orthotropic,
     permuted_nodes,
     stiffness,
+    vector_laplace,
     with_identity,
 )
 
@@ -44,17 +45,6 @@ def body(kind: str) -> Assembled:
 
 def clamped(given: Assembled) -> tuple[sp.csr_array, np.ndarray]:
     return eliminated(given, np.repeat(on_plane(given, 0)[:, None], given.dim, axis=1))
-
-
-@skfem.BilinearForm
-def orthotropic(u, v, w):
-    e, f = sym_grad(u), sym_grad(v)
-    return trace(e) * trace(f) + 2 * ddot(e, f) + 0.3 * e[0, 0] * f[0, 0]
-
-
-@skfem.BilinearForm
-def vector_laplace(u, v, w):
-    return ddot(grad(u), grad(v))
 
 
 @pytest.mark.parametrize("kind", CELLS)

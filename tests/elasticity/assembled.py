@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 import skfem
-from skfem.helpers import ddot, sym_grad, trace
+from skfem.helpers import ddot, grad, sym_grad, trace
 
 ELEMENTS = {
     "tri-p1": (skfem.MeshTri, skfem.ElementTriP1),
@@ -19,6 +19,17 @@ ELEMENTS = {
     "hex-s2": (skfem.MeshHex, skfem.ElementHexS2),
     "hex-q2": (skfem.MeshHex, skfem.ElementHex2),
 }
+
+
+@skfem.BilinearForm
+def orthotropic(u, v, w):
+    e, f = sym_grad(u), sym_grad(v)
+    return trace(e) * trace(f) + 2 * ddot(e, f) + 0.3 * e[0, 0] * f[0, 0]
+
+
+@skfem.BilinearForm
+def vector_laplace(u, v, w):
+    return ddot(grad(u), grad(v))
 
 
 @dataclass(frozen=True)

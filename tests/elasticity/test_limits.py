@@ -4,9 +4,7 @@ import numpy as np
 import pyamg
 import pytest
 import scipy.sparse as sp
-import skfem
-from assembled import box, eliminated, error, on_plane, permuted_nodes, stiffness
-from skfem.helpers import ddot, grad, sym_grad, trace
+from assembled import box, eliminated, error, on_plane, orthotropic, permuted_nodes, stiffness, vector_laplace
 
 from unassemble.elasticity import (
     recover_elasticity,
@@ -16,17 +14,6 @@ from unassemble.elasticity import (
     scalar_parts,
 )  # fmt: skip
 from unassemble.errors import FormatError, GeometryError
-
-
-@skfem.BilinearForm
-def orthotropic(u, v, w):
-    e, f = sym_grad(u), sym_grad(v)
-    return trace(e) * trace(f) + 2 * ddot(e, f) + 0.3 * e[0, 0] * f[0, 0]
-
-
-@skfem.BilinearForm
-def vector_laplace(u, v, w):
-    return ddot(grad(u), grad(v))
 
 
 def test_orthotropic_material_is_a_best_fit():
