@@ -30,10 +30,10 @@ from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
+from irregular import irregular_mesh, laplacian, largest_piece
 from scipy.sparse.linalg import splu
 from scipy.spatial import Delaunay
 
-from meshes import irregular_mesh, laplacian, largest_piece
 from unassemble import Recovery, recover
 
 EXACT, SAMPLES = 3000, 400

@@ -66,7 +66,7 @@ def run_size(size: int, repeat: int, cases: list[str], keep: Path | None) -> dic
 
 def write_matrices(size: int, folder: Path) -> None:
     """L and a multiple of it, and the true positions."""
-    from meshes import irregular_mesh, laplacian
+    from irregular import irregular_mesh, laplacian
 
     folder.mkdir(parents=True, exist_ok=True)
     points, triangles = irregular_mesh(size)

@@ -26,7 +26,7 @@ from .planar.pencil import pencil_pattern
 from .planar.piece import PieceMesh
 from .recovery import Recovery
 from .solving import solve
-from .topology import Polygons, Topology, local_numbering, surfaces
+from .topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
 from .verdict import ambiguous, passes, verdict
 
 
@@ -225,8 +225,10 @@ def _recover(
     with clock("topology"):
         numbering = local_numbering(stored.n, stored.edges)
         analyse: AnalysisAhead | None = None
-        # Most matrices are those of a single piece, and its pencil has their pattern. Others may be large and dense.
-        if method == "conformal" and len(stored.edges) < 3 * stored.n:
+        # Most matrices are those of a single piece, and its pencil has their pattern. Others may be large and dense,
+        # or lack the diagonals of their cells.
+        planar = method == "conformal" and len(stored.edges) < 3 * stored.n
+        if planar and triangles_everywhere(stored.n, numbering.edges):
             analyse = AnalysisAhead(pencil_pattern(stored.n, numbering.edges), threads)
         topology = surfaces(stored.n, stored.edges, numbering)
     matrix, topology, meshes = solve(

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import Delaunay
 
 from meshes import delaunay, edge_list, random_mesh, triangle_set
 from unassemble import NotPlanarError, TopologyError
 from unassemble.topology import recognise
 from unassemble.topology.boundary import loops
 from unassemble.topology.cycles import three_cycles
+from unassemble.topology.separating import _separating
 
 
 def shuffled(triangles, n, seed=0):
@@ -94,6 +96,28 @@ def test_separating_triangles_at_any_depth(nested, fill):
     found = recognise(n, edge_list(cells))
     assert found.method == "3-cycles"
     assert triangle_set(found.pieces[0].triangles) == triangle_set(cells)
+
+
+@pytest.mark.parametrize("filled", [3, 150])
+def test_cycles_with_something_on_both_sides_are_those_of_networkx(filled):
+    points, triangles = random_mesh(200, seed=filled, holes=False)
+    inside, _ = random_mesh(filled, seed=1, holes=False)
+    corners = points[triangles[100]]
+    # Of the large filling every vertex is nearer to the corners than the balls of the first rounds reach.
+    low, high = inside.min(axis=0), inside.max(axis=0)
+    share = 0.4 * (inside - low) / (high - low) + 0.1
+    more = corners[0] + share @ (corners[1:] - corners[0])
+    edges = edge_list(Delaunay(np.concatenate([points, more])).simplices)
+    n = len(points) + len(more)
+    graph = networkx.Graph(edges.tolist())
+    cycles, _ = three_cycles(n, edges)
+    found = _separating(n, edges, cycles)
+    assert found.any()
+    sample = np.random.default_rng(0).permutation(len(cycles))[:40]
+    for k in {*np.flatnonzero(found).tolist(), *sample.tolist()}:
+        rest = graph.subgraph(set(graph) - set(cycles[k].tolist()))
+        parts = [p for p in networkx.connected_components(rest) if all(p & set(graph[v]) for v in cycles[k])]
+        assert found[k] == (len(parts) > 1)
 
 
 def test_ears_and_chords_need_no_embedding():

@@ -17,20 +17,13 @@ from ..topology.faces import FaceComplex
 _SAMPLE = 2000
 
 
-def shared_angles(complex_: FaceComplex, weights: NDArray) -> NDArray[np.float64]:
-    """(2 e,) theta of each half-edge, for weights shared equally and scaled by the likeliest c.
-
-    Parameters
-    ----------
-    complex_ : FaceComplex
-    weights : (e,) float64
-        -A_ij = c w_ij.
-    """
-    return np.pi / 2 - np.arctan(weights / _scale(complex_, weights))[np.arange(2 * len(weights)) >> 1]
+def facing_angles(cotangents: NDArray) -> NDArray[np.float64]:
+    """Angles between 0 and pi of given cotangents."""
+    return np.asarray(np.pi / 2 - np.arctan(cotangents))
 
 
 def face_sums(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]:
-    """(faces,) sum of the angles around each face, about pi for a cell."""
+    """(faces,) sum of the angles of half-edges around each face, about pi for a cell."""
     return np.asarray(np.bincount(complex_.face, angles), dtype=np.float64)
 
 
@@ -41,8 +34,15 @@ def vertex_excess(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]
     return np.asarray(corners - 2 * turned - 2 * np.pi, dtype=np.float64)
 
 
-def _scale(complex_: FaceComplex, weights: NDArray) -> float:
-    """The c for which half of the short faces have an angle sum below pi."""
+def likeliest_scale(complex_: FaceComplex, weights: NDArray) -> float:
+    """The c for which half of the short faces have an angle sum below pi, weights being shared equally.
+
+    Parameters
+    ----------
+    complex_ : FaceComplex
+    weights : (e,) float64
+        -A_ij = c w_ij.
+    """
     unit = float(np.median(np.abs(weights[weights != 0]))) * np.sign(weights.sum())
     if not unit:
         return 1.0
@@ -57,7 +57,7 @@ def _scale(complex_: FaceComplex, weights: NDArray) -> float:
     low, high = np.full(len(faces), -8.0), np.full(len(faces), 8.0)
     for _ in range(40):
         middle = (low + high) / 2
-        angle = np.pi / 2 - np.arctan(share / np.exp(middle)[:, None])
+        angle = facing_angles(share / np.exp(middle)[:, None])
         above = (angle * counted).sum(axis=1) > np.pi  # angles grow with c
         low, high = np.where(above, low, middle), np.where(above, middle, high)
     return unit * float(np.exp(np.median((low + high) / 2)))

@@ -13,10 +13,11 @@ from scipy.sparse import csgraph
 
 from ..topology import Polygons
 from ..topology.faces import FaceComplex, joined
-from .angles import face_sums, shared_angles, vertex_excess
+from .angles import face_sums, facing_angles, likeliest_scale, vertex_excess
 
 _SHORT = 4  # faces of so many edges are cells unless the numbers say otherwise
 _FULL = 1.3 * np.pi  # angle sum below which a face may be a cell
+_LEFT_OUT = 0.05  # squared excess of an angle sum, in units of pi, above which a short face may be left out
 _INNER = (-0.35 * np.pi, -0.55 * np.pi)  # angle excess above which a vertex may be an inner one
 
 
@@ -30,6 +31,8 @@ class Candidates:
     edges : (e, 2) int64
     weights : (e,) float64
         -A_ij of each edge.
+    relative : (e,) float64
+        The same over the likeliest c, from the angles.
     cells : Polygons
     sides : (s, 2) int64
         Pairs (cell, half-edge) of what each cell takes up.
@@ -47,6 +50,7 @@ class Candidates:
     n_vertices: int
     edges: NDArray[np.int64]
     weights: NDArray[np.float64]
+    relative: NDArray[np.float64]
     cells: Polygons
     sides: NDArray[np.int64]
     belief: NDArray[np.float64]
@@ -58,7 +62,8 @@ class Candidates:
     def of(cls, drawing: FaceComplex, weights: NDArray) -> Candidates:
         """All candidates of one drawing of the graph."""
         blocks = drawing.split()
-        angles = shared_angles(blocks, weights)
+        relative = weights / likeliest_scale(blocks, weights)
+        angles = np.repeat(facing_angles(relative), 2)
         sums = face_sums(blocks, angles)
         outer = _longest(blocks, sums)
         faces = np.flatnonzero(blocks.simple)
@@ -80,6 +85,7 @@ class Candidates:
             n_vertices=drawing.n_vertices,
             edges=drawing.edges,
             weights=weights,
+            relative=relative,
             cells=Polygons(offsets, vertices),
             sides=np.concatenate(
                 [
@@ -116,12 +122,24 @@ class Candidates:
         corners = [self.corner & (self.belief > 0.5 + excess / np.pi) for excess in _INNER]
         faces = (self.first, (self.first & (self.size == 3)) | (by_angles & ~self.outer))
         seen = set()
-        for chosen in faces:
+        for chosen in sorted(faces, key=self._strain):
             for extra in (*corners, np.zeros_like(self.corner)):
                 labels = self.covering(self.compatible(np.where(chosen | extra, 1 + self.belief, -np.inf)), self.belief)
                 if labels.any() and labels.tobytes() not in seen:
                     seen.add(labels.tobytes())
                     yield labels
+
+    def _strain(self, labels: NDArray[np.bool_]) -> float:
+        """How far the angles of some faces are from adding up to pi, edges between two of them shared equally.
+
+        Short faces left out add a little, or no cells would be best.
+        """
+        cell, half = self.sides[labels[self.sides[:, 0]]].T
+        used = np.zeros(2 * len(self.edges), dtype=bool)
+        used[half] = True
+        angles = facing_angles(self.relative[half >> 1] * np.where(used[half ^ 1], 1, 2))
+        excess = np.bincount(cell, angles, self.count)[labels] / np.pi - 1
+        return float(excess @ excess) + _LEFT_OUT * float((self.first & ~labels).sum())
 
     def compatible(self, value: NDArray) -> NDArray[np.bool_]:
         """(cells,) candidates of finite value, none of which loses to a better one that wants the same half-edge.

@@ -14,6 +14,7 @@ from ..matrix import OperatorMatrix
 from ..planar.piece import PieceMesh
 from ..planar.polish import PolishOptions, polish
 from ..topology import Numbering, Piece, Polygons, Topology, components, located, recognise
+from ..topology.keys import contains, distinct, pair_keys
 from .reading import FITS, Reading, even, misfits
 from .search import read_cells
 
@@ -154,7 +155,7 @@ def _part(matrix: OperatorMatrix, numbering: Numbering, reading: Reading) -> _Pa
         for piece, mesh in zip(reading.pieces, reading.meshes, strict=True)
     ]
     pairs = np.sort(vertices[reading.edges], axis=1)
-    added = ~np.isin(_keys(matrix.n, pairs), _keys(matrix.n, matrix.edges))
+    added = ~contains(pair_keys(matrix.n, *matrix.edges.T), pair_keys(matrix.n, *pairs.T))
     cells = reading.candidates.cells
     return _Part(pieces, pairs[added], cells.chosen(reading.labels & (cells.size > 3), vertices))
 
@@ -164,15 +165,18 @@ def _merged(
 ) -> tuple[OperatorMatrix, Topology, list[Outcome]]:
     """All parts on one list of edges."""
     n = matrix.n
-    given = _keys(n, matrix.edges)
-    keys = np.union1d(given, _keys(n, np.concatenate([part.vanished for part in parts])))
+    given = pair_keys(n, *matrix.edges.T)
+    vanished = np.concatenate([part.vanished for part in parts])
+    keys = distinct(np.concatenate([given, pair_keys(n, *vanished.T)]))
     edges = np.column_stack([keys // n, keys % n])
     entries = np.zeros(len(keys))
     old = np.searchsorted(keys, given)
     entries[old] = matrix.entries
     solved = sorted((item for part in parts for item in part.pieces), key=lambda item: int(item[0].vertices.min()))
+    ends = [piece.vertices[piece.edges].T for piece, _ in solved]
     pieces = tuple(
-        replace(piece, edge_rows=np.searchsorted(keys, _keys(n, piece.vertices[piece.edges]))) for piece, _ in solved
+        replace(piece, edge_rows=np.searchsorted(keys, pair_keys(n, *pair)))
+        for (piece, _), pair in zip(solved, ends, strict=True)
     )
     whole = replace(
         topology,
@@ -184,8 +188,3 @@ def _merged(
         polygons=Polygons.joined([part.polygons for part in parts]),
     )
     return replace(matrix, edges=edges, entries=entries), whole, [mesh for _, mesh in solved]
-
-
-def _keys(n: int, pairs: NDArray) -> NDArray[np.int64]:
-    """i n + j for pairs of vertices, i < j."""
-    return pairs.min(axis=1, initial=n) * n + pairs.max(axis=1, initial=0)

@@ -15,6 +15,7 @@ from ..planar.cotangent import edge_weights
 from ..planar.hinges import gap
 from ..planar.piece import PieceMesh
 from ..topology import Piece, Topology
+from ..topology.keys import contains, distinct, pair_keys
 from ..topology.recognise import planar_pieces
 from .candidates import Candidates
 
@@ -61,7 +62,7 @@ class Reading:
         triangles = triangulation(candidates, labels)
         key = _keys(n, triangles)
         given = candidates.edges[:, 0] * n + candidates.edges[:, 1]
-        union = np.union1d(given, key)
+        union = distinct(np.concatenate([given, key.ravel()]))
         edges = np.column_stack([union // n, union % n])
         weights = np.zeros(len(union))
         weights[np.searchsorted(union, given)] = candidates.weights
@@ -148,7 +149,7 @@ def triangulation(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[
         key = _keys(n, triangles)[:, 1]  # each diagonal belongs to the triangle before it
         key, owner = key[diagonal], cell[diagonal]
         value, place, count = np.unique(key, return_inverse=True, return_counts=True)
-        clash = np.isin(value, given) | (count > 1)
+        clash = contains(given, value) | (count > 1)
         if not clash.any():
             break
         moved = owner[clash[place]]
@@ -179,7 +180,7 @@ def fans_of(candidates: Candidates, labels: NDArray[np.bool_]) -> tuple[NDArray[
 def _keys(n: int, triangles: NDArray) -> NDArray[np.int64]:
     """(m, 3) keys i n + j, i < j, of the edges facing the corners."""
     ends = triangles[:, [[1, 2], [2, 0], [0, 1]]]
-    return ends.min(axis=2) * n + ends.max(axis=2)
+    return pair_keys(n, ends[..., 0], ends[..., 1])
 
 
 def _solved(piece: Piece, weights: NDArray) -> PieceMesh | None:

@@ -1,5 +1,6 @@
 """From the sparsity graph to faces, orientation, boundary loops and pieces; no coordinates here."""
 
+from .cycles import triangles_everywhere
 from .numbering import Numbering, local_numbering
 from .polygons import Polygons
 from .recognise import components, located, recognise, surfaces
@@ -15,4 +16,5 @@ __all__ = [
     "located",
     "recognise",
     "surfaces",
+    "triangles_everywhere",
 ]

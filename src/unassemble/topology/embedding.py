@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from . import planarity
 from .cycles import three_cycles
 from .faces import FaceComplex, around, from_cycles, from_rotation
+from .keys import distinct
 from .separating import not_faces
 from .short_cycles import chordless_four_cycles
 
@@ -102,7 +103,7 @@ def _with_faces(n: int, edges: NDArray, cycles: list[NDArray]) -> tuple[NDArray,
     cycle, and all midpoints on its rim see it.
     """
     sides = [around(n, edges, c) >> 1 for c in cycles]
-    rim = np.unique(np.concatenate([s.ravel() for s in sides]))
+    rim = distinct(np.concatenate([s.ravel() for s in sides]))
     midpoint = np.full(len(edges), -1)
     midpoint[rim] = n + np.arange(len(rim))
     hub = n + len(rim)

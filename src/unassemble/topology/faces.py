@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from .boundary import loops
+from .keys import contains, distinct, pair_keys
 from .orientation import glue, orient
 
 _ROUNDS = 20
@@ -72,8 +73,8 @@ class FaceComplex:
     @cached_property
     def simple(self) -> NDArray[np.bool_]:
         """(faces,) whether a face is a cycle of three or more different vertices."""
-        distinct = np.unique(self.face * self.n_vertices + self.tail) // self.n_vertices
-        return (np.bincount(distinct, minlength=len(self.size)) == self.size) & (self.size >= 3)
+        visited = distinct(self.face * self.n_vertices + self.tail) // self.n_vertices
+        return (np.bincount(visited, minlength=len(self.size)) == self.size) & (self.size >= 3)
 
     @cached_property
     def block(self) -> NDArray[np.int64]:
@@ -167,8 +168,7 @@ def from_cycles(n: int, edges: NDArray, cycles: list[NDArray]) -> FaceComplex | 
 
 def half_edges(n: int, edges: NDArray, tail: NDArray, head: NDArray) -> NDArray[np.int64]:
     """Half-edges from `tail` to `head`, which are joined by an edge."""
-    key = np.minimum(tail, head) * n + np.maximum(tail, head)
-    return 2 * np.searchsorted(edges[:, 0] * n + edges[:, 1], key) + (tail > head)
+    return 2 * np.searchsorted(edges[:, 0] * n + edges[:, 1], pair_keys(n, tail, head)) + (tail > head)
 
 
 def around(n: int, edges: NDArray, cycles: NDArray) -> NDArray[np.int64]:
@@ -178,9 +178,7 @@ def around(n: int, edges: NDArray, cycles: NDArray) -> NDArray[np.int64]:
 
 def joined(n: int, edges: NDArray, a: NDArray, b: NDArray) -> NDArray[np.bool_]:
     """Whether vertices a and b are joined by an edge, pair by pair."""
-    given = edges[:, 0] * n + edges[:, 1]
-    key = np.minimum(a, b) * n + np.maximum(a, b)
-    return given[np.minimum(np.searchsorted(given, key), len(given) - 1)] == key
+    return contains(edges[:, 0] * n + edges[:, 1], pair_keys(n, a, b))
 
 
 def fan(cycles: NDArray) -> NDArray[np.int64]:

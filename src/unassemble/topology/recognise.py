@@ -14,6 +14,7 @@ from . import planarity
 from .boundary import boundary_corners, following, loops
 from .cycles import three_cycles
 from .embedding import triangular_faces
+from .keys import distinct
 from .numbering import Numbering
 from .orientation import Gluing, glue, orient, reglue
 from .separating import not_faces
@@ -230,7 +231,7 @@ def _spheres_with_holes(
         tails = triangles.ravel()[3 * (corners // 3) + (corners + 1) % 3]
         fans = piece[corners // 3] * n + tails
         n_vertices = n_vertices + np.bincount(fans // n, minlength=n_pieces)
-        n_vertices -= np.bincount(np.unique(fans) // n, minlength=n_pieces)
+        n_vertices -= np.bincount(distinct(fans) // n, minlength=n_pieces)
     return bool(((n_vertices - n_edges + n_triangles == 2 - n_loops) & (n_loops > 0)).all())
 
 
@@ -240,7 +241,7 @@ def _vertices_of_pieces(n: int, triangles: NDArray, piece: NDArray) -> NDArray:
         seen = np.zeros(n, dtype=bool)
         seen[triangles] = True
         return np.flatnonzero(seen)
-    return np.unique(piece[:, None] * n + triangles)
+    return distinct(piece[:, None] * n + triangles)
 
 
 def _cut(

@@ -7,7 +7,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-_MOST_TESTS = 300
+from .adjacency import adjacency, neighbours
+from .keys import contains, distinct
+
+_MOST_WORK = 20_000_000  # vertices in the balls about cycles
 
 
 def not_faces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> NDArray[np.bool_]:
@@ -31,9 +34,7 @@ def not_faces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> 
     false = _peel_inner_vertices(n, edges, triangles, opposite)
     count = np.bincount(opposite[~false].ravel(), minlength=len(edges))
     doubtful = np.flatnonzero((count[opposite] > 2).any(axis=1) & ~false)
-    if len(doubtful) <= _MOST_TESTS:
-        graph = sp.csr_array((np.ones(len(edges), np.int8), edges.T), shape=(n, n))
-        false[[k for k in doubtful if _parts_touching_all(graph, triangles[k]) > 1]] = True
+    false[doubtful] = _separating(n, edges, triangles[doubtful])
     return false
 
 
@@ -77,16 +78,59 @@ def _by_edges(n_edges: int, opposite: NDArray) -> tuple[NDArray, NDArray]:
     return order, key[order]
 
 
-def _parts_touching_all(graph: sp.csr_array, cycle: NDArray) -> int:
-    """Components of the graph without the cycle that have neighbours at each of its vertices."""
+def _separating(n: int, edges: NDArray, cycles: NDArray) -> NDArray[np.bool_]:
+    """(m,) whether at least two components of the graph without a cycle have neighbours at all of its vertices.
+
+    Looked for in balls about all cycles at once, which grow until they tell: nearly always one of the components is
+    small. Cycles that would take too long are said to be faces.
+    """
+    graph = adjacency(n, edges)
+    separating = np.zeros(len(cycles), dtype=bool)
+    left, radius = np.arange(len(cycles)), 2
+    while len(left):
+        parts = _parts_nearby(graph, cycles[left], radius)
+        if parts is None:
+            break
+        separating[left] = parts > 1
+        left, radius = left[parts < 0], 2 * radius
+    return separating
+
+
+def _parts_nearby(graph: sp.csr_array, cycles: NDArray, radius: int) -> NDArray[np.int64] | None:
+    """(m,) components that touch all of a cycle, if the ball about it says; else -1. None if the balls are too large.
+
+    Vertices are keys k n + i: every cycle k has a ball of its own.
+    """
     n = graph.shape[0]
-    whole = graph + graph.T
-    keep = np.ones(n, dtype=bool)
-    keep[cycle] = False
-    number = np.cumsum(keep) - 1
-    _, label = csgraph.connected_components(whole[keep][:, keep], directed=False)
-    touched = []
-    for vertex in cycle:
-        neighbours = whole.indices[whole.indptr[vertex] : whole.indptr[vertex + 1]]
-        touched.append(set(label[number[neighbours[keep[neighbours]]]].tolist()))
-    return len(set.intersection(*touched))
+    removed = distinct(np.arange(len(cycles))[:, None] * n + cycles)
+    ball = rim = removed
+    tails, heads = [], []
+    for _ in range(radius):
+        place, neighbour = neighbours(graph, rim % n)
+        tail = rim[place]
+        head = tail - tail % n + neighbour
+        tails.append(tail)
+        heads.append(head)
+        reached = distinct(head)
+        rim = reached[~contains(ball, reached)]
+        ball = np.sort(np.concatenate([ball, rim]))
+        if len(ball) > _MOST_WORK:
+            return None
+    # Components of all balls without the cycles; one that reaches the rim may go on.
+    tail, head = np.concatenate(tails), np.concatenate(heads)
+    kept = ~contains(removed, tail) & ~contains(removed, head)
+    links = np.searchsorted(ball, np.stack([tail[kept], head[kept]]))
+    count, label = csgraph.connected_components(
+        sp.coo_array((np.ones(links.shape[1], np.int8), links), shape=(len(ball), len(ball))), directed=False
+    )
+    owner = np.empty(count, dtype=np.int64)
+    owner[label] = ball // n
+    goes_on = np.zeros(count, dtype=bool)
+    goes_on[label[np.searchsorted(ball, rim)]] = True
+    outside = ~contains(removed, heads[0])
+    touching = distinct(label[np.searchsorted(ball, heads[0][outside])] * n + tails[0][outside] % n)
+    touches_all = np.bincount(touching // n, minlength=count) == 3
+    parts = np.bincount(owner[touches_all], minlength=len(cycles))
+    closed = np.bincount(owner[touches_all & ~goes_on], minlength=len(cycles))
+    known = (np.bincount(owner[goes_on], minlength=len(cycles)) <= 1) | (closed > 1)
+    return np.where(known, parts, -1)

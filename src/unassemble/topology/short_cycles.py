@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .adjacency import adjacency, neighbours
 from .faces import joined
 
 
@@ -34,15 +34,12 @@ def chordless_four_cycles(n: int, edges: NDArray, usable: NDArray[np.bool_]) -> 
     degree = np.bincount(pairs.ravel(), minlength=n)
     rank = np.empty(n, dtype=np.int64)
     rank[np.argsort(degree, kind="stable")] = np.arange(n)
-    graph = sp.coo_array((np.ones(2 * len(pairs), np.int8), np.r_[pairs, pairs[:, ::-1]].T), shape=(n, n)).tocsr()
+    graph = adjacency(n, pairs)
     tail = np.repeat(np.arange(n), np.diff(graph.indptr))
     down = rank[tail] > rank[graph.indices]
     top, middle = tail[down], graph.indices[down].astype(np.int64)
     # All neighbours `end` of `middle` that rank below `top`.
-    count = degree[middle]
-    path = np.repeat(np.arange(len(top)), count)
-    within = np.arange(len(path)) - np.repeat(np.cumsum(count) - count, count)
-    end = graph.indices[graph.indptr[middle[path]] + within].astype(np.int64)
+    path, end = neighbours(graph, middle)
     top, middle = top[path], middle[path]
     kept = rank[end] < rank[top]
     top, middle, end = top[kept], middle[kept], end[kept]

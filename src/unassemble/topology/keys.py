@@ -1,0 +1,29 @@
+"""Sets of integers as sorted arrays, and the keys of pairs of vertices."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def distinct(values: NDArray) -> NDArray[np.int64]:
+    """Sorted, each value once.
+
+    numpy.unique hashes first, which takes several times as long for the integers that occur here.
+    """
+    values = np.sort(values, axis=None)
+    if not len(values):
+        return values
+    return values[np.append(True, values[1:] != values[:-1])]
+
+
+def contains(values: NDArray, wanted: NDArray) -> NDArray[np.bool_]:
+    """Whether each of `wanted` is among the sorted `values`."""
+    if not len(values):
+        return np.zeros(np.shape(wanted), dtype=bool)
+    return values[np.minimum(np.searchsorted(values, wanted), len(values) - 1)] == wanted
+
+
+def pair_keys(n: int, a: NDArray, b: NDArray) -> NDArray[np.int64]:
+    """i n + j for each pair {a, b} = {i, j} of vertices, i < j: sorted like edges in lexicographic order."""
+    return np.minimum(a, b) * n + np.maximum(a, b)
