@@ -97,7 +97,8 @@ def certify(
     if np.array_equal(key, given):
         pairs, difference = edges, value - entries
     else:
-        union = np.union1d(key, given)
+        both = np.sort(np.concatenate([key, given]))
+        union = both[np.append(True, both[1:] != both[:-1])]
         difference = np.zeros(len(union))
         difference[np.searchsorted(union, key)] += value
         difference[np.searchsorted(union, given)] -= entries

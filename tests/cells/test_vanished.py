@@ -154,7 +154,7 @@ def test_rows_that_can_change_places_are_named():
     assert "can as well stand in the order" in found.reason
     assert found.backward_error < 1e-12
     # Two crossed squares between the outside and a hole: each centre is joined to the same two corners.
-    twins = recover(forgotten(specimen(*squares(holes(8, 8, (5, 1, 2, 2)), crossed=True))).matrix)
+    twins = recover(forgotten(specimen(*squares(holes(8, 8, (5, 1, 2, 2)), crossed=True), seed=2)).matrix)
     assert twins.status == "uncertified"
     assert "can as well stand in the order" in twins.reason
     assert twins.backward_error < 1e-12

@@ -121,25 +121,28 @@ class Candidates:
         by_angles = ~self.corner & (self.belief > 2 - _FULL / np.pi) & (self.size > 3)
         corners = [self.corner & (self.belief > 0.5 + excess / np.pi) for excess in _INNER]
         faces = (self.first, (self.first & (self.size == 3)) | (by_angles & ~self.outer))
+        none = np.zeros_like(self.corner)
+        tried = {(chosen | extra).tobytes(): chosen | extra for chosen in faces for extra in (*corners, none)}
         seen = set()
-        for chosen in sorted(faces, key=self._strain):
-            for extra in (*corners, np.zeros_like(self.corner)):
-                labels = self.covering(self.compatible(np.where(chosen | extra, 1 + self.belief, -np.inf)), self.belief)
-                if labels.any() and labels.tobytes() not in seen:
-                    seen.add(labels.tobytes())
-                    yield labels
+        for chosen in sorted(tried.values(), key=self._strain):
+            labels = self.covering(self.compatible(np.where(chosen, 1 + self.belief, -np.inf)), self.belief)
+            if labels.any() and labels.tobytes() not in seen:
+                seen.add(labels.tobytes())
+                yield labels
 
     def _strain(self, labels: NDArray[np.bool_]) -> float:
-        """How far the angles of some faces are from adding up to pi, edges between two of them shared equally.
+        """How far the angles of some cells are from adding up to pi, edges between two of them shared equally.
 
         Short faces left out add a little, or no cells would be best.
         """
         cell, half = self.sides[labels[self.sides[:, 0]]].T
         used = np.zeros(2 * len(self.edges), dtype=bool)
         used[half] = True
-        angles = facing_angles(self.relative[half >> 1] * np.where(used[half ^ 1], 1, 2))
-        excess = np.bincount(cell, angles, self.count)[labels] / np.pi - 1
-        return float(excess @ excess) + _LEFT_OUT * float((self.first & ~labels).sum())
+        angles = np.bincount(cell, facing_angles(self.relative[half >> 1] * np.where(used[half ^ 1], 1, 2)), self.count)
+        # A corner has a right angle, and two others, the mean of what its sides show.
+        sides = np.maximum(np.bincount(cell, minlength=self.count), 1)
+        sums = np.where(self.corner, np.pi / 2 + 2 * angles / sides, angles)[labels]
+        return float(((sums / np.pi - 1) ** 2).sum()) + _LEFT_OUT * float((self.first & ~labels).sum())
 
     def compatible(self, value: NDArray) -> NDArray[np.bool_]:
         """(cells,) candidates of finite value, none of which loses to a better one that wants the same half-edge.

@@ -13,7 +13,7 @@ from ..errors import GeometryError, RecoveryError, SolverError
 from ..matrix import OperatorMatrix
 from ..planar.piece import PieceMesh
 from ..planar.polish import PolishOptions, polish
-from ..topology import Numbering, Piece, Polygons, Topology, components, located, recognise
+from ..topology import Numbering, Piece, Polygons, Topology, components, local_numbering, located, recognise
 from ..topology.keys import contains, distinct, pair_keys
 from .reading import FITS, Reading, even, misfits
 from .search import read_cells
@@ -100,21 +100,23 @@ def completed(
         If no component has cells.
     """
     misfit = _misfits(matrix, topology, meshes)
-    label = _component(matrix)
     solved: Solved = list(zip(topology.pieces, meshes, strict=True))
     kept = [item for item in solved if not doubtful[item[0].vertices[0]]]
     parts = [_Part(kept, np.empty((0, 2), np.int64), Polygons.none())]
     failures: list[RecoveryError] = []
     numberings = components(matrix.n, matrix.edges)
-    for numbering in numberings:
-        first = numbering.vertices[0]
-        if not doubtful[first]:
+    label = np.full(matrix.n, -1)
+    for k, part in enumerate(numberings):
+        label[part.vertices] = k
+    for k, part in enumerate(numberings):
+        if not doubtful[part.vertices[0]]:
             continue
-        own = [item for item in solved if label[item[0].vertices[0]] == label[first]]
+        own = [item for item in solved if label[item[0].vertices[0]] == k]
+        near = part.then(local_numbering(len(part.vertices), part.edges))
         try:
-            parts.append(_read_again(matrix, numbering, own, misfit[numbering.edge_rows]))
+            parts.append(_read_again(matrix, near, own, misfit[near.edge_rows]))
         except RecoveryError as error:
-            failures.append(located(error, numbering, named=len(numberings) > 1))
+            failures.append(located(error, near, named=len(numberings) > 1))
     if not any(part.pieces for part in parts):
         raise failures[0]
     return _merged(matrix, topology, parts, tuple(map(str, failures)))

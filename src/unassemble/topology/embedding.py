@@ -50,11 +50,10 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
         Pairs i < j in lexicographic order; at least one.
     """
     cycles = short_faces(n, edges)
-    seen: list[NDArray] = []
+    seen: list[FaceComplex] = []
     for drawing in _drawings(n, edges, cycles):
-        faces = _fingerprint(drawing)
-        if not any(np.array_equal(faces, other) for other in seen):
-            seen.append(faces)
+        if not any(np.array_equal(_fingerprint(drawing), _fingerprint(other)) for other in seen):
+            seen.append(drawing)
             yield drawing
 
 
