@@ -57,8 +57,8 @@ def solve(
     doubtful = in_doubt(matrix, topology, outcomes)
     if doubtful.any():
         with clock("faces"):
-            matrix, topology, outcomes = completed(matrix, topology, outcomes, doubtful)
-            # The search leaves c free, stops early and knows one method.
+            matrix, topology, outcomes = completed(matrix, topology, outcomes, doubtful, scale)
+            # The search leaves c free in its solves, stops early and knows one method.
             if scale is not None or not refine or method != "conformal":
                 outcomes = [start(piece) for piece in topology.pieces]
     topology, meshes = _successes(topology, outcomes)

@@ -71,7 +71,11 @@ def _shortly_polished(matrix: OperatorMatrix, topology: Topology, meshes: list[O
 
 
 def completed(
-    matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome], doubtful: NDArray[np.bool_]
+    matrix: OperatorMatrix,
+    topology: Topology,
+    meshes: list[Outcome],
+    doubtful: NDArray[np.bool_],
+    scale: float | None = None,
 ) -> tuple[OperatorMatrix, Topology, list[Outcome]]:
     """Read every doubtful component again.
 
@@ -84,6 +88,8 @@ def completed(
         Positions of its pieces, or why there are none.
     doubtful : (n,) bool
         See :func:`in_doubt`.
+    scale : float, optional
+        c, where it is known.
 
     Returns
     -------
@@ -112,7 +118,7 @@ def completed(
             continue
         own = [item for item in solved if label[item[0].vertices[0]] == label[first]]
         try:
-            parts.append(_read_again(matrix, numbering, own, misfit[numbering.edge_rows]))
+            parts.append(_read_again(matrix, numbering, own, misfit[numbering.edge_rows], scale))
         except RecoveryError as error:
             failures.append(located(error, numbering, named=len(numberings) > 1))
     if not any(part.pieces for part in parts):
@@ -133,10 +139,12 @@ def _component(matrix: OperatorMatrix) -> NDArray[np.int64]:
     return csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def _read_again(matrix: OperatorMatrix, numbering: Numbering, own: Solved, misfit: NDArray) -> _Part:
+def _read_again(
+    matrix: OperatorMatrix, numbering: Numbering, own: Solved, misfit: NDArray, scale: float | None
+) -> _Part:
     """One component: the reading that fits, or the triangles that there were, or the best reading."""
     weights = -matrix.entries[numbering.edge_rows]
-    reading = read_cells(len(numbering.vertices), numbering.edges, weights)
+    reading = read_cells(len(numbering.vertices), numbering.edges, weights, scale)
     before = float(np.sqrt(np.mean(misfit**2)))
     if reading is not None and (reading.fits or (reading.size < _BETTER * before and reading.misfit.max() < 1)):
         return _part(matrix, numbering, reading)
