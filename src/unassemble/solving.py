@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from functools import cache
 
 from numpy.typing import NDArray
 
@@ -45,6 +46,7 @@ def solve(
         If no piece has positions.
     """
 
+    @cache
     def start(piece: Piece) -> Outcome:
         try:
             weights = -matrix.entries[piece.edge_rows]
@@ -53,14 +55,15 @@ def solve(
             return error
 
     with clock(method):
-        outcomes = [start(piece) for piece in topology.pieces]
-    doubtful = in_doubt(matrix, topology, outcomes)
+        doubtful = in_doubt(matrix, topology, start)
     if doubtful.any():
         with clock("faces"):
-            matrix, topology, outcomes = completed(matrix, topology, outcomes, doubtful)
-            # The search leaves c free, stops early and knows one method.
+            matrix, topology, outcomes = completed(matrix, topology, start, doubtful, scale)
+            # The search leaves c free in its solves, stops early and knows one method.
             if scale is not None or not refine or method != "conformal":
                 outcomes = [start(piece) for piece in topology.pieces]
+    else:
+        outcomes = [start(piece) for piece in topology.pieces]
     topology, meshes = _successes(topology, outcomes)
     if refine:
         with clock("polish"):

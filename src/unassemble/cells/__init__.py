@@ -4,7 +4,7 @@ Where entries vanish the graph alone does not tell: see the page on theory in th
 """
 
 from .ambiguity import Exchange, exchanges
-from .completion import Outcome, completed, in_doubt
+from .completion import Attempt, Outcome, completed, in_doubt
 from .search import read_cells
 
-__all__ = ["Exchange", "Outcome", "completed", "exchanges", "in_doubt", "read_cells"]
+__all__ = ["Attempt", "Exchange", "Outcome", "completed", "exchanges", "in_doubt", "read_cells"]

@@ -31,8 +31,10 @@ class Candidates:
     edges : (e, 2) int64
     weights : (e,) float64
         -A_ij of each edge.
+    scale : float or None
+        c, where it is known.
     relative : (e,) float64
-        The same over the likeliest c, from the angles.
+        The weights over c, or over the likeliest c, from the angles.
     cells : Polygons
     sides : (s, 2) int64
         Pairs (cell, half-edge) of what each cell takes up.
@@ -50,6 +52,7 @@ class Candidates:
     n_vertices: int
     edges: NDArray[np.int64]
     weights: NDArray[np.float64]
+    scale: float | None
     relative: NDArray[np.float64]
     cells: Polygons
     sides: NDArray[np.int64]
@@ -59,10 +62,10 @@ class Candidates:
     corner: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, drawing: FaceComplex, weights: NDArray) -> Candidates:
+    def of(cls, drawing: FaceComplex, weights: NDArray, scale: float | None = None) -> Candidates:
         """All candidates of one drawing of the graph."""
         blocks = drawing.split()
-        relative = weights / likeliest_scale(blocks, weights)
+        relative = weights / (scale or likeliest_scale(blocks, weights))
         angles = np.repeat(facing_angles(relative), 2)
         sums = face_sums(blocks, angles)
         outer = _longest(blocks, sums)
@@ -85,6 +88,7 @@ class Candidates:
             n_vertices=drawing.n_vertices,
             edges=drawing.edges,
             weights=weights,
+            scale=scale,
             relative=relative,
             cells=Polygons(offsets, vertices),
             sides=np.concatenate(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,6 +27,9 @@ _SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 Outcome = PieceMesh | RecoveryError
 """Positions of a piece, or why there are none."""
 
+Attempt = Callable[[Piece], Outcome]
+"""Solves a piece, each only once."""
+
 Solved = list[tuple[Piece, Outcome]]
 
 
@@ -37,41 +42,44 @@ class _Part:
     polygons: Polygons
 
 
-def in_doubt(matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome]) -> NDArray[np.bool_]:
+def in_doubt(matrix: OperatorMatrix, topology: Topology, attempt: Attempt) -> NDArray[np.bool_]:
     """(n,) rows of components with nonzero entries on no triangle, or entries that do not fit.
 
     A misfit that is small and spread evenly, at the latest after a short polish, is that of errors in the entries, and
-    raises no doubt.
+    raises no doubt. Pieces of components that are in doubt without it are not solved.
     """
-    misfit = _misfits(matrix, topology, meshes)
-    doubtful = np.zeros(matrix.n, dtype=bool)
+    bare = topology.bare_edges
+    doubtful = _components_of(matrix, bare[matrix.entries[bare] != 0])
+    solved = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
+    rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
+    misfit = _misfits(matrix, solved)[rest]
     wrong = misfit > FITS
-    if not wrong.any() or even(misfit):
+    if not wrong.any() or even(misfit) or even(_misfits(matrix, _shortly_polished(matrix, solved))[rest]):
         return doubtful
-    if len(topology.bare_edges) == 0 and even(_misfits(matrix, topology, _shortly_polished(matrix, topology, meshes))):
-        return doubtful
-    label = _component(matrix)
-    doubtful[label[matrix.edges[wrong, 0]]] = True
-    return doubtful[label]
+    return doubtful | _components_of(matrix, rest[wrong])
 
 
-def _shortly_polished(matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome]) -> list[Outcome]:
-    polished: list[Outcome] = []
-    for piece, mesh in zip(topology.pieces, meshes, strict=True):
+def _shortly_polished(matrix: OperatorMatrix, solved: Solved) -> Solved:
+    polished: Solved = []
+    for piece, mesh in solved:
         if isinstance(mesh, PieceMesh):
             try:
                 found = polish(piece, -matrix.entries[piece.edge_rows], mesh.z, options=_SHORT)
             except SolverError as error:
-                polished.append(error)
+                polished.append((piece, error))
                 continue
-            polished.append(PieceMesh(found.z, found.scale))
+            polished.append((piece, PieceMesh(found.z, found.scale)))
         else:
-            polished.append(mesh)
+            polished.append((piece, mesh))
     return polished
 
 
 def completed(
-    matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome], doubtful: NDArray[np.bool_]
+    matrix: OperatorMatrix,
+    topology: Topology,
+    attempt: Attempt,
+    doubtful: NDArray[np.bool_],
+    scale: float | None = None,
 ) -> tuple[OperatorMatrix, Topology, list[Outcome]]:
     """Read every doubtful component again.
 
@@ -80,10 +88,12 @@ def completed(
     matrix : OperatorMatrix
     topology : Topology
         Surfaces of 3-cycles; see :func:`unassemble.topology.surfaces`.
-    meshes : list of PieceMesh or RecoveryError
-        Positions of its pieces, or why there are none.
+    attempt : callable
+        Gives positions of one of its pieces, or says why there are none.
     doubtful : (n,) bool
         See :func:`in_doubt`.
+    scale : float, optional
+        c, where it is known.
 
     Returns
     -------
@@ -99,22 +109,25 @@ def completed(
     RecoveryError
         If no component has cells.
     """
-    misfit = _misfits(matrix, topology, meshes)
-    solved: Solved = list(zip(topology.pieces, meshes, strict=True))
-    kept = [item for item in solved if not doubtful[item[0].vertices[0]]]
+    kept = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
     parts = [_Part(kept, np.empty((0, 2), np.int64), Polygons.none())]
     failures: list[RecoveryError] = []
     numberings = components(matrix.n, matrix.edges)
+
+    @cache
+    def misfit_of_triangles() -> NDArray[np.float64]:
+        return _misfits(matrix, [(piece, attempt(piece)) for piece in topology.pieces])
+
     label = np.full(matrix.n, -1)
     for k, part in enumerate(numberings):
         label[part.vertices] = k
     for k, part in enumerate(numberings):
         if not doubtful[part.vertices[0]]:
             continue
-        own = [item for item in solved if label[item[0].vertices[0]] == k]
+        own = [piece for piece in topology.pieces if label[piece.vertices[0]] == k]
         near = part.then(local_numbering(len(part.vertices), part.edges))
         try:
-            parts.append(_read_again(matrix, near, own, misfit[near.edge_rows]))
+            parts.append(_read_again(matrix, near, own, attempt, misfit_of_triangles, scale))
         except RecoveryError as error:
             failures.append(located(error, near, named=len(numberings) > 1))
     if not any(part.pieces for part in parts):
@@ -122,30 +135,47 @@ def completed(
     return _merged(matrix, topology, parts, tuple(map(str, failures)))
 
 
-def _misfits(matrix: OperatorMatrix, topology: Topology, meshes: list[Outcome]) -> NDArray[np.float64]:
+def _misfits(matrix: OperatorMatrix, solved: Solved) -> NDArray[np.float64]:
     """(e,) as :func:`unassemble.cells.reading.misfits`."""
-    outcomes = zip(topology.pieces, meshes, strict=True)
-    solved = [(piece, mesh) for piece, mesh in outcomes if isinstance(mesh, PieceMesh)]
-    return misfits(matrix.n, matrix.edges, -matrix.entries, solved)
+    return misfits(
+        matrix.n,
+        matrix.edges,
+        -matrix.entries,
+        [(piece, mesh) for piece, mesh in solved if isinstance(mesh, PieceMesh)],
+    )
 
 
-def _component(matrix: OperatorMatrix) -> NDArray[np.int64]:
-    """(n,) label of the connected component of each row."""
+def _components_of(matrix: OperatorMatrix, rows: NDArray) -> NDArray[np.bool_]:
+    """(n,) rows of the connected components that have one of the given edges."""
+    chosen = np.zeros(matrix.n, dtype=bool)
+    if not len(rows):
+        return chosen
     graph = sp.coo_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
-    return csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
+    label = csgraph.connected_components(graph, directed=False)[1]
+    chosen[label[matrix.edges[rows, 0]]] = True
+    return chosen[label]
 
 
-def _read_again(matrix: OperatorMatrix, numbering: Numbering, own: Solved, misfit: NDArray) -> _Part:
+def _read_again(
+    matrix: OperatorMatrix,
+    numbering: Numbering,
+    own: list[Piece],
+    attempt: Attempt,
+    misfit_of_triangles: Callable[[], NDArray[np.float64]],
+    scale: float | None,
+) -> _Part:
     """One component: the reading that fits, or the triangles that there were, or the best reading."""
     weights = -matrix.entries[numbering.edge_rows]
-    reading = read_cells(len(numbering.vertices), numbering.edges, weights)
-    before = float(np.sqrt(np.mean(misfit**2)))
-    if reading is not None and (reading.fits or (reading.size < _BETTER * before and reading.misfit.max() < 1)):
+    reading = read_cells(len(numbering.vertices), numbering.edges, weights, scale)
+    if reading is not None and reading.fits:
+        return _part(matrix, numbering, reading)
+    before = float(np.sqrt(np.mean(misfit_of_triangles()[numbering.edge_rows] ** 2)))
+    if reading is not None and reading.size < _BETTER * before and reading.misfit.max() < 1:
         return _part(matrix, numbering, reading)
     if reading is None or not own:
         recognise(len(numbering.vertices), numbering.edges)  # says what is wrong with the graph, if that is it
     if own:
-        return _Part(own, np.empty((0, 2), np.int64), Polygons.none())
+        return _Part([(piece, attempt(piece)) for piece in own], np.empty((0, 2), np.int64), Polygons.none())
     raise GeometryError("no choice of cells and holes on the graph fits the entries: they belong to no planar mesh")
 
 

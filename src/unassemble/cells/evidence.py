@@ -24,6 +24,7 @@ from ..topology import Piece
 from .reading import FITS, Reading, fans_of
 
 _RIDGE = 0.1
+_FAR = 1e8
 _LONGEST = 40  # edges of a face that may be a cell
 _STEEPEST = 20.0  # cotangents beyond belong to slivers of a wrong start
 
@@ -32,7 +33,8 @@ def label_changes(reading: Reading) -> NDArray[np.float64]:
     """(cells,) the change of each label that explains the misfit best; NaN where nothing can be said."""
     changes = np.full(reading.candidates.count, np.nan)
     for piece, mesh in zip(reading.pieces, reading.meshes, strict=True):
-        if mesh and (reading.misfit[piece.edge_rows] > FITS).any():
+        overdetermined = len(piece.edges) > 2 * piece.n_vertices - 3
+        if mesh and overdetermined and (reading.misfit[piece.edge_rows] > FITS).any():
             _explain(reading, piece, mesh, changes)
     return changes
 
@@ -48,12 +50,13 @@ def _explain(reading: Reading, piece: Piece, mesh: PieceMesh, changes: NDArray) 
     z = z / np.abs(z).max()
     with np.errstate(all="ignore"):
         w = edge_weights(piece, z)
-        misfit = reading.weights[piece.edge_rows] / mesh.scale - w
-    if not (np.isfinite(w).all() and np.isfinite(misfit).all() and chosen.any()):
+        misfit = reading.weights[piece.edge_rows] / (candidates.scale or mesh.scale) - w
+    size = np.abs(w + misfit)
+    comparable = _FAR * np.abs(w).max() > size.max(initial=0.0) > 0  # not where c is given and out of all proportion
+    if not (np.isfinite(w).all() and np.isfinite(misfit).all() and chosen.any() and comparable):
         return
     response = _response(reading, piece, z, local, chosen)
     extra = response.shape[0] - len(w)  # diagonals of candidates that are no cells yet
-    size = np.abs(w + misfit)
     typical = float(np.median(size[size > 0]))
     spread = np.r_[size + typical, np.full(extra, typical)]
     jacobian = WeightJacobian(piece, z, spread[: len(w)]).matrix.tocsr()
@@ -62,10 +65,11 @@ def _explain(reading: Reading, piece: Piece, mesh: PieceMesh, changes: NDArray) 
     pins = distant_pair(z)
     free[np.r_[2 * pins, 2 * pins + 1]] = False
     scaled = sp.diags_array(1 / spread)
-    scale_column = sp.csr_array((np.append(w, np.zeros(extra)) / spread)[:, None])
+    free_scale = 0.0 if candidates.scale else 1.0
+    scale_column = sp.csr_array((free_scale * np.append(w, np.zeros(extra)) / spread)[:, None])
     columns = sp.hstack([jacobian[:, free], scaled @ response, scale_column]).tocsr()
     n_labels = response.shape[1]
-    ridge = np.r_[np.zeros(free.sum()), np.full(n_labels, _RIDGE**2), 0.0]
+    ridge = np.r_[np.zeros(free.sum()), np.full(n_labels, _RIDGE**2), 1 - free_scale]
     normal = (columns.T @ columns + sp.diags_array(ridge)).tocsr()
     rhs = columns.T @ (np.append(misfit, np.zeros(extra)) / spread)
     solution = _solve(normal, rhs)

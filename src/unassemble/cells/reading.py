@@ -18,6 +18,7 @@ from ..topology import Piece, Topology
 from ..topology.keys import contains, distinct, pair_keys
 from ..topology.recognise import planar_pieces
 from .candidates import Candidates
+from .small import SMALL, small_map
 
 FITS = 1e-6
 """Largest misfit, relative to the row, of a conformal solve with the right cells; the polish does the rest."""
@@ -56,8 +57,10 @@ class Reading:
     misfit: NDArray[np.float64]
 
     @classmethod
-    def of(cls, candidates: Candidates, labels: NDArray[np.bool_]) -> Reading:
-        """Triangulate the cells and solve every piece."""
+    def of(
+        cls, candidates: Candidates, labels: NDArray[np.bool_], known: dict[bytes, PieceMesh | None] | None = None
+    ) -> Reading:
+        """Triangulate the cells and solve every piece, but for those `known`, to which new ones are added."""
         n = candidates.n_vertices
         triangles = triangulation(candidates, labels)
         key = _keys(n, triangles)
@@ -67,10 +70,15 @@ class Reading:
         weights = np.zeros(len(union))
         weights[np.searchsorted(union, given)] = candidates.weights
         pieces = planar_pieces(n, edges, triangles, np.searchsorted(union, key)) or ()
-        meshes = [_solved(piece, weights[piece.edge_rows]) for piece in pieces]
+        known = {} if known is None else known
+        names = [_key_of(piece) for piece in pieces]
+        for name, piece in zip(names, pieces, strict=True):
+            if name not in known:
+                known[name] = _solved(piece, weights[piece.edge_rows])
+        meshes = [known[name] for name in names]
         solved = [(piece, mesh) for piece, mesh in zip(pieces, meshes, strict=True) if mesh]
         misfit = misfits(n, edges, weights, solved)
-        _add_discord(n, edges, solved, misfit)
+        _add_discord(n, edges, solved, misfit, candidates.scale)
         misfit[np.isin(edges, _crowded(candidates, labels)).any(axis=1)] = 1.0
         return cls(candidates, labels, edges, weights, pieces, tuple(meshes), misfit)
 
@@ -111,17 +119,21 @@ def misfits(n: int, edges: NDArray, weights: NDArray, solved: list[tuple[Piece, 
     return misfit
 
 
-def _add_discord(n: int, edges: NDArray, solved: list[tuple[Piece, PieceMesh]], misfit: NDArray) -> None:
+def _add_discord(
+    n: int, edges: NDArray, solved: list[tuple[Piece, PieceMesh]], misfit: NDArray, scale: float | None
+) -> None:
     """Raise the misfit where pieces do not go together: another scale, or rings of pieces that do not close.
 
     Small pieces by themselves fit nearly everything.
     """
-    if len(solved) < 2:
+    if not solved or (len(solved) == 1 and scale is None):
         return
-    scale = max(solved, key=lambda item: item[0].n_vertices)[1].scale
+    scale = scale or max(solved, key=lambda item: item[0].n_vertices)[1].scale
     for piece, mesh in solved:
         rows = piece.edge_rows
         misfit[rows] = np.maximum(misfit[rows], min(abs(mesh.scale / scale - 1), 1.0))
+    if (misfit > FITS).any():  # whether rings close is the last question, and the dearest
+        return
     topology = Topology(n, edges, tuple(piece for piece, _ in solved), "")
     left = gap(topology, [mesh.z / np.abs(mesh.z).max() for _, mesh in solved])
     at_hinges = np.isin(edges, topology.hinges).any(axis=1)
@@ -184,8 +196,16 @@ def _keys(n: int, triangles: NDArray) -> NDArray[np.int64]:
 
 
 def _solved(piece: Piece, weights: NDArray) -> PieceMesh | None:
+    if piece.n_vertices <= SMALL:
+        return small_map(piece, weights)
     try:
         found = conformal_map(piece, weights, sharp=False, options=_OPTIONS)
     except (GeometryError, SolverError):
         return None
     return PieceMesh(found.z, found.scale) if np.isfinite(found.z).all() and found.scale else None
+
+
+def _key_of(piece: Piece) -> bytes:
+    """The same for the same triangles."""
+    triangles = np.sort(piece.vertices[piece.triangles], axis=1)
+    return triangles[np.lexsort(triangles.T)].tobytes()

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..planar.piece import PieceMesh
 from ..topology.embedding import face_complexes
 from .candidates import Candidates
 from .evidence import label_changes
@@ -16,13 +18,38 @@ from .reading import Reading
 _log = logging.getLogger(__name__)
 
 _STARTS = 2  # readings to begin with that are worth repairing
-_WORK = 1e5  # vertices times solves that small changes may take
+_WORK = 1e5  # vertices times solves that repairs may take altogether
 _SUSPECT = 0.3  # change of the label of a lone triangular hole: it was 0.4 or more in all that were tried
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
-_SOLVES = 80
+_SOLVES = 120
+_MANY = 20  # pieces that cost as much as another solve
 
 
-def read_cells(n: int, edges: NDArray, weights: NDArray) -> Reading | None:
+@dataclass
+class Effort:
+    """Solves that are left; all drawings and starts share them, so that input without a mesh is soon given up."""
+
+    solves: int
+    known: dict[bytes, PieceMesh | None] = field(default_factory=dict)
+
+    @classmethod
+    def for_graph(cls, n: int) -> Effort:
+        """As much as a graph of n vertices is worth."""
+        return cls(int(np.clip(_WORK / n, 12, _SOLVES)))
+
+    def reading(self, candidates: Candidates, labels: NDArray[np.bool_]) -> Reading:
+        """A reading, counted."""
+        reading = Reading.of(candidates, labels, self.known)
+        self.solves -= 1 + len(reading.pieces) // _MANY
+        return reading
+
+    @property
+    def spent(self) -> bool:
+        """Whether it is time to give up."""
+        return self.solves <= 0
+
+
+def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = None) -> Reading | None:
     """The reading of a connected planar graph that fits its weights, or else the one that fits best.
 
     Parameters
@@ -32,6 +59,8 @@ def read_cells(n: int, edges: NDArray, weights: NDArray) -> Reading | None:
         Pairs i < j in lexicographic order; at least one.
     weights : (e,) float64
         -A_ij of each edge.
+    scale : float, optional
+        c, where it is known.
 
     Returns
     -------
@@ -39,17 +68,18 @@ def read_cells(n: int, edges: NDArray, weights: NDArray) -> Reading | None:
         None if no reading makes a planar surface.
     """
     best: Reading | None = None
+    effort = Effort.for_graph(n)
     for drawing in face_complexes(n, edges):
-        candidates = Candidates.of(drawing, weights)
+        candidates = Candidates.of(drawing, weights, scale)
         starts = []
         for labels in candidates.starts():
-            starts.append(Reading.of(candidates, labels))
+            starts.append(effort.reading(candidates, labels))
             if starts[-1].fits:
                 return starts[-1]
         if starts and _entries_are_to_blame(starts[0]):
             return _better(best, starts[0])
         for start in sorted(starts, key=lambda reading: reading.size)[:_STARTS]:
-            best = _better(best, start if start.like_noise else _repaired(start))
+            best = _better(best, start if start.like_noise else _repaired(start, effort))
             if best.fits:
                 return best
     return best if best is not None and best.pieces else None
@@ -67,39 +97,37 @@ def _entries_are_to_blame(reading: Reading) -> bool:
     return float(np.nan_to_num(np.abs(label_changes(reading))).max(initial=0.0)) < _SUSPECT
 
 
-def _repaired(reading: Reading) -> Reading:
+def _repaired(reading: Reading, effort: Effort) -> Reading:
     """Turn labels over as the misfit asks for it."""
-    best = _leaps(reading)
-    return best if best.fits else _descent(best)
+    best = _leaps(reading, effort)
+    return best if best.fits else _descent(best, effort)
 
 
-def _leaps(reading: Reading) -> Reading:
+def _leaps(reading: Reading, effort: Effort) -> Reading:
     """All clear changes at once, uphill too: with many wrong cells the misfit of the way is no guide."""
     best, since_best = reading, 0
     patience = np.clip(3e4 / reading.candidates.n_vertices, 2, _PATIENCE)
     seen = {reading.labels.tobytes()}
-    while reading.pieces and not reading.fits and since_best < patience:
+    while reading.pieces and not reading.fits and since_best < patience and not effort.spent:
         changes = np.nan_to_num(label_changes(reading))
         labels = next((x for x in proposals(reading, changes) if x.tobytes() not in seen), None)
         if labels is None:
             break
         seen.add(labels.tobytes())
-        reading = Reading.of(reading.candidates, labels)
+        reading = effort.reading(reading.candidates, labels)
         since_best = 0 if reading.size < best.size else since_best + 1
         best = _better(best, reading)
         _log.debug("leap: misfit %.1e", reading.size)
     return best
 
 
-def _descent(reading: Reading) -> Reading:
+def _descent(reading: Reading, effort: Effort) -> Reading:
     """Small changes, each of which lowers the misfit."""
-    solves, most = 0, int(np.clip(_WORK / reading.candidates.n_vertices, 5, _SOLVES))
-    while solves < most and reading.pieces and not reading.fits:
+    while reading.pieces and not reading.fits and not effort.spent:
         changes = np.nan_to_num(label_changes(reading))
         for labels in proposals(reading, changes):
-            trial = Reading.of(reading.candidates, labels)
-            solves += 1
-            if trial.size < reading.size or solves == most:
+            trial = effort.reading(reading.candidates, labels)
+            if trial.size < reading.size or effort.spent:
                 break
         else:
             return reading

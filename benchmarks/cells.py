@@ -1,0 +1,115 @@
+"""How often cells are told from holes on random meshes, and how long matrices of no mesh keep the search busy.
+
+    python benchmarks/cells.py [--families pierced,crossed,...] [--seeds 60] [--first 0] [--hopeless] [--known-scale]
+
+The meshes are those of tests/families.py, assembled by scikit-fem, vanishing entries dropped, rows in random order. An
+answer counts as right if every edge-connected piece of the mesh comes back to 1e-9 of its diameter; certified answers
+that are not right are listed as WRONG. Ambiguous ones name rows that can change places.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
+
+import contextlib
+
+from families import FAMILIES, HOPELESS
+from meshes import Specimen, largest_error, specimen
+from unassemble import RecoveryError, recover
+from vanishing import forgotten
+
+
+def main() -> None:
+    """Print a line for each family."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--families", default=",".join(FAMILIES))
+    parser.add_argument("--seeds", type=int, default=60)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--hopeless", action="store_true", help="only matrices of no mesh")
+    parser.add_argument("--known-scale", action="store_true", help="tell the scale")
+    arguments = parser.parse_args()
+    seeds = range(arguments.first, arguments.first + arguments.seeds)
+    if arguments.hopeless:
+        for name in HOPELESS:
+            print_hopeless(name, seeds)
+        return
+    for name in arguments.families.split(","):
+        print_family(name, seeds, known_scale=arguments.known_scale)
+
+
+def print_family(name: str, seeds: range, *, known_scale: bool) -> None:
+    """Outcomes and times on one family."""
+    outcomes: dict[str, list[int]] = defaultdict(list)
+    seconds, rows = [], []
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        c = float(rng.choice([1.0, -2.5, 1e-3]))
+        known = forgotten(specimen(*FAMILIES[name](rng), c=c, seed=seed))
+        start = time.perf_counter()
+        outcomes[outcome(known, c if known_scale else None)].append(seed)
+        seconds.append(time.perf_counter() - start)
+        rows.append(known.matrix.shape[0])
+    counts = ", ".join(f"{key} {len(value)}" for key, value in sorted(outcomes.items()))
+    slow = int(np.argmax(seconds))
+    print(
+        f"{name}: {counts}; median {np.median(seconds):.2f} s, slowest {seconds[slow]:.1f} s "
+        f"(seed {seeds[slow]}, {rows[slow]} rows)"
+    )
+    for key in sorted(outcomes.keys() - {"certified"}):
+        print(f"    {key}: {' '.join(map(str, outcomes[key]))}")
+    sys.stdout.flush()
+
+
+def outcome(known: Specimen, scale: float | None) -> str:
+    """In a word."""
+    try:
+        found = recover(known.matrix, scale=scale)
+    except RecoveryError:
+        return "refused"
+    if found.status == "uncertified":
+        return "ambiguous" if "in the order" in found.reason else "uncertified"
+    wrong = [rows for rows in pieces(known.triangles) if error(found.points[rows], known.points[rows]) > 1e-9]
+    return "WRONG" if wrong else "certified"
+
+
+def error(points: np.ndarray, true: np.ndarray) -> float:
+    """Infinite where there are no positions."""
+    return largest_error(points, true) if np.isfinite(points).all() else np.inf
+
+
+def pieces(triangles: np.ndarray) -> list[np.ndarray]:
+    """Vertices of each edge-connected piece."""
+    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, side = np.unique(sides, axis=0, return_inverse=True)
+    incidence = sp.coo_array((np.ones(len(sides)), (np.arange(len(sides)) // 3, side.ravel()))).tocsr()
+    count, label = sp.csgraph.connected_components(incidence @ incidence.T, directed=False)
+    return [np.unique(triangles[label == k]) for k in range(count)]
+
+
+def print_hopeless(name: str, seeds: range) -> None:
+    """Times until a matrix of no mesh is refused."""
+    for n in (20, 60, 200, 600):
+        if name == "dodecahedron" and n > 20:
+            break
+        seconds, certified = [], 0
+        for seed in seeds:
+            matrix = HOPELESS[name](n, seed)
+            start = time.perf_counter()
+            with contextlib.suppress(RecoveryError):
+                certified += recover(matrix).status == "certified"
+            seconds.append(time.perf_counter() - start)
+        print(f"{name}, {n} rows: median {np.median(seconds):.2f} s, slowest {max(seconds):.2f} s", end="")
+        print(f"; certified {certified}" if certified else "", flush=True)
+
+
+if __name__ == "__main__":
+    main()

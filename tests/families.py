@@ -1,0 +1,164 @@
+"""Random meshes in which it is hard to tell cells from holes, a family for each difficulty; and matrices of no mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import networkx
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from meshes import delaunay, random_mesh
+from vanishing import Mesh, refined, squares, triangular_holes, used
+
+
+def pierced(rng: np.random.Generator) -> Mesh:
+    """Every eighth triangle removed, of random or jittered points."""
+    n = int(rng.integers(100, 800))
+    if rng.random() < 0.5:
+        points, triangles = random_mesh(n, int(rng.integers(10**6)), holes=False)
+    else:
+        points, triangles = delaunay(rng.random((n, 2)), longest=4 / np.sqrt(n))
+    return without(points, triangles, rng, 1 / 8)
+
+
+def crossed(rng: np.random.Generator) -> Mesh:
+    """Crossed squares, of which a random part is left."""
+    return squares(_mask(rng, 2, 9, rng.uniform(0, 0.7)), crossed=True)
+
+
+def lattice(rng: np.random.Generator) -> Mesh:
+    """Lattices of equilateral, right or arbitrary triangles with many holes, and pieces that hang by a vertex."""
+    k = int(rng.integers(4, 14))
+    x, y = np.meshgrid(np.arange(k), np.arange(k), indexing="ij")
+    number = np.arange(k * k).reshape(k, k)
+    points = np.column_stack([x.ravel(), y.ravel()]).astype(np.float64)
+    kind = rng.integers(3)
+    if kind != 1:
+        points = points @ np.array([[1, 0], [0.5, np.sqrt(0.75)]])
+    if kind == 2:
+        points += rng.uniform(-0.2, 0.2, points.shape)
+    a, b, c, d = (q.ravel() for q in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
+    triangles = np.concatenate([np.column_stack([a, b, d]), np.column_stack([b, c, d])])
+    return without(points, triangles, rng, rng.uniform(0.05, 0.45))
+
+
+def ring(rng: np.random.Generator) -> Mesh:
+    """A ring one element wide."""
+    n = int(rng.integers(3, 60))
+    angle = 2 * np.pi * (np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n
+    inner = np.column_stack([np.cos(angle), np.sin(angle)])
+    outer = rng.uniform(1.5, 2) * np.column_stack([np.cos(angle + 0.1), np.sin(angle + 0.1)])
+    points = np.concatenate([inner, outer + rng.uniform(-0.1, 0.1, (n, 2))])
+    i = np.arange(n)
+    j = (i + 1) % n
+    return points, np.concatenate([np.column_stack([i, n + i, j]), np.column_stack([n + i, n + j, j])])
+
+
+def grid(rng: np.random.Generator) -> Mesh:
+    """Rectangles, of which a random part is left."""
+    return squares(_mask(rng, 3, 14, rng.uniform(0, 0.35)), width=rng.uniform(0.3, 3))
+
+
+def adaptive(rng: np.random.Generator) -> Mesh:
+    """Right triangles refined around random points."""
+    return refined(int(rng.integers(2, 6)), int(rng.integers(10**6)))
+
+
+def separate_holes(rng: np.random.Generator) -> Mesh:
+    """Triangular holes that share no vertex."""
+    n = int(rng.integers(100, 900))
+    return triangular_holes(n, int(n * rng.uniform(0, 0.12)), int(rng.integers(10**6)))
+
+
+def polygon(rng: np.random.Generator) -> Mesh:
+    """A polygon divided at random."""
+    n = int(rng.integers(3, 30))
+    angle = np.sort(rng.uniform(0, 2 * np.pi, n))
+    points = np.column_stack([rng.uniform(0.5, 1.5) * np.cos(angle), np.sin(angle)])
+
+    def divided(corners: list[int]) -> list[list[int]]:
+        if len(corners) < 3:
+            return []
+        k = int(rng.integers(1, len(corners) - 1))
+        apex = [corners[0], corners[k], corners[-1]]
+        return [apex, *divided(corners[: k + 1]), *divided(corners[k:])]
+
+    return points, np.array(divided(list(range(n))))
+
+
+def scattered(rng: np.random.Generator) -> Mesh:
+    """Delaunay triangles of few random points, long ones left out."""
+    return delaunay(rng.random((int(rng.integers(4, 200)), 2)), longest=rng.uniform(0.15, 2))
+
+
+FAMILIES: dict[str, Callable[[np.random.Generator], Mesh]] = {
+    family.__name__: family
+    for family in (pierced, crossed, lattice, ring, grid, adaptive, separate_holes, polygon, scattered)
+}
+
+
+def tree(n: int, seed: int = 0) -> sp.csr_array:
+    """A random tree with random weights."""
+    rng = np.random.default_rng(seed)
+    parent = np.array([rng.integers(k) for k in range(1, n)])
+    return _weighted(n, np.column_stack([parent, np.arange(1, n)]), rng.uniform(0.2, 2, n - 1))
+
+
+def dodecahedron(_: int, __: int = 0) -> sp.csr_array:
+    """Twelve pentagons, all weights 1."""
+    edges = np.array(networkx.dodecahedral_graph().edges)
+    return _weighted(20, edges, np.ones(len(edges)))
+
+
+def planar_graph(n: int, seed: int = 0) -> sp.csr_array:
+    """A triangulation without a third of its edges, random weights."""
+    rng = np.random.default_rng(seed)
+    _, triangles = delaunay(rng.random((n, 2)))
+    edges = np.unique(np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+    edges = edges[rng.random(len(edges)) < 2 / 3]
+    return _weighted(n, edges, rng.uniform(0.2, 2, len(edges)))
+
+
+def random_grid(n: int, seed: int = 0) -> sp.csr_array:
+    """A square grid, random weights."""
+    k = round(np.sqrt(n))
+    edges = np.array(networkx.convert_node_labels_to_integers(networkx.grid_2d_graph(k, k)).edges)
+    return _weighted(k * k, edges, np.random.default_rng(seed).uniform(0.2, 2, len(edges)))
+
+
+def cactus(n: int, seed: int = 0) -> sp.csr_array:
+    """Cycles that hang together by single vertices, random weights."""
+    rng = np.random.default_rng(seed)
+    edges, count = [], 1
+    while count < n:
+        first, k = int(rng.integers(count)), int(rng.integers(3, 9))
+        cycle = [first, *range(count, count + k - 1)]
+        edges += list(zip(cycle, cycle[1:] + cycle[:1], strict=True))
+        count += k - 1
+    return _weighted(count, np.array(edges), rng.uniform(0.2, 2, len(edges)))
+
+
+HOPELESS: dict[str, Callable[[int, int], sp.csr_array]] = {
+    matrix.__name__: matrix for matrix in (tree, dodecahedron, planar_graph, random_grid, cactus)
+}
+
+
+def without(points: NDArray, triangles: NDArray, rng: np.random.Generator, share: float) -> Mesh:
+    """A mesh without a share of its triangles, one at least being left."""
+    keep = rng.random(len(triangles)) >= share
+    keep[0] |= not keep.any()
+    return used(points, triangles[keep])
+
+
+def _mask(rng: np.random.Generator, least: int, most: int, share: float) -> NDArray[np.bool_]:
+    mask = rng.random(tuple(rng.integers(least, most, 2))) >= share
+    mask[0, 0] |= not mask.any()
+    return mask
+
+
+def _weighted(n: int, edges: NDArray, weights: NDArray) -> sp.csr_array:
+    """Minus a graph's weights, rows in their order."""
+    i, j = edges.T
+    return sp.coo_array((-np.tile(weights, 2), (np.r_[i, j], np.r_[j, i])), shape=(n, n)).tocsr()
