@@ -38,7 +38,30 @@ def join(topology: Topology, positions: list[NDArray], known: NDArray | None = N
     held = _held(_groups(topology), known)
     positions = _matching_images(topology, positions, held)
     joined, _ = _joined(topology, positions, held)
-    return joined
+    # Once more from there: turns and shifts of small pieces in a large mesh differ in size by many digits.
+    return _joined(topology, joined, held)[0]
+
+
+def free_images(topology: Topology, joined: list[NDArray]) -> NDArray[np.int64]:
+    """Pieces in rings of which the mirror image meets the others as well: the matrix does not tell these apart.
+
+    Parameters
+    ----------
+    topology : Topology
+    joined : list of (n_p,) complex128
+        Positions by :func:`join`.
+    """
+    if _rings(topology) <= 0 or len(joined) > _MOST_IMAGES:
+        return np.empty(0, dtype=np.int64)
+    held = _held(_groups(topology), np.zeros(len(joined), dtype=np.int64))
+    shared = [np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces]
+    free = []
+    for piece in np.flatnonzero(~held & (np.array(shared) > 1)):
+        turned = list(joined)
+        turned[piece] = np.conj(turned[piece])
+        if _joined(topology, turned, held)[1] <= _CLOSED:
+            free.append(piece)
+    return np.array(free, dtype=np.int64)
 
 
 def gap(topology: Topology, positions: list[NDArray]) -> float:
@@ -51,9 +74,7 @@ def gap(topology: Topology, positions: list[NDArray]) -> float:
 
 def _matching_images(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> list[NDArray]:
     """Mirror images of pieces in rings that let these close, found by turning over one piece after the other."""
-    shared = sum(np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces)
-    rings = shared - len(topology.hinges) - (len(positions) - len(np.unique(_groups(topology))))
-    if rings <= 0 or len(positions) > _MOST_IMAGES:
+    if _rings(topology) <= 0 or len(positions) > _MOST_IMAGES:
         return positions
     best = _joined(topology, positions, held)[1]
     while best > _CLOSED:
@@ -67,6 +88,12 @@ def _matching_images(topology: Topology, positions: list[NDArray], held: NDArray
             break
         best, positions = lowest, turned
     return positions
+
+
+def _rings(topology: Topology) -> int:
+    """Independent rings of pieces."""
+    shared = sum(np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces)
+    return int(shared) - len(topology.hinges) - (len(topology.pieces) - len(np.unique(_groups(topology))))
 
 
 def _joined(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> tuple[list[NDArray], float]:
