@@ -88,16 +88,16 @@ def test_obtuse_triangles(stretch):
 
 def test_sixty_four_holes():
     rng = np.random.default_rng(64)
-    k = 48
+    k = 60
     x, y = np.meshgrid(np.arange(k), np.arange(k))
     points = np.column_stack([x.ravel(), y.ravel()]) + rng.uniform(-0.25, 0.25, (k * k, 2))
     triangles = Delaunay(points).simplices.astype(np.int64)
     middle = points[triangles].mean(axis=1)
-    kept = np.abs(middle - (k - 1) / 2).max(axis=1) < (k - 2.5) / 2
-    grid = (np.arange(8) + 0.5) * (k - 1) / 8
+    kept = np.abs(middle - (k - 1) / 2).max(axis=1) < (k - 3) / 2
+    grid = 4 + (k - 9) / 7 * np.arange(8)
     for a in grid:
         for b in grid:
-            kept &= np.hypot(middle[:, 0] - a, middle[:, 1] - b) > rng.uniform(1.0, 1.7)
+            kept &= np.hypot(middle[:, 0] - a, middle[:, 1] - b) > rng.uniform(1.2, 1.9)
     # Of one piece: triangles that hang on the rim of a hole by two vertices have a mirror image that fits as well.
     triangles = triangles[kept]
     neighbours = (triangles[:, None, :, None] == triangles[None, :, None, :]).sum(axis=(2, 3)) == 2
