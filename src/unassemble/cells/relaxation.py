@@ -19,13 +19,13 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..errors import RecoveryError
-from ..linalg import factorisation
+from ..errors import RecoveryError, SolverError
+from ..linalg import UpperTriangle, factorisation
 from ..planar.cotangent import corner_gradients
 from ..planar.krylov import ShiftedSearch
 from ..planar.normal import distant_pair
 from ..planar.pencil import ConformalPencil
-from .evidence import LONGEST, solved_normal
+from .evidence import LONGEST
 from .reading import Reading, fans_of
 
 _PRICE = tuple(1e-2 * 0.4**k for k in range(10))
@@ -137,18 +137,17 @@ class Relaxation:
         if not (np.isfinite(normal.data).all() and np.isfinite(rhs).all()):
             return None
         labels = slice(int(free.sum()), -1)
+        problem = Ridge(normal, rhs, np.full(len(rhs), _HELD))
         away, new = current - before, current
-        for smooth in _SMOOTH:
-            pull = price / np.hypot(away, smooth)
-            penalty = np.full(normal.shape[0], _HELD)
-            penalty[labels] = pull
-            wanted = rhs.copy()
-            wanted[labels] -= pull * (current - before)
-            solution = solved_normal((normal + sp.diags_array(penalty)).tocsr(), wanted)
-            if solution is None:
-                return None
-            new = np.clip(current + solution[labels], 0, 1)
-            away = new - before
+        try:
+            for smooth in _SMOOTH:
+                pull = price / np.hypot(away, smooth)
+                new = np.clip(current + problem.solution(labels, pull, before - current)[labels], 0, 1)
+                away = new - before
+        except SolverError:
+            return None
+        finally:
+            problem.release()
         return new
 
     def _derivatives(self, z: NDArray, strength: NDArray) -> tuple[sp.csr_array, sp.csr_array]:
@@ -163,7 +162,8 @@ class Relaxation:
             cotangent = np.clip(np.nan_to_num(sense * product.real / product.imag), -_STEEPEST, _STEEPEST)
             at_u, at_w = (strength[cell][:, None] * sense * g for g in corner_gradients(u, w))
         vertex = np.stack([t, t[:, [1, 2, 0]], t[:, [2, 0, 1]]])
-        gradient = np.nan_to_num(np.stack([-at_u - at_w, at_u, at_w]))
+        gradient = np.stack([-at_u - at_w, at_u, at_w])
+        gradient[:, ~(np.abs(gradient) < _STEEPEST**2).all(axis=0)] = 0
         row = np.broadcast_to(self._row, vertex.shape)
         shape = (len(self._weights), 2 * len(z))
         jacobian = sp.coo_array(
@@ -179,6 +179,40 @@ class Relaxation:
             shape=(shape[0], int(self._chosen.sum())),
         )
         return jacobian.tocsr(), response.tocsr()
+
+
+class Ridge:
+    """Normal equations whose diagonal changes: analysed once.
+
+    Parameters
+    ----------
+    normal : (k, k) csr_array
+    rhs : (k,) float64
+    held : (k,) float64
+        Added to the diagonal for good.
+    """
+
+    def __init__(self, normal: sp.csr_array, rhs: NDArray, held: NDArray):
+        upper = sp.triu(normal + sp.diags_array(held), format="csr")
+        upper.sort_indices()
+        self._upper = UpperTriangle(upper.data, upper.indices, upper.indptr)
+        self._rhs = rhs
+        self._factor = factorisation(self._upper)
+
+    def solution(self, part: slice, pull: NDArray, target: NDArray) -> NDArray:
+        """The minimiser with the further penalty pull |x - target|^2 on a part of the unknowns."""
+        data, rhs = self._upper.data.copy(), self._rhs.copy()
+        data[self._upper.indptr[:-1][part]] += pull
+        rhs[part] += pull * target
+        self._factor.factorise(self._upper.with_data(data))
+        solution = self._factor.solve(rhs)
+        if not np.isfinite(solution).all():
+            raise SolverError("the normal equations of the labels are singular")
+        return solution
+
+    def release(self) -> None:
+        """Give the memory of the factor back."""
+        self._factor.release()
 
 
 def relaxed(start: Reading) -> NDArray[np.bool_] | None:

@@ -84,8 +84,6 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
         if starts and _entries_are_to_blame(starts[0]):
             return _better(best, starts[0])
         starts = sorted(starts, key=lambda reading: reading.size)[:_STARTS]
-        if starts and not starts[0].like_noise:
-            starts[:0] = _relaxed(starts[0], effort)
         for start in starts:
             best = _better(best, start if start.like_noise else _repaired(start, effort))
             if best.fits:
