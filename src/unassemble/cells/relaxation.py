@@ -32,6 +32,8 @@ _PRICE = tuple(1e-2 * 0.4**k for k in range(10))
 """lambda, from one conformal map to the next."""
 _SETTLED = 3
 """Rounds after which changes are counted from the nearest whole labels, no more from those of the start."""
+_STEADY = 2
+"""Rounds without a change of the nearest whole labels that are enough."""
 _SMOOTH = (0.5, 0.3, 0.2, 0.1, 0.05, 0.03)
 """Changes below this are not told from none, in the rounds of one linear problem."""
 _STEEPEST = 1e5  # cotangents beyond belong to flat triangles
@@ -88,7 +90,7 @@ class Relaxation:
             If no conformal map is found on the way.
         """
         strength, z, c = self._start.copy(), np.empty(0), 1.0
-        near = self._start
+        near, labels, same = self._start, self._start > 0.5, 0
         for number, price in enumerate(_PRICE):
             z, c = self._mapped(strength, z, c)
             if number >= _SETTLED:
@@ -97,6 +99,10 @@ class Relaxation:
             if change is None:
                 break
             strength[self._chosen] = change
+            same = same + 1 if np.array_equal(strength > 0.5, labels) else 0
+            if same == _STEADY:
+                break
+            labels = strength > 0.5
         candidates = self._candidates
         taken = candidates.compatible(np.where(strength > 0.5, strength, -np.inf))
         return candidates.covering(taken, strength)

@@ -26,7 +26,6 @@ _SOLVES = 120
 _RELAXED = 20_000  # vertices up to which labels are relaxed
 _WIDE = 20  # vertices of the largest piece below which trying labels one by one is as good
 _AGAIN = 4  # times that a reading is relaxed anew
-_GAIN = 0.9
 _MANY = 20  # pieces that cost as much as another solve
 
 
@@ -84,6 +83,8 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
         if starts and _entries_are_to_blame(starts[0]):
             return _better(best, starts[0])
         starts = sorted(starts, key=lambda reading: reading.size)[:_STARTS]
+        if starts and not starts[0].like_noise:
+            starts[:0] = _relaxed(starts[0], effort)
         for start in starts:
             best = _better(best, start if start.like_noise else _repaired(start, effort))
             if best.fits:
@@ -119,7 +120,7 @@ def _repaired(reading: Reading, effort: Effort) -> Reading:
         if best.fits or effort.spent:
             break
         again = [_leaps(other, effort) for other in _relaxed(best, effort)]
-        if not again or not again[0].size < _GAIN * best.size:
+        if not again or not again[0].size < best.size:
             break
         best = again[0]
     return best if best.fits else _descent(best, effort)
