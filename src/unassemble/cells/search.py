@@ -20,6 +20,7 @@ _log = logging.getLogger(__name__)
 
 _STARTS = 2  # readings to begin with that are worth repairing
 _WORK = 1e5  # vertices times solves that repairs may take altogether
+_FEW = 100  # vertices below which all is tried before the entries are blamed
 _SUSPECT = 0.3  # change of the label of a lone triangular hole: it was 0.4 or more in all that were tried
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 _SOLVES = 120
@@ -99,7 +100,7 @@ def _better(one: Reading | None, other: Reading) -> Reading:
 def _entries_are_to_blame(reading: Reading) -> bool:
     """Whether triangles alone do not fit, and none of them is suspected of being a hole: no choice of cells helps."""
     candidates, labels = reading.candidates, reading.labels
-    if not reading.pieces or (labels & ((candidates.size > 3) | candidates.corner)).any():
+    if not reading.pieces or candidates.n_vertices < _FEW or (labels & ((candidates.size > 3) | candidates.corner)).any():
         return False
     return float(np.nan_to_num(np.abs(label_changes(reading))).max(initial=0.0)) < _SUSPECT
 
