@@ -13,6 +13,7 @@ import argparse
 import sys
 import time
 from collections import defaultdict
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,6 @@ import scipy.sparse as sp
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 
-import contextlib
 
 from families import FAMILIES, HOPELESS
 from meshes import Specimen, largest_error, specimen
@@ -104,7 +104,7 @@ def print_hopeless(name: str, seeds: range) -> None:
         for seed in seeds:
             matrix = HOPELESS[name](n, seed)
             start = time.perf_counter()
-            with contextlib.suppress(RecoveryError):
+            with suppress(RecoveryError):
                 certified += recover(matrix).status == "certified"
             seconds.append(time.perf_counter() - start)
         print(f"{name}, {n} rows: median {np.median(seconds):.2f} s, slowest {max(seconds):.2f} s", end="")

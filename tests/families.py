@@ -49,8 +49,9 @@ def ring(rng: np.random.Generator) -> Mesh:
     n = int(rng.integers(3, 60))
     angle = 2 * np.pi * (np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n
     inner = np.column_stack([np.cos(angle), np.sin(angle)])
-    outer = rng.uniform(1.5, 2) * np.column_stack([np.cos(angle + 0.1), np.sin(angle + 0.1)])
-    points = np.concatenate([inner, outer + rng.uniform(-0.1, 0.1, (n, 2))])
+    angle += rng.uniform(0, 0.6) * 2 * np.pi / n
+    outer = rng.uniform(1.3, 2, (n, 1)) * np.column_stack([np.cos(angle), np.sin(angle)])
+    points = np.concatenate([inner, outer])
     i = np.arange(n)
     j = (i + 1) % n
     return points, np.concatenate([np.column_stack([i, n + i, j]), np.column_stack([n + i, n + j, j])])

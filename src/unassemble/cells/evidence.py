@@ -25,7 +25,7 @@ from .reading import FITS, Reading, fans_of
 
 _RIDGE = 0.1
 _FAR = 1e8
-_LONGEST = 40  # edges of a face that may be a cell
+LONGEST = 40  # edges of a face that may be a cell
 _STEEPEST = 20.0  # cotangents beyond belong to slivers of a wrong start
 
 
@@ -45,7 +45,7 @@ def _explain(reading: Reading, piece: Piece, mesh: PieceMesh, changes: NDArray) 
     local = np.full(candidates.n_vertices, -1)
     local[piece.vertices] = np.arange(piece.n_vertices)
     inside = np.logical_and.reduceat(local[candidates.cells.vertices] >= 0, candidates.cells.offsets[:-1])
-    chosen = inside & (candidates.size <= _LONGEST)
+    chosen = inside & (candidates.size <= LONGEST)
     z = mesh.z - mesh.z.mean()
     z = z / np.abs(z).max()
     with np.errstate(all="ignore"):
@@ -72,7 +72,7 @@ def _explain(reading: Reading, piece: Piece, mesh: PieceMesh, changes: NDArray) 
     ridge = np.r_[np.zeros(free.sum()), np.full(n_labels, _RIDGE**2), 1 - free_scale]
     normal = (columns.T @ columns + sp.diags_array(ridge)).tocsr()
     rhs = columns.T @ (np.append(misfit, np.zeros(extra)) / spread)
-    solution = _solve(normal, rhs)
+    solution = solved_normal(normal, rhs)
     if solution is not None:
         changes[chosen] = solution[free.sum() : -1]
 
@@ -102,7 +102,7 @@ def _response(reading: Reading, piece: Piece, z: NDArray, local: NDArray, chosen
     )
 
 
-def _solve(normal: sp.csr_array, rhs: NDArray) -> NDArray | None:
+def solved_normal(normal: sp.csr_array, rhs: NDArray) -> NDArray | None:
     """Positive definite solve; None where the factorisation breaks down."""
     if not np.isfinite(normal.data).all():  # flat triangles
         return None

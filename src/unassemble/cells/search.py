@@ -14,14 +14,19 @@ from .candidates import Candidates
 from .evidence import label_changes
 from .proposals import proposals
 from .reading import Reading
+from .relaxation import relaxed
 
 _log = logging.getLogger(__name__)
 
 _STARTS = 2  # readings to begin with that are worth repairing
 _WORK = 1e5  # vertices times solves that repairs may take altogether
+_FEW = 100  # vertices below which all is tried before the entries are blamed
 _SUSPECT = 0.3  # change of the label of a lone triangular hole: it was 0.4 or more in all that were tried
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 _SOLVES = 120
+_RELAXED = 20_000  # vertices up to which labels are relaxed
+_WIDE = 20  # vertices of the largest piece below which trying labels one by one is as good
+_AGAIN = 4  # times that a reading is relaxed anew
 _MANY = 20  # pieces that cost as much as another solve
 
 
@@ -78,7 +83,10 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
                 return starts[-1]
         if starts and _entries_are_to_blame(starts[0]):
             return _better(best, starts[0])
-        for start in sorted(starts, key=lambda reading: reading.size)[:_STARTS]:
+        starts = sorted(starts, key=lambda reading: reading.size)[:_STARTS]
+        if starts and not starts[0].like_noise:
+            starts[:0] = _relaxed(starts[0], effort)
+        for start in starts:
             best = _better(best, start if start.like_noise else _repaired(start, effort))
             if best.fits:
                 return best
@@ -92,14 +100,30 @@ def _better(one: Reading | None, other: Reading) -> Reading:
 def _entries_are_to_blame(reading: Reading) -> bool:
     """Whether triangles alone do not fit, and none of them is suspected of being a hole: no choice of cells helps."""
     candidates, labels = reading.candidates, reading.labels
-    if not reading.pieces or (labels & ((candidates.size > 3) | candidates.corner)).any():
+    if not reading.pieces or candidates.n_vertices < _FEW or (labels & ((candidates.size > 3) | candidates.corner)).any():
         return False
     return float(np.nan_to_num(np.abs(label_changes(reading))).max(initial=0.0)) < _SUSPECT
+
+
+def _relaxed(reading: Reading, effort: Effort) -> list[Reading]:
+    """A better reading to begin with, or none."""
+    n = reading.candidates.n_vertices
+    if not reading.pieces or n > _RELAXED or max(piece.n_vertices for piece in reading.pieces) < _WIDE:
+        return []
+    labels = relaxed(reading)
+    return [] if labels is None else [effort.reading(reading.candidates, labels)]
 
 
 def _repaired(reading: Reading, effort: Effort) -> Reading:
     """Turn labels over as the misfit asks for it."""
     best = _leaps(reading, effort)
+    for _ in range(_AGAIN):
+        if best.fits or effort.spent:
+            break
+        again = [_leaps(other, effort) for other in _relaxed(best, effort)]
+        if not again or not again[0].size < best.size:
+            break
+        best = again[0]
     return best if best.fits else _descent(best, effort)
 
 

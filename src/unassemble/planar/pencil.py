@@ -11,11 +11,28 @@ is positive semidefinite for 0 <= s <= c; M(c) z = 0 exactly for similarities of
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..linalg import UpperTriangle, upper_from_edges
-from ..topology import Piece
+
+
+class Outline(Protocol):
+    """What the pencil needs to know of a piece."""
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices."""
+
+    @property
+    def edges(self) -> NDArray[np.int64]:
+        """(e, 2) pairs i < j in lexicographic order."""
+
+    @property
+    def boundary(self) -> NDArray[np.int64]:
+        """(b, 2) directed edges with the mesh on their left."""
 
 
 def pencil_pattern(n: int, edges: NDArray) -> UpperTriangle:
@@ -29,13 +46,17 @@ class ConformalPencil:
 
     Parameters
     ----------
-    piece : Piece
+    piece : Outline
+        A piece, for instance.
     weights : (e,) float64
         c w = -A_ij of each edge.
+    strength : (b,) float64, optional
+        Factors of the boundary edges, such that those that enter a vertex add up to those that leave it; 1 by default.
     """
 
-    def __init__(self, piece: Piece, weights: NDArray):
+    def __init__(self, piece: Outline, weights: NDArray, strength: NDArray | None = None):
         self.n = piece.n_vertices
+        self._strength = np.ones(len(piece.boundary)) if strength is None else strength
         self.tail, self.head = piece.boundary.T
         diagonal = np.bincount(piece.edges.ravel(), np.repeat(weights, 2), self.n)
         kept = piece.edges[:, 1] < self.n - 1  # the pinned vertex is the higher end of all its edges
@@ -53,7 +74,7 @@ class ConformalPencil:
         key = edges[:, 0] * self.n + edges[:, 1]
         # Row i of the triangle starts with its diagonal: i + 1 of those come before an entry of row i.
         place = np.searchsorted(key, low * self.n + high) + low + 1
-        return place, np.where(self.tail[inside] < self.head[inside], 1.0, -1.0)
+        return place, self._strength[inside] * np.where(self.tail[inside] < self.head[inside], 1.0, -1.0)
 
     def matrix(self, shift: float) -> UpperTriangle:
         """M(shift) without the pinned row and column."""
@@ -74,7 +95,7 @@ class ConformalPencil:
         """T z for z (n,) complex."""
         forward = np.zeros(self.n, dtype=np.complex128)
         # As many boundary edges enter a vertex as leave it, so that differences give the same sum.
-        side = -0.25j * (z[self.head] - z[self.tail])
+        side = -0.25j * self._strength * (z[self.head] - z[self.tail])
         # Each vertex of a boundary that touches itself occurs more than once: accumulate.
         np.add.at(forward, self.tail, side)
         np.add.at(forward, self.head, side)
