@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import certify as certificates
-from .cells import exchanges
+from .cells import AGREE, Alternative, OrientedMesh, alternatives
 from .clock import Clock
 from .evidence import pooled_noise, weigh
 from .joined import JoinedMesh
@@ -22,6 +22,8 @@ from .recovery import Recovery
 from .solving import solve
 from .topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
 from .verdict import ambiguous, passes, verdict
+
+_SIGMAS = 10.0  # noise by which numbers that a reading takes for equal may differ
 
 
 def recover_scalar(
@@ -94,16 +96,10 @@ def recover_scalar(
             deviations = _deviations(topology, placement, placed, meshes, sigma, scale is None)
     trouble = [note for m in meshes for note in m.notes]
     status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble)
+    others: list[Alternative] = []
     if status == "certified" and len(topology.vanished) > (topology.polygons.size - 3).sum():
-        z = mesh.points @ [1, 1j]
-        others = exchanges(
-            stored,
-            mesh.triangles[~mesh.in_polygon],
-            mesh.polygons,
-            placement.tensor.to_laplacian(z) if placement.tensor else z,
-            stretch * mesh.scale[np.maximum(mesh.component, 0)],
-            scale_known=scale is not None,
-        )
+        with clock("ambiguity"):
+            others = _alternatives(topology, stored, placement, mesh, stretch, noise, scale_known=scale is not None)
         if others:
             status, reason = ambiguous(others, certificate)
     worst, misfits = certificate.worst(10 if status == "uncertified" else 0, noise=noise, first=evidence.suspects)
@@ -134,7 +130,32 @@ def recover_scalar(
         chi_square=chi_square,
         estimated_noise=evidence.noise,
         suspects=evidence.suspects,
+        alternatives=tuple(others),
     )
+
+
+def _alternatives(
+    topology: Topology,
+    stored: OperatorMatrix,
+    placement: Placement,
+    mesh: JoinedMesh,
+    stretch: float,
+    noise: float | None,
+    *,
+    scale_known: bool,
+) -> list[Alternative]:
+    """Other meshes that fit, in the frame in which the operator is the Laplacian."""
+    z = mesh.points @ [1, 1j]
+    oriented = OrientedMesh(
+        mesh.triangles[~mesh.in_polygon],
+        mesh.polygons,
+        mesh.boundary,
+        mesh.boundary_offsets,
+        np.asarray(placement.tensor.to_laplacian(z) if placement.tensor else z, dtype=np.complex128),
+    )
+    smallest = stretch * float(np.abs(mesh.scale).min())
+    agree = AGREE if noise is None else max(AGREE, _SIGMAS * noise / smallest)
+    return alternatives(stored, topology, oriented, scale_known=scale_known, agree=agree)
 
 
 def _place(topology: Topology, placement: Placement, meshes: list[PieceMesh]) -> tuple[list[NDArray], list[str]]:
