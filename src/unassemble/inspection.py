@@ -108,7 +108,7 @@ class Inspection:
         """What :func:`unassemble.recover` can make of the matrix."""
         if self.n_nodes and self.coupled:
             return (
-                f"coordinates of {_count(self.n_nodes, 'node')} in {self.block_size}D, up to position and size, and "
+                f"coordinates of {count_of(self.n_nodes, 'node')} in {self.block_size}D, up to position and size, and "
                 "elements that the matrix re-assembles from"
             )
         if self.n_nodes:
@@ -117,7 +117,7 @@ class Inspection:
             return "nothing: the graph is not that of a mesh in the plane"
         if self.obstacle:
             return f"nothing: {self.obstacle}"
-        mesh = f"{_count(self.n_triangles, 'triangle')} on {self.n_rows - self.n_undetermined:,} points"
+        mesh = f"{count_of(self.n_triangles, 'triangle')} on {self.n_rows - self.n_undetermined:,} points"
         if self.mixed_signs:
             return f"{mesh}, but no positions that could be certified: look at row {self.mixed_signs[0]}"
         each = f", each of the {self.n_pieces:,} pieces by itself" if self.n_pieces > 1 else ""
@@ -134,7 +134,7 @@ class Inspection:
         return content | {"operator": self.operator, "recoverable": self.recoverable}
 
     def __str__(self) -> str:
-        return "\n".join(f"{name:<13} {value}" for name, value in _lines(self))
+        return "\n".join(f"{name:<13} {value}" for name, value in lines_of(self))
 
 
 def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | None = None) -> Inspection:
@@ -249,73 +249,3 @@ def _scale_of(piece: Piece, weights: NDArray) -> tuple[float, int | None]:
     positive = np.count_nonzero(sums > 0) * 2 >= len(sums)
     other = np.flatnonzero(sums <= 0 if positive else sums >= 0)
     return scale, int(piece.vertices[other[0]]) if len(other) else None
-
-
-def _lines(facts: Inspection) -> list[tuple[str, str]]:
-    lines = [
-        ("matrix", f"{facts.n_rows:,} rows, {facts.n_edges:,} off-diagonal entries above the diagonal"),
-        ("symmetry", f"symmetric up to {facts.asymmetry:.1e}" if facts.asymmetry else "symmetric"),
-        ("graph", _graph(facts)),
-        ("vanished", f"{facts.n_vanished:,} of these are zero up to rounding" if facts.n_vanished else "none of these"),
-        ("row sums", _row_sums(facts)),
-        ("planar", _planar(facts)),
-    ]
-    if facts.n_nodes:
-        nodes = f"{facts.n_nodes:,} nodes with {facts.block_size} unknowns each, {facts.numbering}"
-        lines.append(("nodes", nodes))
-    if not facts.obstacle:
-        lines += [("mesh", _mesh(facts)), ("holes", f"{facts.n_holes:,}"), ("pieces", _pieces(facts))]
-        lines.append(("scale c", _scale(facts)))
-    lines += [("operator", facts.operator), ("recoverable", facts.recoverable)]
-    return lines + [("note", warning) for warning in facts.warnings]
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number:,} {noun}" + ("" if number == 1 else "s")
-
-
-def _graph(facts: Inspection) -> str:
-    isolated = f", and {_count(facts.n_isolated, 'isolated row')}" if facts.n_isolated else ""
-    return f"{_count(facts.n_connected, 'connected piece')}{isolated}"
-
-
-def _row_sums(facts: Inspection) -> str:
-    used = facts.n_rows - facts.n_isolated
-    if facts.n_zero_sums == used:
-        return "zero"
-    where = f"zero in {facts.n_zero_sums:,} of {used:,} rows only" if facts.n_zero_sums else "not zero"
-    return where if facts.n_nodes else f"{where}, so a diagonal was added"
-
-
-def _planar(facts: Inspection) -> str:
-    if facts.planar:
-        return "yes"
-    if facts.n_nodes:
-        return "not looked for, since the rows form nodes of several unknowns"
-    shown = ", ".join(f"{i}-{j}" for i, j in facts.witness[:12]) + (", ..." if len(facts.witness) > 12 else "")
-    return f"no: the edges {shown} form a subdivision of K5 or K3,3"
-
-
-def _mesh(facts: Inspection) -> str:
-    text = (
-        f"{_count(facts.n_triangles, 'triangle')}, {_count(facts.n_faces, 'face')} with the outside and the holes, "
-        f"{_count(facts.n_boundary_edges, 'boundary edge')}"
-    )
-    if facts.n_bare_edges:
-        text += f"; {_count(facts.n_bare_edges, 'edge')} of no triangle"
-    return text + (f"; {_count(facts.n_undetermined, 'row')} of no triangle" if facts.n_undetermined else "")
-
-
-def _pieces(facts: Inspection) -> str:
-    return f"{facts.n_pieces:,}" + (f", joined by {_count(facts.n_hinges, 'hinge')}" if facts.n_hinges else "")
-
-
-def _scale(facts: Inspection) -> str:
-    known = facts.scale[np.isfinite(facts.scale)]
-    if not len(known):
-        return "cannot be estimated: the entries add up to zero"
-    low, high = float(known.min()), float(known.max())
-    about = f"about {low:.2g}" if high - low <= 0.1 * abs(low) else f"about {low:.2g} to {high:.2g}"
-    if facts.mixed_signs:
-        return f"{about}, but of the other sign in row {facts.mixed_signs[0]}"
-    return f"{about}, of one sign in every row" + (" of a piece" if facts.n_pieces > 1 else "")
