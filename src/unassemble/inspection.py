@@ -10,11 +10,13 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
+from .cells import guessed
 from .errors import GeometryError, NotPlanarError, TopologyError
+from .inspection_text import count_of, lines_of, mesh_text
 from .matrix import OperatorMatrix, load
 from .operators import VectorReading, vector_valued
 from .planar.conformal import estimate_scale
-from .topology import Piece, Topology, recognise
+from .topology import Piece, Topology, recognise, surfaces
 
 VANISHED = 1e-12  # an entry this small, relative to both of its rows, is zero up to rounding
 ZERO_SUM = 1e-10  # likewise the sum of a row, to which every entry adds its own rounding
@@ -45,11 +47,11 @@ class Inspection:
     obstacle : str
         Why no mesh is recognised; empty where one is.
     n_triangles, n_faces, n_holes, n_boundary_edges : int
-        Triangles; these and the regions between boundary loops; bounded ones of those; edges on the boundary.
+        Triangles; all cells and the regions between boundary loops; bounded ones of those; edges on the boundary.
     n_pieces, n_hinges : int
         Edge-connected pieces, and vertices that join them.
     n_bare_edges, n_undetermined : int
-        Edges and rows of no triangle.
+        Edges and rows of no cell.
     scale : (n_pieces,) float64
         Estimates of c, right to some ten per cent.
     mixed_signs : tuple of int
@@ -63,6 +65,14 @@ class Inspection:
         How its unknowns stand; empty for a scalar matrix.
     coupled : bool
         Whether its directions are coupled.
+    n_polygons : int
+        Cells of more than three vertices, whose diagonals have no entry.
+    n_vanished_sides : int
+        Sides of the boundary that face a right angle and have no entry; counted among its edges.
+    cells_from : {"graph", "entries", ""}
+        What the cells were taken from: cycles of three edges are cells, unless edges are left over and the entries
+        suggest others. These are what :func:`unassemble.recover` begins with; it solves, holds the result against the
+        entries, and changes cells where that asks for it. Empty where there is no mesh.
     """
 
     n_rows: int
@@ -90,6 +100,9 @@ class Inspection:
     n_nodes: int = 0
     numbering: str = ""
     coupled: bool = True
+    n_polygons: int = 0
+    n_vanished_sides: int = 0
+    cells_from: str = ""
 
     @property
     def operator(self) -> str:
@@ -117,7 +130,7 @@ class Inspection:
             return "nothing: the graph is not that of a mesh in the plane"
         if self.obstacle:
             return f"nothing: {self.obstacle}"
-        mesh = f"{count_of(self.n_triangles, 'triangle')} on {self.n_rows - self.n_undetermined:,} points"
+        mesh = f"{mesh_text(self)} on {self.n_rows - self.n_undetermined:,} points"
         if self.mixed_signs:
             return f"{mesh}, but no positions that could be certified: look at row {self.mixed_signs[0]}"
         each = f", each of the {self.n_pieces:,} pieces by itself" if self.n_pieces > 1 else ""
@@ -138,7 +151,7 @@ class Inspection:
 
 
 def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | None = None) -> Inspection:
-    """Describe a matrix; quick, since nothing is solved.
+    """Describe a matrix; quick, since nothing is solved: cells are those that recovery begins with.
 
     Parameters
     ----------
@@ -166,12 +179,26 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
     vector = vector_valued(matrix)
     if vector is not None:
         return Inspection(**facts, **_no_mesh(vector.why, False, ()), **_nodes_facts(matrix, vector))
-    try:
-        topology = recognise(matrix.n, matrix.edges)
-    except (NotPlanarError, TopologyError) as error:
-        planar = not isinstance(error, NotPlanarError)
-        return Inspection(**facts, **_no_mesh(str(error), planar, getattr(error, "witness", ())))
-    return Inspection(**facts, **_mesh_facts(matrix, topology))
+    topology = surfaces(matrix.n, matrix.edges)
+    read = matrix
+    if _left_over(matrix, topology):
+        read, topology = guessed(matrix, topology)
+    if not topology.pieces or _left_over(read, topology):
+        try:
+            plain = recognise(matrix.n, matrix.edges)  # says what is wrong with the graph, if that is it
+        except (NotPlanarError, TopologyError) as error:
+            planar = not isinstance(error, NotPlanarError)
+            if not (planar and topology.pieces):
+                return Inspection(**facts, **_no_mesh(str(error), planar, getattr(error, "witness", ())))
+        else:
+            if not topology.pieces:
+                read, topology = matrix, plain
+    return Inspection(**facts, **_mesh_facts(read, topology))
+
+
+def _left_over(matrix: OperatorMatrix, topology: Topology) -> bool:
+    """Whether nonzero entries belong to no cell."""
+    return bool((matrix.entries[topology.bare_edges] != 0).any())
 
 
 def _matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
@@ -220,20 +247,24 @@ def _nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any
 
 def _mesh_facts(matrix: OperatorMatrix, topology: Topology) -> dict[str, Any]:
     pieces = topology.pieces
-    n_triangles = sum(len(piece.triangles) for piece in pieces)
+    polygons = topology.polygons
+    n_triangles = sum(len(piece.triangles) for piece in pieces) - int((polygons.size - 2).sum())
     estimates = [_scale_of(piece, -matrix.entries[piece.edge_rows]) for piece in pieces]
     return {
         "planar": True,
         "witness": (),
         "obstacle": "",
         "n_triangles": n_triangles,
-        "n_faces": n_triangles + sum(piece.n_loops for piece in pieces),
+        "n_faces": n_triangles + polygons.count + sum(piece.n_loops for piece in pieces),
         "n_holes": topology.n_holes,
         "n_boundary_edges": sum(len(piece.boundary) for piece in pieces),
         "n_pieces": len(pieces),
         "n_hinges": len(topology.hinges),
         "n_bare_edges": len(topology.bare_edges),
         "n_undetermined": len(topology.undetermined),
+        "n_polygons": polygons.count,
+        "n_vanished_sides": len(topology.vanished) - int((polygons.size - 3).sum()),
+        "cells_from": "entries" if len(topology.vanished) else "graph",
         "scale": np.array([scale for scale, _ in estimates]),
         "mixed_signs": tuple(row for _, row in estimates if row is not None),
     }

@@ -24,7 +24,12 @@ def lines_of(facts: Inspection) -> list[tuple[str, str]]:
         nodes = f"{facts.n_nodes:,} nodes with {facts.block_size} unknowns each, {facts.numbering}"
         lines.append(("nodes", nodes))
     if not facts.obstacle:
-        lines += [("mesh", _mesh(facts)), ("holes", f"{facts.n_holes:,}"), ("pieces", _pieces(facts))]
+        lines += [
+            ("mesh", _mesh(facts)),
+            ("cells", _cells(facts)),
+            ("holes", f"{facts.n_holes:,}"),
+            ("pieces", _pieces(facts)),
+        ]
         lines.append(("scale c", _scale(facts)))
     lines += [("operator", facts.operator), ("recoverable", facts.recoverable)]
     return lines + [("note", warning) for warning in facts.warnings]
@@ -57,14 +62,36 @@ def _planar(facts: Inspection) -> str:
     return f"no: the edges {shown} form a subdivision of K5 or K3,3"
 
 
+def mesh_text(facts: Inspection) -> str:
+    """The cells; likely ones where they are not the graph's triangles."""
+    cells = []
+    if facts.n_triangles or not facts.n_polygons:
+        cells.append(count_of(facts.n_triangles, "triangle"))
+    if facts.n_polygons:
+        cells.append(f"{count_of(facts.n_polygons, 'cell')} of more than three vertices")
+    return ("likely " if facts.cells_from == "entries" else "") + " and ".join(cells)
+
+
+def _cells(facts: Inspection) -> str:
+    if facts.cells_from == "graph":
+        return "the cycles of three edges; recovery holds them against the entries, and leaves some open if it has to"
+    gone = []
+    if facts.n_polygons:
+        gone.append(f"the diagonals of {count_of(facts.n_polygons, 'cell')}")
+    if facts.n_vanished_sides:
+        gone.append(f"{count_of(facts.n_vanished_sides, 'side')} of the boundary, facing right angles")
+    vanished = f"; no entry on {' and on '.join(gone)}" if gone else ""
+    return f"read from the entries, since the graph does not settle them{vanished}; recovery begins with these"
+
+
 def _mesh(facts: Inspection) -> str:
     text = (
-        f"{count_of(facts.n_triangles, 'triangle')}, {count_of(facts.n_faces, 'face')} with the outside and the holes, "
+        f"{mesh_text(facts)}, {count_of(facts.n_faces, 'face')} with the outside and the holes, "
         f"{count_of(facts.n_boundary_edges, 'boundary edge')}"
     )
     if facts.n_bare_edges:
-        text += f"; {count_of(facts.n_bare_edges, 'edge')} of no triangle"
-    return text + (f"; {count_of(facts.n_undetermined, 'row')} of no triangle" if facts.n_undetermined else "")
+        text += f"; {count_of(facts.n_bare_edges, 'edge')} of no cell"
+    return text + (f"; {count_of(facts.n_undetermined, 'row')} of no cell" if facts.n_undetermined else "")
 
 
 def _pieces(facts: Inspection) -> str:

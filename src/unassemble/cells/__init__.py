@@ -3,8 +3,9 @@
 Where entries vanish the graph alone does not tell: see the page on theory in the documentation.
 """
 
+
 from .ambiguity import AGREE, alternatives
-from .completion import Attempt, Outcome, completed, in_doubt
+from .completion import Attempt, Outcome, completed, guessed, in_doubt
 from .corners import Alternative, OrientedMesh
 from .search import read_cells
 
@@ -16,6 +17,7 @@ __all__ = [
     "Outcome",
     "alternatives",
     "completed",
+    "guessed",
     "in_doubt",
     "read_cells",
 ]
