@@ -61,7 +61,7 @@ def test_planar_graphs_without_cells():
 GRIDS = {
     "five-point stencil": (squares(holes(7, 5)), 0, 35, 0, 0),
     "L-shape": (squares(holes(10, 10, (5, 5, 5, 5))), 0, 75, 0, 0),
-    "hole of several rectangles": (squares(holes(12, 12, (3, 3, 4, 5)), width=3.0), 0, 124, 0, 1),
+    "hole of several squares": (squares(holes(12, 12, (3, 3, 4, 5))), 0, 124, 0, 1),
     "crossed squares": (squares(holes(9, 9), crossed=True), 36, 144, 36, 0),
     "triangles and squares": (half_jittered(10), 100, 50, 0, 0),
 }
