@@ -80,7 +80,7 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
             return _better(best, starts[0])
         for start in sorted(starts, key=lambda reading: reading.size)[:_STARTS]:
             best = _better(best, start if start.like_noise else _repaired(start, effort))
-            if best.fits:
+            if best.fits or best.like_noise:
                 return best
     return best if best is not None and best.pieces else None
 
