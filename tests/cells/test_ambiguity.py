@@ -117,7 +117,7 @@ SAME = {
 
 @pytest.mark.parametrize("name", SAME)
 def test_parts_that_can_be_turned_over(name):
-    known = forgotten(specimen(*SAME[name], c=-3.0))
+    known = forgotten(specimen(*SAME[name], c=-3.0, seed=2))
     found = check_alternatives(known.matrix)
     assert found.alternatives
     assert all(other.same_scale for other in found.alternatives)

@@ -3,7 +3,6 @@
 Where entries vanish the graph alone does not tell: see the page on theory in the documentation.
 """
 
-
 from .ambiguity import AGREE, alternatives
 from .completion import Attempt, Outcome, completed, guessed, in_doubt
 from .corners import Alternative, OrientedMesh
