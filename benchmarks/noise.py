@@ -26,6 +26,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -96,7 +97,7 @@ def count_channels(size: int, sigma: float, draws: int) -> None:
 
 def measure(size: int, sigmas: list[float], draws: int) -> list[dict]:
     """One mesh, all noise levels."""
-    points, triangles = irregular_mesh(size)
+    points, triangles = mesh_of_at_least(size)
     matrix, true = laplacian(points, triangles, 1.0)
     place = {tuple(p): k for k, p in enumerate(true)}
     triangles = np.array([place[tuple(p)] for p in points])[triangles]
@@ -133,6 +134,16 @@ def measure(size: int, sigmas: list[float], draws: int) -> list[dict]:
             flush=True,
         )
     return results
+
+
+def mesh_of_at_least(size: int) -> tuple[np.ndarray, np.ndarray]:
+    """An irregular mesh of that many vertices after the islands are cut out."""
+    lattice = size
+    while True:
+        points, triangles = irregular_mesh(lattice)
+        if len(points) >= size:
+            return points, triangles
+        lattice = int(1.02 * lattice) + 1
 
 
 def standard_error(values: np.ndarray) -> float:
@@ -201,13 +212,7 @@ def weights_and_derivative(z: np.ndarray, triangles: np.ndarray) -> tuple[np.nda
 
 
 class Bound:
-    """The best linear estimate, and its mean square error for sigma = 1.
-
-    Attributes
-    ----------
-    mean_square : float
-        Trace of P C P over the number of vertices.
-    """
+    """The best linear estimate, and its mean square error."""
 
     def __init__(self, z: np.ndarray, triangles: np.ndarray):
         self.w, self.derivative = weights_and_derivative(z, triangles)
@@ -224,7 +229,11 @@ class Bound:
         self.gauge = np.linalg.qr(np.column_stack([np.column_stack([f.real, f.imag]).ravel() for f in fields]))[0]
         self.along = self.fitted(self.w[:, None])
         self.rest = self.w - self.derivative @ self.along[:, 0]  # what no displacement explains of w
-        self.mean_square = self.trace() / n
+
+    @cached_property
+    def mean_square(self) -> float:
+        """Expected mean square error for sigma = 1: trace of P C P over the number of vertices."""
+        return self.trace() / (self.derivative.shape[1] / 2)
 
     def fitted(self, noise: np.ndarray) -> np.ndarray:
         """Displacements (2 v, k) that fit errors (e, k) of the weights for known c."""

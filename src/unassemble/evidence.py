@@ -98,7 +98,7 @@ def _suspects(
         if piece.n_vertices > _SUSPECT_LIMIT:
             continue
         weights = -matrix.entries[piece.edge_rows]
-        spread = weight_roundings(piece, mesh.z) if rounding else None
+        spread = weight_roundings(piece, mesh.z) if rounding else mesh.spread
         try:
             found = find_suspects(piece, weights, mesh.z, mesh.scale, spread, free_scale=free_scale)
         except SolverError:  # flat triangles: nothing can be told apart there

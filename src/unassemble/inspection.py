@@ -10,11 +10,13 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
+from .cells import guessed
 from .errors import GeometryError, NotPlanarError, TopologyError
+from .inspection_text import count_of, lines_of, mesh_text
 from .matrix import OperatorMatrix, load
 from .operators import VectorReading, vector_valued
 from .planar.conformal import estimate_scale
-from .topology import Piece, Topology, recognise
+from .topology import Piece, Topology, recognise, surfaces
 
 VANISHED = 1e-12  # an entry this small, relative to both of its rows, is zero up to rounding
 ZERO_SUM = 1e-10  # likewise the sum of a row, to which every entry adds its own rounding
@@ -45,11 +47,11 @@ class Inspection:
     obstacle : str
         Why no mesh is recognised; empty where one is.
     n_triangles, n_faces, n_holes, n_boundary_edges : int
-        Triangles; these and the regions between boundary loops; bounded ones of those; edges on the boundary.
+        Triangles; all cells and the regions between boundary loops; bounded ones of those; edges on the boundary.
     n_pieces, n_hinges : int
         Edge-connected pieces, and vertices that join them.
     n_bare_edges, n_undetermined : int
-        Edges and rows of no triangle.
+        Edges and rows of no cell.
     scale : (n_pieces,) float64
         Estimates of c, right to some ten per cent.
     mixed_signs : tuple of int
@@ -63,6 +65,14 @@ class Inspection:
         How its unknowns stand; empty for a scalar matrix.
     coupled : bool
         Whether its directions are coupled.
+    n_polygons : int
+        Cells of more than three vertices, whose diagonals have no entry.
+    n_vanished_sides : int
+        Sides of the boundary that face a right angle and have no entry; counted among its edges.
+    cells_from : {"graph", "entries", ""}
+        What the cells were taken from: cycles of three edges are cells, unless edges are left over and the entries
+        suggest others. These are what :func:`unassemble.recover` begins with; it solves, holds the result against the
+        entries, and changes cells where that asks for it. Empty where there is no mesh.
     """
 
     n_rows: int
@@ -90,6 +100,9 @@ class Inspection:
     n_nodes: int = 0
     numbering: str = ""
     coupled: bool = True
+    n_polygons: int = 0
+    n_vanished_sides: int = 0
+    cells_from: str = ""
 
     @property
     def operator(self) -> str:
@@ -108,7 +121,7 @@ class Inspection:
         """What :func:`unassemble.recover` can make of the matrix."""
         if self.n_nodes and self.coupled:
             return (
-                f"coordinates of {_count(self.n_nodes, 'node')} in {self.block_size}D, up to position and size, and "
+                f"coordinates of {count_of(self.n_nodes, 'node')} in {self.block_size}D, up to position and size, and "
                 "elements that the matrix re-assembles from"
             )
         if self.n_nodes:
@@ -117,7 +130,7 @@ class Inspection:
             return "nothing: the graph is not that of a mesh in the plane"
         if self.obstacle:
             return f"nothing: {self.obstacle}"
-        mesh = f"{_count(self.n_triangles, 'triangle')} on {self.n_rows - self.n_undetermined:,} points"
+        mesh = f"{mesh_text(self)} on {self.n_rows - self.n_undetermined:,} points"
         if self.mixed_signs:
             return f"{mesh}, but no positions that could be certified: look at row {self.mixed_signs[0]}"
         each = f", each of the {self.n_pieces:,} pieces by itself" if self.n_pieces > 1 else ""
@@ -134,11 +147,11 @@ class Inspection:
         return content | {"operator": self.operator, "recoverable": self.recoverable}
 
     def __str__(self) -> str:
-        return "\n".join(f"{name:<13} {value}" for name, value in _lines(self))
+        return "\n".join(f"{name:<13} {value}" for name, value in lines_of(self))
 
 
 def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | None = None) -> Inspection:
-    """Describe a matrix; quick, since nothing is solved.
+    """Describe a matrix; quick, since nothing is solved: cells are those that recovery begins with.
 
     Parameters
     ----------
@@ -166,12 +179,26 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
     vector = vector_valued(matrix)
     if vector is not None:
         return Inspection(**facts, **_no_mesh(vector.why, False, ()), **_nodes_facts(matrix, vector))
-    try:
-        topology = recognise(matrix.n, matrix.edges)
-    except (NotPlanarError, TopologyError) as error:
-        planar = not isinstance(error, NotPlanarError)
-        return Inspection(**facts, **_no_mesh(str(error), planar, getattr(error, "witness", ())))
-    return Inspection(**facts, **_mesh_facts(matrix, topology))
+    topology = surfaces(matrix.n, matrix.edges)
+    read = matrix
+    if _left_over(matrix, topology):
+        read, topology = guessed(matrix, topology)
+    if not topology.pieces or _left_over(read, topology):
+        try:
+            plain = recognise(matrix.n, matrix.edges)  # says what is wrong with the graph, if that is it
+        except (NotPlanarError, TopologyError) as error:
+            planar = not isinstance(error, NotPlanarError)
+            if not (planar and topology.pieces):
+                return Inspection(**facts, **_no_mesh(str(error), planar, getattr(error, "witness", ())))
+        else:
+            if not topology.pieces:
+                read, topology = matrix, plain
+    return Inspection(**facts, **_mesh_facts(read, topology))
+
+
+def _left_over(matrix: OperatorMatrix, topology: Topology) -> bool:
+    """Whether nonzero entries belong to no cell."""
+    return bool((matrix.entries[topology.bare_edges] != 0).any())
 
 
 def _matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
@@ -220,20 +247,24 @@ def _nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any
 
 def _mesh_facts(matrix: OperatorMatrix, topology: Topology) -> dict[str, Any]:
     pieces = topology.pieces
-    n_triangles = sum(len(piece.triangles) for piece in pieces)
+    polygons = topology.polygons
+    n_triangles = sum(len(piece.triangles) for piece in pieces) - int((polygons.size - 2).sum())
     estimates = [_scale_of(piece, -matrix.entries[piece.edge_rows]) for piece in pieces]
     return {
         "planar": True,
         "witness": (),
         "obstacle": "",
         "n_triangles": n_triangles,
-        "n_faces": n_triangles + sum(piece.n_loops for piece in pieces),
+        "n_faces": n_triangles + polygons.count + sum(piece.n_loops for piece in pieces),
         "n_holes": topology.n_holes,
         "n_boundary_edges": sum(len(piece.boundary) for piece in pieces),
         "n_pieces": len(pieces),
         "n_hinges": len(topology.hinges),
         "n_bare_edges": len(topology.bare_edges),
         "n_undetermined": len(topology.undetermined),
+        "n_polygons": polygons.count,
+        "n_vanished_sides": len(topology.vanished) - int((polygons.size - 3).sum()),
+        "cells_from": "entries" if len(topology.vanished) else "graph",
         "scale": np.array([scale for scale, _ in estimates]),
         "mixed_signs": tuple(row for _, row in estimates if row is not None),
     }
@@ -249,73 +280,3 @@ def _scale_of(piece: Piece, weights: NDArray) -> tuple[float, int | None]:
     positive = np.count_nonzero(sums > 0) * 2 >= len(sums)
     other = np.flatnonzero(sums <= 0 if positive else sums >= 0)
     return scale, int(piece.vertices[other[0]]) if len(other) else None
-
-
-def _lines(facts: Inspection) -> list[tuple[str, str]]:
-    lines = [
-        ("matrix", f"{facts.n_rows:,} rows, {facts.n_edges:,} off-diagonal entries above the diagonal"),
-        ("symmetry", f"symmetric up to {facts.asymmetry:.1e}" if facts.asymmetry else "symmetric"),
-        ("graph", _graph(facts)),
-        ("vanished", f"{facts.n_vanished:,} of these are zero up to rounding" if facts.n_vanished else "none of these"),
-        ("row sums", _row_sums(facts)),
-        ("planar", _planar(facts)),
-    ]
-    if facts.n_nodes:
-        nodes = f"{facts.n_nodes:,} nodes with {facts.block_size} unknowns each, {facts.numbering}"
-        lines.append(("nodes", nodes))
-    if not facts.obstacle:
-        lines += [("mesh", _mesh(facts)), ("holes", f"{facts.n_holes:,}"), ("pieces", _pieces(facts))]
-        lines.append(("scale c", _scale(facts)))
-    lines += [("operator", facts.operator), ("recoverable", facts.recoverable)]
-    return lines + [("note", warning) for warning in facts.warnings]
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number:,} {noun}" + ("" if number == 1 else "s")
-
-
-def _graph(facts: Inspection) -> str:
-    isolated = f", and {_count(facts.n_isolated, 'isolated row')}" if facts.n_isolated else ""
-    return f"{_count(facts.n_connected, 'connected piece')}{isolated}"
-
-
-def _row_sums(facts: Inspection) -> str:
-    used = facts.n_rows - facts.n_isolated
-    if facts.n_zero_sums == used:
-        return "zero"
-    where = f"zero in {facts.n_zero_sums:,} of {used:,} rows only" if facts.n_zero_sums else "not zero"
-    return where if facts.n_nodes else f"{where}, so a diagonal was added"
-
-
-def _planar(facts: Inspection) -> str:
-    if facts.planar:
-        return "yes"
-    if facts.n_nodes:
-        return "not looked for, since the rows form nodes of several unknowns"
-    shown = ", ".join(f"{i}-{j}" for i, j in facts.witness[:12]) + (", ..." if len(facts.witness) > 12 else "")
-    return f"no: the edges {shown} form a subdivision of K5 or K3,3"
-
-
-def _mesh(facts: Inspection) -> str:
-    text = (
-        f"{_count(facts.n_triangles, 'triangle')}, {_count(facts.n_faces, 'face')} with the outside and the holes, "
-        f"{_count(facts.n_boundary_edges, 'boundary edge')}"
-    )
-    if facts.n_bare_edges:
-        text += f"; {_count(facts.n_bare_edges, 'edge')} of no triangle"
-    return text + (f"; {_count(facts.n_undetermined, 'row')} of no triangle" if facts.n_undetermined else "")
-
-
-def _pieces(facts: Inspection) -> str:
-    return f"{facts.n_pieces:,}" + (f", joined by {_count(facts.n_hinges, 'hinge')}" if facts.n_hinges else "")
-
-
-def _scale(facts: Inspection) -> str:
-    known = facts.scale[np.isfinite(facts.scale)]
-    if not len(known):
-        return "cannot be estimated: the entries add up to zero"
-    low, high = float(known.min()), float(known.max())
-    about = f"about {low:.2g}" if high - low <= 0.1 * abs(low) else f"about {low:.2g} to {high:.2g}"
-    if facts.mixed_signs:
-        return f"{about}, but of the other sign in row {facts.mixed_signs[0]}"
-    return f"{about}, of one sign in every row" + (" of a piece" if facts.n_pieces > 1 else "")

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import meshio
     from matplotlib.figure import Figure
 
+    from .cells.corners import Alternative
     from .elasticity.results import Evidence
 
 
@@ -96,6 +97,9 @@ class Recovery:
         Standard deviation of independent errors of the entries that would leave the misfit found.
     suspects : (k, 2) int64
         Entries that the mesh would fit the others far better without, the gravest first.
+    alternatives : tuple of Alternative
+        Cells in doubt where other meshes fit as well, and what these have instead; see
+        :class:`unassemble.cells.Alternative`.
     """
 
     points: NDArray[np.float64]
@@ -131,6 +135,7 @@ class Recovery:
     polygons_data: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     estimated_noise: float | None = None
     suspects: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    alternatives: tuple[Alternative, ...] = ()
 
     @property
     def certified(self) -> bool:

@@ -29,8 +29,10 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
     for each piece), ``backward_error``, ``timings`` (seconds by stage), ``warnings``; further ``n_polygons``
     (cells that the matrix leaves undivided), ``n_hinges``,
     ``n_undetermined``, ``n_boundary_edges``, ``worst_entries`` (``row``, ``column``, ``misfit``, worst first),
-    ``suspects`` (``row``, ``column``), ``chi_square``, ``estimated_noise``, ``largest_standard_deviation`` and
-    ``version``. Vector-valued matrices have those of :func:`_vector_facts` too.
+    ``suspects`` (``row``, ``column``), ``alternatives`` (where other cells fit as well: ``cells`` and
+    ``other_cells``, lists of rows; the rows ``around`` which they lie, and others in the order ``found`` and in that
+    of the ``other`` mesh; ``same_scale``, whether both have the same c), ``chi_square``, ``estimated_noise``,
+    ``largest_standard_deviation`` and ``version``. Vector-valued matrices have those of :func:`_vector_facts` too.
     """
     return _plain(
         {
@@ -55,6 +57,7 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
                 for (i, j), misfit in zip(recovery.worst_entries, recovery.worst_misfits, strict=True)
             ],
             "suspects": [{"row": i, "column": j} for i, j in recovery.suspects],
+            "alternatives": [asdict(other) for other in recovery.alternatives],
             **(_vector_facts(recovery) if recovery.vector_valued else {}),
             "timings": recovery.timings,
             "warnings": recovery.warnings,

@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
 from numpy.typing import NDArray
 
 from .cells import Outcome, completed, in_doubt
@@ -66,9 +67,18 @@ def solve(
         outcomes = [start(piece) for piece in topology.pieces]
     topology, meshes = _successes(topology, outcomes)
     if refine:
+        vanished = np.zeros(len(matrix.edges), dtype=bool)
+        vanished[topology.vanished] = True
         with clock("polish"):
             meshes = [
-                refined(piece, -matrix.entries[piece.edge_rows], mesh, scale=scale, rounding=rounding)
+                refined(
+                    piece,
+                    -matrix.entries[piece.edge_rows],
+                    mesh,
+                    scale=scale,
+                    rounding=rounding,
+                    exact=vanished[piece.edge_rows],
+                )
                 for piece, mesh in zip(topology.pieces, meshes, strict=True)
             ]
     return matrix, topology, meshes

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import Exchange
+from .cells import Alternative
 from .certify import CERTIFIED, CONFIDENCE, LARGEST_NOISE, Certificate
 from .evidence import Evidence
 from .matrix import OperatorMatrix
@@ -82,15 +82,26 @@ def _misfit(
     return differs + _culprits(evidence) + _like_noise(certificate, evidence) + _because(notes)
 
 
-def ambiguous(others: list[Exchange], certificate: Certificate) -> tuple[str, str]:
+def ambiguous(others: list[Alternative], certificate: Certificate) -> tuple[str, str]:
     """The status and reason of a mesh that fits, where others do as well."""
     first = others[0]
     more = f"; and likewise in {len(others) - 1} more places" if len(others) > 1 else ""
-    return "uncertified", (
-        f"the mesh gives the matrix back to {certificate.backward_error:.1e}, but so does another: the rows "
-        f"{_words(first.found)}, joined to {_words(first.around)}, can as well stand in the order "
-        f"{_words(first.other)}{more}"
+    order = (
+        f"the rows {_words(first.found)}, joined to {_words(first.around)}, can as well stand in the order "
+        f"{_words(first.other)}, with "
+        if first.found != first.other
+        else ""
     )
+    factor = "" if all(other.same_scale for other in others) else ", each with a factor c of its own: known, it decides"
+    return "uncertified", (
+        f"the mesh gives the matrix back to {certificate.backward_error:.1e}, but so does another: {order}the cells "
+        f"{_cells(first.other_cells)} in place of {_cells(first.cells)}{more}{factor}"
+    )
+
+
+def _cells(cells: tuple[tuple[int, ...], ...]) -> str:
+    shown = ", ".join("-".join(map(str, cell)) for cell in cells[:6])
+    return shown + (", ..." if len(cells) > 6 else "")
 
 
 def _words(rows: tuple[int, ...]) -> str:

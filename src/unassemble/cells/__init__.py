@@ -3,8 +3,20 @@
 Where entries vanish the graph alone does not tell: see the page on theory in the documentation.
 """
 
-from .ambiguity import Exchange, exchanges
-from .completion import Attempt, Outcome, completed, in_doubt
+from .ambiguity import AGREE, alternatives
+from .completion import Attempt, Outcome, completed, guessed, in_doubt
+from .corners import Alternative, OrientedMesh
 from .search import read_cells
 
-__all__ = ["Attempt", "Exchange", "Outcome", "completed", "exchanges", "in_doubt", "read_cells"]
+__all__ = [
+    "AGREE",
+    "Alternative",
+    "Attempt",
+    "OrientedMesh",
+    "Outcome",
+    "alternatives",
+    "completed",
+    "guessed",
+    "in_doubt",
+    "read_cells",
+]

@@ -230,8 +230,10 @@ def _in_strips(whole: FaceComplex, corners: NDArray) -> NDArray[np.bool_]:
         return inside
     n = whole.n_vertices
     graph = sp.coo_array((np.ones(len(whole.edges)), whole.edges.T), shape=(n, n)).tocsr()
-    # One root for each component, or parts without one would have no distance.
-    _, root = np.unique(csgraph.connected_components(graph, directed=False)[1], return_index=True)
+    # One root for each component, or parts without one would have no distance; never inside a path.
+    label = csgraph.connected_components(graph, directed=False)[1]
+    order = np.argsort(2 * label + (np.diff(graph.indptr) == 2), kind="stable")
+    root = order[np.flatnonzero(np.diff(label[order], prepend=-1))]
     depth = csgraph.dijkstra(graph, directed=False, indices=root, unweighted=True, min_only=True).astype(np.int64)
     outwards = depth[whole.tail[corners]] < depth[whole.head[corners]]
     return inside & (outwards == (depth[whole.head[corners]] % 2 == 0))

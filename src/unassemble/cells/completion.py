@@ -18,7 +18,7 @@ from ..planar.polish import PolishOptions, polish
 from ..topology import Numbering, Piece, Polygons, Topology, components, local_numbering, located, recognise
 from ..topology.keys import contains, distinct, pair_keys
 from .reading import FITS, Reading, even, misfits
-from .search import read_cells
+from .search import first_reading, read_cells
 
 _BETTER = 0.1  # a reading that does not fit replaces the triangles only if its misfit is below this times theirs
 
@@ -133,6 +133,25 @@ def completed(
     if not any(part.pieces for part in parts):
         raise failures[0]
     return _merged(matrix, topology, parts, tuple(map(str, failures)))
+
+
+def guessed(matrix: OperatorMatrix, topology: Topology) -> tuple[OperatorMatrix, Topology]:
+    """The cells that the angles suggest in components with nonzero entries on no triangle; nothing is solved.
+
+    Parameters and results are those of :func:`completed`, without positions.
+    """
+    bare = topology.bare_edges
+    doubtful = _components_of(matrix, bare[matrix.entries[bare] != 0])
+    unsolved = GeometryError("not solved")
+    kept: Solved = [(piece, unsolved) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
+    parts = [_Part(kept, np.empty((0, 2), np.int64), Polygons.none())]
+    for part in components(matrix.n, matrix.edges):
+        if doubtful[part.vertices[0]]:
+            near = part.then(local_numbering(len(part.vertices), part.edges))
+            reading = first_reading(len(near.vertices), near.edges, -matrix.entries[near.edge_rows])
+            if reading is not None:
+                parts.append(_part(matrix, near, reading))
+    return _merged(matrix, topology, parts, ())[:2]
 
 
 def _misfits(matrix: OperatorMatrix, solved: Solved) -> NDArray[np.float64]:

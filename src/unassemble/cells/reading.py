@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -57,10 +57,8 @@ class Reading:
     misfit: NDArray[np.float64]
 
     @classmethod
-    def of(
-        cls, candidates: Candidates, labels: NDArray[np.bool_], known: dict[bytes, PieceMesh | None] | None = None
-    ) -> Reading:
-        """Triangulate the cells and solve every piece, but for those `known`, to which new ones are added."""
+    def unsolved(cls, candidates: Candidates, labels: NDArray[np.bool_]) -> Reading:
+        """Triangulate the cells, without positions."""
         n = candidates.n_vertices
         triangles = triangulation(candidates, labels)
         key = _keys(n, triangles)
@@ -70,17 +68,26 @@ class Reading:
         weights = np.zeros(len(union))
         weights[np.searchsorted(union, given)] = candidates.weights
         pieces = planar_pieces(n, edges, triangles, np.searchsorted(union, key)) or ()
+        return cls(candidates, labels, edges, weights, pieces, (None,) * len(pieces), misfits(n, edges, weights, []))
+
+    @classmethod
+    def of(
+        cls, candidates: Candidates, labels: NDArray[np.bool_], known: dict[bytes, PieceMesh | None] | None = None
+    ) -> Reading:
+        """Triangulate the cells and solve every piece, but for those `known`, to which new ones are added."""
+        bare = cls.unsolved(candidates, labels)
+        n, edges, weights = candidates.n_vertices, bare.edges, bare.weights
         known = {} if known is None else known
-        names = [_key_of(piece) for piece in pieces]
-        for name, piece in zip(names, pieces, strict=True):
+        names = [_key_of(piece) for piece in bare.pieces]
+        for name, piece in zip(names, bare.pieces, strict=True):
             if name not in known:
                 known[name] = _solved(piece, weights[piece.edge_rows])
         meshes = [known[name] for name in names]
-        solved = [(piece, mesh) for piece, mesh in zip(pieces, meshes, strict=True) if mesh]
+        solved = [(piece, mesh) for piece, mesh in zip(bare.pieces, meshes, strict=True) if mesh]
         misfit = misfits(n, edges, weights, solved)
         _add_discord(n, edges, solved, misfit, candidates.scale)
         misfit[np.isin(edges, _crowded(candidates, labels)).any(axis=1)] = 1.0
-        return cls(candidates, labels, edges, weights, pieces, tuple(meshes), misfit)
+        return replace(bare, meshes=tuple(meshes), misfit=misfit)
 
     @property
     def fits(self) -> bool:

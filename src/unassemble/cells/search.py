@@ -88,9 +88,20 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
             starts[:0] = _relaxed(starts[0], effort)
         for start in starts:
             best = _better(best, start if start.like_noise else _repaired(start, effort))
-            if best.fits:
+            if best.fits or best.like_noise:
                 return best
     return best if best is not None and best.pieces else None
+
+
+def first_reading(n: int, edges: NDArray, weights: NDArray) -> Reading | None:
+    """What the angles suggest, without positions: the first choice of cells that makes planar surfaces."""
+    for drawing in face_complexes(n, edges):
+        candidates = Candidates.of(drawing, weights)
+        for labels in candidates.starts():
+            reading = Reading.unsolved(candidates, labels)
+            if reading.pieces:
+                return reading
+    return None
 
 
 def _better(one: Reading | None, other: Reading) -> Reading:

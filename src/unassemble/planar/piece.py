@@ -18,6 +18,8 @@ from .polish import PolishedMesh, polish
 
 _ROUNDING = 1e-12
 """Errors of the weights that may be rounding."""
+_EXACT = 1e-3
+"""Standard deviation of entries without noise, relative to that of the others: next to none, and safe to divide by."""
 _CAUTIOUS_LIMIT = 200_000
 """Most vertices for which a polish that fails is tried again with a factorisation in every step."""
 
@@ -57,21 +59,31 @@ def positions(
     return PieceMesh(found.z, found.scale, notes)
 
 
-def refined(piece: Piece, weights: NDArray, mesh: PieceMesh, *, scale: float | None, rounding: bool) -> PieceMesh:
+def refined(
+    piece: Piece,
+    weights: NDArray,
+    mesh: PieceMesh,
+    *,
+    scale: float | None,
+    rounding: bool,
+    exact: NDArray[np.bool_] | None = None,
+) -> PieceMesh:
     """Gauss-Newton polish; where it cannot be done the mesh stays as it is, with a note.
 
     With `rounding`, errors are taken to be those of assembly in floating-point arithmetic, unless the misfit is beyond
-    that and more likely to be noise of one size.
+    that and more likely to be noise of one size. Noise leaves the entries `exact`, (e,) bool, as they are: these have
+    vanished.
     """
+    noise = None if exact is None or not exact.any() else np.where(exact, _EXACT, 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         flat = not np.isfinite(edge_weights(piece, mesh.z)).all()
     if flat:
         return PieceMesh(mesh.z, mesh.scale, (*mesh.notes, "no polish: triangles are flat"))
-    spread = weight_roundings(piece, mesh.z) if rounding else None
+    spread = weight_roundings(piece, mesh.z) if rounding else noise
     try:
         found = _polished(piece, weights, mesh.z, scale, spread)
-        if spread is not None and _is_uniform_noise(piece, weights, found, spread):
-            spread = None
+        if rounding and spread is not None and _is_uniform_noise(piece, weights, found, spread):
+            spread = noise
             found = _polished(piece, weights, found.z, scale, spread)
     except SolverError as error:
         return PieceMesh(mesh.z, mesh.scale, (*mesh.notes, f"no polish: {error}"))

@@ -1,0 +1,109 @@
+"""An inspection in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .inspection import Inspection
+
+
+def lines_of(facts: Inspection) -> list[tuple[str, str]]:
+    """Names and values, in the order in which they are shown."""
+    lines = [
+        ("matrix", f"{facts.n_rows:,} rows, {facts.n_edges:,} off-diagonal entries above the diagonal"),
+        ("symmetry", f"symmetric up to {facts.asymmetry:.1e}" if facts.asymmetry else "symmetric"),
+        ("graph", _graph(facts)),
+        ("vanished", f"{facts.n_vanished:,} of these are zero up to rounding" if facts.n_vanished else "none of these"),
+        ("row sums", _row_sums(facts)),
+        ("planar", _planar(facts)),
+    ]
+    if facts.n_nodes:
+        nodes = f"{facts.n_nodes:,} nodes with {facts.block_size} unknowns each, {facts.numbering}"
+        lines.append(("nodes", nodes))
+    if not facts.obstacle:
+        lines += [
+            ("mesh", _mesh(facts)),
+            ("cells", _cells(facts)),
+            ("holes", f"{facts.n_holes:,}"),
+            ("pieces", _pieces(facts)),
+        ]
+        lines.append(("scale c", _scale(facts)))
+    lines += [("operator", facts.operator), ("recoverable", facts.recoverable)]
+    return lines + [("note", warning) for warning in facts.warnings]
+
+
+def count_of(number: int, noun: str) -> str:
+    """A number with its noun."""
+    return f"{number:,} {noun}" + ("" if number == 1 else "s")
+
+
+def _graph(facts: Inspection) -> str:
+    isolated = f", and {count_of(facts.n_isolated, 'isolated row')}" if facts.n_isolated else ""
+    return f"{count_of(facts.n_connected, 'connected piece')}{isolated}"
+
+
+def _row_sums(facts: Inspection) -> str:
+    used = facts.n_rows - facts.n_isolated
+    if facts.n_zero_sums == used:
+        return "zero"
+    where = f"zero in {facts.n_zero_sums:,} of {used:,} rows only" if facts.n_zero_sums else "not zero"
+    return where if facts.n_nodes else f"{where}, so a diagonal was added"
+
+
+def _planar(facts: Inspection) -> str:
+    if facts.planar:
+        return "yes"
+    if facts.n_nodes:
+        return "not looked for, since the rows form nodes of several unknowns"
+    shown = ", ".join(f"{i}-{j}" for i, j in facts.witness[:12]) + (", ..." if len(facts.witness) > 12 else "")
+    return f"no: the edges {shown} form a subdivision of K5 or K3,3"
+
+
+def mesh_text(facts: Inspection) -> str:
+    """The cells; likely ones where they are not the graph's triangles."""
+    cells = []
+    if facts.n_triangles or not facts.n_polygons:
+        cells.append(count_of(facts.n_triangles, "triangle"))
+    if facts.n_polygons:
+        cells.append(f"{count_of(facts.n_polygons, 'cell')} of more than three vertices")
+    return ("likely " if facts.cells_from == "entries" else "") + " and ".join(cells)
+
+
+def _cells(facts: Inspection) -> str:
+    if facts.cells_from == "graph":
+        return "the cycles of three edges; recovery holds them against the entries, and leaves some open if it has to"
+    gone = []
+    if facts.n_polygons:
+        gone.append(f"the diagonals of {count_of(facts.n_polygons, 'cell')}")
+    if facts.n_vanished_sides:
+        gone.append(f"{count_of(facts.n_vanished_sides, 'side')} of the boundary, facing right angles")
+    vanished = f"; no entry on {' and on '.join(gone)}" if gone else ""
+    return f"read from the entries, since the graph does not settle them{vanished}; recovery begins with these"
+
+
+def _mesh(facts: Inspection) -> str:
+    text = (
+        f"{mesh_text(facts)}, {count_of(facts.n_faces, 'face')} with the outside and the holes, "
+        f"{count_of(facts.n_boundary_edges, 'boundary edge')}"
+    )
+    if facts.n_bare_edges:
+        text += f"; {count_of(facts.n_bare_edges, 'edge')} of no cell"
+    return text + (f"; {count_of(facts.n_undetermined, 'row')} of no cell" if facts.n_undetermined else "")
+
+
+def _pieces(facts: Inspection) -> str:
+    return f"{facts.n_pieces:,}" + (f", joined by {count_of(facts.n_hinges, 'hinge')}" if facts.n_hinges else "")
+
+
+def _scale(facts: Inspection) -> str:
+    known = facts.scale[np.isfinite(facts.scale)]
+    if not len(known):
+        return "cannot be estimated: the entries add up to zero"
+    low, high = float(known.min()), float(known.max())
+    about = f"about {low:.2g}" if high - low <= 0.1 * abs(low) else f"about {low:.2g} to {high:.2g}"
+    if facts.mixed_signs:
+        return f"{about}, but of the other sign in row {facts.mixed_signs[0]}"
+    return f"{about}, of one sign in every row" + (" of a piece" if facts.n_pieces > 1 else "")

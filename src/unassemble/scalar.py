@@ -1,0 +1,203 @@
+"""A scalar matrix on one page: recognise, solve, place, certify."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import certify as certificates
+from .cells import AGREE, Alternative, OrientedMesh, alternatives
+from .clock import Clock
+from .evidence import pooled_noise, weigh
+from .joined import JoinedMesh
+from .linalg import AnalysisAhead, factorisation
+from .matrix import OperatorMatrix
+from .notes import topology_notes, vanished_notes
+from .placement import Placement
+from .planar.deviations import coordinate_covariances
+from .planar.hinges import join
+from .planar.pencil import pencil_pattern
+from .planar.piece import PieceMesh
+from .recovery import Recovery
+from .solving import solve
+from .topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
+from .verdict import ambiguous, passes, verdict
+
+_SIGMAS = 10.0  # noise by which numbers that a reading takes for equal may differ
+
+
+def recover_scalar(
+    stored: OperatorMatrix,
+    placement: Placement,
+    clock: Clock,
+    method: str,
+    refine: bool,
+    scale: float | None,
+    noise: float | None,
+    standard_deviations: bool,
+    threads: int | None,
+    triangulate: bool,
+) -> Recovery:
+    """The mesh of a checked scalar matrix; options as for :func:`unassemble.recover`."""
+    # With a tensor, c L is what is left of c div(K grad): its factor is c sqrt(det K).
+    stretch = placement.tensor.root_determinant if placement.tensor else 1.0
+    known = None if scale is None else scale * stretch
+    with clock("topology"):
+        numbering = local_numbering(stored.n, stored.edges)
+        analyse: AnalysisAhead | None = None
+        # Most matrices are those of a single piece, and its pencil has their pattern. Others may be large and dense,
+        # or lack the diagonals of their cells.
+        planar = method == "conformal" and len(stored.edges) < 3 * stored.n
+        if planar and triangles_everywhere(stored.n, numbering.edges):
+            analyse = AnalysisAhead(pencil_pattern(stored.n, numbering.edges), threads)
+        topology = surfaces(stored.n, stored.edges, numbering)
+    matrix, topology, meshes = solve(
+        topology,
+        stored,
+        clock,
+        method=method,
+        scale=known,
+        refine=refine,
+        rounding=noise is None,
+        analyse=analyse or factorisation,
+    )
+    with clock("place"):
+        placed, notes = _place(topology, placement, meshes)
+        mesh = JoinedMesh.of(topology, placed, np.array([m.scale for m in meshes]) / stretch)
+    with clock("certify"):
+        certificate = certificates.certify(
+            stored.edges,
+            stored.entries,
+            mesh.points,
+            mesh.triangles,
+            mesh.scale[mesh.triangle_piece],
+            (placement.tensor.kxx, placement.tensor.kxy, placement.tensor.kyy) if placement.tensor else None,
+        )
+        freedom = _freedom(topology, scale)
+        chi_square = certificates.chi_square_verdict(certificate.differences, noise, freedom) if noise else None
+        factors = np.array([m.scale for m in meshes])
+        # A misfit at rounding level, or one that noise explains, hides no wrong entry.
+        search = not passes(certificate, chi_square, factors)
+        search |= (noise is None or freedom <= 0) and certificate.backward_error > certificates.SUSPICIOUS
+        evidence = weigh(
+            topology,
+            matrix,
+            meshes,
+            certificate,
+            freedom,
+            free_scale=scale is None,
+            search=search,
+            rounding=noise is None,
+        )
+    deviations = None
+    if standard_deviations:
+        with clock("deviations"):
+            sigma = noise or pooled_noise(topology, matrix, meshes, freedom)
+            deviations = _deviations(topology, placement, placed, meshes, sigma, scale is None)
+    trouble = [note for m in meshes for note in m.notes]
+    status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble)
+    others: list[Alternative] = []
+    if status == "certified" and len(topology.vanished) > (topology.polygons.size - 3).sum():
+        with clock("ambiguity"):
+            others = _alternatives(topology, stored, placement, mesh, stretch, noise, scale_known=scale is not None)
+        if others:
+            status, reason = ambiguous(others, certificate)
+    worst, misfits = certificate.worst(10 if status == "uncertified" else 0, noise=noise, first=evidence.suspects)
+    if chi_square and evidence.noise is not None and evidence.noise < 0.5 * chi_square["sigma"]:
+        notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
+    polygons = Polygons.none() if triangulate else mesh.polygons
+    return Recovery(
+        points=mesh.points,
+        triangles=mesh.triangles if triangulate else mesh.triangles[~mesh.in_polygon],
+        component=mesh.component,
+        hinges=topology.hinges,
+        scale=mesh.scale,
+        polygons_offsets=polygons.offsets,
+        polygons_data=polygons.vertices,
+        boundary=mesh.boundary,
+        boundary_offsets=mesh.boundary_offsets,
+        node_status=(topology.multiplicity == 0).astype(np.int8),
+        status=status,
+        reason=reason,
+        operator="anisotropic laplacian" if placement.tensor else "laplacian",
+        backward_error=certificate.backward_error,
+        n_holes=topology.n_holes,
+        timings=clock.timings,
+        warnings=(*matrix.warnings, *notes),
+        worst_entries=worst,
+        worst_misfits=misfits,
+        standard_deviations=deviations,
+        chi_square=chi_square,
+        estimated_noise=evidence.noise,
+        suspects=evidence.suspects,
+        alternatives=tuple(others),
+    )
+
+
+def _alternatives(
+    topology: Topology,
+    stored: OperatorMatrix,
+    placement: Placement,
+    mesh: JoinedMesh,
+    stretch: float,
+    noise: float | None,
+    *,
+    scale_known: bool,
+) -> list[Alternative]:
+    """Other meshes that fit, in the frame in which the operator is the Laplacian."""
+    z = mesh.points @ [1, 1j]
+    oriented = OrientedMesh(
+        mesh.triangles[~mesh.in_polygon],
+        mesh.polygons,
+        mesh.boundary,
+        mesh.boundary_offsets,
+        np.asarray(placement.tensor.to_laplacian(z) if placement.tensor else z, dtype=np.complex128),
+    )
+    smallest = stretch * float(np.abs(mesh.scale).min())
+    agree = AGREE if noise is None else max(AGREE, _SIGMAS * noise / smallest)
+    return alternatives(stored, topology, oriented, scale_known=scale_known, agree=agree)
+
+
+def _place(topology: Topology, placement: Placement, meshes: list[PieceMesh]) -> tuple[list[NDArray], list[str]]:
+    """Every piece in its final frame, hinges joined; and what is to be said about it."""
+    placed, notes = [], []
+    for label, (piece, mesh) in enumerate(zip(topology.pieces, meshes, strict=True)):
+        z, remarks = placement.apply(piece, mesh.z)
+        placed.append(z)
+        prefix = f"piece {label}: " if len(meshes) > 1 else ""
+        notes += [prefix + remark for remark in (*mesh.notes, *remarks)]
+    known = np.array([placement.known_positions(piece) for piece in topology.pieces])
+    placed = join(topology, placed, known)
+    notes += placement.unused(topology)
+    notes += [*topology_notes(topology), *vanished_notes(topology), *topology.failures]
+    return placed, notes
+
+
+def _freedom(topology: Topology, scale: float | None) -> int:
+    """Entries less fitted unknowns: 2 v - 4 coordinates of each piece, and its c."""
+    unknowns = sum(2 * piece.n_vertices - 4 + (scale is None) for piece in topology.pieces)
+    return len(topology.edges) - unknowns
+
+
+def _deviations(
+    topology: Topology,
+    placement: Placement,
+    placed: list[NDArray],
+    meshes: list[PieceMesh],
+    sigma: float,
+    free_scale: bool,
+) -> NDArray:
+    """(n, 2) standard deviations in the final frame."""
+    tensor = placement.tensor
+    result = np.full((topology.n_vertices, 2), np.nan)
+    for piece, z, mesh in reversed(list(zip(topology.pieces, placed, meshes, strict=True))):
+        covariance = coordinate_covariances(
+            piece,
+            tensor.to_laplacian(z) if tensor else z,
+            sigma=sigma / abs(mesh.scale),
+            free_scale=free_scale,
+            stretch=tensor.root if tensor else None,
+            spread=mesh.spread,
+        )
+        result[piece.vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    return result

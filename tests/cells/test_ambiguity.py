@@ -1,0 +1,156 @@
+"""Other meshes with the same matrix: each that is named is one, and those that are known are named."""
+
+from itertools import pairwise
+
+import networkx
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from meshes import random_mesh, specimen, triangle_set
+from unassemble import recover
+from vanishing import forgotten, holes, refined, squares, without_zeros
+
+
+def cells_of(found):
+    ends = zip(found.polygons_offsets[:-1], found.polygons_offsets[1:], strict=True)
+    return [*map(tuple, found.triangles.tolist()), *(tuple(found.polygons_data[a:b].tolist()) for a, b in ends)]
+
+
+def with_structure(matrix, cells):
+    """The matrix with zeros stored on every side and diagonal of cells: then there is one reading only."""
+    fans = np.array([(cell[0], p, q) for cell in cells for p, q in pairwise(cell[1:])])
+    i, j = fans[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).T
+    entries = matrix.tocoo()
+    zeros = np.zeros(2 * len(i))
+    ends = np.r_[entries.row, i, j], np.r_[entries.col, j, i]
+    return sp.coo_array((np.r_[entries.data, zeros], ends), shape=matrix.shape), fans
+
+
+def check_alternatives(matrix, **options):
+    """Put the cells of each alternative in place of those in doubt, and recover that mesh."""
+    found = recover(matrix, **options)
+    cells = cells_of(found)
+    for other in found.alternatives:
+        gone = {tuple(sorted(cell)) for cell in other.cells}
+        kept = [cell for cell in cells if tuple(sorted(cell)) not in gone]
+        assert len(kept) == len(cells) - len(gone)
+        stored, fans = with_structure(matrix, [*kept, *other.other_cells])
+        again = recover(stored)
+        assert again.certified, again.reason
+        assert triangle_set(again.triangles) == triangle_set(fans)
+        if other.same_scale:
+            assert again.scale == pytest.approx(found.scale, rel=1e-9)
+        else:
+            assert abs(again.scale[0] / found.scale[0] - 1) > 1e-6
+    assert found.certified != bool(found.alternatives)
+    return found
+
+
+def weighted(graph, seed=0):
+    rng = np.random.default_rng(seed)
+    n = len(graph)
+    i, j = np.array(graph.edges).T
+    row = rng.permutation(n)
+    w = rng.uniform(0.5, 2, len(i))
+    return sp.coo_array((np.r_[-w, -w], (row[np.r_[i, j]], row[np.r_[j, i]])), shape=(n, n)).tocsr()
+
+
+LOOSE = {
+    "path": networkx.path_graph(4),
+    "longer path": networkx.path_graph(9),
+    "star of three": networkx.star_graph(3),
+    "star of four": networkx.star_graph(4),
+    "triangle and an edge": networkx.Graph([(0, 1), (1, 2), (2, 0), (2, 3)]),
+    "triangle and two edges": networkx.Graph([(0, 1), (1, 2), (2, 0), (2, 3), (2, 4)]),
+    "triangle and a path": networkx.Graph([(0, 1), (1, 2), (2, 0), (2, 3), (3, 4)]),
+    "square and an edge": networkx.Graph([(0, 1), (1, 2), (2, 3), (3, 0), (0, 4)]),
+    "two triangles and an edge": networkx.Graph([(0, 1), (1, 2), (2, 0), (1, 3), (2, 3), (2, 4)]),
+}
+
+
+@pytest.mark.parametrize("name", LOOSE)
+def test_all_vertices_on_the_boundary_and_a_right_angle(name):
+    """As many unknowns as entries: other cells fit with another factor, and only a known one decides."""
+    matrix = weighted(LOOSE[name], seed=len(name))
+    found = check_alternatives(matrix)
+    assert found.alternatives
+    assert "in place of" in found.reason
+    assert "factor c" in found.reason
+    assert recover(matrix, scale=found.scale[0]).certified
+
+
+@pytest.mark.parametrize("name", ["triangle", "two triangles", "square", "fan"])
+def test_without_right_angles_there_is_one_reading(name):
+    graphs = {
+        "triangle": networkx.cycle_graph(3),
+        "two triangles": networkx.Graph([(0, 1), (1, 2), (2, 0), (1, 3), (2, 3)]),
+        "square": networkx.cycle_graph(4),
+        "fan": networkx.Graph([(0, k) for k in range(1, 6)] + [(k, k + 1) for k in range(1, 5)]),
+    }
+    assert check_alternatives(weighted(graphs[name])).certified
+
+
+def test_right_angle_on_a_mesh_with_vertices_inside():
+    """What surplus of entries there is tells on which side a lone edge is joined to the rest."""
+    points, triangles = random_mesh(40, seed=1)
+    edges, count = np.unique(np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0,
+                             return_counts=True)  # fmt: skip
+    a, b = edges[count == 1][0]
+    inside = points[np.setdiff1d(triangles[(triangles == a).any(1) & (triangles == b).any(1)][0], [a, b])[0]]
+    side = points[b] - points[a]
+    normal = np.array([-side[1], side[0]])
+    normal *= -np.sign(normal @ (inside - points[a]))
+    points = np.vstack([points, points[b] + 0.7 * normal])
+    known = specimen(points, np.vstack([triangles, [a, b, len(points) - 1]]))
+    found = check_alternatives(without_zeros(known.matrix))
+    assert found.certified
+    assert triangle_set(found.triangles) == triangle_set(known.triangles)
+
+
+SAME = {
+    "one row of crossed squares": squares(holes(4, 1), crossed=True),
+    "a row between the outside and a hole": squares(holes(8, 8, (5, 1, 2, 2)), crossed=True),
+    "an arch": squares(holes(5, 4, (2, 1, 1, 3)), crossed=True),
+}
+
+
+@pytest.mark.parametrize("name", SAME)
+def test_parts_that_can_be_turned_over(name):
+    known = forgotten(specimen(*SAME[name], c=-3.0, seed=2))
+    found = check_alternatives(known.matrix)
+    assert found.alternatives
+    assert all(other.same_scale for other in found.alternatives)
+    assert not recover(known.matrix, scale=-3.0).certified  # a known factor does not decide here
+
+
+def test_rows_and_cells_are_in_the_report():
+    star = np.array([[0.0, 0], [1, 0], [0, 2], [-3, 0], [0, -1.5]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]])
+    found = recover(forgotten(specimen(star, triangles)).matrix)
+    assert found.status == "uncertified"
+    assert "can as well stand in the order" in found.reason
+    assert found.backward_error < 1e-12
+    (other,) = found.report()["alternatives"]
+    (hub,) = other["around"]
+    assert all(hub in cell for cell in other["cells"] + other["other_cells"])
+    assert set(other["found"]) == set(other["other"]) == set(range(5)) - {hub}
+    assert other["same_scale"] is False
+    for cell in other["cells"]:
+        assert "-".join(map(str, cell)) in found.reason
+
+
+@pytest.mark.parametrize("mesh", [squares(holes(6, 5), crossed=True), squares(holes(7, 7, (2, 2, 3, 3)), crossed=True),
+                                  refined(4, 1)])  # fmt: skip
+def test_meshes_without_narrow_places_have_one_reading(mesh):
+    assert recover(forgotten(specimen(*mesh)).matrix).certified
+
+
+def test_noise_leaves_twins_in_doubt():
+    known = forgotten(specimen(*SAME["one row of crossed squares"], seed=1))
+    upper = sp.triu(known.matrix, 1).tocoo()
+    value = upper.data + 1e-6 * np.random.default_rng(0).standard_normal(upper.nnz)
+    ends = np.r_[upper.row, upper.col], np.r_[upper.col, upper.row]
+    found = recover(sp.coo_array((np.r_[value, value], ends), shape=known.matrix.shape), noise=1e-6)
+    assert found.status == "uncertified"
+    assert found.alternatives
