@@ -111,7 +111,11 @@ def _better(one: Reading | None, other: Reading) -> Reading:
 def _entries_are_to_blame(reading: Reading) -> bool:
     """Whether triangles alone do not fit, and none of them is suspected of being a hole: no choice of cells helps."""
     candidates, labels = reading.candidates, reading.labels
-    if not reading.pieces or candidates.n_vertices < _FEW or (labels & ((candidates.size > 3) | candidates.corner)).any():
+    if (
+        not reading.pieces
+        or candidates.n_vertices < _FEW
+        or (labels & ((candidates.size > 3) | candidates.corner)).any()
+    ):
         return False
     return float(np.nan_to_num(np.abs(label_changes(reading))).max(initial=0.0)) < _SUSPECT
 
