@@ -213,3 +213,12 @@ def test_grid_of_zeros_only_in_part():
     found = recover(part)
     assert (len(found.triangles), found.n_polygons) == (0, 36)
     assert recover(known.matrix).n_polygons == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_drawing_with_a_part_the_wrong_way_round(seed):
+    """Where a band is one crossed square wide the graph can be folded at two of its vertices; the numbers cannot."""
+    known = forgotten(specimen(*squares(holes(8, 8, (5, 1, 2, 2)), crossed=True), seed=seed))
+    found = recover(known.matrix)
+    assert found.backward_error < 1e-12, found.reason
+    assert found.n_holes == 1

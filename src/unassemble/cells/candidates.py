@@ -7,16 +7,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from ..topology import Polygons
-from ..topology.faces import FaceComplex, joined
+from ..topology.faces import FaceComplex
 from .angles import face_sums, facing_angles, likeliest_scale, vertex_excess
+from .open_corners import OpenCorners
+from .turning import Turns
 
 _SHORT = 4  # faces of so many edges are cells unless the numbers say otherwise
 _FULL = 1.3 * np.pi  # angle sum below which a face may be a cell
+_TURNED = 0.01  # belief that a corner loses by not being as drawn
 _LEFT_OUT = 0.05  # squared excess of an angle sum, in units of pi, above which a short face may be left out
 _INNER = (-0.35 * np.pi, -0.55 * np.pi)  # angle excess above which a vertex may be an inner one
 
@@ -47,6 +48,8 @@ class Candidates:
     corner : (cells,) bool
         Triangles a-b-c of two edges a-b, b-c of an empty face; the third has vanished from the boundary, which it
         does if the angle at b is a right one.
+    turns : Turns
+        Parts that can be turned over; its corners are numbered after the faces.
     """
 
     n_vertices: int
@@ -60,6 +63,7 @@ class Candidates:
     first: NDArray[np.bool_]
     outer: NDArray[np.bool_]
     corner: NDArray[np.bool_]
+    turns: Turns
 
     @classmethod
     def of(cls, drawing: FaceComplex, weights: NDArray, scale: float | None = None) -> Candidates:
@@ -71,36 +75,33 @@ class Candidates:
         outer = _longest(blocks, sums)
         faces = np.flatnonzero(blocks.simple)
         outside = (blocks.size > _SHORT) | outer | ~blocks.simple
-        whole = blocks.joined(outside)
-        corners = _open_corners(whole, outside[blocks.face])
+        corners = OpenCorners.of(blocks.joined(outside), outside[blocks.face])
         size = np.r_[blocks.size[faces], np.full(len(corners), 3)]
-        offsets = np.append(0, np.cumsum(size))
         chosen = np.isin(blocks.face[blocks.order], faces)
-        vertices = np.r_[
-            blocks.tail[blocks.order[chosen]],
-            np.column_stack([whole.tail[corners], whole.head[corners], whole.head[whole.successor[corners]]]).ravel(),
-        ]
         number = np.full(len(blocks.size), -1)
         number[faces] = np.arange(len(faces))
-        excess = vertex_excess(blocks, angles)[whole.head[corners]]
-        belief = np.where(_in_strips(whole, corners), 1.0, 0.5 - np.abs(excess) / np.pi)
+        excess = vertex_excess(blocks, angles)[corners.vertices[:, 1]]
+        belief = np.where(corners.in_strip, 1.0, 0.5 - np.abs(excess) / np.pi) - np.where(corners.turned, _TURNED, 0.0)
         return cls(
             n_vertices=drawing.n_vertices,
             edges=drawing.edges,
             weights=weights,
             scale=scale,
             relative=relative,
-            cells=Polygons(offsets, vertices),
+            cells=Polygons(
+                np.append(0, np.cumsum(size)), np.r_[blocks.tail[blocks.order[chosen]], corners.vertices.ravel()]
+            ),
             sides=np.concatenate(
                 [
                     np.column_stack([number[blocks.face[blocks.order[chosen]]], blocks.order[chosen]]),
-                    _corner_sides(whole, corners, len(faces), outside[blocks.face]),
+                    corners.sides + [len(faces), 0],
                 ]
             ),
             belief=np.r_[1 - np.abs(sums[faces] / np.pi - 1), belief],
             first=np.r_[(blocks.size <= _SHORT)[faces] & ~outer[faces], np.zeros(len(corners), bool)],
             outer=np.r_[outer[faces], np.zeros(len(corners), bool)],
             corner=np.r_[np.zeros(len(faces), bool), np.ones(len(corners), bool)],
+            turns=corners.turns,
         )
 
     @property
@@ -119,6 +120,12 @@ class Candidates:
         order = np.argsort(self.sides[:, 1], kind="stable")
         start = np.flatnonzero(np.diff(self.sides[order, 1], prepend=-1))
         return self.sides[order], np.append(start, len(order))
+
+    def turned(self, labels: NDArray[np.bool_]) -> Iterator[NDArray[np.bool_]]:
+        """Labels with one part of the drawing turned over, where that changes any."""
+        faces = self.count - int(self.corner.sum())
+        for corners in self.turns.turned(labels[faces:]):
+            yield np.r_[labels[:faces], corners]
 
     def starts(self) -> Iterator[NDArray[np.bool_]]:
         """Readings to begin with, the likeliest first."""
@@ -208,47 +215,3 @@ def _longest(blocks: FaceComplex, sums: NDArray) -> NDArray[np.bool_]:
     longest = np.zeros(len(sums), dtype=bool)
     longest[last] = True
     return longest
-
-
-def _open_corners(whole: FaceComplex, outside: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Half-edges a -> b that b -> c follows in an empty face, with a and c different and not joined."""
-    half = np.flatnonzero(outside)
-    a, c = whole.tail[half], whole.head[whole.successor[half]]
-    return half[(a != c) & ~joined(whole.n_vertices, whole.edges, a, c)]
-
-
-def _in_strips(whole: FaceComplex, corners: NDArray) -> NDArray[np.bool_]:
-    """Corners of the one reading of paths that hang on a graph, or are one: strips of triangles.
-
-    Every vertex inside such a path has a right angle, on alternating sides. Which side is the left one is told by
-    the distance from a root.
-    """
-    bridge = whole.face == whole.face[np.arange(len(whole.face)) ^ 1]
-    lone = np.bincount(whole.tail, minlength=whole.n_vertices)[whole.head[corners]] == 2
-    inside = lone & bridge[corners] & bridge[whole.successor[corners]]
-    if not inside.any():
-        return inside
-    n = whole.n_vertices
-    graph = sp.coo_array((np.ones(len(whole.edges)), whole.edges.T), shape=(n, n)).tocsr()
-    # One root for each component, or parts without one would have no distance; never inside a path.
-    label = csgraph.connected_components(graph, directed=False)[1]
-    order = np.argsort(2 * label + (np.diff(graph.indptr) == 2), kind="stable")
-    root = order[np.flatnonzero(np.diff(label[order], prepend=-1))]
-    depth = csgraph.dijkstra(graph, directed=False, indices=root, unweighted=True, min_only=True).astype(np.int64)
-    outwards = depth[whole.tail[corners]] < depth[whole.head[corners]]
-    return inside & (outwards == (depth[whole.head[corners]] % 2 == 0))
-
-
-def _corner_sides(whole: FaceComplex, corners: NDArray, first: int, outside: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Pairs (candidate, half-edge) of what each corner takes up.
-
-    Where nothing else meets at b, a face on the far side of both edges would contain the vanished edge as a diagonal:
-    the corner takes up the far sides as well, if they belong to such a face.
-    """
-    number = first + np.arange(len(corners))
-    follower = whole.successor[corners]
-    lone = np.bincount(whole.tail, minlength=whole.n_vertices)[whole.head[corners]] == 2
-    lone &= ~outside[corners ^ 1]
-    near = np.column_stack([np.r_[number, number], np.r_[corners, follower]])
-    far = np.column_stack([np.r_[number[lone], number[lone]], np.r_[corners[lone] ^ 1, follower[lone] ^ 1]])
-    return np.concatenate([near, far])

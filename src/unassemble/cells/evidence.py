@@ -51,7 +51,7 @@ def _explain(reading: Reading, piece: Piece, mesh: PieceMesh, changes: NDArray) 
     with np.errstate(all="ignore"):
         w = edge_weights(piece, z)
         misfit = reading.weights[piece.edge_rows] / (candidates.scale or mesh.scale) - w
-    size = np.abs(w + misfit)
+        size = np.abs(w + misfit)
     comparable = _FAR * np.abs(w).max() > size.max(initial=0.0) > 0  # not where c is given and out of all proportion
     if not (np.isfinite(w).all() and np.isfinite(misfit).all() and chosen.any() and comparable):
         return
