@@ -1,10 +1,11 @@
 """Coordinates from elasticity matrices: time and memory beside PyAMG's, and growth with the number of nodes.
 
 Run ``python benchmarks/elasticity.py``; options ``--sizes 10 15 31`` (vertices per edge of the cube), ``--kinds
-tet-p1 hex-q1``, ``--peers plain block true recovered``. Each case is a cube clamped and eliminated on one face, inner
-vertices moved at random, homogeneous material, assembled by scikit-fem. The peer is PyAMG's smoothed aggregation with
-conjugate gradients to 1e-8 on the same matrix: with its defaults on the scalar matrix, with the block size, and with
-true and recovered rigid-body modes.
+tet-p1 hex-q1``, ``--peers cells plain block true recovered``, ``--folder F`` (keeps the matrices there for the next
+run). Each case is a cube clamped and eliminated on one face, inner vertices moved at random, homogeneous material,
+assembled by scikit-fem with as many quadrature points as the element needs. The peer is PyAMG's smoothed aggregation
+with conjugate gradients to 1e-8 on the same matrix: with its defaults on the scalar matrix, with the block size, and
+with true and recovered rigid-body modes. ``cells`` is the recovery once more, with elements.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ def assemble(kind: str, size: int, path: Path) -> None:
     sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "elasticity"))
     from assembled import box, eliminated, on_plane, stiffness
 
-    case = stiffness(kind, box(kind, (size,) * 3, perturb=0.2))
+    case = stiffness(kind, box(kind, (size,) * 3, perturb=0.2), intorder={"tet-p1": 1, "hex-q1": 3}.get(kind))
     matrix, nodes = eliminated(case, np.repeat(on_plane(case, 0)[:, None], 3, axis=1))
     np.savez(path, data=matrix.data, indices=matrix.indices, indptr=matrix.indptr, points=case.points[nodes])
 
@@ -42,12 +43,12 @@ def peak() -> float:
     return int(line.split()[1]) / 1024
 
 
-def measure_recovery(path: Path) -> dict:
+def measure_recovery(path: Path, cells: bool) -> dict:
     from unassemble.elasticity import recover_elasticity
 
     matrix, points = load(path)
     before, start = peak(), perf_counter()
-    found = recover_elasticity(matrix, cells=False)
+    found = recover_elasticity(matrix, cells=cells)
     seconds = perf_counter() - start
     a, b = found.points, points - points.mean(axis=0)
     a = a - a.mean(axis=0)
@@ -55,7 +56,7 @@ def measure_recovery(path: Path) -> dict:
     error = np.linalg.norm(scale * a - b, axis=1).max() / np.linalg.norm(np.ptp(b, axis=0))
     return {
         "nodes": len(points), "seconds": seconds, "memory": peak() - before, "error": float(error),
-        "status": found.status, "gap": found.evidence[0].gap,
+        "status": found.status, "cells": found.cells.n_cells, "timings": dict(found.timings),
     }  # fmt: skip
 
 
@@ -91,29 +92,42 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--sizes", nargs="+", type=int, default=[10, 15, 22, 31])
     parser.add_argument("--kinds", nargs="+", default=["tet-p1", "hex-q1"])
-    parser.add_argument("--peers", nargs="+", default=["plain", "block", "true", "recovered"])
+    parser.add_argument("--peers", nargs="+", default=["cells", "plain", "block", "true", "recovered"])
+    parser.add_argument("--folder", type=Path)
+    parser.add_argument("--assemble", action="store_true", help="only fill the folder")
     parser.add_argument("--one", nargs="+")
     chosen = parser.parse_args()
     if chosen.one:
         what, path = chosen.one[0], Path(chosen.one[1])
-        print(json.dumps(measure_recovery(path) if what == "recover" else measure_pyamg(path, what)))
+        own = what in ("recover", "cells")
+        print(json.dumps(measure_recovery(path, what == "cells") if own else measure_pyamg(path, what)))
         return
-    for kind in chosen.kinds:
-        for size in chosen.sizes:
-            with tempfile.TemporaryDirectory() as folder:
-                path = Path(folder) / "case.npz"
-                assemble(kind, size, path)
-                mine = in_process("--one", "recover", str(path))
-                peers = {name: in_process("--one", name, str(path)) for name in chosen.peers}
-            print(
-                f"{kind} {mine['nodes']:7d} nodes: coordinates {mine['seconds']:6.2f} s {mine['memory']:6.0f} MiB, "
-                f"error {mine['error']:.0e}, {mine['status']}; PyAMG "
-                + "; ".join(
-                    f"{name} {one['seconds']:.2f} s {one['memory']:.0f} MiB {one['iterations']} it"
-                    for name, one in peers.items()
-                ),
-                flush=True,
-            )
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = chosen.folder or Path(temporary)
+        folder.mkdir(exist_ok=True)
+        for kind in chosen.kinds:
+            for size in chosen.sizes:
+                path = folder / f"{kind}-{size}.npz"
+                if not path.exists():
+                    assemble(kind, size, path)
+                if not chosen.assemble:
+                    print(line(kind, path, chosen.peers), flush=True)
+
+
+def line(kind: str, path: Path, peers: list[str]) -> str:
+    """Measure one case and put it into words."""
+    mine = in_process("--one", "recover", str(path))
+    text = (
+        f"{kind} {mine['nodes']:7d} nodes: coordinates {mine['seconds']:6.2f} s {mine['memory']:6.0f} MiB, "
+        f"error {mine['error']:.0e}, {mine['status']}"
+    )
+    for name in peers:
+        one = in_process("--one", name, str(path))
+        if name == "cells":
+            text += f"; with {one['cells']} cells {one['seconds']:.2f} s {one['memory']:.0f} MiB"
+        else:
+            text += f"; PyAMG {name} {one['seconds']:.2f} s {one['memory']:.0f} MiB {one['iterations']} it"
+    return text
 
 
 if __name__ == "__main__":

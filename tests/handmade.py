@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from meshes import edge_list, random_mesh
+from unassemble.elasticity.kinds import KINDS
+from unassemble.elasticity.reference import reference_nodes
 from unassemble.recovery import Recovery
 from unassemble.topology import recognise
 
@@ -70,12 +72,14 @@ def two_pieces(apart: float = 0.0) -> Recovery:
     )
 
 
+_FIELDS = {"triangle": "triangles", "quad": "quads", "tetra": "tetrahedra", "hexahedron": "hexahedra"}
+
+
 def solid(kind: str) -> Recovery:
     """Two cells, or one, of any kind on the corners of a box or of two squares, as of an elasticity matrix."""
     square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64)
     flat = np.vstack([square, square + [2, 0.5]])
     box = np.column_stack([np.vstack([square, square]), np.repeat([0.0, 1.25], 4)])
-    names = {"triangle": "triangles", "quad": "quads", "tetra": "tetrahedra", "hexahedron": "hexahedra"}
     cells = {
         "triangle": [[0, 1, 2], [4, 6, 7]],
         "quad": [[0, 1, 2, 3], [4, 5, 6, 7]],
@@ -84,7 +88,7 @@ def solid(kind: str) -> Recovery:
     }
     points = flat if kind in ("triangle", "quad") else box
     d = points.shape[1]
-    fields: dict[str, Any] = {"triangles": np.empty((0, 3), np.int64), names[kind]: np.array(cells[kind])}
+    fields: dict[str, Any] = {"triangles": np.empty((0, 3), np.int64), _FIELDS[kind]: np.array(cells[kind])}
     return Recovery(
         **fields,
         points=points,
@@ -102,4 +106,21 @@ def solid(kind: str) -> Recovery:
         direction_of_row=np.tile(np.arange(d), 8),
         numbering="interleaved",
         poisson_ratio=0.25,
+    )
+
+
+def quadratic(kind: str) -> Recovery:
+    """One quadratic cell of any kind, as of an elasticity matrix."""
+    shape = KINDS[kind]
+    n, d = shape.nodes, shape.dim
+    nodes = np.arange(n)[None]
+    return replace(
+        solid(shape.base),
+        points=1.25 * reference_nodes(shape),
+        **{_FIELDS[shape.base]: nodes[:, : shape.corners]},
+        mid_nodes=nodes[:, shape.corners :],
+        component=np.zeros(n, np.int64),
+        node_status=np.zeros(n, np.int8),
+        node_of_row=np.repeat(np.arange(n), d),
+        direction_of_row=np.tile(np.arange(d), n),
     )

@@ -14,7 +14,8 @@ import meshio
 import numpy as np
 import pytest
 
-from handmade import lake, solid, with_loose_row
+from handmade import lake, quadratic, solid, with_loose_row
+from unassemble.elasticity.kinds import KINDS
 from unassemble.errors import FormatError, OutputError
 from unassemble.export import check_output, save, to_meshio
 from unassemble.formats import FORMATS, MeshFormat
@@ -132,11 +133,11 @@ def test_formats_of_two_files_or_none_are_refused_at_the_door(suffix, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("kind", ["triangle", "quad", "tetra", "hexahedron"])
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("suffix", [suffix for suffix, f in FORMATS.items() if f.name and not f.cannot])
 def test_every_format_holds_the_cells_of_vector_valued_matrices_or_refuses(suffix, kind, tmp_path, capfd):
     mesh_format = available(suffix)
-    recovery = solid(kind)
+    recovery = quadratic(kind) if KINDS[kind].quadratic else solid(kind)
     path = tmp_path / f"mesh{suffix}"
     if kind not in mesh_format.cells:
         with pytest.raises(FormatError, match=f"cells of kind {kind}"):
@@ -154,7 +155,8 @@ def test_every_format_holds_the_cells_of_vector_valued_matrices_or_refuses(suffi
     assert cells.type == kind
     np.testing.assert_array_equal(cells.data, recovery.cells[kind])
     if mesh_format.data == "all":
-        np.testing.assert_array_equal(np.ravel(mesh.point_data["row_y"]), 1 + recovery.dim * np.arange(8))
+        rows = 1 + recovery.dim * np.arange(recovery.n_points)
+        np.testing.assert_array_equal(np.ravel(mesh.point_data["row_y"]), rows)
 
 
 def test_nodes_without_cells_are_points(tmp_path):
@@ -182,6 +184,21 @@ def test_a_missing_package_is_named(monkeypatch, tmp_path):
     monkeypatch.setattr("unassemble.formats.find_spec", lambda name: None)
     with pytest.raises(OutputError, match="pip install h5py"):
         check_output(tmp_path / "mesh.h5m")
+
+
+def test_npz_of_quadratic_cells(tmp_path):
+    recovery = quadratic("tetra10")
+    save(recovery, tmp_path / "mesh.npz")
+    with np.load(tmp_path / "mesh.npz") as content:
+        assert content["tetrahedra"].tolist() == [[0, 1, 2, 3]]
+        assert content["mid_nodes"].tolist() == [[4, 5, 6, 7, 8, 9]]
+        assert content["mid_nodes"].dtype == np.int64
+
+
+def test_the_outside_of_quadratic_cells_is_marked_to_the_last_node():
+    for kind in ("tetra10", "hexahedron20"):
+        assert to_meshio(quadratic(kind)).point_data["boundary"].all()
+    assert to_meshio(quadratic("hexahedron27")).point_data["boundary"].tolist() == [1] * 26 + [0]
 
 
 @pytest.mark.parametrize("exponent", [-300, -100, -99, -10, -9, 0, 9, 10, 99, 100, 300])

@@ -41,9 +41,9 @@ def check_output(path: str | os.PathLike[str]) -> None:
 def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
     """Write a recovered mesh, whole or not at all; the extension names the format.
 
-    ``.npz`` holds ``points``, cells (``triangles``, ``quads``, ``tetrahedra``, ``hexahedra``, ``polygons_offsets`` and
-    ``polygons_data``), ``component``,
-    ``hinges``, ``scale``, ``node_status`` and, of vector-valued matrices, ``node_of_row`` and ``direction_of_row``.
+    ``.npz`` holds ``points``, cells (``triangles``, ``quads``, ``tetrahedra``, ``hexahedra``, ``mid_nodes``,
+    ``polygons_offsets`` and ``polygons_data``), ``component``, ``hinges``, ``scale``, ``node_status`` and, of
+    vector-valued matrices, ``node_of_row`` and ``direction_of_row``.
     Other formats are those of meshio (:mod:`unassemble.formats`); of these ``.vtu`` holds polygons, the others get
     them divided into triangles.
 
@@ -72,8 +72,8 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
 def arrays(recovery: Recovery) -> dict[str, Any]:
     """What the ``.npz`` holds, by key; what there is nothing of has no key."""
     content: dict[str, Any] = {"points": recovery.points}
-    for name in ("triangles", "quads", "tetrahedra", "hexahedra"):
-        if len(getattr(recovery, name)):
+    for name in ("triangles", "quads", "tetrahedra", "hexahedra", "mid_nodes"):
+        if getattr(recovery, name).size:
             content[name] = getattr(recovery, name)
     if recovery.n_polygons:
         content |= {"polygons_offsets": recovery.polygons_offsets, "polygons_data": recovery.polygons_data}
@@ -150,10 +150,10 @@ def _boundary_flag(recovery: Recovery) -> NDArray[np.int64]:
     flag = np.zeros(recovery.n_points, dtype=np.int64)
     flag[recovery.boundary] = 1
     if recovery.dim == 3:
-        from .elasticity.surface import outer_facets
+        from .elasticity.surface import outer_nodes
 
         for kind, cells in recovery.cells.items():
-            flag[outer_facets(kind, cells)] = 1
+            flag[outer_nodes(kind, cells)] = 1
     return flag
 
 

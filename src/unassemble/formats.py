@@ -15,6 +15,9 @@ _FLAT = frozenset({"triangle", "quad"})
 _SOLID = frozenset({"tetra", "hexahedron"})
 _CELLS = _FLAT | _SOLID
 _ALL = _CELLS | {"vertex"}
+_HALFWAY = frozenset({"triangle6", "quad8", "tetra10", "hexahedron20"})
+_QUADRATIC = _HALFWAY | {"quad9", "hexahedron27"}
+_EVERY = _ALL | _QUADRATIC
 _TRIANGLES = frozenset({"triangle"})
 
 
@@ -66,12 +69,13 @@ _NOT_COMPRESSED = "meshio writes it without compressing: write {} and compress t
 
 # XML inside the one file: heavy data in a side file could not be renamed into place together with it.
 # (meshio imports h5py even then.)
-_XDMF = MeshFormat("xdmf", undetermined=True, options={"data_format": "XML"}, needs="h5py")
-_EXODUS = MeshFormat("exodus", dimension=2, undetermined=True, needs="netCDF4")
+_XDMF = MeshFormat("xdmf", cells=_EVERY, undetermined=True, options={"data_format": "XML"}, needs="h5py")
+_EXODUS = MeshFormat("exodus", cells=_EVERY, dimension=2, undetermined=True, needs="netCDF4")
 # Eleven significant digits are what the sixteen columns of a field hold at any sign and exponent.
-_NASTRAN = MeshFormat("nastran", data="none", digits=11)
+_NASTRAN = MeshFormat("nastran", cells=_ALL | _HALFWAY | {"quad9"}, data="none", digits=11)
+# meshio turns the nodes of quadratic cells when it writes this one, and not when it reads.
 _PERMAS = MeshFormat("permas", data="none")
-_NETGEN = MeshFormat("netgen", data="none")
+_NETGEN = MeshFormat("netgen", cells=_ALL | _HALFWAY, data="none")
 _TECPLOT = MeshFormat("tecplot", dimension=2, cells=_CELLS)
 _TETGEN = MeshFormat("tetgen", cannot=_TWO_FILES)
 _UGRID = MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True)
@@ -92,13 +96,13 @@ FORMATS: Mapping[str, MeshFormat] = {
     ".f3grid": MeshFormat("flac3d", cells=_SOLID, data="none"),
     ".fem": _NASTRAN,
     ".h5m": MeshFormat("h5m", cells=frozenset({"triangle", "tetra"}), undetermined=True, needs="h5py"),
-    ".hmf": MeshFormat("hmf", undetermined=True, needs="h5py"),
-    ".inp": MeshFormat("abaqus", cells=_CELLS, data="none"),
-    ".mdpa": MeshFormat("mdpa", data="none"),
-    ".med": MeshFormat("med", dimension=2, undetermined=True, needs="h5py"),
+    ".hmf": MeshFormat("hmf", cells=_EVERY, undetermined=True, needs="h5py"),
+    ".inp": MeshFormat("abaqus", cells=_CELLS | _HALFWAY | {"quad9"}, data="none"),
+    ".mdpa": MeshFormat("mdpa", cells=_EVERY, data="none"),
+    ".med": MeshFormat("med", cells=_ALL | _HALFWAY, dimension=2, undetermined=True, needs="h5py"),
     ".mesh": MeshFormat("medit", dimension=2, cells=_CELLS, data="boundary"),
     ".meshb": MeshFormat("medit", dimension=2, cells=_CELLS, data="boundary", undetermined=True),
-    ".msh": MeshFormat("gmsh", undetermined=True),  # Gmsh, not ANSYS, which shares the extension
+    ".msh": MeshFormat("gmsh", cells=_EVERY, undetermined=True),  # Gmsh, not ANSYS, which shares the extension
     ".nas": _NASTRAN,
     ".node": _TETGEN,
     ".obj": MeshFormat("obj", cells=_FLAT, data="none"),
@@ -123,8 +127,8 @@ FORMATS: Mapping[str, MeshFormat] = {
     **{f".{kind}.ugrid": _UGRID_SINGLE for kind in ("b4", "lb4", "r4", "lr4")},
     ".vol": _NETGEN,
     ".vol.gz": _NETGEN,
-    ".vtk": MeshFormat("vtk", undetermined=True),
-    ".vtu": MeshFormat("vtu", polygons=True, undetermined=True),
+    ".vtk": MeshFormat("vtk", cells=_EVERY, undetermined=True),
+    ".vtu": MeshFormat("vtu", cells=_EVERY, polygons=True, undetermined=True),
     ".wkt": MeshFormat("wkt", cells=_TRIANGLES, data="none", keeps_rows=False),
     ".xdmf": _XDMF,
     ".xml": MeshFormat("dolfin-xml", dimension=2, cells=frozenset({"triangle", "tetra"}), data="none"),

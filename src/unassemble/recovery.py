@@ -75,7 +75,10 @@ class Recovery:
         With noise: ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``, ``largest``, ``largest_p_value``; see
         :func:`unassemble.certify.chi_square_verdict`.
     quads, tetrahedra, hexahedra : (m, 4), (m, 4), (m, 8) int64
-        Further cells, in meshio's order and positively oriented; empty where there are none.
+        Further cells, in meshio's order and positively oriented; empty where there are none. Of quadratic cells these
+        are the corners.
+    mid_nodes : (m, k) int64
+        Quadratic cells: the nodes that each has besides its corners, in meshio's order; else empty.
     node_of_row, direction_of_row : (N,) int64 or None
         Vector-valued matrices: node and direction of each matrix row.
     numbering : str
@@ -124,6 +127,7 @@ class Recovery:
     quads: NDArray[np.int64] = field(default_factory=lambda: _no_cells(4))
     tetrahedra: NDArray[np.int64] = field(default_factory=lambda: _no_cells(4))
     hexahedra: NDArray[np.int64] = field(default_factory=lambda: _no_cells(8))
+    mid_nodes: NDArray[np.int64] = field(default_factory=lambda: _no_cells(0))
     node_of_row: NDArray[np.int64] | None = None
     direction_of_row: NDArray[np.int64] | None = None
     numbering: str = ""
@@ -159,14 +163,20 @@ class Recovery:
 
     @property
     def cells(self) -> dict[str, NDArray[np.int64]]:
-        """Cells of each kind that occurs, by meshio's names; polygons are not among them."""
+        """Cells of each kind that occurs, all their nodes, by meshio's names; polygons are not among them."""
         kinds = {
             "triangle": self.triangles,
             "quad": self.quads,
             "tetra": self.tetrahedra,
             "hexahedron": self.hexahedra,
         }
-        return {kind: cells for kind, cells in kinds.items() if len(cells)}
+        if not self.mid_nodes.size:
+            return {kind: cells for kind, cells in kinds.items() if len(cells)}
+        return {
+            f"{kind}{cells.shape[1] + self.mid_nodes.shape[1]}": np.hstack([cells, self.mid_nodes])
+            for kind, cells in kinds.items()
+            if len(cells)
+        }
 
     def divided(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Triangles, with the polygons in fans.

@@ -181,9 +181,16 @@ def numbering_text(recovery: Recovery) -> str:
 _KINDS = {"triangle": "triangles", "quad": "quadrilaterals", "tetra": "tetrahedra", "hexahedron": "hexahedra"}
 
 
+def _kind_text(kind: str) -> str:
+    """Cells of a meshio kind in words, with the number of nodes of quadratic ones."""
+    base = kind.rstrip("0123456789")
+    nodes = kind[len(base) :]
+    return _KINDS[base] + (f" of {nodes} nodes" if nodes else "")
+
+
 def cells_text(recovery: Recovery) -> list[tuple[str, int]]:
     """Kinds of cells and their numbers; triangles, if there are none, of scalar matrices."""
-    known = [(_KINDS[kind], len(cells)) for kind, cells in recovery.cells.items()]
+    known = [(_kind_text(kind), len(cells)) for kind, cells in recovery.cells.items()]
     if recovery.n_polygons:
         known.append(("polygons", recovery.n_polygons))
     return known or [("cells" if recovery.vector_valued else "triangles", 0)]

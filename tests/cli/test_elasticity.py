@@ -372,27 +372,35 @@ def test_inspect(work):
     assert json.loads(work.run("inspect", "--json", "A.mtx").stdout)["block_size"] == 1
 
 
-@pytest.mark.parametrize("kind", [*CELLS, "tri-p2"])
+@pytest.mark.parametrize("kind", [*CELLS, "tri-p2", "quad-q2", "tet-p2", "hex-q2"])
 def test_pictures(work, kind):
-    given = body(kind) if kind in CELLS else stiffness(kind, box(kind, (5, 6)))
+    counts = (5, 6) if kind[:3] in ("tri", "qua") else (3, 4, 3)
+    given = body(kind) if kind in CELLS else stiffness(kind, box(kind, counts))
     matrix = sp.block_diag([given.matrix, given.matrix], format="csr") if kind == "hex-q1" else given.matrix
     work.write("E.mtx", matrix)
     assert work.recover("--plot", "p.png", "--plot", "p.svg", matrix="E.mtx").exit_code == 0
     text = Path("p.svg").read_text()
-    drawn = {"tet-p1": "tetrahedra", "hex-q1": "hexahedra", "quad-q1": "quadrilaterals", "tri-p1": "triangles"}
+    drawn = {"tet": "tetrahedra", "hex": "hexahedra", "qua": "quadrilaterals", "tri": "triangles"}
     figure = recover(matrix).plot()
     (ax,) = figure.axes
     assert "<svg" in text
-    if kind not in CELLS:
-        assert len(ax.lines[0].get_xdata()) == len(given.points)
-        return
-    assert any(drawn[kind] in label.get_text() for label in figure.texts)
-    facets = sum(len(collection.get_paths()) for collection in ax.collections[:1])
-    counts = [c - 1 for c in ((7, 8) if kind in FLAT else (4, 5, 5))]
-    if kind == "hex-q1":  # three of the six sides of a box face the eye
-        assert facets == 2 * (counts[0] * counts[1] + counts[0] * counts[2] + counts[1] * counts[2])
-    if kind == "quad-q1":
-        assert facets == counts[0] * counts[1]
+    assert any(drawn[kind[:3]] in label.get_text() for label in figure.texts)
+    facets = [path.vertices for collection in ax.collections[:1] for path in collection.get_paths()]
+    if kind in CELLS:
+        counts = (7, 8) if kind in FLAT else (4, 5, 5)
+    a, b, c = (count - 1 for count in (*counts, 1)[:3])
+    sides = a * b + a * c + b * c  # three of the six sides of a box face the eye
+    number = {"tri": 2 * a * b, "qua": a * b, "tet": 2 * sides, "hex": sides}[kind[:3]]
+    assert len(facets) == number * (2 if kind == "hex-q1" else 1)
+    corners = {"tri": 3, "tet": 3}.get(kind[:3], 4)
+    assert {len(facet) for facet in facets} == {corners * (1 if kind in CELLS else 2) + 1}
+
+
+def test_bare_nodes_are_drawn(work):
+    given = stiffness("tri-p2", box("tri-p2", (5, 6)))
+    figure = recover(given.matrix, cells=False).plot()
+    (ax,) = figure.axes
+    assert len(ax.lines[0].get_xdata()) == len(given.points)
 
 
 def test_scalar_matrices_do_not_load_the_elasticity_room(work):

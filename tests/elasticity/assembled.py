@@ -13,6 +13,8 @@ ELEMENTS = {
     "tri-p1": (skfem.MeshTri, skfem.ElementTriP1),
     "tri-p2": (skfem.MeshTri, skfem.ElementTriP2),
     "quad-q1": (skfem.MeshQuad, skfem.ElementQuad1),
+    "quad-s2": (skfem.MeshQuad, skfem.ElementQuadS2),
+    "quad-q2": (skfem.MeshQuad, skfem.ElementQuad2),
     "tet-p1": (skfem.MeshTet, skfem.ElementTetP1),
     "tet-p2": (skfem.MeshTet, skfem.ElementTetP2),
     "hex-q1": (skfem.MeshHex, skfem.ElementHex1),
@@ -59,9 +61,13 @@ def box(kind: str, counts, *, perturb: float = 0.0, seed: int = 0, grading: floa
     return mesh_type(p, mesh.t)
 
 
-def stiffness(kind: str, mesh, *, lam=1.0, mu=1.0, form=None) -> Assembled:
-    """Assemble; lam and mu are numbers or functions of the position."""
-    basis = skfem.Basis(mesh, skfem.ElementVector(ELEMENTS[kind][1]()))
+def stiffness(kind: str, mesh, *, lam=1.0, mu=1.0, form=None, intorder=None) -> Assembled:
+    """Assemble; lam and mu are numbers or functions of the position.
+
+    Hexahedra of 27 nodes get three points in each direction, as in most codes, where scikit-fem would take seven.
+    """
+    intorder = intorder or {"hex-q2": 5}.get(kind)
+    basis = skfem.Basis(mesh, skfem.ElementVector(ELEMENTS[kind][1]()), intorder=intorder)
 
     @skfem.BilinearForm
     def isotropic(u, v, w):

@@ -1,33 +1,31 @@
 """Elements, recognised by re-assembly.
 
-With the positions known, the matrix is linear in the Lame coefficients of the cells: each candidate, a clique of the
-graph,
-gets two unknowns, and a sparse least-squares problem on the entries between nodes tells which candidates carry
-material.
-The residual is the certificate. Material may differ from cell to cell.
+Candidates for cells are cliques of the graph. With the positions known, the matrix is linear in the Lame coefficients
+of each; the residual of the fit is the certificate. Material may differ from cell to cell.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..linalg import threads
-from .cliques import Graph, boxes, ordered_boxes, simplices
-from .elements import element_blocks
-from .homogeneous import reassembled
-from .nodal import NodalMatrix, determined, valid_pairs
-from .surface import tiles
+from .cliques import Graph, shared_cliques, simplices, straight_simplices
+from .entries import Entries, Pairs
+from .kinds import KINDS, Kind
+from .materials import fits
+from .moduli import FITS, Fit, Model
+from .nodal import NodalMatrix, determined
+from .ordering import ordered
+from .piercing import unpierced
+from .surface import contested, tiles
 
-_KINDS = {2: ("triangles", "quads"), 3: ("tetrahedra", "hexahedra")}
-MESHIO = {"triangles": "triangle", "quads": "quad", "tetrahedra": "tetra", "hexahedra": "hexahedron"}
-_FITS = 1e-9
 _EMPTY = 1e-7  # of the largest coefficient; candidates below carry no material
+_COVERED = 0.5  # of the nodes: what cells have to touch before they are tried
 _LINEAR = {2: 8, 3: 20}  # blocks per row, at most, in meshes of linear simplices; others have too many cliques to try
-_MOST = 400_000  # candidates beyond which nobody waits for the answer
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,26 +34,35 @@ class Cells:
 
     Attributes
     ----------
-    kind : {"", "triangles", "quads", "tetrahedra", "hexahedra"}
-        Empty where no element was recognised.
+    kind : str
+        meshio's name; empty where no element was recognised.
     cells : (m, k) int64
         Nodes, in meshio's order, positively oriented.
     lame : (m, 2) float64
-        lambda and mu of each cell, up to one common factor (the unknown size of the body).
+        lambda and mu of each cell, up to one common factor (the unknown size of the body); empty where they are not
+        known.
     backward_error : float
         Largest difference between an entry and the re-assembled one, relative to the largest off-diagonal entry of
-        its row.
+        its row; NaN where the cells were read off the graph only.
+    varying : bool
+        Whether material differs within cells, at the points of the quadrature; `lame` then has the means.
     """
 
     kind: str
     cells: NDArray[np.int64]
     lame: NDArray[np.float64]
     backward_error: float
+    varying: bool = False
 
     @property
     def recognised(self) -> bool:
-        """Whether the cells re-assemble to the given matrix."""
+        """Whether there are cells."""
         return bool(self.kind)
+
+    @property
+    def certified(self) -> bool:
+        """Whether the cells re-assemble to the given matrix."""
+        return self.recognised and bool(np.isfinite(self.backward_error))
 
     @property
     def n_cells(self) -> int:
@@ -69,140 +76,86 @@ def no_cells(d: int) -> Cells:
 
 
 def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: float | None = None) -> Cells:
-    """Find linear simplices, or multilinear boxes, that re-assemble to the matrix.
+    """Find cells of one kind that re-assemble to the matrix: simplices or boxes, linear or quadratic.
 
-    With lambda / mu known to be one number, `ratio`, one material is tried first, which is quick.
+    With lambda / mu known to be one number, `ratio`, linear simplices of one material are tried first, which is quick.
+    Where no material fits, boxes and quadratic cells that lie side by side and of which each entry belongs to one at
+    least are returned all the same, without certificate.
 
     Entries between two nodes that both miss a neighbour are left out, since cells that lost a node to a support
     contribute to them. Cells all of whose entries are left out cannot be seen and are not reported.
     """
     d = nodal.dim
+    graph = _graph(nodal, points)
+    entries = Entries.of(nodal)
+    plain = no_cells(d)
+    if not len(entries.key):
+        return plain
+    for kind, sets in _candidates(graph, points, d):
+        cells = ordered(sets, points, kind)
+        if kind.linear_simplex:
+            cells = _without_pierced(kind, cells, points, graph)
+        told = entries.explained_by(Pairs.of(cells, entries), FITS)
+        if told is None or not len(told.key):
+            continue
+        cells = cells[Pairs.of(cells, told).seen]
+        for model, fit in fits(points, cells, kind, told, ratio):
+            found = _accepted(model, fit)
+            if found is not None:
+                return found
+        if not plain.recognised:
+            plain = _by_graph(kind, cells)
+    return plain
+
+
+def _graph(nodal: NodalMatrix, points: NDArray) -> Graph:
+    """Pairs of determined nodes with an entry."""
     known = determined(points)
     live = (np.abs(nodal.data).max(axis=(1, 2)) > 1e-13 * nodal.size[nodal.node]) & known[nodal.node]
     live &= known[nodal.indices]
-    pattern = sp.csr_array((np.ones(live.sum()), (nodal.node[live], nodal.indices[live])), shape=(nodal.n, nodal.n))
-    if pattern.nnz <= nodal.n:
-        return no_cells(d)
-    graph = Graph(pattern)
-    entries = _Entries.of(nodal)
-    box = boxes(graph, d) if pattern.nnz <= nodal.n * 3**d else np.empty((0, 2**d), np.int64)
-    if len(box) and len(np.unique(box)) > 0.9 * known.sum() and len(box) < _MOST // 4:
-        box = ordered_boxes(box, points)
-        for order in (2, 3, 4, 1):
-            found = _fit(nodal, points, box, order, entries, _KINDS[d][1], ratio)
-            if found.recognised:
-                return found
-    if nodal.n * (2 if d == 2 else 8) > _MOST or pattern.nnz > nodal.n * _LINEAR[d]:
-        return no_cells(d)
-    return _fit(nodal, points, _oriented(simplices(graph, d), points), 1, entries, _KINDS[d][0], ratio)
+    return Graph(sp.csr_array((np.ones(live.sum()), (nodal.node[live], nodal.indices[live])), shape=(nodal.n,) * 2))
 
 
-@dataclass(frozen=True, eq=False)
-class _Entries:
-    """Blocks above the diagonal that complete cells alone explain."""
-
-    key: NDArray[np.int64]
-    value: NDArray[np.float64]
-    size: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, nodal: NodalMatrix) -> _Entries:
-        complete = np.asarray(valid_pairs(nodal).all(axis=(1, 2)))
-        i, j = nodal.node.astype(np.int64), nodal.indices.astype(np.int64)
-        off = np.abs(nodal.data).max(axis=(1, 2))
-        off[i == j] = 0
-        largest = np.maximum.reduceat(off, nodal.indptr[:-1])
-        use = (i < j) & (complete[i] | complete[j])
-        return cls(i[use] * nodal.n + j[use], nodal.data[use], np.minimum(largest[i[use]], largest[j[use]]))
+def _candidates(graph: Graph, points: NDArray, d: int) -> Iterator[tuple[Kind, NDArray[np.int64]]]:
+    """Sets of nodes that could be the cells of a kind, those of most nodes first."""
+    known = int(determined(points).sum())
+    for kind in sorted((kind for kind in KINDS.values() if kind.dim == d), key=lambda kind: -kind.nodes):
+        if kind.linear_simplex:
+            pattern = len(graph.row) + graph.n
+            if pattern <= graph.n * _LINEAR[d]:
+                yield kind, simplices(graph, d)
+            continue
+        sets = shared_cliques(graph, kind.nodes)
+        if kind.name == "triangle6":
+            sets = np.unique(np.vstack([sets, straight_simplices(graph, points, d)]), axis=0)
+        if len(np.unique(sets)) > _COVERED * known:
+            yield kind, sets
 
 
-def _oriented(cells: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Positive simplices; flat ones are left out."""
-    edges = points[cells[:, 1:]] - points[cells[:, :1]]
-    volume = np.linalg.det(edges)
-    size = np.linalg.norm(edges, axis=2).max(axis=1) ** points.shape[1]
-    cells = cells[np.abs(volume) > 1e-9 * size]
-    mirrored = volume[np.abs(volume) > 1e-9 * size] < 0
-    cells[mirrored, -2:] = cells[mirrored, -1:-3:-1]
-    return cells
+def _without_pierced(kind: Kind, cells: NDArray[np.int64], points: NDArray, graph: Graph) -> NDArray[np.int64]:
+    """Cliques that may be cells; only those that overlap others need a look."""
+    doubtful = np.flatnonzero(contested(kind.base, cells))
+    return np.delete(cells, doubtful[~unpierced(cells[doubtful], points, graph)], axis=0)
 
 
-def _homogeneous(
-    points: NDArray, cells: NDArray, order: int, entries: _Entries, kind: str, ratio: float
-) -> Cells | None:
-    """All candidates, of one material; None where they do not fit."""
-    blocks, seen = reassembled(points, cells, order, ratio, entries.key)
-    square = float((blocks * blocks).sum())
-    if not square:
-        return None
-    mu = float((blocks * entries.value).sum()) / square
-    error = float(np.abs((mu * blocks - entries.value) / entries.size[:, None, None]).max())
-    lame = np.tile([ratio * mu, mu], (int(seen.sum()), 1))
-    if not error <= _FITS or not _are_elements(kind, cells[seen], lame):
-        return None
-    return Cells(kind, cells[seen], lame, error)
+def _by_graph(kind: Kind, cells: NDArray[np.int64]) -> Cells:
+    """Cells without certificate, if they lie side by side; cliques of linear simplices are no evidence."""
+    if kind.linear_simplex or not len(cells) or not tiles(kind.base, cells[:, : kind.corners]):
+        return no_cells(kind.dim)
+    return Cells(kind.name, cells, np.empty((0, 2)), float("nan"))
 
 
-def _fit(
-    nodal: NodalMatrix,
-    points: NDArray,
-    cells: NDArray,
-    order: int,
-    entries: _Entries,
-    kind: str,
-    ratio: float | None,
-) -> Cells:
-    """One material, or least squares for the coefficients of all candidates."""
-    d = nodal.dim
-    if not len(cells) or not len(entries.key):
-        return no_cells(d)
-    found = None if ratio is None else _homogeneous(points, cells, order, entries, kind, ratio)
-    if found is not None:
-        return found
-    operator = _assembly(nodal, points, cells, order, entries)
-    target = (entries.value / entries.size[:, None, None]).ravel()
-    weight = np.sqrt(np.asarray(operator.power(2).sum(axis=0)).ravel())
-    seen = weight > 0
-    scaled = operator[:, np.flatnonzero(seen)] @ sp.diags_array(1 / weight[seen])
-    with threads(1):  # its many short vectors are not worth waking threads for
-        answer = sp.linalg.lsmr(scaled, target, atol=1e-15, btol=1e-15, conlim=0, maxiter=600)[0]
-    lame = np.zeros(2 * len(cells))
-    lame[seen] = answer / weight[seen]
-    error = float(np.abs(operator @ lame - target).max())
-    pairs = lame.reshape(-1, 2)
-    carries = np.abs(pairs).max(axis=1) > _EMPTY * np.abs(pairs).max()
-    if not error <= _FITS or not _are_elements(kind, cells[carries], pairs[carries]):
-        return no_cells(d)
-    return Cells(kind, cells[carries], pairs[carries], error)
-
-
-def _are_elements(kind: str, cells: NDArray[np.int64], lame: NDArray[np.float64]) -> bool:
-    """Whether cells have shear moduli of one sign and do not overlap; made-up ones do one or the other.
+def _accepted(model: Model, fit: Fit) -> Cells | None:
+    """Cells that carry material, if they fit, have shear moduli of one sign and do not overlap; made-up ones do.
 
     A quadratic triangle, for one, is a combination of small linear ones and a large one with a negative modulus.
     """
+    kind, lame = model.kind, fit.lame
+    if not fit.misfit <= FITS or not lame.any():
+        return None
+    carries = np.abs(lame).max(axis=1) > _EMPTY * np.abs(lame).max()
+    cells, lame = model.cells[carries], lame[carries]
     mu = lame[:, 1]
-    return bool((mu > 0).all() or (mu < 0).all()) and tiles(MESHIO[kind], cells)
-
-
-def _assembly(nodal: NodalMatrix, points: NDArray, cells: NDArray, order: int, entries: _Entries) -> sp.csr_array:
-    """(entries d d, 2 cells) what each coefficient adds to each entry, relative to the entry's row."""
-    d, k = nodal.dim, cells.shape[1]
-    blocks = element_blocks(points, cells, order)
-    a, b = np.triu_indices(k, 1)
-    i, j = cells[:, a], cells[:, b]
-    flip = i > j
-    key = np.minimum(i, j) * nodal.n + np.maximum(i, j)
-    place = np.minimum(np.searchsorted(entries.key, key), len(entries.key) - 1)
-    there = entries.key[place] == key
-    rows, columns, values = [], [], []
-    for number, block in enumerate(blocks):
-        part = block[:, a, b]
-        part = np.where(flip[..., None, None], part.transpose(0, 1, 3, 2), part)
-        part = part / entries.size[place][..., None, None]
-        cell = np.broadcast_to(np.arange(len(cells))[:, None], key.shape)[there]
-        rows.append((place[there][:, None] * d * d + np.arange(d * d)).ravel())
-        columns.append(np.repeat(2 * cell + number, d * d))
-        values.append(part[there].reshape(-1))
-    shape = (len(entries.key) * d * d, 2 * len(cells))
-    return sp.csr_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)
+    if not ((mu > 0).all() or (mu < 0).all()) or not tiles(kind.base, cells[:, : kind.corners]):
+        return None
+    return Cells(kind.name, cells, lame, fit.misfit, model.varying)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from itertools import combinations
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
+from scipy.spatial import cKDTree
+
+_AT_ONCE = 10_000_000  # products in one go
+_STRAIGHT = 1e-6  # of a side's length: how far from its middle a node may be
 
 
 class Graph:
@@ -31,6 +32,8 @@ class Graph:
 
     def coupled(self, i: NDArray, j: NDArray) -> NDArray[np.bool_]:
         """(k,) whether i and j are neighbours."""
+        if not len(self._key):
+            return np.zeros(np.shape(i), dtype=bool)
         key = i * self.n + j
         place = np.minimum(np.searchsorted(self._key, key), len(self._key) - 1)
         return self._key[place] == key
@@ -41,6 +44,20 @@ class Graph:
         place = np.repeat(np.arange(len(nodes)), count)
         offset = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
         return place, self.col[self.start[nodes[place]] + offset]
+
+    def closed(self) -> sp.csr_array:
+        """Pattern of ones, with the diagonal."""
+        own = np.arange(self.n)
+        row, col = np.concatenate([self.row, own]), np.concatenate([self.col, own])
+        return sp.csr_array((np.ones(len(row), np.int32), (row, col)), shape=(self.n, self.n))
+
+    def cliques(self, sets: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(m,) whether all nodes of each of the sets (m, k) are coupled to each other."""
+        good = np.ones(len(sets), dtype=bool)
+        for a in range(sets.shape[1]):
+            for b in range(a + 1, sets.shape[1]):
+                good[good] = self.coupled(sets[good, a], sets[good, b])
+        return good
 
 
 def simplices(graph: Graph, d: int) -> NDArray[np.int64]:
@@ -57,76 +74,56 @@ def simplices(graph: Graph, d: int) -> NDArray[np.int64]:
     return cliques
 
 
-def boxes(graph: Graph, d: int) -> NDArray[np.int64]:
-    """(m, 2**d) cliques of 2**d nodes that are all common neighbours of two of theirs; nodes increasing.
+def shared_cliques(graph: Graph, k: int) -> NDArray[np.int64]:
+    """(m, k) cliques of k nodes that are all that two of them have in common; nodes increasing.
 
-    In a mesh of quadrilaterals or hexahedra opposite corners of a cell share the nodes of that cell and no others.
+    A node couples to the nodes of the cells around it. So nodes on opposite sides of a cell, like opposite corners of
+    a box or the middles of opposite edges of a quadratic tetrahedron, share the nodes of that cell and no others; a
+    node inside a cell has no others itself.
     """
-    corners = 2**d
-    first = graph.row < graph.col
+    closed = graph.closed()
+    degree = np.diff(closed.indptr)
+    work = np.cumsum(closed @ degree.astype(np.int64))
+    found = np.empty((0, k), np.int64)
+    if not graph.n or degree.max() < k:
+        return found
+    for rows in np.split(np.arange(graph.n), np.searchsorted(work, np.arange(_AT_ONCE, work[-1], _AT_ONCE))):
+        if not len(rows):
+            continue
+        block = closed[rows]
+        common = sp.triu(sp.csr_array((block @ closed).multiply(block)), rows[0], format="coo")
+        pairs = common.data == k
+        i, j = rows[common.row[pairs]], common.col[pairs]
+        if len(i):
+            sets = sp.csr_array(closed[i].multiply(closed[j]))
+            sets.sort_indices()
+            found = np.unique(np.vstack([found, sets.indices.reshape(-1, k).astype(np.int64)]), axis=0)
+    return found[graph.cliques(found)]
+
+
+def straight_simplices(graph: Graph, points: NDArray[np.float64], d: int) -> NDArray[np.int64]:
+    """(m, 6 or 10) corners and middles of simplices whose sides have a node in the middle; nodes increasing.
+
+    For quadratic triangles of one material: there the entries between a corner and the middle of the side facing
+    it vanish, so that the six nodes are no clique; but all middles are coupled.
+    """
+    known = np.flatnonzero(np.isfinite(points).all(axis=1))
+    first = (graph.row < graph.col) & np.isin(graph.row, known) & np.isin(graph.col, known)
     i, j = graph.row[first], graph.col[first]
-    place, other = graph.spread(i)
-    common = graph.coupled(j[place], other)
-    place, other = place[common], other[common]
-    full = np.bincount(place, minlength=len(i)) == corners - 2
-    kept = full[place]
-    others = other[kept].reshape(-1, corners - 2)
-    cells = np.unique(np.sort(np.column_stack([i[full], j[full], others]), axis=1), axis=0)
-    for a in range(corners):
-        for b in range(a + 1, corners):
-            cells = cells[graph.coupled(cells[:, a], cells[:, b])]
-    return cells
+    length = np.linalg.norm(points[i] - points[j], axis=1)
+    away, nearest = cKDTree(points[known]).query((points[i] + points[j]) / 2)
+    middle = known[nearest]
+    side = (away < _STRAIGHT * length) & graph.coupled(i, middle) & graph.coupled(j, middle)
+    i, j, middle = i[side], j[side], middle[side]
+    corners = simplices(Graph(_symmetric(i, j, graph.n)), d)
+    key = i * graph.n + j  # increasing, as the graph's rows are
+    a, b = np.triu_indices(d + 1, 1)
+    middles = middle[np.searchsorted(key, corners[:, a] * graph.n + corners[:, b])]
+    whole = graph.cliques(middles)
+    return np.sort(np.column_stack([corners[whole], middles[whole]]), axis=1)
 
 
-def ordered_boxes(cells: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Put the corners of each cell in meshio's order, positively oriented.
-
-    For each choice of d corners as neighbours of the first, the others are predicted as those of a parallelepiped;
-    the choice
-    whose predictions are nearest to distinct corners wins.
-    """
-    m, corners = cells.shape
-    d = points.shape[1]
-    x = _rounded(points[cells])
-    x = x - x[:, :1]
-    bits = (np.arange(corners)[:, None] >> np.arange(d)) & 1
-    best = np.full(m, np.inf)
-    order = np.zeros((m, corners), dtype=np.int64)
-    for choice in combinations(range(1, corners), d):
-        edges = x[:, choice, :]
-        predicted = np.einsum("kd,mde->mke", bits, edges)
-        distance = np.linalg.norm(predicted[:, :, None, :] - x[:, None, :, :], axis=3)
-        nearest = distance.argmin(axis=2)
-        distinct = (np.sort(nearest, axis=1) == np.arange(corners)).all(axis=1)
-        misfit = np.where(distinct, distance.min(axis=2).sum(axis=1), np.inf)
-        better = misfit < best
-        best[better], order[better] = misfit[better], nearest[better]
-    for odd in np.flatnonzero(~np.isfinite(best)):
-        order[odd] = _assigned(x[odd], bits)
-    cube = np.take_along_axis(cells, order, axis=1)
-    edges = points[cube[:, 1 << np.arange(d)]] - points[cube[:, :1]]
-    mirrored = np.linalg.det(edges) < 0
-    swapped = cube.copy()
-    exchange = ((np.arange(corners) & 1) << 1) | ((np.arange(corners) >> 1) & 1) | (np.arange(corners) & ~3)
-    swapped[mirrored] = cube[mirrored][:, exchange]
-    ring = [0, 1, 3, 2] if d == 2 else [0, 1, 3, 2, 4, 5, 7, 6]
-    return swapped[:, ring]
-
-
-def _rounded(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Corners of each cell (m, k, d) after the linear map that makes their covariance the identity: nearly a cube."""
-    centred = x - x.mean(axis=1, keepdims=True)
-    value, vector = np.linalg.eigh(np.einsum("mka,mkb->mab", centred, centred))
-    value = np.maximum(value, 1e-12 * value[:, -1:])
-    return np.einsum("mka,mab->mkb", centred, vector / np.sqrt(value)[:, None, :])
-
-
-def _assigned(x: NDArray[np.float64], bits: NDArray) -> NDArray[np.int64]:
-    """The same for one distorted cell (k, d), with the cheapest assignment for each choice."""
-    best, order = np.inf, np.arange(len(x))
-    for choice in combinations(range(1, len(x)), x.shape[1]):
-        distance = np.linalg.norm((bits @ x[list(choice)])[:, None] - x[None], axis=2)
-        rows, columns = linear_sum_assignment(distance)
-        if distance[rows, columns].sum() < best:
-            best, order = distance[rows, columns].sum(), columns
-    return order
+def _symmetric(i: NDArray, j: NDArray, n: int) -> sp.csr_array:
+    """Pattern of pairs both ways."""
+    pair = np.concatenate([i, j]), np.concatenate([j, i])
+    return sp.csr_array((np.ones(2 * len(i)), pair), shape=(n, n))

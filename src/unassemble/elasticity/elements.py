@@ -2,57 +2,60 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 from numpy.typing import NDArray
 
+from .kinds import Kind
+from .reference import Rule, shape_gradients
 
-def element_blocks(points: NDArray, cells: NDArray, order: int) -> tuple[NDArray, NDArray]:
-    """Blocks of all pairs of corners, for (lambda, mu) = (1, 0) and (0, 1).
+
+def element_blocks(points: NDArray, cells: NDArray, kind: Kind, rule: Rule) -> tuple[NDArray, NDArray]:
+    """Blocks of all pairs of nodes, for (lambda, mu) = (1, 0) and (0, 1).
 
     Parameters
     ----------
     points : (n, d) float64
-    cells : (m, d + 1) or (m, 2**d) int64
-        Simplices with linear functions, or boxes with multilinear ones in meshio's order.
-    order : int
-        Gauss points per direction, for boxes.
+    cells : (m, k) int64
+        Isoparametric, in meshio's order.
+    kind : Kind
+    rule : (q, d) and (q,) float64
+        Quadrature in the reference element.
 
     Returns
     -------
     first, second : (m, k, k, d, d) float64
+        ``first[e, i, j, c, b]`` is the integral of d_c phi_i d_b phi_j.
     """
-    d = points.shape[1]
-    k = cells.shape[1]
-    if k == d + 1:
-        local, weights = np.vstack([-np.ones(d), np.eye(d)])[None], np.array([1 / (1, 1, 2, 6)[d]])
-    else:
-        local, weights = _box_gradients(d, order)
-    first = np.zeros((len(cells), k, k, d, d))
-    second = np.zeros_like(first)
-    for gradient, weight in zip(local, weights, strict=True):
-        jacobian = np.einsum("mke,kr->mer", points[cells], gradient)
-        g = np.einsum("kr,mre->mke", gradient, np.linalg.inv(jacobian))
-        volume = weight * np.abs(np.linalg.det(jacobian))
-        outer = np.einsum("m,mic,mjb->mijcb", volume, g, g)
-        first += outer
-        second += outer.transpose(0, 1, 2, 4, 3)
-        second += np.einsum("mijcc->mij", outer)[..., None, None] * np.eye(d)
-    return first, second
+    m, k, d = len(cells), kind.nodes, kind.dim
+    g, volume = _gradients(points, cells, kind, rule)
+    g = g.reshape(m, len(volume.T), k * d)
+    # One product of matrices per cell: its columns are the quadrature points.
+    outer = (g * volume[..., None]).transpose(0, 2, 1) @ g
+    first = outer.reshape(m, k, d, k, d).transpose(0, 1, 3, 2, 4)
+    trace = np.trace(first, axis1=3, axis2=4)
+    return first, first.transpose(0, 1, 2, 4, 3) + trace[..., None, None] * np.eye(d)
 
 
-def _box_gradients(d: int, order: int) -> tuple[NDArray, NDArray]:
-    """Gradients of the multilinear functions at Gauss points of the unit box, and weights."""
-    node, weight = np.polynomial.legendre.leggauss(order)
-    node, weight = (node + 1) / 2, weight / 2
-    ring = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    corners = ring if d == 2 else [(*r, z) for z in (0, 1) for r in ring]
-    gradients, weights = [], []
-    for place in product(range(order), repeat=d):
-        s = node[list(place)]
-        value = np.array([[s[a] if c[a] else 1 - s[a] for a in range(d)] for c in corners])
-        slope = np.array([[1.0 if c[a] else -1.0 for a in range(d)] for c in corners])
-        gradients.append(np.stack([slope[:, a] * np.delete(value, a, axis=1).prod(axis=1) for a in range(d)], axis=1))
-        weights.append(weight[list(place)].prod())
-    return np.array(gradients), np.array(weights)
+def point_blocks(points: NDArray, cells: NDArray, kind: Kind, rule: Rule) -> NDArray[np.float64]:
+    """The same point by point of the quadrature: (2 q, m, k, k, d, d), first for lambda, then for mu."""
+    g, volume = _gradients(points, cells, kind, rule)
+    first = np.einsum("mq,mqic,mqjb->qmijcb", volume, g, g, optimize=True)
+    trace = np.trace(first, axis1=4, axis2=5)
+    return np.concatenate([first, first.swapaxes(4, 5) + trace[..., None, None] * np.eye(kind.dim)])
+
+
+def point_volumes(points: NDArray, cells: NDArray, kind: Kind, rule: Rule) -> NDArray[np.float64]:
+    """(m, q) shares of each cell's volume that the quadrature points stand for."""
+    volume = _gradients(points, cells, kind, rule)[1]
+    return volume / volume.sum(axis=1, keepdims=True)
+
+
+def _gradients(points: NDArray, cells: NDArray, kind: Kind, rule: Rule) -> tuple[NDArray, NDArray]:
+    """(m, q, k, d) gradients of the shape functions in space, and (m, q) weights."""
+    at, weights = rule
+    local = shape_gradients(kind, at)
+    jacobian = np.einsum("mke,qkr->mqer", points[cells], local, optimize=True)
+    size = np.abs(np.linalg.det(jacobian))
+    flat = size <= 1e-14 * np.linalg.norm(jacobian, axis=(2, 3)) ** kind.dim
+    jacobian[flat] = np.eye(kind.dim)  # not a cell: whatever it adds does not fit
+    return np.einsum("qkr,mqre->mqke", local, np.linalg.inv(jacobian), optimize=True), size * weights

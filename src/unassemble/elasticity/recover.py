@@ -100,15 +100,12 @@ def _describe(
     if want_cells and error < 1e-6:
         with clock("cells"):
             found = recognise_cells(nodal, points, None if ratio is None else 2 * ratio / (1 - 2 * ratio))
-    backward = found.backward_error if found.recognised else error
+    backward = found.backward_error if found.certified else error
     status, reason = _verdict(nodal, solution, error, found, numbering)
     loose = ~determined(points)
     warnings = list(solution.warnings)
-    if want_cells and not found.recognised:
-        warnings.append(
-            "no elements were recognised: looked for are linear triangles and tetrahedra in bodies of moderate size, "
-            "and bilinear quadrilaterals and trilinear hexahedra of one material each"
-        )
+    if want_cells:
+        warnings += _about_cells(found)
     if loose.any():
         warnings.append(f"{loose.sum()} of {nodal.n} nodes are tied to eliminated unknowns only and stay undetermined")
     if solution.ratio is not None:
@@ -117,6 +114,22 @@ def _describe(
         points, numbering.node_of_row, numbering.direction_of_row, np.asarray(loose, dtype=np.int8), solution.component,
         solution.evidence, ratio, found, backward, status, reason, numbering.kind, tuple(warnings), clock.timings,
     )  # fmt: skip
+
+
+def _about_cells(found: Cells) -> list[str]:
+    if not found.recognised:
+        return [
+            "no elements were recognised: looked for are linear and quadratic triangles, quadrilaterals, tetrahedra "
+            "and hexahedra, of one kind throughout"
+        ]
+    if not found.certified:
+        return [
+            "the elements were read off the graph and are not certified: no material was found with which they "
+            "re-assemble to the matrix"
+        ]
+    if found.varying:
+        return ["the material differs within elements: their Lame coefficients are means"]
+    return []
 
 
 _FREEDOMS = {
@@ -147,7 +160,7 @@ def _verdict(
             "which direction each row belongs to was inferred from the entries, and not without contradiction: coupled "
             "nodes came out as separate pieces; give the numbering if it is known"
         )
-    if found.recognised and found.backward_error <= CERTIFIED:
+    if found.certified and found.backward_error <= CERTIFIED:
         return "certified", f"the matrix re-assembled on the {found.n_cells} elements is the given one"
     if numbering.kind == "pattern" and numbering.incomplete:
         return "uncertified", (

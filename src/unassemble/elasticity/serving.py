@@ -15,7 +15,8 @@ from ..errors import RecoveryError
 from ..matrix import OperatorMatrix, check_matrix
 from ..recovery import Recovery
 from .anchoring import anchored, checked_anchors
-from .cells import MESHIO
+from .cells import Cells
+from .kinds import KINDS
 from .nodal import nodal_matrix, uncoupled
 from .recover import parts_of, place_nodes
 from .results import ElasticityRecovery, ScalarParts
@@ -63,11 +64,10 @@ def serve(
     found = place_nodes(nodal, numbering, clock, cells=cells)
     points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
     lame, scale = _in_units(found, factor)
-    fields: dict[str, Any] = {"triangles": np.empty((0, 3), np.int64), found.cells.kind: found.cells.cells}
-    fields.pop("", None)
+    fields: dict[str, Any] = {"triangles": np.empty((0, 3), np.int64), **_cell_fields(found.cells)}
     boundary, offsets = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
     if found.cells.recognised and nodal.dim == 2:
-        boundary, offsets = boundary_loops(MESHIO[found.cells.kind], found.cells.cells)
+        boundary, offsets = boundary_loops(found.cells.kind, found.cells.cells)
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: with a mesh its point reflection fits the matrix as well")
     return Recovery(
@@ -95,6 +95,18 @@ def serve(
     )
 
 
+_FIELD = {"triangle": "triangles", "quad": "quads", "tetra": "tetrahedra", "hexahedron": "hexahedra"}
+
+
+def _cell_fields(found: Cells) -> dict[str, NDArray[np.int64]]:
+    """Corners of the cells by their name in a Recovery, and their further nodes."""
+    if not found.recognised:
+        return {}
+    kind = KINDS[found.kind]
+    fields = {_FIELD[kind.base]: np.ascontiguousarray(found.cells[:, : kind.corners])}
+    return fields | ({"mid_nodes": np.ascontiguousarray(found.cells[:, kind.corners :])} if kind.quadratic else {})
+
+
 def _in_units(found: ElasticityRecovery, factor: NDArray) -> tuple[NDArray, NDArray]:
     """Lame coefficients of the cells, and the mean shear modulus of each piece, for the size that it was given.
 
@@ -103,7 +115,7 @@ def _in_units(found: ElasticityRecovery, factor: NDArray) -> tuple[NDArray, NDAr
     d = found.points.shape[1]
     pieces = len(found.evidence)
     scale = np.full(pieces, np.nan)
-    if not found.cells.recognised:
+    if not found.cells.certified:
         return np.empty((0, 2)), scale
     piece = found.component[found.cells.cells[:, 0]]
     lame = found.cells.lame / np.where(np.isnan(factor), 1.0, np.abs(factor))[piece, None] ** (d - 2)

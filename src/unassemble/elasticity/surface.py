@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..topology.boundary import loops
+from .kinds import KINDS, Kind
 
 # Facets of a positively oriented cell in meshio's order, each seen counter-clockwise from outside.
-_FACETS = {
+_FACETS: dict[str, list[tuple[int, ...]]] = {
     "triangle": [(0, 1), (1, 2), (2, 0)],
     "quad": [(0, 1), (1, 2), (2, 3), (3, 0)],
     "tetra": [(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)],
@@ -16,34 +20,87 @@ _FACETS = {
 }
 
 
-def outer_facets(kind: str, cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(f, k) facets that no other cell shares.
+def _ring(kind: Kind, corners: Sequence[int]) -> list[int]:
+    """Corners in a ring, and between them the nodes on the sides."""
+    middle = {frozenset(some): kind.corners + k for k, some in enumerate(kind.between)}
+    sides = zip(corners, (*corners[1:], corners[0]), strict=True)
+    return [node for a, b in sides for node in ([a, middle[frozenset((a, b))]] if kind.quadratic else [a])]
+
+
+@cache
+def _outlines(name: str) -> NDArray[np.int64]:
+    """(f, r) facets of a kind of cell: in the plane pairs of neighbours on its rim, in space rings."""
+    kind = KINDS[name]
+    if kind.dim == 3:
+        return np.array([_ring(kind, facet) for facet in _FACETS[kind.base]])
+    rim = _ring(kind, list(range(kind.corners)))
+    return np.column_stack([rim, np.roll(rim, -1)])
+
+
+def planar_outlines(name: str, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m, r) nodes around each planar cell (m, k), counter-clockwise."""
+    return cells[:, _outlines(name)[:, 0]]
+
+
+def outer_facets(name: str, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(f, k) facets that no other cell shares, seen counter-clockwise from outside.
+
+    Sides of quadratic cells in the plane are two facets each; in space facets have the nodes in the middle of their
+    sides between their corners.
 
     Parameters
     ----------
-    kind : {"triangle", "quad", "tetra", "hexahedron"}
-    cells : (m, corners) int64
+    name : str
+        The kind of cell, by meshio's name.
+    cells : (m, k) int64
     """
-    corners = np.array(_FACETS[kind])
+    corners = _outlines(name)
     facets = cells[:, corners].reshape(-1, corners.shape[1])
     _, which, count = np.unique(np.sort(facets, axis=1), axis=0, return_inverse=True, return_counts=True)
     return facets[count[which.ravel()] == 1]
 
 
-def tiles(kind: str, cells: NDArray[np.int64]) -> bool:
-    """Whether positively oriented cells lie side by side: any facet bounds one from each side at most.
+def outer_nodes(name: str, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Nodes on the outside, those inside facets included."""
+    kind = KINDS[name]
+    nodes = [np.unique(outer_facets(name, cells))]
+    for k, some in enumerate(kind.between):
+        if kind.dim == 3 and len(some) == 4:  # in the middle of a facet of a hexahedron
+            facets = np.sort(cells[:, list(some)], axis=1)
+            outside = np.sort(outer_facets(kind.base, cells[:, : kind.corners]), axis=1)
+            nodes.append(cells[_rows_among(facets, outside), kind.corners + k])
+    return np.unique(np.concatenate(nodes))
+
+
+def _rows_among(rows: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(m,) whether each row is one of the others."""
+    _, label = np.unique(np.vstack([rows, others]), axis=0, return_inverse=True)
+    return np.isin(label.ravel()[: len(rows)], label.ravel()[len(rows) :])
+
+
+def tiles(base: str, cells: NDArray[np.int64]) -> bool:
+    """Whether positively oriented linear cells lie side by side: any facet bounds one from each side at most.
 
     Cells made up to explain entries overlap: several small triangles in a quadratic one, for example.
     """
-    corners = np.array(_FACETS[kind])
+    return not contested(base, cells).any()
+
+
+def contested(base: str, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(m,) positively oriented linear cells one of whose facets bounds another cell from the same side."""
+    corners = np.array(_FACETS[base])
     facets = cells[:, corners].reshape(-1, corners.shape[1])
     if facets.shape[1] > 2:  # start with the least node: the order of the others then tells the side, as an edge's does
         start = facets.argmin(axis=1)[:, None]
         facets = np.take_along_axis(facets, (start + np.arange(facets.shape[1])) % facets.shape[1], axis=1)
-    return len(np.unique(facets, axis=0)) == len(facets)
+    order = np.lexsort(facets.T)
+    same = (facets[order[1:]] == facets[order[:-1]]).all(axis=1)
+    double = np.zeros(len(facets), dtype=bool)
+    double[order[1:][same]] = double[order[:-1][same]] = True
+    return np.asarray(double.reshape(len(cells), len(corners)).any(axis=1))
 
 
-def boundary_loops(kind: str, cells: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def boundary_loops(name: str, cells: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Directed boundary edges of planar cells loop by loop, and where each loop begins.
 
     Where loops touch in a vertex they are taken apart, or joined, as the order of the cells has it.
@@ -53,7 +110,7 @@ def boundary_loops(kind: str, cells: NDArray[np.int64]) -> tuple[NDArray[np.int6
     boundary : (b, 2) int64
     offsets : (loops + 1,) int64
     """
-    edges = outer_facets(kind, cells)
+    edges = outer_facets(name, cells)
     if not len(edges):
         return edges.reshape(0, 2), np.zeros(1, np.int64)
     successor = np.empty(len(edges), np.int64)

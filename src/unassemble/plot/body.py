@@ -110,10 +110,12 @@ def _draw_surface(ax: Axes, recovery: Recovery, flat: NDArray, depth: NDArray) -
 def _draw_cells(ax: Axes, recovery: Recovery, flat: NDArray) -> None:
     from matplotlib.collections import LineCollection, PolyCollection
 
-    for cells in recovery.cells.values():
+    from ..elasticity.surface import planar_outlines
+
+    for kind, cells in recovery.cells.items():
         ax.add_collection(
             PolyCollection(
-                list(flat[cells]),
+                list(flat[planar_outlines(kind, cells)]),
                 facecolors=style.FILL,
                 edgecolors=style.EDGE,
                 linewidths=float(np.clip(40 / np.sqrt(len(cells)), 0.15, 0.6)),

@@ -1,0 +1,76 @@
+"""Kinds of cells by meshio's names: how many nodes, in which order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+_TRIANGLE = ((0, 1), (1, 2), (2, 0))
+_QUAD = ((0, 1), (1, 2), (2, 3), (3, 0))
+_TETRA = (*_TRIANGLE, (0, 3), (1, 3), (2, 3))
+_HEXAHEDRON = (*_QUAD, (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+_SIDES = ((0, 3, 4, 7), (1, 2, 5, 6), (0, 1, 4, 5), (2, 3, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7))
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of cell.
+
+    Attributes
+    ----------
+    name : str
+        meshio's.
+    base : {"triangle", "quad", "tetra", "hexahedron"}
+        The linear cell on the same corners.
+    dim : {2, 3}
+    corners : int
+    between : tuple of tuples of int
+        For each further node, in meshio's order, the corners that it lies in the middle of where sides are straight.
+    """
+
+    name: str
+    base: str
+    dim: int
+    corners: int
+    between: tuple[tuple[int, ...], ...] = ()
+
+    @property
+    def nodes(self) -> int:
+        """Nodes of a cell."""
+        return self.corners + len(self.between)
+
+    @property
+    def simplex(self) -> bool:
+        """Triangles and tetrahedra."""
+        return self.corners == self.dim + 1
+
+    @property
+    def linear_simplex(self) -> bool:
+        """Cells of which any clique of the graph could be one."""
+        return self.simplex and not self.quadratic
+
+    @property
+    def quadratic(self) -> bool:
+        """Whether it has nodes other than corners."""
+        return bool(self.between)
+
+
+KINDS = {
+    kind.name: kind
+    for kind in (
+        Kind("triangle", "triangle", 2, 3),
+        Kind("triangle6", "triangle", 2, 3, _TRIANGLE),
+        Kind("quad", "quad", 2, 4),
+        Kind("quad8", "quad", 2, 4, _QUAD),
+        Kind("quad9", "quad", 2, 4, (*_QUAD, (0, 1, 2, 3))),
+        Kind("tetra", "tetra", 3, 4),
+        Kind("tetra10", "tetra", 3, 4, _TETRA),
+        Kind("hexahedron", "hexahedron", 3, 8),
+        Kind("hexahedron20", "hexahedron", 3, 8, _HEXAHEDRON),
+        Kind("hexahedron27", "hexahedron", 3, 8, (*_HEXAHEDRON, *_SIDES, tuple(range(8)))),
+    )
+}
+
+
+def kind_of(base: str, nodes: int) -> Kind:
+    """The kind on the corners of `base` that has so many nodes."""
+    return next(kind for kind in KINDS.values() if kind.base == base and kind.nodes == nodes)
