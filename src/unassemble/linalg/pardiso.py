@@ -1,4 +1,4 @@
-"""Intel MKL PARDISO, called through the library that ``pypardiso`` finds and loads.
+"""Intel MKL PARDISO, called through the library that ``pypardiso`` brings along.
 
 ``pypardiso`` itself drives real matrices only; the conformal system is complex Hermitian, so the
 one C entry point is called here, with the phases separated: analysis once, factorisations many.
@@ -10,9 +10,11 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
 import sys
 import threading
 from functools import cache
+from importlib.metadata import PackageNotFoundError, distribution
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,14 +35,29 @@ _ERRORS = {
 
 @cache
 def _library() -> ctypes.CDLL:
-    from pypardiso import PyPardisoSolver
-
     # A handle of our own: ctypes keeps argument types per handle, and pypardiso's declares pointers to reals.
-    library = ctypes.CDLL(PyPardisoSolver().libmkl._name)
+    library = ctypes.CDLL(_installed() or _searched())
     if "MKL_CBWR" not in os.environ:
         # The same bits on every run: sums of several threads are otherwise added in the order in which they come in.
         library.MKL_CBWR_Set(_REPRODUCIBLE)
     return library
+
+
+def _installed() -> str | None:
+    """Path of the library that the package ``mkl`` has installed."""
+    try:
+        files = distribution("mkl").files or []
+    except PackageNotFoundError:
+        return None
+    paths = (str(file.locate()) for file in files if re.fullmatch(r"(lib)?mkl_rt\b.*(so|dylib|dll)[.\d]*", file.name))
+    return next(filter(os.path.exists, paths), None)
+
+
+def _searched() -> str:
+    """Path of the library that ``pypardiso`` finds; it looks through the whole environment."""
+    from pypardiso import PyPardisoSolver
+
+    return str(PyPardisoSolver().libmkl._name)
 
 
 def available() -> bool:
