@@ -1,6 +1,6 @@
 """Noise on matrices that do not store their zeros: how often the cells are found, and how far off the mesh is.
 
-    python benchmarks/vanished.py [--sigmas 1e-9,1e-6,1e-4,1e-3,1e-2,3e-2] [--draws 10]
+    python benchmarks/vanished.py [--sigmas 1e-6,1e-3,3e-2] [--draws 10]
 
 Entries that vanish are not stored; all others get independent normal errors of standard deviation sigma times c.
 """
@@ -24,7 +24,7 @@ C = 1.7
 def main() -> None:
     """Print a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sigmas", default="1e-9,1e-6,1e-4,1e-3,1e-2,3e-2")
+    parser.add_argument("--sigmas", default="1e-6,1e-3,3e-2")
     parser.add_argument("--draws", type=int, default=10)
     arguments = parser.parse_args()
     print(

@@ -6,20 +6,15 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from .cells import guessed
-from .errors import GeometryError, NotPlanarError, TopologyError
+from .errors import NotPlanarError, TopologyError
+from .inspection_facts import matrix_facts, mesh_facts, no_mesh, nodes_facts
 from .inspection_text import count_of, lines_of, mesh_text
 from .matrix import OperatorMatrix, load
-from .operators import VectorReading, vector_valued
-from .planar.conformal import estimate_scale
-from .topology import Piece, Topology, recognise, surfaces
-
-VANISHED = 1e-12  # an entry this small, relative to both of its rows, is zero up to rounding
-ZERO_SUM = 1e-10  # likewise the sum of a row, to which every entry adds its own rounding
+from .operators import vector_valued
+from .topology import Topology, recognise, surfaces
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,10 +170,10 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
     (1, 0, 'laplacian, linear triangles')
     """
     matrix = A if isinstance(A, OperatorMatrix) else load(A, variable=variable, drop_zeros=drop_zeros)
-    facts = _matrix_facts(matrix)
+    facts = matrix_facts(matrix)
     vector = vector_valued(matrix)
     if vector is not None:
-        return Inspection(**facts, **_no_mesh(vector.why, False, ()), **_nodes_facts(matrix, vector))
+        return Inspection(**facts, **no_mesh(vector.why, False, ()), **nodes_facts(matrix, vector))
     topology = surfaces(matrix.n, matrix.edges)
     read = matrix
     if _left_over(matrix, topology):
@@ -189,94 +184,13 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
         except (NotPlanarError, TopologyError) as error:
             planar = not isinstance(error, NotPlanarError)
             if not (planar and topology.pieces):
-                return Inspection(**facts, **_no_mesh(str(error), planar, getattr(error, "witness", ())))
+                return Inspection(**facts, **no_mesh(str(error), planar, getattr(error, "witness", ())))
         else:
             if not topology.pieces:
                 read, topology = matrix, plain
-    return Inspection(**facts, **_mesh_facts(read, topology))
+    return Inspection(**facts, **mesh_facts(read, topology))
 
 
 def _left_over(matrix: OperatorMatrix, topology: Topology) -> bool:
     """Whether nonzero entries belong to no cell."""
     return bool((matrix.entries[topology.bare_edges] != 0).any())
-
-
-def _matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
-    degree = np.bincount(matrix.edges.ravel(), minlength=matrix.n)
-    size = matrix.row_size
-    sums = matrix.diagonal + np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n)
-    graph = sp.csr_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
-    n_isolated = int(np.count_nonzero(degree == 0))
-    smaller = np.minimum(size[matrix.edges[:, 0]], size[matrix.edges[:, 1]])
-    return {
-        "n_rows": matrix.n,
-        "n_edges": len(matrix.edges),
-        "asymmetry": float(matrix.asymmetry),
-        "n_connected": int(csgraph.connected_components(graph, directed=False)[0]) - n_isolated,
-        "n_isolated": n_isolated,
-        "n_vanished": int(np.count_nonzero(np.abs(matrix.entries) <= VANISHED * smaller)),
-        "n_zero_sums": int(np.count_nonzero((np.abs(sums) <= ZERO_SUM * size) & (degree > 0))),
-        "warnings": matrix.warnings,
-    }
-
-
-def _no_mesh(obstacle: str, planar: bool, witness: tuple[tuple[int, int], ...]) -> dict[str, Any]:
-    counts = ("triangles", "faces", "holes", "boundary_edges", "pieces", "hinges", "bare_edges", "undetermined")
-    return {
-        **{f"n_{name}": 0 for name in counts},
-        "planar": planar,
-        "witness": witness,
-        "obstacle": obstacle,
-        "scale": np.empty(0),
-        "mixed_signs": (),
-    }
-
-
-def _nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]:
-    from .elasticity.nodal import nodal_matrix, uncoupled
-
-    found = vector.numbering
-    words = {"pattern": "in an order found by the pattern"}
-    return {
-        "block_size": found.block_size,
-        "n_nodes": found.n_nodes,
-        "numbering": words.get(found.kind, found.kind),
-        "coupled": not uncoupled(nodal_matrix(matrix.csr(), found)),
-    }
-
-
-def _mesh_facts(matrix: OperatorMatrix, topology: Topology) -> dict[str, Any]:
-    pieces = topology.pieces
-    polygons = topology.polygons
-    n_triangles = sum(len(piece.triangles) for piece in pieces) - int((polygons.size - 2).sum())
-    estimates = [_scale_of(piece, -matrix.entries[piece.edge_rows]) for piece in pieces]
-    return {
-        "planar": True,
-        "witness": (),
-        "obstacle": "",
-        "n_triangles": n_triangles,
-        "n_faces": n_triangles + polygons.count + sum(piece.n_loops for piece in pieces),
-        "n_holes": topology.n_holes,
-        "n_boundary_edges": sum(len(piece.boundary) for piece in pieces),
-        "n_pieces": len(pieces),
-        "n_hinges": len(topology.hinges),
-        "n_bare_edges": len(topology.bare_edges),
-        "n_undetermined": len(topology.undetermined),
-        "n_polygons": polygons.count,
-        "n_vanished_sides": len(topology.vanished) - int((polygons.size - 3).sum()),
-        "cells_from": "entries" if len(topology.vanished) else "graph",
-        "scale": np.array([scale for scale, _ in estimates]),
-        "mixed_signs": tuple(row for _, row in estimates if row is not None),
-    }
-
-
-def _scale_of(piece: Piece, weights: NDArray) -> tuple[float, int | None]:
-    """An estimate of c; a row of the other sign, if there is one: c L_ii is the sum of a row's weights, L_ii > 0."""
-    try:
-        scale = estimate_scale(piece, weights)
-    except GeometryError:
-        scale = np.nan
-    sums = np.bincount(piece.edges.ravel(), np.repeat(weights, 2), piece.n_vertices)
-    positive = np.count_nonzero(sums > 0) * 2 >= len(sums)
-    other = np.flatnonzero(sums <= 0 if positive else sums >= 0)
-    return scale, int(piece.vertices[other[0]]) if len(other) else None

@@ -1,0 +1,104 @@
+"""What an inspection counts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse import csgraph
+
+from .errors import GeometryError
+from .matrix import OperatorMatrix
+from .operators import VectorReading
+from .planar.conformal import estimate_scale
+from .topology import Piece, Topology
+
+VANISHED = 1e-12  # an entry this small, relative to both of its rows, is zero up to rounding
+ZERO_SUM = 1e-10  # likewise the sum of a row, to which every entry adds its own rounding
+
+
+def matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
+    """Of any matrix."""
+    degree = np.bincount(matrix.edges.ravel(), minlength=matrix.n)
+    size = matrix.row_size
+    sums = matrix.diagonal + np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n)
+    graph = sp.csr_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
+    n_isolated = int(np.count_nonzero(degree == 0))
+    smaller = np.minimum(size[matrix.edges[:, 0]], size[matrix.edges[:, 1]])
+    return {
+        "n_rows": matrix.n,
+        "n_edges": len(matrix.edges),
+        "asymmetry": float(matrix.asymmetry),
+        "n_connected": int(csgraph.connected_components(graph, directed=False)[0]) - n_isolated,
+        "n_isolated": n_isolated,
+        "n_vanished": int(np.count_nonzero(np.abs(matrix.entries) <= VANISHED * smaller)),
+        "n_zero_sums": int(np.count_nonzero((np.abs(sums) <= ZERO_SUM * size) & (degree > 0))),
+        "warnings": matrix.warnings,
+    }
+
+
+def no_mesh(obstacle: str, planar: bool, witness: tuple[tuple[int, int], ...]) -> dict[str, Any]:
+    """Where no mesh is recognised."""
+    counts = ("triangles", "faces", "holes", "boundary_edges", "pieces", "hinges", "bare_edges", "undetermined")
+    return {
+        **{f"n_{name}": 0 for name in counts},
+        "planar": planar,
+        "witness": witness,
+        "obstacle": obstacle,
+        "scale": np.empty(0),
+        "mixed_signs": (),
+    }
+
+
+def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]:
+    """Of a vector-valued matrix."""
+    from .elasticity.nodal import nodal_matrix, uncoupled
+
+    found = vector.numbering
+    words = {"pattern": "in an order found by the pattern"}
+    return {
+        "block_size": found.block_size,
+        "n_nodes": found.n_nodes,
+        "numbering": words.get(found.kind, found.kind),
+        "coupled": not uncoupled(nodal_matrix(matrix.csr(), found)),
+    }
+
+
+def mesh_facts(matrix: OperatorMatrix, topology: Topology) -> dict[str, Any]:
+    """Of the cells that recovery begins with."""
+    pieces = topology.pieces
+    polygons = topology.polygons
+    n_triangles = sum(len(piece.triangles) for piece in pieces) - int((polygons.size - 2).sum())
+    estimates = [_scale_of(piece, -matrix.entries[piece.edge_rows]) for piece in pieces]
+    return {
+        "planar": True,
+        "witness": (),
+        "obstacle": "",
+        "n_triangles": n_triangles,
+        "n_faces": n_triangles + polygons.count + sum(piece.n_loops for piece in pieces),
+        "n_holes": topology.n_holes,
+        "n_boundary_edges": sum(len(piece.boundary) for piece in pieces),
+        "n_pieces": len(pieces),
+        "n_hinges": len(topology.hinges),
+        "n_bare_edges": len(topology.bare_edges),
+        "n_undetermined": len(topology.undetermined),
+        "n_polygons": polygons.count,
+        "n_vanished_sides": len(topology.vanished) - int((polygons.size - 3).sum()),
+        "cells_from": "entries" if len(topology.vanished) else "graph",
+        "scale": np.array([scale for scale, _ in estimates]),
+        "mixed_signs": tuple(row for _, row in estimates if row is not None),
+    }
+
+
+def _scale_of(piece: Piece, weights: NDArray) -> tuple[float, int | None]:
+    """An estimate of c; a row of the other sign, if there is one: c L_ii is the sum of a row's weights, L_ii > 0."""
+    try:
+        scale = estimate_scale(piece, weights)
+    except GeometryError:
+        scale = np.nan
+    sums = np.bincount(piece.edges.ravel(), np.repeat(weights, 2), piece.n_vertices)
+    positive = np.count_nonzero(sums > 0) * 2 >= len(sums)
+    other = np.flatnonzero(sums <= 0 if positive else sums >= 0)
+    return scale, int(piece.vertices[other[0]]) if len(other) else None
