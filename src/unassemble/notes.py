@@ -25,6 +25,15 @@ def topology_notes(topology: Topology) -> list[str]:
     return notes
 
 
+def image_notes(topology: Topology, free: NDArray) -> list[str]:
+    """Pieces, by number, of which the mirror image fits as well."""
+    return [
+        f"piece {label}, of row {topology.pieces[label].vertices.min()}: its mirror image meets the other pieces in "
+        "the same vertices, and the matrix does not tell which of the two it is"
+        for label in free.tolist()
+    ]
+
+
 def vanished_notes(topology: Topology) -> list[str]:
     """Cells that stay undivided, boundary edges without an entry."""
     notes = []

@@ -12,10 +12,10 @@ from .evidence import pooled_noise, weigh
 from .joined import JoinedMesh
 from .linalg import AnalysisAhead, factorisation
 from .matrix import OperatorMatrix
-from .notes import topology_notes, vanished_notes
+from .notes import image_notes, topology_notes, vanished_notes
 from .placement import Placement
 from .planar.deviations import coordinate_covariances
-from .planar.hinges import join
+from .planar.hinges import free_images, join
 from .planar.pencil import pencil_pattern
 from .planar.piece import PieceMesh
 from .recovery import Recovery
@@ -169,7 +169,8 @@ def _place(topology: Topology, placement: Placement, meshes: list[PieceMesh]) ->
     known = np.array([placement.known_positions(piece) for piece in topology.pieces])
     placed = join(topology, placed, known)
     notes += placement.unused(topology)
-    notes += [*topology_notes(topology), *vanished_notes(topology), *topology.failures]
+    images = image_notes(topology, free_images(topology, placed))
+    notes += [*topology_notes(topology), *images, *vanished_notes(topology), *topology.failures]
     return placed, notes
 
 
