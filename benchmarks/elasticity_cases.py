@@ -55,7 +55,7 @@ def outcome(case: Given) -> tuple[str, float, str]:
     except RecoveryError as error:
         return "-", 1.0, f"{type(error).__name__}: {error}"
     truth = judged(found, case)
-    right = truth.error <= TOLERANCE and not truth.split
+    right = truth.error <= TOLERANCE
     sign = {(True, True): "=", (True, False): "~", (False, False): "?", (False, True): "!"}[right, found.certified]
     return sign, truth.missing, f"error {truth.error:.0e}, {truth.split} split; {found.reason}"
 

@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .likeness import doubtful, partners, reach
 from .regions import exchanged
 
 _STARTS = 8
@@ -166,40 +167,24 @@ class _Search:
 def nodes_by_neighbours(matrix: sp.csr_array, direction: NDArray, d: int) -> NDArray[np.int64]:
     """Pair rows of different directions that couple to the same rows, although entries that vanished are not stored.
 
-    Row r of direction c and row s of direction b belong to one node if r couples to those rows of direction b
-    to which s does, and s to those of direction c to which r does. Both have to prefer each other.
+    Rows belong to one node if over two steps they reach the same rows. Both have to prefer each other to all others.
     """
     order = matrix.shape[0]
     pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
+    reached = reach(matrix, 2)
     rows = [np.flatnonzero(direction == a) for a in range(d)]
     first, second = [], []
     for c, b in combinations(range(d), 2):
         if not len(rows[c]) or not len(rows[b]):
             continue
-        cross = pattern[rows[c]][:, rows[b]]
-        own_c, own_b = pattern[rows[c]][:, rows[c]], pattern[rows[b]][:, rows[b]]
-        r, s = _mutual_best(cross, own_c, own_b, rows[c], rows[b])
-        first.append(rows[c][r])
-        second.append(rows[b][s])
+        r, s, value = partners(pattern, reached, rows[c], rows[b])
+        alone = (np.bincount(r)[r] == 1) & (np.bincount(s)[s] == 1)  # where several are alike, nothing decides
+        r, s, value = r[alone], s[alone], value[alone]
+        sure = value >= doubtful(value)
+        first.append(rows[c][r[sure]])
+        second.append(rows[b][s[sure]])
     if not first:
         return np.arange(order)
     pairs = (np.concatenate(first), np.concatenate(second))
     link = sp.csr_array((np.ones(len(pairs[0])), pairs), shape=(order, order))
     return sp.csgraph.connected_components(link, directed=False)[1].astype(np.int64)
-
-
-def _mutual_best(
-    cross: sp.csr_array, own_c: sp.csr_array, own_b: sp.csr_array, rows_c: NDArray, rows_b: NDArray
-) -> tuple[NDArray, NDArray]:
-    """Pairs (r, s) that are each other's most similar partner."""
-    common = (cross @ own_b + own_c @ cross).tocoo()
-    size_r = np.asarray(cross.sum(axis=1)).ravel() + np.asarray(own_c.sum(axis=1)).ravel()
-    size_s = np.asarray(cross.sum(axis=0)).ravel() + np.asarray(own_b.sum(axis=1)).ravel()
-    alike = 2 * common.data / (size_r[common.row] + size_s[common.col])
-    # Rows next to each other win where nothing else decides.
-    alike = alike - 1e-6 * np.minimum(np.abs(rows_c[common.row] - rows_b[common.col]), 1e4) / 1e4
-    best_r, best_s = np.zeros(len(size_r)), np.zeros(len(size_s))
-    np.maximum.at(best_r, common.row, alike)
-    np.maximum.at(best_s, common.col, alike)
-    chosen = (alike == best_r[common.row]) & (alike == best_s[common.col]) & (alike > 0.5)
-    return common.row[chosen], common.col[chosen]

@@ -11,8 +11,9 @@ from ..linalg import blas_threads
 from ..matrix import check_matrix
 from .cells import Cells, no_cells, recognise_cells
 from .certificate import largest_residual
+from .halves import joined
 from .material import poisson_ratio
-from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled
+from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled, without_trace
 from .positions import Solution, solve
 from .results import ElasticityRecovery, ScalarParts
 from .unknowns import Numbering, find_numbering
@@ -85,6 +86,10 @@ def place_nodes(
     """The recovery once the nodes are known: null space, certificate, cells; see :func:`recover_elasticity`."""
     with clock("null space"), blas_threads(1):
         solution = solve(nodal, patch)
+        better = joined(nodal, numbering, solution.points, solution.component)
+        if better is not None:
+            nodal, numbering = better
+            solution = solve(nodal, patch)
     return _describe(nodal, numbering, solution, clock, cells)
 
 
@@ -155,17 +160,23 @@ def _verdict(
             "supports leave too few rows that are surely whole; rows whose entries add up to zero were taken for "
             "whole, which they need not be"
         )
-    if numbering.kind == "pattern" and _torn(nodal, solution):
+    if numbering.kind != "given" and numbering.incomplete | (numbering.kind == "pattern") and _torn(nodal, solution):
         return "uncertified", (
             "which direction each row belongs to was inferred from the entries, and not without contradiction: coupled "
             "nodes came out as separate pieces; give the numbering if it is known"
         )
     if found.certified and found.backward_error <= CERTIFIED:
         return "certified", f"the matrix re-assembled on the {found.n_cells} elements is the given one"
-    if numbering.kind == "pattern" and numbering.incomplete:
+    odd = int(without_trace(nodal).any(axis=1).sum())
+    if odd:
         return "uncertified", (
-            "which rows belong to one node was inferred from the pattern, where some nodes lack rows; only elements "
-            "that re-assemble to the matrix would show that the inference is right"
+            f"{odd} nodes lack directions although no row next to them misses anything: their rows belong to other "
+            "nodes, and neither pattern nor positions tell to which; give the numbering if it is known"
+        )
+    if numbering.incomplete and numbering.kind != "given" and numbering.common < 1:
+        return "uncertified", (
+            "which rows belong to one node was inferred, where some nodes lack rows and others do not store entries "
+            "that vanished; only elements that re-assemble to the matrix would show that the inference is right"
         )
     if error <= CERTIFIED:
         return "certified", "the valid identities hold to rounding, and only translations and scale satisfy them"
