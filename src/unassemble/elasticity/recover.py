@@ -113,6 +113,10 @@ def _describe(
         warnings += _about_cells(found)
     if loose.any():
         warnings.append(f"{loose.sum()} of {nodal.n} nodes are tied to eliminated unknowns only and stay undetermined")
+    if solution.planes:
+        warnings.append(
+            "nodes that lack a direction were taken to lie in planes across it, which fits, to determine others"
+        )
     if solution.ratio is not None:
         warnings.append("Poisson's ratio, read off the nodes that determine it, was used to determine others")
     return ElasticityRecovery(

@@ -22,7 +22,7 @@ _ROUNDS = 4
 _FEW = 4  # places to start from where a glance is all that a matrix gets
 _KINDS = ("interleaved", "by component")
 _ANNIHILATED = 0.02  # share of rows and directions below which an orderly numbering calls for a search
-_ODD = 0.02  # and share of nodes above which it does
+_LIKELY = 0.6  # quality of nodes apart from that share; made-up ones have half or less
 _ORDERLY = 0.8  # rows of made-up nodes couple to common nodes less than this
 
 
@@ -96,7 +96,7 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
     best = max((_regular(matrix, identity, d, kind) for d in sizes for kind in _KINDS), key=_quality)
     if best is None or _quality(best) <= 0 or best.share < 0.5 or (best.kind == "by component" and best.common < 0.9):
         best = max([best, *_orderly(matrix, identity, sizes)], key=_quality)
-        if best is None or best.share < _ANNIHILATED or best.odd > _ODD * best.n_nodes:
+        if not _sound(best):
             best = max([best, *_searched(matrix, identity, sizes)], key=_quality)
     if best is None or _quality(best) <= 0:
         raise RecoveryError(
@@ -163,6 +163,11 @@ def _quality(one: Numbering | None) -> float:
     return one.share * one.common * len(one.node_of_row) / (one.n_nodes * one.block_size) * (1 - one.odd / one.n_nodes)
 
 
+def _sound(one: Numbering | None) -> bool:
+    """Whether its nodes look like nodes, however few of their rows annihilate constants."""
+    return one is not None and one.share > _ANNIHILATED and _quality(one) > _LIKELY * one.share
+
+
 def _orderly(matrix: sp.csr_array, identity: NDArray, sizes: tuple[int, ...]) -> list[Numbering]:
     """Numberings in one of the usual orders that lack unknowns here and there.
 
@@ -192,6 +197,8 @@ def _searched(matrix: sp.csr_array, identity: NDArray, sizes: tuple[int, ...]) -
             for _ in range(_ROUNDS):  # directions tell nodes apart, and nodes help to find directions
                 direction = find_directions(matrix, node, identity, d)
                 found.append(_measured(matrix, identity, node, direction, d))
+                if found[-1].share > 0.5 and _sound(found[-1]):
+                    return found
                 merged = nodes_by_neighbours(matrix, direction, d)
                 if len(np.unique(merged * d + direction)) < len(merged) or merged.max() == node.max():
                     break
