@@ -1,4 +1,4 @@
-"""Every kind of element, mesh, material, support, order of the unknowns and storage: what comes back?
+"""What comes back from every kind of element, mesh, material, support, order of the unknowns and storage.
 
 Run ``python benchmarks/elasticity_cases.py``; ``--kinds tet-p1 hex-q1``, ``--supports roller symmetry``, ``--orders
 "by component"``, ``--zeros dropped``, ``--meshes structured``, ``--materials one`` choose among the cases, ``--list``
@@ -25,11 +25,11 @@ from pathlib import Path
 from time import perf_counter
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "elasticity"))
-from assembled import ELEMENTS, Assembled, box, heterogeneous, permuted_nodes, stiffness  # noqa: E402
-from supported import ORDERS, SUPPORTS, ZEROS, Given, given, judged  # noqa: E402
+from assembled import ELEMENTS, Assembled, box, heterogeneous, permuted_nodes, stiffness
+from supported import ORDERS, SUPPORTS, ZEROS, Given, given, judged
 
-from unassemble.elasticity import recover_elasticity  # noqa: E402
-from unassemble.errors import RecoveryError  # noqa: E402
+from unassemble.elasticity import recover_elasticity
+from unassemble.errors import RecoveryError
 
 COUNTS = {"tri-p1": (8, 9), "tri-p2": (6, 7), "quad-q1": (8, 9), "tet-p1": (5, 6, 7), "hex-q1": (5, 6, 7)}
 MESHES = {"structured": 0.0, "perturbed": 0.2}

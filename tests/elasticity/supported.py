@@ -89,8 +89,8 @@ def with_zeros(matrix: sp.csr_array, d: int, zeros: str) -> sp.csr_array:
 class Judgement:
     """What the truth says about coordinates: error relative to the diameter, share of true nodes without any.
 
-    A node made up of rows of several true ones counts as an error of one; `split` counts true nodes that
-    came out as two.
+    Where the reason says that an affine map stays free the error is what the best one leaves. A node made up of rows
+    of several true ones counts as an error of one; `split` counts true nodes that came out as two.
     """
 
     error: float
@@ -120,7 +120,9 @@ def judged(found, truth: Given) -> Judgement:
         rows = here[found.node_of_row]
         np.add.at(named, (found.direction_of_row[rows], truth.direction[rows]), 1)
         axes = max(permutations(range(d)), key=lambda one, named=named: named[range(d), one].sum())
-        if here.any():
+        if here.any() and "affine" in found.reason:
+            worst = max(worst, _up_to_affine(found.points[here], true[here][:, axes], np.ptp(truth.points, axis=0)))
+        elif here.any():
             worst = max(worst, _misfit(found.points[here], true[here][:, axes], np.ptp(truth.points, axis=0)))
     return Judgement(worst, missing, split)
 
@@ -130,3 +132,9 @@ def _misfit(a: np.ndarray, b: np.ndarray, extent: np.ndarray) -> float:
     square = (a * a).sum()
     scale = (a * b).sum() / square if square > 0 else 0.0
     return float(np.linalg.norm(scale * a - b, axis=1).max() / np.linalg.norm(extent))
+
+
+def _up_to_affine(a: np.ndarray, b: np.ndarray, extent: np.ndarray) -> float:
+    design = np.column_stack([a, np.ones(len(a))])
+    left = b - design @ np.linalg.lstsq(design, b, rcond=None)[0]
+    return float(np.linalg.norm(left, axis=1).max() / np.linalg.norm(extent))

@@ -21,7 +21,12 @@ _SETTLED = 0.05  # energy, relative to the trace, of directions that need no fur
 
 
 def find_directions(
-    matrix: sp.csr_array, group: NDArray, identity: NDArray, d: int, *, starts: int | None = None
+    matrix: sp.csr_array,
+    group: NDArray,
+    identity: NDArray,
+    d: int,
+    *,
+    starts: int | None = None,
 ) -> NDArray[np.int64]:
     """Direction of each row.
 
@@ -58,6 +63,14 @@ def find_directions(
     return _named_in_order(exchanged(search, matrix, group, best[1], d), members, d)
 
 
+def reconsidered(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> NDArray[np.int64]:
+    """Directions after each row, by itself, has changed its own until nothing changes."""
+    order = len(direction)
+    row = np.arange(order)
+    return _Search(matrix, row, [row[:, None], *[np.empty((0, k), np.int64) for k in range(2, d + 1)]],
+                   np.zeros(order, dtype=bool), d).reconsider(direction)  # fmt: skip
+
+
 def _named_in_order(direction: NDArray, members: list[NDArray], d: int) -> NDArray[np.int64]:
     """Exchange the names of directions so that those of whole nodes, or of all rows, increase as often as possible."""
     names = [np.array(one) for one in permutations(range(d))]
@@ -89,7 +102,14 @@ def _starts(members: list[NDArray], n: int, d: int) -> list[NDArray]:
 class _Search:
     """Directions that spread over the nodes, the surest first, and are then reconsidered."""
 
-    def __init__(self, matrix: sp.csr_array, group: NDArray, members: list[NDArray], identity: NDArray, d: int):
+    def __init__(
+        self,
+        matrix: sp.csr_array,
+        group: NDArray,
+        members: list[NDArray],
+        identity: NDArray,
+        d: int,
+    ):
         off = matrix.tocoo()
         between = group[off.row] != group[off.col]
         sign = np.sign(matrix.diagonal().sum())
@@ -99,6 +119,7 @@ class _Search:
         self._trace = float(np.abs(matrix.diagonal()[~identity]).sum())
         self._diagonal = float(sign * matrix.diagonal()[~identity].sum())
         self._members, self._live, self._d = members, ~identity, d
+        self._choices = [np.array(list(permutations(range(d), k))) for k in range(1, d + 1)]
 
     def energy(self, direction: NDArray) -> float:
         """Sum of the entries between rows of the same direction, relative to the trace."""
@@ -155,7 +176,7 @@ class _Search:
         margin = np.zeros(len(direction))
         for rows in self._members:
             if len(rows):
-                choices = np.array(list(permutations(range(self._d), rows.shape[1])))
+                choices = self._choices[rows.shape[1] - 1]
                 fit = score[rows[:, None, :], choices[None]].sum(axis=2)
                 two = np.partition(fit, -2, axis=1)[:, -2:]
                 best[rows] = choices[np.argmax(fit, axis=1)]

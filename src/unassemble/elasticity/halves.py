@@ -41,7 +41,8 @@ def joined(
     label = sp.csgraph.connected_components(link, directed=False)[1]
     count = np.zeros((label.max() + 1, d), np.int64)
     np.add.at(count, label, present)
-    label = by_first_row(np.where((count <= 1).all(axis=1)[label], label, label.max() + 1 + np.arange(nodal.n)))
+    fits = np.asarray((count <= 1).all(axis=1))[label]
+    label = by_first_row(np.asarray(np.where(fits, label, label.max() + 1 + np.arange(nodal.n))))
     if label.max() + 1 == nodal.n:
         return None
     node = label[numbering.node_of_row]

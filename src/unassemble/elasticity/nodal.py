@@ -125,7 +125,8 @@ def without_trace(nodal: NodalMatrix) -> NDArray[np.bool_]:
     """
     missing = (~(_annihilating(nodal) | _excused(nodal))).any(axis=1)
     present = nodal.row_of >= 0
-    return ~present & (_graph(nodal) @ missing.astype(float) == 0) & present.any(axis=1)[:, None]
+    some = np.asarray(present.any(axis=1))
+    return ~present & (_graph(nodal) @ missing.astype(float) == 0) & some[:, None]
 
 
 def _annihilating(nodal: NodalMatrix) -> NDArray[np.bool_]:

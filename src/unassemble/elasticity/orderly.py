@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .directions import find_directions
+from .directions import find_directions, reconsidered
 from .grouping import by_first_row
 from .likeness import alike, doubtful, partners, reach
 
@@ -22,8 +22,8 @@ _STEPS = 2
 _ROUNDS = 3
 
 
-def by_component(matrix: sp.csr_array, d: int) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
-    """Nodes and directions of rows that stand direction by direction; None where no such order shows.
+def by_component(matrix: sp.csr_array, d: int) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Nodes and directions of rows that stand direction by direction; none where no such order shows.
 
     Parameters
     ----------
@@ -33,13 +33,13 @@ def by_component(matrix: sp.csr_array, d: int) -> tuple[NDArray[np.int64], NDArr
 
     Returns
     -------
-    node, direction : (N,) int64
+    list of (node, direction), (N,) int64 each
     """
     cuts = _cuts(matrix, d)
     if cuts is None:
-        return None
+        return []
     direction = np.searchsorted(cuts, np.arange(matrix.shape[0]), side="right")
-    return matched_in_order(matrix, direction, d), direction
+    return [(matched_in_order(matrix, direction, d), direction)]
 
 
 def _cuts(matrix: sp.csr_array, d: int) -> NDArray[np.int64] | None:
@@ -175,41 +175,46 @@ def _longest_increasing(r: NDArray[np.int64], s: NDArray[np.int64]) -> NDArray[n
     return np.array(chain[::-1], dtype=np.int64)
 
 
-def node_by_node(matrix: sp.csr_array, d: int) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
-    """Nodes and directions of rows that stand node by node, each with at most d rows.
+def node_by_node(matrix: sp.csr_array, d: int) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Nodes and directions of rows that stand node by node, each with at most d rows: two readings.
 
-    Neighbouring rows that reach the same rows are taken for one node to find directions by; then a node
-    ends where directions stop increasing.
+    Neighbouring rows that reach the same rows are taken for one node to find directions by; then a node ends where
+    directions stop increasing. In the second reading each row has chosen its direction for itself in the end, since
+    rows of two nodes taken for one would keep different ones for ever.
     """
     order = matrix.shape[0]
     if order < 2 * d:
-        return None
-    reached = reach(matrix, _STEPS)
-    row = np.arange(order - 1)
-    link = alike(reached, row, row + 1)
-    node = _stretches(link, d)
-    direction = np.zeros(order, dtype=np.int64)
-    identity = np.zeros(order, dtype=bool)
+        return []
+    nobody = np.zeros(order, dtype=bool)
+    node, link = stretches(matrix, d)
     for _ in range(_ROUNDS):
-        direction = find_directions(matrix, node, identity, d)
-        again = _increasing(direction, link)
+        directions = find_directions(matrix, node, nobody, d)
+        again = _increasing(directions, link)
         if np.array_equal(again, node):
             break
         node = again
-    return node, direction
+    freely = reconsidered(matrix, directions, d)
+    return [(node, directions), (_increasing(freely, link), freely)]
 
 
-def _stretches(link: NDArray[np.float64], d: int) -> NDArray[np.int64]:
-    """(N,) runs of at most d rows, cut where neighbouring rows are least alike.
+def stretches(matrix: sp.csr_array, d: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Runs of at most d rows, cut where neighbouring rows are least alike, and how alike each is to the next.
 
     Complete nodes have one cut in d places; that many weakest links are cut at least.
+
+    Returns
+    -------
+    node : (N,) int64
+    link : (N - 1,) float64
     """
-    cut = link < np.quantile(link, 1 / d) + 1e-9
+    row = np.arange(matrix.shape[0] - 1)
+    link = alike(reach(matrix, _STEPS), row, row + 1)
+    cut = link < min(np.quantile(link, 1 / d) + 1e-9, doubtful(np.sort(link)[len(link) // d :]))
     while True:
         node = np.concatenate([[0], np.cumsum(cut)])
         size = np.bincount(node)
         if size.max() <= d:
-            return node
+            return node, link
         inner = ~cut & (size[node[:-1]] > d)
         weakest = np.full(len(size), np.inf)
         np.minimum.at(weakest, node[:-1][inner], link[inner])

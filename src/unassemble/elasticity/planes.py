@@ -3,8 +3,8 @@
 A row next to unknowns of direction b that were taken out lacks some coefficients of its blocks (c, b), of which it
 keeps one number: all of them together would add up to zero. If the nodes that lack direction b lie in a plane
 across b, as on rollers and symmetry planes they do, that number is enough for the coordinate x_b, the same in
-all of them: the missing coefficients may be thought of as any that have this sum. So A^{cb} x_b = delta_bb p_c + ... stays
-valid, though A^{cb} x_a for other a does not. And x_b is constant over such nodes, one more equation each.
+all of them: the missing coefficients may be thought of as any that have this sum. So A^{cb} x_b = p_c + 2 delta_cb q_b
+stays valid, though A^{cb} x_a for other a does not. And x_b is constant over such nodes, one more equation each.
 
 That they lie in a plane is an assumption. It is refused where no exact null field is left with it.
 """
@@ -39,7 +39,7 @@ def with_planes(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NodalMatr
     """
     n, d = nodal.n, nodal.dim
     present = nodal.row_of >= 0
-    gone = ~present & ~without_trace(nodal) & present.any(axis=1)[:, None]
+    gone: NDArray[np.bool_] = ~present & ~without_trace(nodal) & np.asarray(present.any(axis=1))[:, None]
     graph = sp.csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(n, n))
     count = graph @ gone.astype(float)
     near = (count > 0) & ~penalised(nodal)
@@ -54,7 +54,7 @@ def with_planes(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NodalMatr
     data = nodal.data + np.where(held, missing, 0)[i] * gone[j][:, None, :]
     flat = gone & (count > 1) & (nodal.size > 0)[:, None]
     level = np.where(i == j, 1.0, 0.0)[:, None] - gone[j] / np.maximum(count, 1)[i]
-    full = np.repeat(valid[..., None], d, axis=3)
+    full: NDArray[np.bool_] = np.repeat(valid[..., None], d, axis=3)
     for b in range(d):
         data[:, b, b] += np.where(flat[i, b], nodal.size[i] * level[:, b], 0)
         full[:, :, b, b] |= held[:, :, b]

@@ -152,7 +152,7 @@ def _positions(nodal: NodalMatrix, valid: NDArray[np.bool_], patch: int | None, 
 
 def _pieces(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
     """Pieces held together by valid identities; -1 for nodes that none of them touches."""
-    pairs = valid if valid.ndim == 3 else valid.any(axis=3)
+    pairs = valid if valid.ndim == 3 else np.asarray(valid.any(axis=3))
     live = (np.abs(nodal.data) * pairs[nodal.node]).max(axis=(1, 2)) > 0
     link = sp.csr_array((np.ones(live.sum()), (nodal.node[live], nodal.indices[live])), shape=(nodal.n, nodal.n))
     _, label = sp.csgraph.connected_components(link, directed=False)

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..clock import Clock
-from ..errors import GeometryError
+from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..matrix import check_matrix
 from .cells import Cells, no_cells, recognise_cells
@@ -85,7 +85,15 @@ def place_nodes(
 ) -> ElasticityRecovery:
     """The recovery once the nodes are known: null space, certificate, cells; see :func:`recover_elasticity`."""
     with clock("null space"), blas_threads(1):
-        solution = solve(nodal, patch)
+        try:
+            solution = solve(nodal, patch)
+        except RecoveryError as error:
+            if numbering.kind == "given" or (numbering.common == 1 and not numbering.incomplete):
+                raise
+            raise GeometryError(
+                f"{error}; but which rows belong to one node, and to which direction, was inferred and may be wrong: "
+                "give the numbering if it is known"
+            ) from error
         better = joined(nodal, numbering, solution.points, solution.component)
         if better is not None:
             nodal, numbering = better

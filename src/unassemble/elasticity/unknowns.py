@@ -16,12 +16,14 @@ from ..errors import InputError, RecoveryError
 from .directions import find_directions, nodes_by_neighbours
 from .grouping import by_first_row, coupled_in_common, possible_nodes, same_pattern
 from .orderly import by_component, node_by_node
+from .sampling import promising
 
 _ROUNDING = 1e-9
 _ROUNDS = 4
 _FEW = 4  # places to start from where a glance is all that a matrix gets
 _KINDS = ("interleaved", "by component")
 _ANNIHILATED = 0.02  # share of rows and directions below which an orderly numbering calls for a search
+_LARGE = 20_000  # rows beyond which a few places are looked at before every row is asked
 _LIKELY = 0.6  # quality of nodes apart from that share; made-up ones have half or less
 _ORDERLY = 0.8  # rows of made-up nodes couple to common nodes less than this
 
@@ -95,8 +97,9 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
     identity = _uncoupled_rows(matrix)
     best = max((_regular(matrix, identity, d, kind) for d in sizes for kind in _KINDS), key=_quality)
     if best is None or _quality(best) <= 0 or best.share < 0.5 or (best.kind == "by component" and best.common < 0.9):
-        best = max([best, *_orderly(matrix, identity, sizes)], key=_quality)
-        if not _sound(best):
+        hopeful = matrix.shape[0] <= _LARGE or promising(matrix, sizes)
+        best = max([best, *_orderly(matrix, identity, sizes, hopeful)], key=_quality)
+        if not _sound(best) and hopeful:
             best = max([best, *_searched(matrix, identity, sizes)], key=_quality)
     if best is None or _quality(best) <= 0:
         raise RecoveryError(
@@ -168,8 +171,8 @@ def _sound(one: Numbering | None) -> bool:
     return one is not None and one.share > _ANNIHILATED and _quality(one) > _LIKELY * one.share
 
 
-def _orderly(matrix: sp.csr_array, identity: NDArray, sizes: tuple[int, ...]) -> list[Numbering]:
-    """Numberings in one of the usual orders that lack unknowns here and there.
+def _orderly(matrix: sp.csr_array, identity: NDArray, sizes: tuple[int, ...], hopeful: bool) -> list[Numbering]:
+    """Numberings in one of the usual orders that lack unknowns here and there; unless hopeful, those found at once.
 
     Rows of the identity say nothing about where they belong; each is a node by itself.
     """
@@ -179,8 +182,9 @@ def _orderly(matrix: sp.csr_array, identity: NDArray, sizes: tuple[int, ...]) ->
     found = []
     for d in sizes:
         for kind, read in zip(_KINDS, (node_by_node, by_component), strict=True):
-            reading = read(inner, d)
-            if reading is not None:
+            if read is node_by_node and not hopeful:
+                continue
+            for reading in read(inner, d):
                 node, direction = np.arange(matrix.shape[0]) + len(live), np.zeros(matrix.shape[0], np.int64)
                 node[live], direction[live] = reading
                 found.append(_measured(matrix, identity, by_first_row(node), direction, d, kind))
