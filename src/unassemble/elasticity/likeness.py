@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 _AT_ONCE = 1 << 22  # entries of the reach to multiply at a time
 _SAME = 1e-6  # single precision
-_FEW = 0.02  # share of pairs of rows whose likeness may be an exception
+_FEW = 0.15  # share of pairs of rows whose likeness may be an exception
 _MOST = 60_000_000  # entries of a reach beyond which it is not taken a step further
 
 
@@ -63,4 +63,4 @@ def partners(
 
 def doubtful(likeness: NDArray[np.float64]) -> float:
     """How alike rows have to be to be taken for one node, given how alike those are that mostly are."""
-    return float(1 - _SAME - 2 * (1 - np.quantile(likeness, _FEW))) if len(likeness) else 1.0
+    return float(1 - _SAME - 3 * (1 - np.quantile(likeness, _FEW))) if len(likeness) else 1.0

@@ -94,6 +94,16 @@ def place_nodes(
                 f"{error}; but which rows belong to one node, and to which direction, was inferred and may be wrong: "
                 "give the numbering if it is known"
             ) from error
+        if (
+            not solution.exact
+            and numbering.kind != "given"
+            and (numbering.odd or numbering.common < 1)
+            and numbering.incomplete
+        ):
+            raise GeometryError(
+                "no positions fit the matrix exactly; which rows belong to one node was inferred, where some nodes lack "
+                "rows, and is probably wrong: give the numbering if it is known"
+            )
         better = joined(nodal, numbering, solution.points, solution.component)
         if better is not None:
             nodal, numbering = better
