@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 _AT_ONCE = 1 << 22  # entries of the reach to multiply at a time
 _SAME = 1e-6  # single precision
-_FEW = 0.15  # share of pairs of rows whose likeness may be an exception
+_FEW = 0.08  # share of pairs of rows whose likeness may be an exception
 _MOST = 60_000_000  # entries of a reach beyond which it is not taken a step further
 
 
