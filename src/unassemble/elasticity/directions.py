@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .likeness import doubtful, partners, reach
 from .regions import exchanged
 
 _STARTS = 8
@@ -20,7 +21,12 @@ _SETTLED = 0.05  # energy, relative to the trace, of directions that need no fur
 
 
 def find_directions(
-    matrix: sp.csr_array, group: NDArray, identity: NDArray, d: int, *, starts: int | None = None
+    matrix: sp.csr_array,
+    group: NDArray,
+    identity: NDArray,
+    d: int,
+    *,
+    starts: int | None = None,
 ) -> NDArray[np.int64]:
     """Direction of each row.
 
@@ -57,6 +63,14 @@ def find_directions(
     return _named_in_order(exchanged(search, matrix, group, best[1], d), members, d)
 
 
+def reconsidered(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> NDArray[np.int64]:
+    """Directions after each row, by itself, has changed its own until nothing changes."""
+    order = len(direction)
+    row = np.arange(order)
+    return _Search(matrix, row, [row[:, None], *[np.empty((0, k), np.int64) for k in range(2, d + 1)]],
+                   np.zeros(order, dtype=bool), d).reconsider(direction)  # fmt: skip
+
+
 def _named_in_order(direction: NDArray, members: list[NDArray], d: int) -> NDArray[np.int64]:
     """Exchange the names of directions so that those of whole nodes, or of all rows, increase as often as possible."""
     names = [np.array(one) for one in permutations(range(d))]
@@ -88,7 +102,14 @@ def _starts(members: list[NDArray], n: int, d: int) -> list[NDArray]:
 class _Search:
     """Directions that spread over the nodes, the surest first, and are then reconsidered."""
 
-    def __init__(self, matrix: sp.csr_array, group: NDArray, members: list[NDArray], identity: NDArray, d: int):
+    def __init__(
+        self,
+        matrix: sp.csr_array,
+        group: NDArray,
+        members: list[NDArray],
+        identity: NDArray,
+        d: int,
+    ):
         off = matrix.tocoo()
         between = group[off.row] != group[off.col]
         sign = np.sign(matrix.diagonal().sum())
@@ -98,6 +119,7 @@ class _Search:
         self._trace = float(np.abs(matrix.diagonal()[~identity]).sum())
         self._diagonal = float(sign * matrix.diagonal()[~identity].sum())
         self._members, self._live, self._d = members, ~identity, d
+        self._choices = [np.array(list(permutations(range(d), k))) for k in range(1, d + 1)]
 
     def energy(self, direction: NDArray) -> float:
         """Sum of the entries between rows of the same direction, relative to the trace."""
@@ -154,7 +176,7 @@ class _Search:
         margin = np.zeros(len(direction))
         for rows in self._members:
             if len(rows):
-                choices = np.array(list(permutations(range(self._d), rows.shape[1])))
+                choices = self._choices[rows.shape[1] - 1]
                 fit = score[rows[:, None, :], choices[None]].sum(axis=2)
                 two = np.partition(fit, -2, axis=1)[:, -2:]
                 best[rows] = choices[np.argmax(fit, axis=1)]
@@ -166,40 +188,24 @@ class _Search:
 def nodes_by_neighbours(matrix: sp.csr_array, direction: NDArray, d: int) -> NDArray[np.int64]:
     """Pair rows of different directions that couple to the same rows, although entries that vanished are not stored.
 
-    Row r of direction c and row s of direction b belong to one node if r couples to those rows of direction b
-    to which s does, and s to those of direction c to which r does. Both have to prefer each other.
+    Rows belong to one node if over two steps they reach the same rows. Both have to prefer each other to all others.
     """
     order = matrix.shape[0]
     pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
+    reached = reach(matrix, 2)
     rows = [np.flatnonzero(direction == a) for a in range(d)]
     first, second = [], []
     for c, b in combinations(range(d), 2):
         if not len(rows[c]) or not len(rows[b]):
             continue
-        cross = pattern[rows[c]][:, rows[b]]
-        own_c, own_b = pattern[rows[c]][:, rows[c]], pattern[rows[b]][:, rows[b]]
-        r, s = _mutual_best(cross, own_c, own_b, rows[c], rows[b])
-        first.append(rows[c][r])
-        second.append(rows[b][s])
+        r, s, value = partners(pattern, reached, rows[c], rows[b])
+        alone = (np.bincount(r)[r] == 1) & (np.bincount(s)[s] == 1)  # where several are alike, nothing decides
+        r, s, value = r[alone], s[alone], value[alone]
+        sure = value >= doubtful(value)
+        first.append(rows[c][r[sure]])
+        second.append(rows[b][s[sure]])
     if not first:
         return np.arange(order)
     pairs = (np.concatenate(first), np.concatenate(second))
     link = sp.csr_array((np.ones(len(pairs[0])), pairs), shape=(order, order))
     return sp.csgraph.connected_components(link, directed=False)[1].astype(np.int64)
-
-
-def _mutual_best(
-    cross: sp.csr_array, own_c: sp.csr_array, own_b: sp.csr_array, rows_c: NDArray, rows_b: NDArray
-) -> tuple[NDArray, NDArray]:
-    """Pairs (r, s) that are each other's most similar partner."""
-    common = (cross @ own_b + own_c @ cross).tocoo()
-    size_r = np.asarray(cross.sum(axis=1)).ravel() + np.asarray(own_c.sum(axis=1)).ravel()
-    size_s = np.asarray(cross.sum(axis=0)).ravel() + np.asarray(own_b.sum(axis=1)).ravel()
-    alike = 2 * common.data / (size_r[common.row] + size_s[common.col])
-    # Rows next to each other win where nothing else decides.
-    alike = alike - 1e-6 * np.minimum(np.abs(rows_c[common.row] - rows_b[common.col]), 1e4) / 1e4
-    best_r, best_s = np.zeros(len(size_r)), np.zeros(len(size_s))
-    np.maximum.at(best_r, common.row, alike)
-    np.maximum.at(best_s, common.col, alike)
-    chosen = (alike == best_r[common.row]) & (alike == best_s[common.col]) & (alike > 0.5)
-    return common.row[chosen], common.col[chosen]

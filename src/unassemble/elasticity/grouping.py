@@ -25,30 +25,14 @@ def by_first_row(label: NDArray) -> NDArray[np.int64]:
     return rank[inverse]
 
 
-def split(group: NDArray[np.int64], d: int) -> NDArray[np.int64]:
-    """Nodes of the same closed neighbourhood: take runs of consecutive rows, or else every k-th of a group."""
-    order = np.argsort(group, kind="stable")
-    start = np.searchsorted(group[order], np.arange(group.max() + 1))
-    size = np.bincount(group)
-    position = np.arange(len(group)) - np.repeat(start, size)
-    jump = np.diff(order, prepend=-2) != 1
-    jump[start] = True
-    run = np.cumsum(jump) - 1
-    place = np.arange(len(group)) - np.flatnonzero(jump)[run]
-    in_runs = bool((np.bincount(run) % d == 0).mean() > 0.5)
-    per_group = np.maximum(np.repeat(size // d, size), 1)
-    big = np.repeat(size > d, size)
-    part = (run * len(group) + place // d) if in_runs else position % per_group
-    label = np.where(big, group[order] * (len(group) ** 2) + part + 1, group[order] * (len(group) ** 2))
-    split = np.empty_like(group)
-    split[order] = label
-    return by_first_row(split)
-
-
 def possible_nodes(group: NDArray[np.int64], d: int) -> list[NDArray[np.int64]]:
-    """Labels of rows to start a search from: rows of the same pattern as nodes, if these are not too large; none."""
-    whole = group if np.bincount(group).max() <= d else split(group, d)
-    return [*([whole] if np.bincount(whole).max() <= d else []), np.arange(len(group))]
+    """Labels of rows to start a search from: rows of the same pattern as nodes, each row of larger groups by itself.
+
+    Several nodes of the same neighbours make such a group; nothing about the pattern tells their rows apart.
+    """
+    single = np.arange(len(group))
+    whole = by_first_row(np.where(np.bincount(group)[group] > d, len(group) + single, group))
+    return [whole, single] if whole.max() < len(group) - 1 else [single]
 
 
 def coupled_in_common(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> float:

@@ -35,11 +35,23 @@ def boundary_terms(d: int, ratio: float | None = None) -> NDArray[np.float64]:
     return terms if ratio is None else ratio * terms[..., :d] + terms[..., d:]
 
 
-def boundary_basis(valid: NDArray[np.bool_], ratio: float | None = None) -> NDArray[np.float64]:
-    """Orthonormal basis of the boundary terms seen by the valid pairs (d, d) of one node: (d, d, d, k)."""
+def seen_terms(valid: NDArray[np.bool_], ratio: float | None = None) -> NDArray[np.float64]:
+    """(d, d, d, k) boundary terms in the valid places (d, d, d) of one node.
+
+    A node without a row of direction b may use its place (b, b, b) for an equation without boundary terms.
+    """
     d = len(valid)
-    seen = boundary_terms(d, ratio) * valid[:, :, None, None]
-    u, s, _ = np.linalg.svd(seen.reshape(d**3, -1), full_matrices=False)
+    seen = boundary_terms(d, ratio) * valid[..., None]
+    for b in range(d):
+        if valid[b].sum() == 1 and valid[b, b, b]:
+            seen[b, b, b] = 0
+    return seen
+
+
+def boundary_basis(valid: NDArray[np.bool_], ratio: float | None = None) -> NDArray[np.float64]:
+    """Orthonormal basis of the boundary terms seen by the valid places (d, d, d) of one node: (d, d, d, k)."""
+    d = len(valid)
+    u, s, _ = np.linalg.svd(seen_terms(valid, ratio).reshape(d**3, -1), full_matrices=False)
     return u[:, s > 1e-10].reshape(d, d, d, -1)
 
 
@@ -57,7 +69,8 @@ class Identities:
         Row k couples to ``columns[indices[indptr[k]:indptr[k + 1]]]``.
     data : (nnz, d, d) float64
         Blocks relative to the size of their row, zero where not valid.
-    valid : (m, d, d) bool
+    valid : (m, d, d, d) bool
+        Places (c, b, a) that count.
     ratio : float or None
         lambda / mu, where it is known.
     """
@@ -79,7 +92,7 @@ class Identities:
     def _kinds(self) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]:
         """Rows with the same valid pairs, and the basis of their boundary terms."""
         d = self.dim
-        code = self.valid.reshape(len(self.rows), -1) @ (1 << np.arange(d * d))
+        code = self.valid.reshape(len(self.rows), -1) @ (1 << np.arange(d**3))
         kinds = [np.flatnonzero(code == value) for value in np.unique(code)]
         return [(rows, boundary_basis(self.valid[rows[0]], self.ratio)) for rows in kinds]
 
@@ -90,10 +103,16 @@ class Identities:
         shape = (len(self.rows) * d * d, len(self.columns))
         return sp.bsr_array((self.data.reshape(-1, d * d, 1), self.indices, self.indptr), shape=shape).tocsr()
 
+    @cached_property
+    def _even(self) -> bool:
+        """Whether pairs (c, b) are valid for all coordinates or for none."""
+        return bool((self.valid == self.valid[..., :1]).all())
+
     def apply(self, x: NDArray) -> NDArray[np.float64]:
         """(m, d, d, d, k) products A^{cb} x_a, by node, c, b, a, for k fields x of shape (n, d, k)."""
         n, d, k = x.shape
-        return (self._stacked @ x.reshape(n, d * k)).reshape(-1, d, d, d, k)
+        value = (self._stacked @ x.reshape(n, d * k)).reshape(-1, d, d, d, k)
+        return value if self._even else value * self.valid[..., None]
 
     def residual(self, x: NDArray) -> NDArray[np.float64]:
         """(m, d, d, d, k) what sticks out of the boundary terms; zero for the true coordinates."""
@@ -111,13 +130,23 @@ class Identities:
     def normal_matrix(self) -> sp.bsr_array:
         """(n d, n d) the normal matrix in blocks of d; blocks of zeros are missing."""
         d = self.dim
-        stacked = self._stacked
-        gram = sp.kron(stacked.T @ stacked, np.eye(d), format="bsr")
+        gram = self._gram()
         q = self._boundary_part()
         product = q.T.tobsr(blocksize=(d, 2 * d)) @ q
         normal = (gram - product.tobsr(blocksize=(d, d))).tobsr((d, d))
         normal.sort_indices()
         return normal
+
+    def _gram(self) -> sp.bsr_array:
+        """The normal matrix with p and q set to zero."""
+        d, stacked = self.dim, self._stacked
+        if self._even:
+            return sp.kron(stacked.T @ stacked, np.eye(d), format="bsr")
+        parts = []
+        for a in range(d):
+            part = sp.csr_array(sp.diags_array(self.valid[..., a].ravel().astype(float)) @ stacked)
+            parts.append(sp.kron(part.T @ part, np.diag(np.arange(d) == a).astype(float), format="csr"))
+        return sp.csr_array(sum(parts[1:], start=parts[0])).tobsr((d, d))
 
     def _boundary_part(self) -> sp.bsr_array:
         """Components of the products along the boundary terms: blocks of 2 d by d."""
@@ -128,6 +157,8 @@ class Identities:
         for index, (rows, _) in enumerate(self._kinds):
             kind[rows] = index
         for index, (_, basis) in enumerate(self._kinds):
+            if not basis.shape[3]:
+                continue
             here = kind[block_row] == index
             weights = basis.transpose(0, 1, 3, 2).reshape(d * d, -1)
             part = self.data[here].reshape(-1, d * d) @ weights
@@ -144,7 +175,7 @@ class Identities:
         found = np.full((len(self.rows), 2 * d), np.nan)
         for rows, basis in self._kinds:
             if basis.shape[3] == 2 * d:
-                seen = (boundary_terms(d) * self.valid[rows[0]][:, :, None, None]).reshape(d**3, 2 * d)
+                seen = seen_terms(self.valid[rows[0]]).reshape(d**3, 2 * d)
                 found[rows] = value[rows].reshape(len(rows), -1) @ np.linalg.pinv(seen).T
         return found[:, :d], found[:, d:]
 
@@ -152,12 +183,12 @@ class Identities:
 def _telling(valid: NDArray[np.bool_], ratio: float | None) -> NDArray[np.bool_]:
     """(m,) rows with an equation left once p and q are eliminated."""
     d = valid.shape[1]
-    code = valid.reshape(len(valid), -1) @ (1 << np.arange(d * d))
+    code = valid.reshape(len(valid), -1) @ (1 << np.arange(d**3))
     telling = np.zeros(len(valid), dtype=bool)
     for value in np.unique(code):
         here = np.flatnonzero(code == value)
         one = valid[here[0]]
-        telling[here] = one.sum() * d > boundary_basis(one, ratio).shape[3]
+        telling[here] = one.sum() > boundary_basis(one, ratio).shape[3]
     return telling
 
 
@@ -169,19 +200,20 @@ def identities(
     Parameters
     ----------
     nodal : NodalMatrix
-    valid : (n, d, d) bool
-        See :func:`~unassemble.elasticity.nodal.valid_pairs`.
+    valid : (n, d, d) or (n, d, d, d) bool
+        See :func:`~unassemble.elasticity.nodal.valid_pairs` and :func:`~unassemble.elasticity.planes.with_planes`.
     rows : (m,) int64
         Nodes whose rows to use; those that say nothing once p and q are eliminated are dropped.
     ratio : float, optional
         lambda / mu, where it is known to be one number: half as many unknowns p and q, and more equations left.
     """
+    valid = valid if valid.ndim == 4 else np.repeat(valid[..., None], nodal.dim, axis=3)
     rows = rows[_telling(valid[rows], ratio)]
     count = np.diff(nodal.indptr)[rows]
     start = np.repeat(nodal.indptr[rows] - (np.cumsum(count) - count), count)
     entry = (np.arange(count.sum()) + start).astype(np.int64)
     row = np.repeat(np.arange(len(rows)), count)
-    data = nodal.data[entry] * (valid[rows] / nodal.size[rows, None, None])[row]
+    data = nodal.data[entry] * (valid[rows].any(axis=3) / nodal.size[rows, None, None])[row]
     live = (data != 0).any(axis=(1, 2))
     neighbour = nodal.indices[entry[live]]
     touched = np.zeros(nodal.n, dtype=bool)

@@ -36,6 +36,16 @@ class NodalMatrix:
     row_of: NDArray[np.int64]
     size: NDArray[np.float64]
 
+    @classmethod
+    def of(cls, indptr: NDArray, indices: NDArray, data: NDArray, row_of: NDArray[np.int64]) -> NodalMatrix:
+        """From blocks in BSR form, every node coupled to itself."""
+        n, d = row_of.shape
+        indptr = indptr.astype(np.int32)
+        indices, data = indices[: indptr[-1]].astype(np.int32), data[: indptr[-1]]
+        off = np.abs(data).sum(axis=(1, 2)) / d**2
+        off[np.repeat(np.arange(n), np.diff(indptr)) == indices] = 0
+        return cls(indptr, indices, data, row_of, np.add.reduceat(off, indptr[:-1]))
+
     @property
     def n(self) -> int:
         """Number of nodes."""
@@ -79,12 +89,7 @@ def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
     )
     blocks = entries.tocsr().tobsr(blocksize=(d, d))
     blocks.sort_indices()
-    indptr = blocks.indptr.astype(np.int32)
-    indices, data = blocks.indices[: indptr[-1]].astype(np.int32), blocks.data[: indptr[-1]]
-    off = np.abs(data).sum(axis=(1, 2)) / d**2
-    off[np.repeat(np.arange(n), np.diff(indptr)) == indices] = 0
-    size = np.add.reduceat(off, indptr[:-1])
-    return NodalMatrix(indptr, indices, data, row_of.reshape(n, d), size)
+    return NodalMatrix.of(blocks.indptr, blocks.indices, blocks.data, row_of.reshape(n, d))
 
 
 def valid_pairs(nodal: NodalMatrix, *, strict: bool = True) -> NDArray[np.bool_]:
@@ -102,17 +107,41 @@ def valid_pairs(nodal: NodalMatrix, *, strict: bool = True) -> NDArray[np.bool_]
     (n, d, d) bool
         Component c of the row, component b of the columns.
     """
-    size = np.where(nodal.size > 0, nodal.size, np.inf)[:, None, None]
     present = nodal.row_of >= 0
-    zero = np.abs(nodal.row_sums()) <= _ROUNDING * size
+    zero = _annihilating(nodal)
     valid = zero & present[:, :, None] & present[:, None, :] & (nodal.size > 0)[:, None, None]
     if not strict:
         return valid
-    d = nodal.dim
-    excused = penalised(nodal)[:, None, :] & np.eye(d, dtype=bool) | ~present[:, :, None]
-    graph = sp.csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2)
-    lacking = graph @ ~present
-    return valid & ((zero | excused).all(axis=1) & (lacking == 0))[:, None, :]
+    whole = (zero | _excused(nodal)).all(axis=1)
+    lacking = _graph(nodal) @ (~present & ~without_trace(nodal))
+    return valid & (whole & (lacking == 0))[:, None, :]
+
+
+def without_trace(nodal: NodalMatrix) -> NDArray[np.bool_]:
+    """(n, d) unknowns that are not there, although no row coupled to the node misses anything.
+
+    What was eliminated leaves a trace in the rows next to it. Where there is none, the unknown stands
+    somewhere else: the node's rows were not recognised as those of one node.
+    """
+    missing = (~(_annihilating(nodal) | _excused(nodal))).any(axis=1)
+    present = nodal.row_of >= 0
+    some = np.asarray(present.any(axis=1))
+    return ~present & (_graph(nodal) @ missing.astype(float) == 0) & some[:, None]
+
+
+def _annihilating(nodal: NodalMatrix) -> NDArray[np.bool_]:
+    """(n, d, d) rows of blocks that annihilate constants."""
+    size = np.where(nodal.size > 0, nodal.size, np.inf)[:, None, None]
+    return np.asarray(np.abs(nodal.row_sums()) <= _ROUNDING * size)
+
+
+def _excused(nodal: NodalMatrix) -> NDArray[np.bool_]:
+    """(n, d, d) rows that are not there, and rows that do not annihilate constants because of a penalty."""
+    return penalised(nodal)[:, None, :] & np.eye(nodal.dim, dtype=bool) | ~(nodal.row_of >= 0)[:, :, None]
+
+
+def _graph(nodal: NodalMatrix) -> sp.csr_array:
+    return sp.csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2)
 
 
 def penalised(nodal: NodalMatrix) -> NDArray[np.bool_]:

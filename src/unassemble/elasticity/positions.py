@@ -12,6 +12,7 @@ from ..errors import GeometryError
 from .atlas import NullFields, null_fields
 from .material import poisson_ratio
 from .nodal import NodalMatrix, determined, valid_pairs
+from .planes import with_planes
 from .results import Evidence
 from .shape import EXACT, Shape, in_gauge, shape
 
@@ -37,6 +38,8 @@ class Solution:
         lambda / mu, where it was used.
     strict : bool
         Whether rows were judged by the strict rule.
+    planes : bool
+        Whether nodes that lack a direction were taken to lie in planes across it.
     """
 
     valid: NDArray[np.bool_]
@@ -48,6 +51,7 @@ class Solution:
     warnings: tuple[str, ...]
     ratio: float | None = None
     strict: bool = True
+    planes: bool = False
 
     @property
     def whole(self) -> bool:
@@ -66,12 +70,17 @@ def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
     failure: GeometryError | None = None
     for strict in (True, False):
         valid = valid_pairs(nodal, strict=strict)
+        found = None
         try:
             found = _positions(nodal, valid, patch)
-            found = replace(_with_ratio(nodal, found, patch), strict=strict)
         except GeometryError as error:
             failure = failure or error
+        completed = with_planes(nodal, valid) if strict and not (found is not None and found.whole) else None
+        if completed is not None:
+            found = _with_planes(*completed, found, valid, patch)
+        if found is None:
             continue
+        found = replace(_with_ratio(nodal, found, completed, patch), strict=strict)
         if found.exact and not any(found.freedoms):
             return found
         best = best or found
@@ -80,18 +89,37 @@ def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
     return best
 
 
-def _with_ratio(nodal: NodalMatrix, found: Solution, patch: int | None) -> Solution:
+def _with_planes(
+    completed: NodalMatrix, full: NDArray[np.bool_], found: Solution | None, valid: NDArray[np.bool_], patch: int | None
+) -> Solution | None:
+    """Once more with what rows next to rollers say, if that fits and determines more."""
+    try:
+        other = replace(_positions(completed, full, patch), planes=True, valid=valid)
+    except GeometryError:
+        return found
+    if not other.exact or (found is not None and other.rank <= found.rank):
+        return found
+    return other
+
+
+def _with_ratio(
+    nodal: NodalMatrix,
+    found: Solution,
+    completed: tuple[NodalMatrix, NDArray[np.bool_]] | None,
+    patch: int | None,
+) -> Solution:
     """Once more with Poisson's ratio, if it is one number and nodes were left loose."""
     if found.whole or not found.exact:
         return found
     nu = poisson_ratio(nodal, found.valid, found.points)
     if nu is None:
         return found
+    rows = completed if completed is not None and found.planes else (nodal, found.valid)
     try:
-        other = _positions(nodal, found.valid, patch, 2 * nu / (1 - 2 * nu))
+        other = _positions(*rows, patch, 2 * nu / (1 - 2 * nu))
     except GeometryError:
         return found
-    return other if other.rank > found.rank else found
+    return replace(other, planes=found.planes, valid=found.valid) if other.rank > found.rank else found
 
 
 def _positions(nodal: NodalMatrix, valid: NDArray[np.bool_], patch: int | None, ratio: float | None = None) -> Solution:
@@ -124,7 +152,8 @@ def _positions(nodal: NodalMatrix, valid: NDArray[np.bool_], patch: int | None, 
 
 def _pieces(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
     """Pieces held together by valid identities; -1 for nodes that none of them touches."""
-    live = (np.abs(nodal.data) * valid[nodal.node]).max(axis=(1, 2)) > 0
+    pairs = valid if valid.ndim == 3 else np.asarray(valid.any(axis=3))
+    live = (np.abs(nodal.data) * pairs[nodal.node]).max(axis=(1, 2)) > 0
     link = sp.csr_array((np.ones(live.sum()), (nodal.node[live], nodal.indices[live])), shape=(nodal.n, nodal.n))
     _, label = sp.csgraph.connected_components(link, directed=False)
     size = np.bincount(label)

@@ -6,13 +6,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..clock import Clock
-from ..errors import GeometryError
+from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..matrix import check_matrix
 from .cells import Cells, no_cells, recognise_cells
 from .certificate import largest_residual
+from .halves import joined
 from .material import poisson_ratio
-from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled
+from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled, without_trace
 from .positions import Solution, solve
 from .results import ElasticityRecovery, ScalarParts
 from .unknowns import Numbering, find_numbering
@@ -84,7 +85,29 @@ def place_nodes(
 ) -> ElasticityRecovery:
     """The recovery once the nodes are known: null space, certificate, cells; see :func:`recover_elasticity`."""
     with clock("null space"), blas_threads(1):
-        solution = solve(nodal, patch)
+        try:
+            solution = solve(nodal, patch)
+        except RecoveryError as error:
+            if numbering.kind == "given" or (numbering.common == 1 and not numbering.incomplete):
+                raise
+            raise GeometryError(
+                f"{error}; but which rows belong to one node, and to which direction, was inferred and may be wrong: "
+                "give the numbering if it is known"
+            ) from error
+        if (
+            not solution.exact
+            and numbering.kind != "given"
+            and (numbering.odd or numbering.common < 1)
+            and numbering.incomplete
+        ):
+            raise GeometryError(
+                "no positions fit the matrix exactly; which rows belong to one node was inferred, where some nodes "
+                "lack rows, and is probably wrong: give the numbering if it is known"
+            )
+        better = joined(nodal, numbering, solution.points, solution.component)
+        if better is not None:
+            nodal, numbering = better
+            solution = solve(nodal, patch)
     return _describe(nodal, numbering, solution, clock, cells)
 
 
@@ -108,6 +131,10 @@ def _describe(
         warnings += _about_cells(found)
     if loose.any():
         warnings.append(f"{loose.sum()} of {nodal.n} nodes are tied to eliminated unknowns only and stay undetermined")
+    if solution.planes:
+        warnings.append(
+            "nodes that lack a direction were taken to lie in planes across it, which fits, to determine others"
+        )
     if solution.ratio is not None:
         warnings.append("Poisson's ratio, read off the nodes that determine it, was used to determine others")
     return ElasticityRecovery(
@@ -155,17 +182,23 @@ def _verdict(
             "supports leave too few rows that are surely whole; rows whose entries add up to zero were taken for "
             "whole, which they need not be"
         )
-    if numbering.kind == "pattern" and _torn(nodal, solution):
+    if numbering.kind != "given" and numbering.incomplete | (numbering.kind == "pattern") and _torn(nodal, solution):
         return "uncertified", (
             "which direction each row belongs to was inferred from the entries, and not without contradiction: coupled "
             "nodes came out as separate pieces; give the numbering if it is known"
         )
     if found.certified and found.backward_error <= CERTIFIED:
         return "certified", f"the matrix re-assembled on the {found.n_cells} elements is the given one"
-    if numbering.kind == "pattern" and numbering.incomplete:
+    odd = int(without_trace(nodal).any(axis=1).sum())
+    if odd:
         return "uncertified", (
-            "which rows belong to one node was inferred from the pattern, where some nodes lack rows; only elements "
-            "that re-assemble to the matrix would show that the inference is right"
+            f"{odd} nodes lack directions although no row next to them misses anything: their rows belong to other "
+            "nodes, and neither pattern nor positions tell to which; give the numbering if it is known"
+        )
+    if numbering.incomplete and numbering.kind != "given" and numbering.common < 1:
+        return "uncertified", (
+            "which rows belong to one node was inferred, where some nodes lack rows and others do not store entries "
+            "that vanished; only elements that re-assemble to the matrix would show that the inference is right"
         )
     if error <= CERTIFIED:
         return "certified", "the valid identities hold to rounding, and only translations and scale satisfy them"

@@ -60,8 +60,9 @@ def serve(
         parts = parts_of(whole, nodal, numbering)
         return replace(_vector_laplacian(parts, matrix, anchors, scalar), choice=choice, timings=clock.timings)
     del whole
-    known = checked_anchors(anchors, numbering.node_of_row, numbering.block_size)
+    checked_anchors(anchors, numbering.node_of_row, numbering.block_size)  # before the long work
     found = place_nodes(nodal, numbering, clock, cells=cells)
+    known = checked_anchors(anchors, found.node_of_row, numbering.block_size)
     points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
     lame, scale = _in_units(found, factor)
     fields: dict[str, Any] = {"triangles": np.empty((0, 3), np.int64), **_cell_fields(found.cells)}

@@ -15,11 +15,16 @@ from numpy.typing import NDArray
 from ..errors import InputError, RecoveryError
 from .directions import find_directions, nodes_by_neighbours
 from .grouping import by_first_row, coupled_in_common, possible_nodes, same_pattern
+from .orderly import by_component, node_by_node
+from .sampling import promising
 
 _ROUNDING = 1e-9
 _ROUNDS = 4
 _FEW = 4  # places to start from where a glance is all that a matrix gets
 _KINDS = ("interleaved", "by component")
+_ANNIHILATED = 0.02  # share of rows and directions below which an orderly numbering calls for a search
+_LARGE = 20_000  # rows beyond which a few places are looked at before every row is asked
+_LIKELY = 0.6  # quality of nodes apart from that share; made-up ones have half or less
 _ORDERLY = 0.8  # rows of made-up nodes couple to common nodes less than this
 
 
@@ -41,6 +46,9 @@ class Numbering:
         Share of the pairs (row, direction) whose entries add up to zero, among rows that couple.
     common : float
         How far the rows of a node couple to the same nodes: 1 if all do.
+    odd : int
+        Nodes that lack a direction without a trace, no row near them missing it: their rows belong together, and it
+        did not show.
     """
 
     block_size: int
@@ -50,6 +58,7 @@ class Numbering:
     kind: str
     share: float
     common: float
+    odd: int = 0
 
     @property
     def incomplete(self) -> bool:
@@ -88,7 +97,10 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
     identity = _uncoupled_rows(matrix)
     best = max((_regular(matrix, identity, d, kind) for d in sizes for kind in _KINDS), key=_quality)
     if best is None or _quality(best) <= 0 or best.share < 0.5 or (best.kind == "by component" and best.common < 0.9):
-        best = max([best, *_searched(matrix, identity, sizes)], key=_quality)
+        hopeful = matrix.shape[0] <= _LARGE or promising(matrix, sizes)
+        best = max([best, *_orderly(matrix, identity, sizes, hopeful)], key=_quality)
+        if not _sound(best) and hopeful:
+            best = max([best, *_searched(matrix, identity, sizes)], key=_quality)
     if best is None or _quality(best) <= 0:
         raise RecoveryError(
             f"no numbering with {block_size or '2 or 3'} unknowns per node makes the rows annihilate translations: "
@@ -151,7 +163,32 @@ def _quality(one: Numbering | None) -> float:
     """Rows add up to zero, those of a node couple to the same nodes, and most nodes have all their directions."""
     if one is None or not one.has_whole_node:
         return 0.0
-    return one.share * one.common * len(one.node_of_row) / (one.n_nodes * one.block_size)
+    return one.share * one.common * len(one.node_of_row) / (one.n_nodes * one.block_size) * (1 - one.odd / one.n_nodes)
+
+
+def _sound(one: Numbering | None) -> bool:
+    """Whether its nodes look like nodes, however few of their rows annihilate constants."""
+    return one is not None and one.share > _ANNIHILATED and _quality(one) > _LIKELY * one.share
+
+
+def _orderly(matrix: sp.csr_array, identity: NDArray, sizes: tuple[int, ...], hopeful: bool) -> list[Numbering]:
+    """Numberings in one of the usual orders that lack unknowns here and there; unless hopeful, those found at once.
+
+    Rows of the identity say nothing about where they belong; each is a node by itself.
+    """
+    live = np.flatnonzero(~identity)
+    inner = sp.csr_array(matrix[live][:, live])
+    inner.sort_indices()
+    found = []
+    for d in sizes:
+        for kind, read in zip(_KINDS, (node_by_node, by_component), strict=True):
+            if read is node_by_node and not hopeful:
+                continue
+            for reading in read(inner, d):
+                node, direction = np.arange(matrix.shape[0]) + len(live), np.zeros(matrix.shape[0], np.int64)
+                node[live], direction[live] = reading
+                found.append(_measured(matrix, identity, by_first_row(node), direction, d, kind))
+    return found
 
 
 def _searched(matrix: sp.csr_array, identity: NDArray, sizes: tuple[int, ...]) -> list[Numbering]:
@@ -164,6 +201,8 @@ def _searched(matrix: sp.csr_array, identity: NDArray, sizes: tuple[int, ...]) -
             for _ in range(_ROUNDS):  # directions tell nodes apart, and nodes help to find directions
                 direction = find_directions(matrix, node, identity, d)
                 found.append(_measured(matrix, identity, node, direction, d))
+                if found[-1].share > 0.5 and _sound(found[-1]):
+                    return found
                 merged = nodes_by_neighbours(matrix, direction, d)
                 if len(np.unique(merged * d + direction)) < len(merged) or merged.max() == node.max():
                     break
@@ -172,9 +211,25 @@ def _searched(matrix: sp.csr_array, identity: NDArray, sizes: tuple[int, ...]) -
     return found
 
 
-def _measured(matrix: sp.csr_array, identity: NDArray, node: NDArray, direction: NDArray, d: int) -> Numbering:
+def _measured(
+    matrix: sp.csr_array, identity: NDArray, node: NDArray, direction: NDArray, d: int, kind: str = "pattern"
+) -> Numbering:
     share, common = _share(matrix, identity, direction, d, searched=True), coupled_in_common(matrix, node, direction)
-    return Numbering(d, node, direction, identity, "pattern", share, common)
+    return Numbering(d, node, direction, identity, kind, share, common, _odd(matrix, identity, node, direction, d))
+
+
+def _odd(matrix: sp.csr_array, identity: NDArray, node: NDArray, direction: NDArray, d: int) -> int:
+    """Number of nodes that lack a direction although all rows coupled to them annihilate it."""
+    order, n, live = len(node), int(node.max()) + 1, ~identity
+    labels = np.zeros((order, d))
+    labels[np.flatnonzero(live), direction[live]] = 1
+    size = np.asarray(abs(matrix).sum(axis=1)).ravel()
+    missing = (np.abs(matrix @ labels) > _ROUNDING * size[:, None]) & live[:, None]
+    pattern = sp.csr_array((np.ones(matrix.nnz, np.int8), matrix.indices, matrix.indptr), shape=matrix.shape)
+    onto = sp.csr_array((np.ones(order, np.int32), (node, np.arange(order))), shape=(n, order))
+    missed = onto @ (pattern.astype(np.int32) @ missing.astype(np.int32))
+    present = (onto @ labels) > 0
+    return int((~present & (missed == 0) & present.any(axis=1)[:, None]).any(axis=1).sum())
 
 
 def _uncoupled_rows(matrix: sp.csr_array) -> NDArray[np.bool_]:

@@ -1,0 +1,66 @@
+"""How alike two rows are in what they couple to, over several steps of the graph.
+
+Rows of one node start from the same place of the mesh. Over one step they may reach different rows, where entries that
+vanished are not stored; over two or three the difference fades, while rows of neighbouring nodes stay apart.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+_AT_ONCE = 1 << 22  # entries of the reach to multiply at a time
+_SAME = 1e-6  # single precision
+_FEW = 0.08  # share of pairs of rows whose likeness may be an exception
+_MOST = 60_000_000  # entries of a reach beyond which it is not taken a step further
+
+
+def reach(matrix: sp.csr_array, steps: int) -> sp.csr_array:
+    """(N, N) where the rows lead to over some steps, rows of norm one.
+
+    Each step divides by the number of rows coupled to, half before and half after it.
+    """
+    pattern = sp.csr_array((np.ones(matrix.nnz, np.float32), matrix.indices, matrix.indptr), shape=matrix.shape)
+    weight = sp.diags_array(1 / np.sqrt(np.maximum(np.diff(matrix.indptr), 1)).astype(np.float32))
+    step = sp.csr_array(weight @ pattern @ weight)
+    reached = step
+    for _ in range(steps - 1):
+        if reached.nnz * (step.nnz / max(step.shape[0], 1)) > _MOST * 8:
+            break
+        reached = sp.csr_array(reached @ step)
+    norm = np.sqrt(np.asarray(reached.power(2).sum(axis=1)).ravel())
+    return sp.csr_array(sp.diags_array(1 / np.where(norm > 0, norm, 1).astype(np.float32)) @ reached)
+
+
+def alike(reached: sp.csr_array, r: NDArray, s: NDArray) -> NDArray[np.float64]:
+    """(k,) cosines between the reaches of rows r and s."""
+    step = max(int(_AT_ONCE / max(reached.nnz / max(reached.shape[0], 1), 1)), 1)
+    parts = [
+        np.asarray(reached[r[k : k + step]].multiply(reached[s[k : k + step]]).sum(axis=1), dtype=np.float64).ravel()
+        for k in range(0, len(r), step)
+    ]
+    return np.concatenate([np.empty(0), *parts])
+
+
+def partners(
+    pattern: sp.csr_array, reached: sp.csr_array, rows_c: NDArray, rows_b: NDArray
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Pairs (r, s) of places in two lists of rows that are each other's likest, or equal to it, and how alike they are.
+
+    Only rows at most two steps apart are compared.
+    """
+    cross = pattern[rows_c][:, rows_b]
+    near = sp.coo_array(cross @ pattern[rows_b][:, rows_b] + pattern[rows_c][:, rows_c] @ cross)
+    r, s = near.row.astype(np.int64), near.col.astype(np.int64)
+    value = alike(reached, rows_c[r], rows_b[s])
+    best_r, best_s = np.zeros(len(rows_c)), np.zeros(len(rows_b))
+    np.maximum.at(best_r, r, value)
+    np.maximum.at(best_s, s, value)
+    chosen = (value >= best_r[r] - _SAME) & (value >= best_s[s] - _SAME)
+    return r[chosen], s[chosen], value[chosen]
+
+
+def doubtful(likeness: NDArray[np.float64]) -> float:
+    """How alike rows have to be to be taken for one node, given how alike those are that mostly are."""
+    return float(1 - _SAME - 3 * (1 - np.quantile(likeness, _FEW))) if len(likeness) else 1.0

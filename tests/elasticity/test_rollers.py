@@ -1,0 +1,90 @@
+"""Unknowns taken out one by one, in the orders that codes write, with zeros stored or dropped."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from assembled import box, heterogeneous, permuted_nodes, stiffness
+from supported import given, judged
+
+from unassemble.elasticity import recover_elasticity
+from unassemble.elasticity.unknowns import find_numbering
+from unassemble.errors import RecoveryError
+
+COUNTS = {"tri-p1": (8, 9), "tri-p2": (6, 7), "quad-q1": (8, 9), "tet-p1": (4, 5, 5)}
+
+
+def varying_shear(x):
+    return 1 + x[1] + x[0] * x[1]
+
+
+def body(kind, perturb=0.0, permuted=True, **material):
+    material = material or {"lam": heterogeneous, "mu": varying_shear}
+    case = stiffness(kind, box(kind, COUNTS[kind], perturb=perturb), **material)
+    return permuted_nodes(case, seed=1) if permuted else case
+
+
+@pytest.mark.parametrize("zeros", ["stored", "dropped"])
+@pytest.mark.parametrize("order", ["interleaved", "by component"])
+@pytest.mark.parametrize("support", ["roller", "symmetry"])
+@pytest.mark.parametrize("kind", ["tri-p1", "quad-q1", "tet-p1"])
+def test_structured_meshes_of_linear_elements(kind, support, order, zeros):
+    """Varying Poisson's ratio as well: nodes on the plane are placed because it is a plane."""
+    case = given(body(kind), support, order, zeros)
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert truth.error < 1e-10
+    assert truth.missing == 0
+
+
+@pytest.mark.parametrize("order", ["interleaved", "by component"])
+@pytest.mark.parametrize("permuted", [False, True])
+def test_quadratic_triangles_with_dropped_zeros(order, permuted):
+    case = given(body("tri-p2", permuted=permuted), "roller", order, "dropped")
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert truth.error < 1e-9
+    assert truth.missing == 0
+
+
+def test_quadratic_triangles_lose_nothing_at_a_roller():
+    case = given(body("tri-p2"), "roller", "interleaved", "stored")
+    found = recover_elasticity(case.matrix)
+    assert found.certified
+    assert not found.node_status.any()
+    assert judged(found, case).error < 1e-9
+    assert any("planes" in one for one in found.warnings)
+
+
+def test_directions_held_elsewhere_than_on_a_plane_across_them_are_not_believed():
+    """x is taken out of nodes on y = 0, no plane across x: these stay without coordinates, the others are right."""
+    whole = body("tri-p1", perturb=0.2)
+    gone = np.zeros(whole.points.shape, dtype=bool)
+    gone[np.abs(whole.points[:, 1]) < 1e-9, 0] = True
+    keep = sp.diags_array((~gone.ravel()).astype(float))
+    matrix = sp.csr_array(keep @ whole.matrix @ keep + sp.diags_array(gone.ravel().astype(float)))
+    found = recover_elasticity(matrix)
+    truth = given(whole, "free", "interleaved", "dropped")
+    assert found.certified
+    assert np.array_equal(found.node_status == 1, gone.any(axis=1))
+    assert judged(found, truth).error < 1e-10
+
+
+def test_rows_of_nodes_with_the_same_neighbours_are_joined_by_position():
+    """Rows at random: the nodes at the corners of quadratic triangles couple to the same ones as their neighbours."""
+    case = given(body("tri-p2"), "free", "at random", "stored")
+    numbering = find_numbering(case.matrix)
+    assert numbering.odd > 0
+    found = recover_elasticity(case.matrix)
+    assert found.certified
+    assert len(found.points) < numbering.n_nodes
+    assert judged(found, case).error < 1e-9
+
+
+def test_large_matrix_that_is_none_is_refused_without_a_search():
+    n = 28
+    line = sp.diags_array([-np.ones(n - 1), 2 * np.ones(n), -np.ones(n - 1)], offsets=[-1, 0, 1])
+    one = sp.eye_array(n)
+    laplace = sum(sp.kron(sp.kron(a, b), c) for a, b, c in ((line, one, one), (one, line, one), (one, one, line)))
+    with pytest.raises(RecoveryError, match="no numbering"):
+        find_numbering(sp.csr_array(laplace))
