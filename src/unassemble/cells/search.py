@@ -26,7 +26,8 @@ _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 _SOLVES = 120
 _RELAXED = 20_000  # vertices up to which labels are relaxed
 _WIDE = 20  # vertices of the largest piece below which trying labels one by one is as good
-_AGAIN = 4  # times that a reading is relaxed anew
+_RELAXING = 15  # solves that a relaxation is worth
+_AGAIN = 2  # times that a reading is relaxed anew
 _MANY = 20  # pieces that cost as much as another solve
 
 
@@ -47,6 +48,12 @@ class Effort:
         reading = Reading.of(candidates, labels, self.known)
         self.solves -= 1 + len(reading.pieces) // _MANY
         return reading
+
+    def share(self, parts: int) -> Effort:
+        """A part of what is left; all of it for one."""
+        solves = self.solves // parts
+        self.solves -= solves
+        return Effort(solves, self.known)
 
     @property
     def spent(self) -> bool:
@@ -90,10 +97,12 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
                 return starts[k]
         if starts and not starts[0].like_noise:
             starts[:0] = _relaxed(starts[0], effort)
-        for start in starts:
-            best = _better(best, start if start.like_noise else _repaired(start, effort))
+        for number, start in enumerate(starts):
+            share = effort.share(len(starts) - number)
+            best = _better(best, start if start.like_noise else _repaired(start, share))
             if best.fits or best.like_noise:
                 return best
+            effort.solves += max(share.solves, 0)
     return best if best is not None and best.pieces else None
 
 
@@ -129,6 +138,7 @@ def _relaxed(reading: Reading, effort: Effort) -> list[Reading]:
     n = reading.candidates.n_vertices
     if not reading.pieces or n > _RELAXED or max(piece.n_vertices for piece in reading.pieces) < _WIDE:
         return []
+    effort.solves -= _RELAXING
     labels = relaxed(reading)
     return [] if labels is None else [effort.reading(reading.candidates, labels)]
 
