@@ -97,10 +97,11 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
             if starts[k].fits:
                 return starts[k]
         if starts and not starts[0].like_noise:
-            place = 0 if n >= _FEW else len(starts)
+            triangles = 2 * (candidates.first & (candidates.size == 3)).sum() > candidates.first.sum()
+            place = 0 if n >= _FEW and triangles else len(starts)
             starts[place:place] = _relaxed(starts[0], effort)
         for number, start in enumerate(starts):
-            share = effort.share(_FIRST if number == 0 else 1 / (len(starts) - number))
+            share = effort.share(_FIRST if number == 0 and len(starts) > 1 else 1 / (len(starts) - number))
             best = _better(best, start if start.like_noise else _repaired(start, share))
             if best.fits or best.like_noise:
                 return best
