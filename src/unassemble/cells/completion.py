@@ -22,6 +22,9 @@ from .search import first_reading, read_cells
 
 _BETTER = 0.1  # a reading that does not fit replaces the triangles only if its misfit is below this times theirs
 
+_WIDE = 200  # rows of a matrix on which the misfit of a wrong cell stays near it
+_SURE = 1e-3  # misfit that no wrong cell is known to leave
+
 _SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 
 Outcome = PieceMesh | RecoveryError
@@ -54,9 +57,16 @@ def in_doubt(matrix: OperatorMatrix, topology: Topology, attempt: Attempt) -> ND
     rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
     misfit = _misfits(matrix, solved)[rest]
     wrong = misfit > FITS
-    if not wrong.any() or even(misfit) or even(_misfits(matrix, _shortly_polished(matrix, solved))[rest]):
+    if not wrong.any() or _like_noise(misfit, matrix.n):
+        return doubtful
+    if _like_noise(_misfits(matrix, _shortly_polished(matrix, solved))[rest], matrix.n):
         return doubtful
     return doubtful | _components_of(matrix, rest[wrong])
+
+
+def _like_noise(misfit: NDArray, n: int) -> bool:
+    """Whether a misfit is that of errors in the entries; small meshes spread that of a wrong cell as evenly."""
+    return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < _SURE)
 
 
 def _shortly_polished(matrix: OperatorMatrix, solved: Solved) -> Solved:

@@ -19,14 +19,16 @@ from .relaxation import relaxed
 _log = logging.getLogger(__name__)
 
 _STARTS = 2  # readings to begin with that are worth repairing
-_WORK = 1e5  # vertices times solves that repairs may take altogether
+_WORK = 1.2e5  # vertices times solves that repairs may take altogether
 _FEW = 100  # vertices below which all is tried before the entries are blamed
 _SUSPECT = 0.3  # change of the label of a lone triangular hole: it was 0.4 or more in all that were tried
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
-_SOLVES = 120
+_SOLVES = 180
+_FIRST = 0.7  # part of them for the likeliest reading
 _RELAXED = 20_000  # vertices up to which labels are relaxed
 _WIDE = 20  # vertices of the largest piece below which trying labels one by one is as good
-_AGAIN = 4  # times that a reading is relaxed anew
+_RELAXING = 10  # solves that a relaxation is worth
+_AGAIN = 2  # times that a reading is relaxed anew
 _MANY = 20  # pieces that cost as much as another solve
 
 
@@ -47,6 +49,12 @@ class Effort:
         reading = Reading.of(candidates, labels, self.known)
         self.solves -= 1 + len(reading.pieces) // _MANY
         return reading
+
+    def share(self, part: float) -> Effort:
+        """A part of what is left."""
+        solves = int(self.solves * part)
+        self.solves -= solves
+        return Effort(solves, self.known)
 
     @property
     def spent(self) -> bool:
@@ -89,11 +97,15 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
             if starts[k].fits:
                 return starts[k]
         if starts and not starts[0].like_noise:
-            starts[:0] = _relaxed(starts[0], effort)
-        for start in starts:
-            best = _better(best, start if start.like_noise else _repaired(start, effort))
+            triangles = 2 * (candidates.first & (candidates.size == 3)).sum() > candidates.first.sum()
+            place = 0 if n >= _FEW and triangles else len(starts)
+            starts[place:place] = _relaxed(starts[0], effort)
+        for number, start in enumerate(starts):
+            share = effort.share(_FIRST if number == 0 and len(starts) > 1 else 1 / (len(starts) - number))
+            best = _better(best, start if start.like_noise else _repaired(start, share))
             if best.fits or best.like_noise:
                 return best
+            effort.solves += max(share.solves, 0)
     return best if best is not None and best.pieces else None
 
 
@@ -129,6 +141,7 @@ def _relaxed(reading: Reading, effort: Effort) -> list[Reading]:
     n = reading.candidates.n_vertices
     if not reading.pieces or n > _RELAXED or max(piece.n_vertices for piece in reading.pieces) < _WIDE:
         return []
+    effort.solves -= _RELAXING
     labels = relaxed(reading)
     return [] if labels is None else [effort.reading(reading.candidates, labels)]
 

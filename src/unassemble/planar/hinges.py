@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
@@ -12,6 +14,8 @@ from ..topology import Topology
 
 _CLOSED = 1e-6  # distance at shared vertices, relative to the largest piece, below which rings count as closed
 _MOST_IMAGES = 100  # pieces; above, mirror images are left as they are
+_FEW, _SOME = 9, 24  # pieces of which several, or two, are turned over at once
+_MOST_TOGETHER = 4
 _DENSE = 500  # pieces; above, an iterative least-squares solution
 
 
@@ -73,20 +77,26 @@ def gap(topology: Topology, positions: list[NDArray]) -> float:
 
 
 def _matching_images(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> list[NDArray]:
-    """Mirror images of pieces in rings that let these close, found by turning over one piece after the other."""
+    """Mirror images of pieces in rings that let these close, found by turning over one piece after the other.
+
+    Where that ends, two at once are tried, and of few pieces more.
+    """
     if _rings(topology) <= 0 or len(positions) > _MOST_IMAGES:
         return positions
     best = _joined(topology, positions, held)[1]
-    while best > _CLOSED:
+    free = np.flatnonzero(~held).tolist()
+    most = _MOST_TOGETHER if len(free) <= _FEW else 2 if len(free) <= _SOME else 1
+    together = 1
+    while best > _CLOSED and together <= most:
         trials = []
-        for piece in np.flatnonzero(~held):
-            turned = list(positions)
-            turned[piece] = np.conj(turned[piece])
+        for pieces in combinations(free, together):
+            turned = [np.conj(z) if p in pieces else z for p, z in enumerate(positions)]
             trials.append((_joined(topology, turned, held)[1], turned))
         lowest, turned = min(trials, key=lambda trial: trial[0], default=(np.inf, positions))
-        if not lowest < 0.999 * best:
-            break
-        best, positions = lowest, turned
+        if lowest < 0.999 * best:
+            best, positions, together = lowest, turned, 1
+        else:
+            together += 1
     return positions
 
 

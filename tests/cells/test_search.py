@@ -1,0 +1,86 @@
+"""Many wrong cells, many pieces, a known scale, and matrices of no mesh."""
+
+import numpy as np
+import pytest
+
+from families import FAMILIES, HOPELESS
+from meshes import largest_error, random_mesh, specimen, triangle_set
+from unassemble import RecoveryError, recover
+from unassemble.cells.reading import Reading
+from unassemble.cells.small import small_map
+from unassemble.planar.conformal import conformal_map
+from unassemble.topology import recognise
+from vanishing import forgotten, holes, squares
+
+
+def _member(family, seed, c):
+    return forgotten(specimen(*FAMILIES[family](np.random.default_rng(seed)), c=c, seed=seed))
+
+
+# Labels have to be relaxed; in the second the pieces close rings, two being mirrored at once.
+@pytest.mark.parametrize(("family", "seed"), [("pierced", 11), ("lattice", 24)])
+def test_one_triangle_in_eight_is_missing(family, seed):
+    rng = np.random.default_rng(seed)
+    c = float(rng.choice([1.0, -2.5, 1e-3]))
+    known = forgotten(specimen(*FAMILIES[family](rng), c=c, seed=seed))
+    found = recover(known.matrix)
+    assert found.status == "certified", found.reason
+    assert triangle_set(found.triangles) == triangle_set(known.triangles)
+    assert found.scale == pytest.approx(c, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("family", ["ring", "polygon", "scattered", "adaptive"])
+def test_easy_families(family, seed):
+    known = _member(family, seed, -2.5)
+    found = recover(known.matrix)
+    assert found.status == "certified", found.reason
+    for label in range(found.n_components):
+        rows = found.component == label
+        assert largest_error(found.points[rows], known.points[rows]) <= 1e-9
+
+
+@pytest.mark.parametrize(("name", "n"), [("tree", 200), ("dodecahedron", 20), ("random_grid", 60)])
+def test_hopeless_matrices_are_given_up_soon(name, n, monkeypatch):
+    """Counted in readings, since times depend on the machine."""
+    count = 0
+    original = Reading.of.__func__
+
+    def counted(cls, *arguments):
+        nonlocal count
+        count += 1
+        return original(cls, *arguments)
+
+    monkeypatch.setattr(Reading, "of", classmethod(counted))
+    try:
+        status = recover(HOPELESS[name](n, 0)).status
+    except RecoveryError:
+        status = "refused"
+    assert status in ("uncertified", "refused")
+    assert 0 < count <= 220
+
+
+def test_known_scale_is_part_of_the_search():
+    known = forgotten(specimen(*squares(holes(6, 5, (2, 2, 1, 1))), c=0.3))
+    assert recover(known.matrix, scale=0.3).status == "certified"
+    try:
+        status = recover(known.matrix, scale=0.6).status
+    except RecoveryError:
+        status = "refused"
+    assert status != "certified"
+
+
+def test_small_pieces_have_the_same_conformal_map():
+    known = specimen(*random_mesh(36, holes=False), c=-7.0)
+    upper = forgotten(known).matrix.tocoo()
+    above = upper.row < upper.col
+    order = np.lexsort((upper.col[above], upper.row[above]))
+    edges = np.column_stack([upper.row[above], upper.col[above]])[order].astype(np.int64)
+    weights = -upper.data[above][order]
+    (piece,) = recognise(known.matrix.shape[0], edges).pieces
+    small, sparse = small_map(piece, weights[piece.edge_rows]), conformal_map(piece, weights[piece.edge_rows])
+    assert small.scale == pytest.approx(-7.0, rel=1e-12)
+    assert sparse.scale == pytest.approx(-7.0, rel=1e-12)
+    points = small.z.view(np.float64).reshape(-1, 2)
+    assert largest_error(points, known.points[piece.vertices]) <= 1e-9
+    assert small_map(piece, np.zeros(len(piece.edges))) is None
