@@ -11,7 +11,11 @@ from .cells import Alternative
 from .certify import CERTIFIED, CONFIDENCE, LARGEST_NOISE, Certificate
 from .evidence import Evidence
 from .matrix import OperatorMatrix
+from .planar.hinges import groups
 from .topology import Topology
+
+_SAME_SCALE = 1e-6
+_SCALE_ERROR = 1e5  # relative error of c in small pieces, over that of the entries, at most
 
 
 def passes(certificate: Certificate, chi_square: Mapping[str, float] | None, scale: NDArray) -> bool:
@@ -44,6 +48,9 @@ def verdict(
         Stages that did not converge.
     """
     good = passes(certificate, chi_square, scale)
+    apart = _discord(topology, certificate, scale) if good else None
+    if apart:
+        return "uncertified", apart
     if chi_square and _tested(certificate, chi_square, scale):
         return ("certified" if good else "uncertified"), _with_noise(
             chi_square, certificate, topology, evidence, scale, notes
@@ -52,6 +59,24 @@ def verdict(
     if good and not evidence.certain:
         return "certified", f"the operator re-assembled on this mesh gives the matrix back to {error:.1e}"
     return "uncertified", _misfit(topology, certificate, matrix, evidence, notes)
+
+
+def _discord(topology: Topology, certificate: Certificate, scale: NDArray) -> str | None:
+    """What is wrong where pieces share vertices but not c: each by itself, small ones fit nearly anything."""
+    if not len(topology.hinges):
+        return None
+    label = groups(topology)
+    first = np.unique(label, return_index=True)[1][np.unique(label, return_inverse=True)[1]]
+    difference = np.abs(scale / scale[first] - 1)
+    worst = int(difference.argmax())
+    if difference[worst] <= max(_SAME_SCALE, _SCALE_ERROR * certificate.backward_error):
+        return None
+    a, b = int(first[worst]), worst
+    return (
+        f"the matrix is given back to {certificate.backward_error:.1e}, but by pieces with different factors c that "
+        f"share vertices: {scale[a]:.6g} in piece {a}, of row {topology.pieces[a].vertices.min()}, and {scale[b]:.6g} in "
+        f"piece {b}, of row {topology.pieces[b].vertices.min()}"
+    )
 
 
 def _misfit(

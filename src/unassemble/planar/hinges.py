@@ -39,7 +39,7 @@ def join(topology: Topology, positions: list[NDArray], known: NDArray | None = N
         return positions
     n = len(positions)
     known = np.zeros(n, dtype=np.int64) if known is None else known
-    held = _held(_groups(topology), known)
+    held = _held(groups(topology), known)
     positions = _matching_images(topology, positions, held)
     joined, _ = _joined(topology, positions, held)
     # Once more from there: turns and shifts of small pieces in a large mesh differ in size by many digits.
@@ -57,7 +57,7 @@ def free_images(topology: Topology, joined: list[NDArray]) -> NDArray[np.int64]:
     """
     if _rings(topology) <= 0 or len(joined) > _MOST_IMAGES:
         return np.empty(0, dtype=np.int64)
-    held = _held(_groups(topology), np.zeros(len(joined), dtype=np.int64))
+    held = _held(groups(topology), np.zeros(len(joined), dtype=np.int64))
     shared = [np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces]
     free = []
     for piece in np.flatnonzero(~held & (np.array(shared) > 1)):
@@ -72,7 +72,7 @@ def gap(topology: Topology, positions: list[NDArray]) -> float:
     """How far apart the pieces stay at shared vertices when they are joined, relative to the largest piece."""
     if not len(topology.hinges):
         return 0.0
-    held = _held(_groups(topology), np.zeros(len(positions), dtype=np.int64))
+    held = _held(groups(topology), np.zeros(len(positions), dtype=np.int64))
     return _joined(topology, _matching_images(topology, positions, held), held)[1]
 
 
@@ -103,7 +103,7 @@ def _matching_images(topology: Topology, positions: list[NDArray], held: NDArray
 def _rings(topology: Topology) -> int:
     """Independent rings of pieces."""
     shared = sum(np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces)
-    return int(shared) - len(topology.hinges) - (len(topology.pieces) - len(np.unique(_groups(topology))))
+    return int(shared) - len(topology.hinges) - (len(topology.pieces) - len(np.unique(groups(topology))))
 
 
 def _joined(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> tuple[list[NDArray], float]:
@@ -133,8 +133,8 @@ def _held(group: NDArray, known: NDArray) -> NDArray[np.bool_]:
     return held
 
 
-def _groups(topology: Topology) -> NDArray:
-    """Label of each piece: those joined by hinges share one."""
+def groups(topology: Topology) -> NDArray[np.int64]:
+    """(number of pieces,) label: pieces joined by hinges share one."""
     n = len(topology.pieces)
     piece = np.repeat(np.arange(n), [p.n_vertices for p in topology.pieces])
     vertex = np.concatenate([p.vertices for p in topology.pieces])
