@@ -74,8 +74,8 @@ def _discord(topology: Topology, certificate: Certificate, scale: NDArray) -> st
     a, b = int(first[worst]), worst
     return (
         f"the matrix is given back to {certificate.backward_error:.1e}, but by pieces with different factors c that "
-        f"share vertices: {scale[a]:.6g} in piece {a}, of row {topology.pieces[a].vertices.min()}, and {scale[b]:.6g} in "
-        f"piece {b}, of row {topology.pieces[b].vertices.min()}"
+        f"share vertices: {scale[a]:.6g} in piece {a}, of row {topology.pieces[a].vertices.min()}, and "
+        f"{scale[b]:.6g} in piece {b}, of row {topology.pieces[b].vertices.min()}"
     )
 
 
