@@ -14,6 +14,7 @@ from assembled import (
     with_identity,
     with_penalty,
 )  # fmt: skip
+from supported import with_zeros
 
 from unassemble.elasticity import recover_elasticity
 from unassemble.elasticity.unknowns import find_numbering, given_numbering
@@ -90,7 +91,7 @@ def test_numbering(kind, order):
         "nodes at random": (rng.permutation(n)[:, None] * d + np.arange(d)).ravel(),
         "rows at random": rng.permutation(n * d),
     }[order]
-    matrix = _full_blocks(given.matrix, d)[rows][:, rows]
+    matrix = with_zeros(given.matrix, d, "stored")[rows][:, rows]
     found = find_numbering(matrix)
     assert found.block_size == d
     pairs = np.unique(np.column_stack([found.node_of_row, rows // d]), axis=0)
@@ -183,13 +184,3 @@ def test_matrix_that_is_not_elasticity():
     noise = sp.random_array((60, 60), density=0.1, rng=rng)
     with pytest.raises(RecoveryError):
         recover_elasticity(sp.csr_array(noise + noise.T + 10 * sp.eye_array(60)))
-
-
-def _full_blocks(matrix, d):
-    """Store the zeros that assembly produced, as most codes do."""
-    blocks = matrix.tobsr((d, d))
-    n = matrix.shape[0] // d
-    node = np.repeat(np.arange(n), np.diff(blocks.indptr))
-    row = (node[:, None, None] * d + np.arange(d)[None, :, None]) + np.zeros((1, 1, d), int)
-    column = (blocks.indices[:, None, None] * d + np.arange(d)[None, None, :]) + np.zeros((1, d, 1), int)
-    return sp.csr_array((blocks.data.ravel(), (row.ravel(), column.ravel())), shape=matrix.shape)

@@ -56,7 +56,7 @@ class OpenCorners:
         leaving = whole.successor[arriving]
         crossed = [_Wedges.of(whole, *pair.T) for pair in (arriving, leaving)]
         possible = np.column_stack([wedges.open for wedges in crossed])
-        wedges = _Wedges.joined([drawn, *crossed]).chosen()
+        wedges = _Wedges.concatenated([drawn, *crossed]).chosen()
         rank = np.empty(len(whole.order), dtype=np.int64)
         rank[whole.order] = np.arange(len(rank))
         turned = np.arange(len(wedges.apex)) >= len(half)
@@ -71,7 +71,7 @@ class OpenCorners:
                 drawn=number[arriving],
                 crossed=np.where(possible, columns, -1),
                 faces=whole.face[arriving],
-                rank=rank[arriving[:, 0]] if len(arriving) else np.empty(0, np.int64),
+                rank=rank[arriving[:, 0]],
                 far=np.stack([whole.tail[arriving], whole.head[leaving]], axis=-1),
             ),
         )
@@ -99,7 +99,7 @@ class _Wedges:
         return cls(np.column_stack([one, other]), apex, far, apart & ~joined(whole.n_vertices, whole.edges, *far.T))
 
     @classmethod
-    def joined(cls, parts: list[_Wedges]) -> _Wedges:
+    def concatenated(cls, parts: list[_Wedges]) -> _Wedges:
         """One after the other."""
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__dataclass_fields__))
 
