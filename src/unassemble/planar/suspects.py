@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import fdtrc
 
 from ..topology import Piece
 from .cotangent import edge_weights
@@ -88,13 +89,11 @@ def find_suspects(
 
 def _log_probability(entries: int, chosen: int, left: float, freedom: int) -> float:
     """By an F test, times the number of ways to choose (Bonferroni)."""
-    from scipy.stats import f
-
     if not chosen:
         return 0.0
     with np.errstate(divide="ignore"):
         ratio = np.float64((1 - left) / chosen) / np.float64(left / (freedom - chosen))
-    return min(0.0, chosen * np.log(entries) + float(f.logsf(ratio, chosen, freedom - chosen)))
+        return min(0.0, chosen * np.log(entries) + float(np.log(fdtrc(chosen, freedom - chosen, ratio))))
 
 
 def _forward(misfit: NDArray, columns: NDArray, freedom: int) -> tuple[list[int], float]:
