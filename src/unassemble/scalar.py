@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import certify as certificates
-from .cells import AGREE, Alternative, OrientedMesh, alternatives
+from .cells import AGREE, Alternative, OrientedMesh, alternatives, other_readings
 from .clock import Clock
 from .evidence import pooled_noise, weigh
 from .joined import JoinedMesh
@@ -97,9 +97,9 @@ def recover_scalar(
     trouble = [note for m in meshes for note in m.notes]
     status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble)
     others: list[Alternative] = []
-    if status == "certified" and len(topology.vanished) > (topology.polygons.size - 3).sum():
+    if status == "certified" and topology.method == "the numbers":
         with clock("ambiguity"):
-            others = _alternatives(topology, stored, placement, mesh, stretch, noise, scale_known=scale is not None)
+            others = _alternatives(topology, stored, placement, mesh, stretch, noise, known)
         if others:
             status, reason = ambiguous(others, certificate)
     worst, misfits = certificate.worst(10 if status == "uncertified" else 0, noise=noise, first=evidence.suspects)
@@ -141,8 +141,7 @@ def _alternatives(
     mesh: JoinedMesh,
     stretch: float,
     noise: float | None,
-    *,
-    scale_known: bool,
+    known: float | None,
 ) -> list[Alternative]:
     """Other meshes that fit, in the frame in which the operator is the Laplacian."""
     z = mesh.points @ [1, 1j]
@@ -155,7 +154,10 @@ def _alternatives(
     )
     smallest = stretch * float(np.abs(mesh.scale).min())
     agree = AGREE if noise is None else max(AGREE, _SIGMAS * noise / smallest)
-    return alternatives(stored, topology, oriented, scale_known=scale_known, agree=agree)
+    others: list[Alternative] = []
+    if len(topology.vanished) > (topology.polygons.size - 3).sum():
+        others = alternatives(stored, topology, oriented, scale_known=known is not None, agree=agree)
+    return others or other_readings(stored, topology, oriented, stretch * mesh.scale[mesh.component], known)
 
 
 def _place(topology: Topology, placement: Placement, meshes: list[PieceMesh]) -> tuple[list[NDArray], list[str]]:

@@ -154,3 +154,26 @@ def test_noise_leaves_twins_in_doubt():
     found = recover(sp.coo_array((np.r_[value, value], ends), shape=known.matrix.shape), noise=1e-6)
     assert found.status == "uncertified"
     assert found.alternatives
+
+
+def permuted_laplacian(graph, seed):
+    matrix = sp.csr_array(networkx.laplacian_matrix(graph).astype(float))
+    order = np.random.default_rng(seed).permutation(len(graph))
+    return sp.csr_array(matrix[order][:, order])
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "graph", [networkx.octahedral_graph(), networkx.grid_2d_graph(3, 3)], ids=["octahedron", "nine rows"]
+)
+def test_symmetric_graphs_whose_cells_and_holes_may_change_places(graph, seed):
+    found = recover(permuted_laplacian(graph, seed))
+    assert found.status == "uncertified"
+    assert found.alternatives
+    assert "so does another" in found.reason
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_long_paths_are_not_certified(seed):
+    found = recover(permuted_laplacian(networkx.path_graph(150), seed))
+    assert found.status == "uncertified"

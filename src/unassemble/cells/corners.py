@@ -24,6 +24,8 @@ class Alternative:
         Cells that only the one or the other has.
     same_scale : bool
         Whether both have the same factor c; otherwise a known c decides.
+    tested : bool
+        Whether the other was solved and fits; otherwise there are as many entries as unknowns, and it should.
     """
 
     around: tuple[int, ...]
@@ -32,6 +34,7 @@ class Alternative:
     cells: tuple[tuple[int, ...], ...]
     other_cells: tuple[tuple[int, ...], ...]
     same_scale: bool = True
+    tested: bool = True
 
 
 @dataclass(frozen=True, eq=False)

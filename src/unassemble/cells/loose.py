@@ -10,6 +10,7 @@ of them fits with a c of its own, and two right angles in a zigzag fit as one ce
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain, islice, pairwise
 
 import numpy as np
@@ -27,6 +28,7 @@ from .hubs import Hub
 
 _WORK = 4e5  # vertices times trials
 _MOST_TRIALS = 60
+_SURE = 40  # triangles; the map of long strips of right triangles loses too many digits
 _FITS = 1e-6
 _OPTIONS = ConformalOptions(max_factorisations=4)
 
@@ -40,6 +42,8 @@ def other_reading(
     stored: OperatorMatrix, triangles: NDArray, corners: Corners, hubs: list[Hub], fits: float = _FITS
 ) -> Alternative | None:
     """Other cells for a loose piece that fit with a factor c of their own; found by trying.
+
+    Where not all can be tried, or the piece is too large to be solved well, the first stands for them, untested.
 
     Parameters
     ----------
@@ -56,7 +60,8 @@ def other_reading(
     """
     trials = int(np.clip(_WORK / max(len(triangles), 1), 2, _MOST_TRIALS))
     whole = np.sort(triangles, axis=1)
-    for alternative in islice(chain(_orders(hubs), _folds(corners)), trials):
+    others = list(islice(chain(_orders(hubs), _folds(corners)), trials + 1))
+    for alternative in others[:trials]:
         gone = {tuple(c) for c in alternative.cells}
         near = np.flatnonzero(np.isin(whole, list(alternative.around)).any(axis=1))
         kept = np.delete(triangles, [k for k in near if tuple(whole[k].tolist()) in gone], axis=0)
@@ -64,7 +69,8 @@ def other_reading(
         added = np.array(fans, dtype=np.int64).reshape(-1, 3)
         if _fit(stored, np.concatenate([kept, added]), alternative.around, fits):
             return alternative
-    return None
+    doubtful = len(others) > trials or (others and len(triangles) > _SURE)
+    return replace(others[0], tested=False) if doubtful else None
 
 
 def _orders(hubs: list[Hub]) -> Iterator[Alternative]:

@@ -15,19 +15,24 @@ from .status import CommandLine
 __all__ = ["main"]
 
 
-@click.group(cls=CommandLine, context_settings={"help_option_names": ["-h", "--help"]})
+# A backspace keeps click from running the lines together.
+_HELP = """Turn a sparse matrix back into the mesh it was assembled on.
+
+\b
+Exit status:
+  0    recovered and certified
+  1    internal error
+  2    bad usage, or a file that cannot be read as a matrix
+  3    a mesh was written, but is not certified
+  4    no mesh can be recovered, or the format cannot hold it; nothing written
+  130  interrupted; nothing written
+"""
+
+
+@click.group(cls=CommandLine, context_settings={"help_option_names": ["-h", "--help"]}, help=_HELP)
 @click.version_option(__version__, prog_name="unassemble")
 def main() -> None:
-    r"""Turn a sparse matrix back into the mesh it was assembled on.
-
-    \b
-    Exit status:
-      0  recovered and certified
-      1  internal error
-      2  bad usage, or a file that cannot be read as a matrix
-      3  a mesh was written, but is not certified
-      4  no mesh can be recovered, or the format cannot hold it; nothing written
-    """
+    """All commands."""
 
 
 main.add_command(recover)

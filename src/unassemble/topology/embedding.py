@@ -49,6 +49,8 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
     edges : (e, 2) int64
         Pairs i < j in lexicographic order; at least one.
     """
+    if n >= 3 and len(edges) > 3 * n - 6:  # not planar, and may have very many cycles
+        return
     cycles = short_faces(n, edges)
     seen: list[FaceComplex] = []
     for drawing in _drawings(n, edges, cycles):

@@ -1,0 +1,81 @@
+"""Small graphs read again with their vertices in another order.
+
+Which reading of several that fit is found first depends on the order. This finds by trying what no rule foresees:
+symmetric graphs whose cells and holes may change places, small pieces that hang together by vertices.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..matrix import OperatorMatrix
+from ..topology import Numbering, Topology, components
+from .corners import Alternative, OrientedMesh
+from .reading import Reading
+from .search import read_cells
+
+_MOST_VERTICES = 60
+_ORDERS = 5
+_SAME_SCALE = 1e-6
+
+
+def other_readings(
+    stored: OperatorMatrix, topology: Topology, mesh: OrientedMesh, factors: NDArray, scale: float | None
+) -> list[Alternative]:
+    """Readings of small components that fit, but have other cells; at most one for each.
+
+    Parameters
+    ----------
+    stored : OperatorMatrix
+        Without the vanished entries.
+    topology : Topology
+        Of the mesh that was found.
+    mesh : OrientedMesh
+    factors : (n,) float64
+        c of the piece of each row.
+    scale : float, optional
+        c, where it is known.
+    """
+    if topology.method != "the numbers":
+        return []
+    found = {*map(_cell, mesh.triangles.tolist()), *_polygons(mesh.polygons.offsets, mesh.polygons.vertices)}
+    rng = np.random.default_rng(0)
+    others = []
+    for part in components(stored.n, stored.edges):
+        if len(part.vertices) > _MOST_VERTICES:
+            continue
+        own = {cell for cell in found if cell[0] in set(part.vertices.tolist())}
+        for _ in range(_ORDERS):
+            shuffled = part.then(_shuffled(part, rng))
+            weights = -stored.entries[shuffled.edge_rows]
+            reading = read_cells(len(shuffled.vertices), shuffled.edges, weights, scale)
+            if reading is not None and reading.fits and (cells := _cells(reading, shuffled)) != own:
+                gone, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
+                c = next(solved.scale for solved in reading.meshes if solved)
+                same = abs(c / factors[part.vertices[0]] - 1) < _SAME_SCALE
+                others.append(Alternative((), (), (), gone, new, same_scale=same))
+                break
+    return others
+
+
+def _shuffled(part: Numbering, rng: np.random.Generator) -> Numbering:
+    """The same graph with its vertices in random order."""
+    order = rng.permutation(len(part.vertices))
+    number = np.argsort(order)
+    edges = np.sort(number[part.edges], axis=1)
+    rows = np.lexsort(edges.T[::-1])
+    return Numbering(order, rows, edges[rows])
+
+
+def _cells(reading: Reading, numbering: Numbering) -> set[tuple[int, ...]]:
+    chosen = reading.candidates.cells.chosen(reading.labels, numbering.vertices)
+    return _polygons(chosen.offsets, chosen.vertices)
+
+
+def _polygons(offsets: NDArray, vertices: NDArray) -> set[tuple[int, ...]]:
+    return {_cell(cell.tolist()) for cell in np.split(vertices, offsets[1:-1]) if len(cell)}
+
+
+def _cell(vertices: list[int]) -> tuple[int, ...]:
+    return tuple(sorted(vertices))
