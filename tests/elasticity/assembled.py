@@ -62,7 +62,9 @@ def box(kind: str, counts, *, perturb: float = 0.0, seed: int = 0, grading: floa
 
 
 def stiffness(kind: str, mesh, *, lam=1.0, mu=1.0, form=None, intorder=None, quadrature=None) -> Assembled:
-    """Assemble; lam and mu are numbers or functions of the position, `quadrature` points and weights of a rule.
+    """Assemble; lam and mu are numbers, (m, 1) numbers of each cell, or functions of the position.
+
+    A quadrature is given as its points and weights.
 
     Hexahedra of 27 nodes get three points in each direction, as in most codes, where scikit-fem would take seven.
     """
