@@ -2,10 +2,11 @@
 
 Run ``python benchmarks/elasticity.py``; options ``--sizes 10 15 31`` (vertices per edge of the cube), ``--kinds
 tet-p1 hex-q1``, ``--peers cells plain block true recovered``, ``--folder F`` (keeps the matrices there for the next
-run). Each case is a cube clamped and eliminated on one face, inner vertices moved at random, homogeneous material,
-assembled by scikit-fem with as many quadrature points as the element needs. The peer is PyAMG's smoothed aggregation
-with conjugate gradients to 1e-8 on the same matrix: with its defaults on the scalar matrix, with the block size, and
-with true and recovered rigid-body modes. ``cells`` is the recovery once more, with elements.
+run), ``--materials one cells`` (homogeneous; both Lame coefficients of each cell at random between 1 and 5). Each
+case is a cube clamped and eliminated on one face, inner vertices moved at random, assembled by scikit-fem with as many
+quadrature points as the element needs. The peer is PyAMG's smoothed aggregation with conjugate gradients to 1e-8 on the
+same matrix: with its defaults on the scalar matrix, with the block size, and with true and recovered rigid-body modes.
+``cells`` is the recovery once more, with elements.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import json
 import subprocess
 import sys
 import tempfile
+from itertools import product
 from pathlib import Path
 from time import perf_counter
 
@@ -22,12 +24,15 @@ import numpy as np
 import scipy.sparse as sp
 
 
-def assemble(kind: str, size: int, path: Path) -> None:
+def assemble(kind: str, size: int, material: str, path: Path) -> None:
     """Write matrix and true points of a clamped cube."""
     sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "elasticity"))
     from assembled import box, eliminated, on_plane, stiffness
 
-    case = stiffness(kind, box(kind, (size,) * 3, perturb=0.2), intorder={"tet-p1": 1, "hex-q1": 3}.get(kind))
+    mesh = box(kind, (size,) * 3, perturb=0.2)
+    cells = mesh.t.shape[1]
+    lam, mu = np.random.default_rng(1).uniform(1, 5, (2, cells, 1)) if material == "cells" else (1.0, 1.0)
+    case = stiffness(kind, mesh, lam=lam, mu=mu, intorder={"tet-p1": 1, "hex-q1": 3}.get(kind))
     matrix, nodes = eliminated(case, np.repeat(on_plane(case, 0)[:, None], 3, axis=1))
     np.savez(path, data=matrix.data, indices=matrix.indices, indptr=matrix.indptr, points=case.points[nodes])
 
@@ -93,6 +98,7 @@ def main() -> None:
     parser.add_argument("--sizes", nargs="+", type=int, default=[10, 15, 22, 31])
     parser.add_argument("--kinds", nargs="+", default=["tet-p1", "hex-q1"])
     parser.add_argument("--peers", nargs="+", default=["cells", "plain", "block", "true", "recovered"])
+    parser.add_argument("--materials", nargs="+", default=["one"], choices=["one", "cells"])
     parser.add_argument("--folder", type=Path)
     parser.add_argument("--assemble", action="store_true", help="only fill the folder")
     parser.add_argument("--one", nargs="+")
@@ -105,20 +111,19 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         folder = chosen.folder or Path(temporary)
         folder.mkdir(exist_ok=True)
-        for kind in chosen.kinds:
-            for size in chosen.sizes:
-                path = folder / f"{kind}-{size}.npz"
-                if not path.exists():
-                    assemble(kind, size, path)
-                if not chosen.assemble:
-                    print(line(kind, path, chosen.peers), flush=True)
+        for kind, size, material in product(chosen.kinds, chosen.sizes, chosen.materials):
+            path = folder / f"{kind}-{size}{'' if material == 'one' else '-' + material}.npz"
+            if not path.exists():
+                assemble(kind, size, material, path)
+            if not chosen.assemble:
+                print(line(f"{kind} {material}", path, chosen.peers), flush=True)
 
 
 def line(kind: str, path: Path, peers: list[str]) -> str:
     """Measure one case and put it into words."""
     mine = in_process("--one", "recover", str(path))
     text = (
-        f"{kind} {mine['nodes']:7d} nodes: coordinates {mine['seconds']:6.2f} s {mine['memory']:6.0f} MiB, "
+        f"{kind:12} {mine['nodes']:7d} nodes: coordinates {mine['seconds']:6.2f} s {mine['memory']:6.0f} MiB, "
         f"error {mine['error']:.0e}, {mine['status']}"
     )
     for name in peers:

@@ -61,13 +61,16 @@ def box(kind: str, counts, *, perturb: float = 0.0, seed: int = 0, grading: floa
     return mesh_type(p, mesh.t)
 
 
-def stiffness(kind: str, mesh, *, lam=1.0, mu=1.0, form=None, intorder=None) -> Assembled:
-    """Assemble; lam and mu are numbers or functions of the position.
+def stiffness(kind: str, mesh, *, lam=1.0, mu=1.0, form=None, intorder=None, quadrature=None) -> Assembled:
+    """Assemble; lam and mu are numbers, (m, 1) numbers of each cell, or functions of the position.
+
+    A quadrature is given as its points and weights.
 
     Hexahedra of 27 nodes get three points in each direction, as in most codes, where scikit-fem would take seven.
     """
     intorder = intorder or {"hex-q2": 5}.get(kind)
-    basis = skfem.Basis(mesh, skfem.ElementVector(ELEMENTS[kind][1]()), intorder=intorder)
+    element = skfem.ElementVector(ELEMENTS[kind][1]())
+    basis = skfem.Basis(mesh, element, intorder=intorder, quadrature=quadrature)
 
     @skfem.BilinearForm
     def isotropic(u, v, w):

@@ -16,6 +16,10 @@ from .planes import with_planes
 from .results import Evidence
 from .shape import EXACT, Shape, in_gauge, shape
 
+# Nodes of a body whose best fit, where none is exact, one factorisation finds. Charts are no help there: each fits in
+# its own way, and where two of them meet the joined field has a kink that costs far more than the misfit itself.
+_WHOLE = {2: 250_000, 3: 30_000}
+
 
 @dataclass(frozen=True, eq=False)
 class Solution:
@@ -70,6 +74,8 @@ def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
     failure: GeometryError | None = None
     for strict in (True, False):
         valid = valid_pairs(nodal, strict=strict)
+        if best is not None and np.array_equal(valid, best.valid):
+            break
         found = None
         try:
             found = _positions(nodal, valid, patch)
@@ -132,8 +138,17 @@ def _positions(nodal: NodalMatrix, valid: NDArray[np.bool_], patch: int | None, 
     for piece in range(n_pieces):
         body = np.flatnonzero(component == piece)
         found = null_fields(nodal, valid, body, patch=patch, ratio=ratio)
+        if found.charts > 1 and not _settled(found):
+            if len(body) <= _WHOLE[nodal.dim]:
+                found = null_fields(nodal, valid, body, patch=len(body), ratio=ratio)
+            else:
+                warnings.append(
+                    f"piece {piece} with node {body[0]} is too large for the best fit by one factorisation; the "
+                    "points are those of smaller parts, joined, whose distances may be far from right"
+                )
         try:
-            one = shape(found.fields, found.values)
+            told = np.asarray(valid.reshape(nodal.n, -1)[found.nodes].any(axis=1))
+            one = shape(found.fields, found.values, graph[found.nodes][:, found.nodes], told)
         except GeometryError as error:
             failure = failure or error
             warnings.append(f"piece {piece} with node {body[0]}: {error}")
@@ -148,6 +163,12 @@ def _positions(nodal: NodalMatrix, valid: NDArray[np.bool_], patch: int | None, 
         raise failure or GeometryError("no row annihilates constants: no node has a valid equation")
     component = np.where(determined(points), component, -1)
     return Solution(valid, component, points, tuple(evidence), tuple(freedoms), all(exact), tuple(warnings), ratio)
+
+
+def _settled(found: NullFields) -> bool:
+    """Whether more than translations satisfies the identities exactly, and not all fields that were looked for."""
+    d = found.fields.shape[1]
+    return len(found.values) > d and bool(found.values[d] <= EXACT < found.values[-1])
 
 
 def _pieces(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:

@@ -162,6 +162,8 @@ def _about_cells(found: Cells) -> list[str]:
 _FREEDOMS = {
     "axes": "each axis keeps a scale of its own",
     "affine": "an affine map stays free, since the material around every valid row is homogeneous",
+    "hourglass": "fields that no quadrature point sees, as hourglass modes of reduced integration, may be added in "
+    "each direction; the points are the smoothest that fit",
 }
 
 
@@ -172,10 +174,11 @@ def _verdict(
     if remaining:
         return "uncertified", f"the null space is larger than it should be: {remaining[0]}"
     if not solution.exact:
-        worst = max(one.residual for one in solution.evidence)
+        worst = max(solution.evidence, key=lambda one: one.residual)
         return "uncertified", (
-            f"no exact null vector exists (singular value {worst:.1e}); the points are the best fit, as for materials "
-            "that are not isotropic, or elements that do not reproduce linear functions"
+            f"no exact null vector exists (singular value {worst.residual:.1e}, that of the next field "
+            f"{worst.gap:.1e}); the points are the best fit, as for materials that are not isotropic, or elements that "
+            "do not reproduce linear functions"
         )
     if not solution.strict:
         return "uncertified", (

@@ -22,7 +22,7 @@ class Evidence:
     ----------
     null_dimension : int
         Independent fields that satisfy all valid identities, nodes that stay loose left out. 4 in space, 3 in the
-        plane: translations and scale.
+        plane: translations and scale. One less where no field but translations is exact.
     residual : float
         Singular value of the coordinates: norm of the residual over the norm of the centred field.
     gap : float

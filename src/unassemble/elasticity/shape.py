@@ -26,8 +26,8 @@ class Shape:
     loose : (n,) bool
         Nodes that can move while the others stay.
     dimension : int
-        Of the null space, translations counted, loose nodes left out.
-    freedom : {"", "axes", "affine"}
+        Of the null space, translations counted, loose nodes left out; that of the translations where no field is exact.
+    freedom : {"", "axes", "affine", "hourglass"}
         What remains beyond translation and scale.
     exact : bool
         Whether the field is a null field, not only the best one.
@@ -40,7 +40,9 @@ class Shape:
     exact: bool
 
 
-def shape(fields: NDArray[np.float64], values: NDArray[np.float64]) -> Shape:
+def shape(
+    fields: NDArray[np.float64], values: NDArray[np.float64], graph: sp.csr_array, told: NDArray[np.bool_]
+) -> Shape:
     """Find the coordinates among the least singular fields.
 
     Parameters
@@ -49,6 +51,10 @@ def shape(fields: NDArray[np.float64], values: NDArray[np.float64]) -> Shape:
         Orthonormal.
     values : (k,) float64
         Increasing singular values.
+    graph : (n, n) sparse
+        Which nodes are coupled.
+    told : (n,) bool
+        Nodes with a valid row of their own; supports do not leave these loose.
 
     Raises
     ------
@@ -62,12 +68,14 @@ def shape(fields: NDArray[np.float64], values: NDArray[np.float64]) -> Shape:
     null = fields[..., values <= EXACT] if exact else fields[..., : d + 1]
     loose = np.zeros(n, dtype=bool)
     if null.shape[2] > d + 1:
-        null, loose = _set_aside(null)
+        shared, apart = _set_aside(null)
+        if 2 * np.count_nonzero(told & apart) <= np.count_nonzero(apart):
+            null, loose = shared, apart
     kept = null[~loose]
     moving = _without_translations(kept)
-    dimension = d + moving.shape[2]
+    dimension = d + moving.shape[2] if exact else d
     points = np.full((n, d), np.nan)
-    points[~loose], freedom = _choose(moving)
+    points[~loose], freedom = _choose(moving, graph[~loose][:, ~loose])
     return Shape(points, loose, dimension, freedom, bool(exact))
 
 
@@ -105,7 +113,7 @@ def _without_translations(fields: NDArray) -> NDArray:
     return u[:, s > 1e-6].reshape(n, d, -1)
 
 
-def _choose(moving: NDArray) -> tuple[NDArray, str]:
+def _choose(moving: NDArray, graph: sp.csr_array) -> tuple[NDArray, str]:
     """The coordinates, or a representative and the name of what remains free."""
     _, d, k = moving.shape
     if k == 1:
@@ -118,10 +126,33 @@ def _choose(moving: NDArray) -> tuple[NDArray, str]:
         return np.stack([u[:, 0] for u, _, _ in single], axis=1) / np.sqrt(d), "axes"
     if k == d * d and ranks == [d] * d:
         return single[0][0][:, :d] / np.sqrt(d), "affine"
+    if _of_one_direction(moving):
+        return _smoothest(moving, graph), "hourglass"
     raise GeometryError(
         f"the valid rows leave a null space of dimension {d + k} where {d + 1} is expected: too many unknowns are "
         "eliminated for the matrix to determine the nodes"
     )
+
+
+def _of_one_direction(moving: NDArray) -> bool:
+    """Whether in each direction some of the fields move nodes in that direction only.
+
+    A scalar field h that every block of the matrix maps to zero gives such fields, one in each direction: where no
+    quadrature point sees its gradient, it is an hourglass mode.
+    """
+    _, d, k = moving.shape
+    for a in range(d):
+        others = np.delete(moving, a, axis=1).reshape(-1, k)
+        if scipy.linalg.svd(others, compute_uv=False)[-1] > _LOOSE:
+            return False
+    return True
+
+
+def _smoothest(moving: NDArray, graph: sp.csr_array) -> NDArray:
+    """Of the fields of norm one that whose differences along edges are least: hourglass modes alternate."""
+    pairs = sp.triu(graph, 1).tocoo()
+    steps = (moving[pairs.row] - moving[pairs.col]).reshape(-1, moving.shape[2])
+    return moving @ scipy.linalg.eigh(steps.T @ steps)[1][:, 0]
 
 
 def in_gauge(points: NDArray, graph: sp.csr_array) -> NDArray[np.float64]:
