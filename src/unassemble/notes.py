@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numpy.typing import NDArray
 
+from .matrix import OperatorMatrix
 from .topology import Topology
+
+_SUM = 1e-10  # sum of a row, relative to its entries, that is rounding
+_MANY = 0.7  # share of rows; more would be a mass matrix that was added, or no Laplacian at all
 
 
 def topology_notes(topology: Topology) -> list[str]:
@@ -48,6 +53,23 @@ def vanished_notes(topology: Topology) -> list[str]:
         count = len(topology.vanished) - diagonals
         notes.append(f"{count} boundary edges, which face right angles, have no entry in the matrix")
     return notes
+
+
+def elimination_notes(matrix: OperatorMatrix) -> list[str]:
+    """What row sums say of unknowns that were taken out, where no mesh fits."""
+    size = np.abs(matrix.diagonal)
+    sums = matrix.diagonal.copy()
+    for end in matrix.edges.T:
+        sums += np.bincount(end, matrix.entries, matrix.n)
+        size += np.bincount(end, np.abs(matrix.entries), matrix.n)
+    rest = np.flatnonzero(np.abs(sums) > _SUM * size)
+    if not 0 < len(rest) < _MANY * matrix.n:
+        return []
+    return [
+        f"all rows add up to zero but for {len(rest)}: {_some(rest)}; unknowns next to these seem to have been "
+        "eliminated, on a boundary for one, and entries still contain triangles whose vertices are gone: keep all rows "
+        "and columns"
+    ]
 
 
 def _some(rows: NDArray, count: int = 8) -> str:

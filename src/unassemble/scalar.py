@@ -12,7 +12,7 @@ from .evidence import pooled_noise, weigh
 from .joined import JoinedMesh
 from .linalg import AnalysisAhead, factorisation
 from .matrix import OperatorMatrix
-from .notes import image_notes, topology_notes, vanished_notes
+from .notes import elimination_notes, image_notes, topology_notes, vanished_notes
 from .placement import Placement
 from .planar.deviations import coordinate_covariances
 from .planar.hinges import free_images, join
@@ -105,6 +105,8 @@ def recover_scalar(
     worst, misfits = certificate.worst(10 if status == "uncertified" else 0, noise=noise, first=evidence.suspects)
     if chi_square and evidence.noise is not None and evidence.noise < 0.5 * chi_square["sigma"]:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
+    if status == "uncertified" and not others and not chi_square:
+        notes += elimination_notes(stored)
     polygons = Polygons.none() if triangulate else mesh.polygons
     return Recovery(
         points=mesh.points,

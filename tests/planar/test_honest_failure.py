@@ -152,3 +152,15 @@ def test_noise_is_tested():
     deviations = recover(noisy, noise=sigma, standard_deviations=True).standard_deviations
     assert np.isfinite(deviations).all()
     assert (deviations > 0).all()
+
+
+def test_eliminated_boundary_is_suspected():
+    """The interior of a Dirichlet problem: entries next to the boundary contain triangles that are gone."""
+    points, triangles = random_mesh(300, seed=1, holes=False)
+    known = specimen(points, triangles, c=2.0)
+    found = recover(known.matrix)
+    inside = np.setdiff1d(np.arange(len(points)), found.boundary)
+    taken = recover(known.matrix[inside][:, inside])
+    assert taken.status == "uncertified"
+    assert any("seem to have been eliminated" in note for note in taken.warnings)
+    assert not any("eliminated" in note for note in found.warnings)

@@ -37,15 +37,14 @@ def other_readings(
     scale : float, optional
         c, where it is known.
     """
-    if topology.method != "the numbers":
-        return []
-    found = {*map(_cell, mesh.triangles.tolist()), *_polygons(mesh.polygons.offsets, mesh.polygons.vertices)}
     rng = np.random.default_rng(0)
     others = []
-    for part in components(stored.n, stored.edges):
-        if len(part.vertices) > _MOST_VERTICES:
-            continue
-        own = {cell for cell in found if cell[0] in set(part.vertices.tolist())}
+    small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= _MOST_VERTICES]
+    for part in small if topology.method == "the numbers" else []:
+        inside = np.isin(mesh.triangles[:, 0], part.vertices)
+        chosen = np.isin(mesh.polygons.vertices[mesh.polygons.offsets[:-1]], part.vertices)
+        polygons = mesh.polygons.chosen(chosen, np.arange(stored.n))
+        own = {*map(_cell, mesh.triangles[inside].tolist()), *_polygons(polygons.offsets, polygons.vertices)}
         for _ in range(_ORDERS):
             shuffled = part.then(_shuffled(part, rng))
             weights = -stored.entries[shuffled.edge_rows]

@@ -33,6 +33,8 @@ _STEEPEST = 1e12  # weight in units of the scale, beyond that of any triangle in
 
 _log = logging.getLogger(__name__)
 
+_MOST, _AGREE = 0.7, 1e-10  # if the values of c of that share of the triangles agree like this, that is c
+
 _FARTHEST = 1e-6
 """Least ratio of a scale to its estimate, or of the estimate to it."""
 
@@ -82,6 +84,14 @@ class ConformalMap:
     converged: bool
 
 
+def _likely_scale(piece: Piece, weights: NDArray, unit: float) -> float | None:
+    """A value of c that is probably right to all digits: that of most triangles, as on structured grids, or 1."""
+    size = _scales_of_triangles(piece, weights / unit)
+    if len(size) and np.quantile(np.abs(size - 1), _MOST) < _AGREE:
+        return unit
+    return 1.0 if abs(1 / unit - 1) < 0.3 else None
+
+
 def estimate_scale(piece: Piece, weights: NDArray) -> float:
     """A guess of c, right to some ten per cent on meshes of decent triangles.
 
@@ -97,12 +107,17 @@ def estimate_scale(piece: Piece, weights: NDArray) -> float:
     if not sign:
         raise GeometryError("the off-diagonal entries add up to zero, those of a Laplacian cannot")
     largest = float(np.abs(weights).max())  # taken out, so that no square overflows
-    share = weights / largest / np.where(piece.facing[:, 1] >= 0, 2, 1)
+    sizes = _scales_of_triangles(piece, weights / largest)
+    size = np.median(sizes) if len(sizes) else np.sqrt(3) * np.abs(weights / largest).mean()
+    return float(sign * size * largest)
+
+
+def _scales_of_triangles(piece: Piece, weights: NDArray) -> NDArray[np.float64]:
+    """|c| by each triangle of which the three shares belong to a triangle at all."""
+    share = weights / np.where(piece.facing[:, 1] >= 0, 2, 1)
     a, b, c = share[piece.opposite].T
     form = a * b + b * c + c * a
-    form = form[form > 0]
-    size = 2 * np.sqrt(np.median(form)) if len(form) else np.sqrt(3) * np.abs(weights / largest).mean()
-    return float(sign * size * largest)
+    return np.asarray(2 * np.sqrt(form[form > 0]))
 
 
 def conformal_map(
@@ -122,7 +137,8 @@ def conformal_map(
     weights : (e,) float64
         -A_ij = c w_ij of each edge.
     scale : float, optional
-        c, where it is known. Otherwise c = 1 is tried first if the estimate allows it.
+        c, where it is known. Otherwise an estimate in which most triangles agree is tried first, or c = 1 if the
+        estimate allows it.
     sharp : bool
         Go on until z, not only c, has converged. A polish does not need that.
     analyse : callable
@@ -152,8 +168,8 @@ def conformal_map(
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     search = ShiftedSearch(ConformalPencil(piece, relative), analyse, options.krylov_steps)
     z = _smooth_start(piece)
-    known = scale if scale is not None else 1.0
-    if scale is not None or abs(known / unit - 1) < 0.3:
+    known = scale if scale is not None else _likely_scale(piece, weights, unit)
+    if known is not None:
         z, c, _ = search.at(known / unit * (1 - options.margin), z, steps=2)
         # The quotient is stationary, and accurate to some hundred roundings at any size.
         if scale is not None or abs(c * unit / known - 1) < 1e-13:
