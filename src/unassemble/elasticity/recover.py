@@ -162,8 +162,9 @@ def _about_cells(found: Cells) -> list[str]:
 _FREEDOMS = {
     "axes": "each axis keeps a scale of its own",
     "affine": "an affine map stays free, since the material around every valid row is homogeneous",
-    "hourglass": "fields that no quadrature point sees, as hourglass modes of reduced integration, may be added in "
-    "each direction; the points are the smoothest that fit",
+    "hourglass": "fields that move points in one direction only may be added in each: hourglass modes of reduced "
+    "integration, or smooth ones where a homogeneous body is held on its whole boundary; the points are the smoothest "
+    "that fit",
 }
 
 
