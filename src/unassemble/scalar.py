@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import certify as certificates
-from .cells import AGREE, Alternative, OrientedMesh, alternatives, other_readings
+from .cells import AGREE, Alternative, OrientedMesh, alternatives
 from .clock import Clock
 from .evidence import pooled_noise, weigh
 from .joined import JoinedMesh
@@ -156,10 +156,8 @@ def _alternatives(
     )
     smallest = stretch * float(np.abs(mesh.scale).min())
     agree = AGREE if noise is None else max(AGREE, _SIGMAS * noise / smallest)
-    others: list[Alternative] = []
-    if len(topology.vanished) > (topology.polygons.size - 3).sum():
-        others = alternatives(stored, topology, oriented, scale_known=known is not None, agree=agree)
-    return others or other_readings(stored, topology, oriented, stretch * mesh.scale[mesh.component], known)
+    factors = stretch * mesh.scale[mesh.component]
+    return alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
 
 
 def _place(topology: Topology, placement: Placement, meshes: list[PieceMesh]) -> tuple[list[NDArray], list[str]]:

@@ -6,7 +6,6 @@ Where entries vanish the graph alone does not tell: see the page on theory in th
 from .ambiguity import AGREE, alternatives
 from .completion import Attempt, Outcome, completed, guessed, in_doubt
 from .corners import Alternative, OrientedMesh
-from .rereading import other_readings
 from .search import read_cells
 
 __all__ = [
@@ -19,6 +18,5 @@ __all__ = [
     "completed",
     "guessed",
     "in_doubt",
-    "other_readings",
     "read_cells",
 ]

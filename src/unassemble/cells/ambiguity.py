@@ -7,6 +7,7 @@ far sides have vanished from the boundary.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
 from ..topology import Topology
@@ -14,6 +15,7 @@ from .corners import Alternative, Corners, OrientedMesh
 from .flips import turned_over
 from .hubs import Hub, hubs, rearranged
 from .loose import is_loose, other_reading
+from .rereading import other_readings
 from .twins import twins
 
 AGREE = 1e-9
@@ -21,9 +23,17 @@ AGREE = 1e-9
 
 
 def alternatives(
-    stored: OperatorMatrix, topology: Topology, mesh: OrientedMesh, *, scale_known: bool, agree: float = AGREE
+    stored: OperatorMatrix,
+    topology: Topology,
+    mesh: OrientedMesh,
+    factors: NDArray,
+    *,
+    scale: float | None,
+    agree: float = AGREE,
 ) -> list[Alternative]:
     """Other meshes that fit as well as the one found: the places where they differ, each by itself.
+
+    Where the rules find none, small graphs are read again in other orders.
 
     Parameters
     ----------
@@ -32,10 +42,21 @@ def alternatives(
     topology : Topology
         Of the mesh that was found.
     mesh : OrientedMesh
-    scale_known : bool
-        Otherwise a mesh with another c is as good.
+    factors : (n,) float64
+        c of the piece of each row.
+    scale : float, optional
+        c, where it is known; otherwise a mesh with another c is as good.
     agree : float
     """
+    found: list[Alternative] = []
+    if len(topology.vanished) > (topology.polygons.size - 3).sum():  # not on diagonals only
+        found = _by_rules(stored, topology, mesh, scale_known=scale is not None, agree=agree)
+    return found or other_readings(stored, mesh, factors, scale)
+
+
+def _by_rules(
+    stored: OperatorMatrix, topology: Topology, mesh: OrientedMesh, *, scale_known: bool, agree: float
+) -> list[Alternative]:
     corners = Corners.of(stored.n, stored.edges, mesh)
     around = list(hubs(corners, mesh.z))
     found = twins(stored, mesh, agree)

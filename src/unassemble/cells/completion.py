@@ -51,8 +51,7 @@ def in_doubt(matrix: OperatorMatrix, topology: Topology, attempt: Attempt) -> ND
     A misfit that is small and spread evenly, at the latest after a short polish, is that of errors in the entries, and
     raises no doubt. Pieces of components that are in doubt without it are not solved.
     """
-    bare = topology.bare_edges
-    doubtful = _components_of(matrix, bare[matrix.entries[bare] != 0])
+    doubtful = _unexplained(matrix, topology)
     solved = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
     rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
     misfit = _misfits(matrix, solved)[rest]
@@ -150,8 +149,7 @@ def guessed(matrix: OperatorMatrix, topology: Topology) -> tuple[OperatorMatrix,
 
     Parameters and results are those of :func:`completed`, without positions.
     """
-    bare = topology.bare_edges
-    doubtful = _components_of(matrix, bare[matrix.entries[bare] != 0])
+    doubtful = _unexplained(matrix, topology)
     unsolved = GeometryError("not solved")
     kept: Solved = [(piece, unsolved) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
     parts = [_Part(kept, np.empty((0, 2), np.int64), Polygons.none())]
@@ -172,6 +170,12 @@ def _misfits(matrix: OperatorMatrix, solved: Solved) -> NDArray[np.float64]:
         -matrix.entries,
         [(piece, mesh) for piece, mesh in solved if isinstance(mesh, PieceMesh)],
     )
+
+
+def _unexplained(matrix: OperatorMatrix, topology: Topology) -> NDArray[np.bool_]:
+    """(n,) rows of components with nonzero entries on no triangle."""
+    bare = topology.bare_edges
+    return _components_of(matrix, bare[matrix.entries[bare] != 0])
 
 
 def _components_of(matrix: OperatorMatrix, rows: NDArray) -> NDArray[np.bool_]:

@@ -22,6 +22,7 @@ from ..matrix.operator import row_sizes
 from ..planar.cautious import count_flipped
 from ..planar.conformal import ConformalOptions, conformal_map
 from ..planar.cotangent import edge_weights
+from ..topology.keys import with_sides
 from ..topology.recognise import planar_pieces
 from .corners import Alternative, Corners, cell
 from .hubs import Hub
@@ -103,14 +104,10 @@ def _fit(stored: OperatorMatrix, triangles: NDArray, around: tuple[int, ...], mo
     rows, corner = np.unique(triangles, return_inverse=True)
     n, triangles = len(rows), corner.reshape(-1, 3)
     inside = np.isin(stored.edges, rows).all(axis=1)
-    given = np.searchsorted(rows, stored.edges[inside]) @ [n, 1]
-    sides = triangles[:, [[1, 2], [2, 0], [0, 1]]]
-    key = sides.min(axis=2) * n + sides.max(axis=2)
-    union = np.union1d(given, key)
-    edges = np.column_stack([union // n, union % n])
-    weights = np.zeros(len(union))
-    weights[np.searchsorted(union, given)] = -stored.entries[inside]
-    pieces = planar_pieces(n, edges, triangles, np.searchsorted(union, key))
+    edges, given, opposite = with_sides(n, np.searchsorted(rows, stored.edges[inside]), triangles)
+    weights = np.zeros(len(edges))
+    weights[given] = -stored.entries[inside]
+    pieces = planar_pieces(n, edges, triangles, opposite)
     if not pieces or len(pieces) > 1 or pieces[0].n_vertices < n or len(pieces[0].edges) < len(edges):
         return False
     piece = pieces[0]

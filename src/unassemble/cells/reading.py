@@ -15,7 +15,7 @@ from ..planar.cotangent import edge_weights
 from ..planar.hinges import gap
 from ..planar.piece import PieceMesh
 from ..topology import Piece, Topology
-from ..topology.keys import contains, distinct, pair_keys
+from ..topology.keys import contains, pair_keys, with_sides
 from ..topology.recognise import planar_pieces
 from .candidates import Candidates
 from .small import SMALL, small_map
@@ -61,13 +61,10 @@ class Reading:
         """Triangulate the cells, without positions."""
         n = candidates.n_vertices
         triangles = triangulation(candidates, labels)
-        key = _keys(n, triangles)
-        given = candidates.edges[:, 0] * n + candidates.edges[:, 1]
-        union = distinct(np.concatenate([given, key.ravel()]))
-        edges = np.column_stack([union // n, union % n])
-        weights = np.zeros(len(union))
-        weights[np.searchsorted(union, given)] = candidates.weights
-        pieces = planar_pieces(n, edges, triangles, np.searchsorted(union, key)) or ()
+        edges, given, opposite = with_sides(n, candidates.edges, triangles)
+        weights = np.zeros(len(edges))
+        weights[given] = candidates.weights
+        pieces = planar_pieces(n, edges, triangles, opposite) or ()
         return cls(candidates, labels, edges, weights, pieces, (None,) * len(pieces), misfits(n, edges, weights, []))
 
     @classmethod

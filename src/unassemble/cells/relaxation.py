@@ -25,6 +25,7 @@ from ..planar.cotangent import corner_gradients
 from ..planar.krylov import ShiftedSearch
 from ..planar.normal import distant_pair
 from ..planar.pencil import ConformalPencil
+from ..topology.keys import with_sides
 from .evidence import LONGEST
 from .reading import Reading, fans_of
 
@@ -70,16 +71,13 @@ class Relaxation:
         self._chosen = (candidates.size <= LONGEST) & ~candidates.outer
         self._triangles, self._cell = fans_of(candidates, self._chosen)
         tails, heads = self._triangles[:, [1, 2, 0]], self._triangles[:, [2, 0, 1]]
-        key = np.minimum(tails, heads) * n + np.maximum(tails, heads)
-        given = candidates.edges[:, 0] * n + candidates.edges[:, 1]
-        keys = np.union1d(given, key)
-        self._graph = _Graph(n, np.column_stack([keys // n, keys % n]))
-        self._row = np.searchsorted(keys, key)  # (m, 3) edge that faces each corner
+        edges, given, self._row = with_sides(n, candidates.edges, self._triangles)
+        self._graph = _Graph(n, edges)
         self._sense = np.where(tails < heads, 1.0, -1.0)
         solved = [(piece, mesh) for piece, mesh in zip(start.pieces, start.meshes, strict=True) if mesh]
         self._unit = candidates.scale or max(solved, key=lambda item: item[0].n_vertices)[1].scale
-        self._weights = np.zeros(len(keys))  # in these units
-        self._weights[np.searchsorted(keys, given)] = candidates.weights / self._unit
+        self._weights = np.zeros(len(edges))  # in these units
+        self._weights[given] = candidates.weights / self._unit
 
     def labels(self) -> NDArray[np.bool_]:
         """Labels that are compatible and cover every edge, after all rounds.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
-from ..topology import Numbering, Topology, components
+from ..topology import Numbering, components
 from .corners import Alternative, OrientedMesh
 from .reading import Reading
 from .search import read_cells
@@ -21,30 +21,16 @@ _SAME_SCALE = 1e-6
 
 
 def other_readings(
-    stored: OperatorMatrix, topology: Topology, mesh: OrientedMesh, factors: NDArray, scale: float | None
+    stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, scale: float | None
 ) -> list[Alternative]:
     """Readings of small components that fit, but have other cells; at most one for each.
 
-    Parameters
-    ----------
-    stored : OperatorMatrix
-        Without the vanished entries.
-    topology : Topology
-        Of the mesh that was found.
-    mesh : OrientedMesh
-    factors : (n,) float64
-        c of the piece of each row.
-    scale : float, optional
-        c, where it is known.
+    Parameters are those of :func:`unassemble.cells.ambiguity.alternatives`.
     """
     rng = np.random.default_rng(0)
     others = []
     small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= _MOST_VERTICES]
-    for part in small if topology.method == "the numbers" else []:
-        inside = np.isin(mesh.triangles[:, 0], part.vertices)
-        chosen = np.isin(mesh.polygons.vertices[mesh.polygons.offsets[:-1]], part.vertices)
-        polygons = mesh.polygons.chosen(chosen, np.arange(stored.n))
-        own = {*map(_cell, mesh.triangles[inside].tolist()), *_polygons(polygons.offsets, polygons.vertices)}
+    for part, own in zip(small, _own_cells(stored.n, small, mesh), strict=True):
         for _ in range(_ORDERS):
             shuffled = part.then(_shuffled(part, rng))
             weights = -stored.entries[shuffled.edge_rows]
@@ -56,6 +42,20 @@ def other_readings(
                 others.append(Alternative((), (), (), gone, new, same_scale=same))
                 break
     return others
+
+
+def _own_cells(n: int, parts: list[Numbering], mesh: OrientedMesh) -> list[set[tuple[int, ...]]]:
+    """The cells of each part of the graph."""
+    label = np.full(n, -1)
+    for k, part in enumerate(parts):
+        label[part.vertices] = k
+    triangles = mesh.triangles[label[mesh.triangles[:, 0]] >= 0]
+    first = mesh.polygons.vertices[mesh.polygons.offsets[:-1]]
+    polygons = mesh.polygons.chosen(label[first] >= 0, np.arange(n))
+    own: list[set[tuple[int, ...]]] = [set() for _ in parts]
+    for cell in (*map(_cell, triangles.tolist()), *_polygons(polygons.offsets, polygons.vertices)):
+        own[label[cell[0]]].add(cell)
+    return own
 
 
 def _shuffled(part: Numbering, rng: np.random.Generator) -> Numbering:

@@ -84,10 +84,9 @@ class ConformalMap:
     converged: bool
 
 
-def _likely_scale(piece: Piece, weights: NDArray, unit: float) -> float | None:
+def _likely_scale(unit: float, *, agreed: bool) -> float | None:
     """A value of c that is probably right to all digits: that of most triangles, as on structured grids, or 1."""
-    size = _scales_of_triangles(piece, weights / unit)
-    if len(size) and np.quantile(np.abs(size - 1), _MOST) < _AGREE:
+    if agreed:
         return unit
     return 1.0 if abs(1 / unit - 1) < 0.3 else None
 
@@ -103,13 +102,21 @@ def estimate_scale(piece: Piece, weights: NDArray) -> float:
     GeometryError
         If the weights add up to zero.
     """
+    return _estimate(piece, weights)[0]
+
+
+def _estimate(piece: Piece, weights: NDArray) -> tuple[float, bool]:
+    """The guess, and whether most triangles agree in it to nearly all digits."""
     sign = np.sign(weights.sum())
     if not sign:
         raise GeometryError("the off-diagonal entries add up to zero, those of a Laplacian cannot")
     largest = float(np.abs(weights).max())  # taken out, so that no square overflows
     sizes = _scales_of_triangles(piece, weights / largest)
-    size = np.median(sizes) if len(sizes) else np.sqrt(3) * np.abs(weights / largest).mean()
-    return float(sign * size * largest)
+    if not len(sizes):
+        return float(sign * np.sqrt(3) * np.abs(weights / largest).mean() * largest), False
+    size = np.median(sizes)
+    agreed = np.quantile(np.abs(sizes / size - 1), _MOST) < _AGREE
+    return float(sign * size * largest), bool(agreed)
 
 
 def _scales_of_triangles(piece: Piece, weights: NDArray) -> NDArray[np.float64]:
@@ -151,7 +158,7 @@ def conformal_map(
         If no map of positive area is found.
     """
     options = options or ConformalOptions()
-    unit = estimate_scale(piece, weights)
+    unit, agreed = _estimate(piece, weights)
     with np.errstate(over="ignore"):
         relative = weights / unit if unit else np.full_like(weights, np.inf)
     if not np.abs(relative).max() < _STEEPEST or (
@@ -168,7 +175,7 @@ def conformal_map(
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     search = ShiftedSearch(ConformalPencil(piece, relative), analyse, options.krylov_steps)
     z = _smooth_start(piece)
-    known = scale if scale is not None else _likely_scale(piece, weights, unit)
+    known = scale if scale is not None else _likely_scale(unit, agreed=agreed)
     if known is not None:
         z, c, _ = search.at(known / unit * (1 - options.margin), z, steps=2)
         # The quotient is stationary, and accurate to some hundred roundings at any size.

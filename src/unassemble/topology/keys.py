@@ -27,3 +27,28 @@ def contains(values: NDArray, wanted: NDArray) -> NDArray[np.bool_]:
 def pair_keys(n: int, a: NDArray, b: NDArray) -> NDArray[np.int64]:
     """i n + j for each pair {a, b} = {i, j} of vertices, i < j: sorted like edges in lexicographic order."""
     return np.minimum(a, b) * n + np.maximum(a, b)
+
+
+def with_sides(n: int, edges: NDArray, triangles: NDArray) -> tuple[NDArray[np.int64], NDArray, NDArray]:
+    """Edges of a graph and of triangles together.
+
+    Parameters
+    ----------
+    n : int
+    edges : (e, 2) int64
+        Pairs i < j in lexicographic order.
+    triangles : (m, 3) int64
+
+    Returns
+    -------
+    edges : (e', 2) int64
+        In the same order.
+    given : (e,) int64
+        Rows of the given ones.
+    opposite : (m, 3) int64
+        Rows of those that face the corners.
+    """
+    known = edges[:, 0] * n + edges[:, 1]
+    sides = pair_keys(n, triangles[:, [1, 2, 0]], triangles[:, [2, 0, 1]])
+    keys = distinct(np.concatenate([known, sides.ravel()]))
+    return np.column_stack([keys // n, keys % n]), np.searchsorted(keys, known), np.searchsorted(keys, sides)
