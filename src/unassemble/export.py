@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from .errors import FormatError
 from .files import check_target, whole_file
 from .formats import MeshFormat, format_of
+from .structures.layouts import layout_named
 
 if TYPE_CHECKING:
     import meshio
@@ -41,7 +42,7 @@ def check_output(path: str | os.PathLike[str]) -> None:
 def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
     """Write a recovered mesh, whole or not at all; the extension names the format.
 
-    ``.npz`` holds ``points``, cells (``triangles``, ``quads``, ``tetrahedra``, ``hexahedra``, ``mid_nodes``,
+    ``.npz`` holds ``points``, cells (``triangles``, ``quads``, ``tetrahedra``, ``hexahedra``, ``mid_nodes``, ``lines``,
     ``polygons_offsets`` and ``polygons_data``), ``component``, ``hinges``, ``scale``, ``node_status`` and, of
     vector-valued matrices, ``node_of_row`` and ``direction_of_row``.
     Other formats are those of meshio (:mod:`unassemble.formats`); of these ``.vtu`` holds polygons, the others get
@@ -72,7 +73,7 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
 def arrays(recovery: Recovery) -> dict[str, Any]:
     """What the ``.npz`` holds, by key; what there is nothing of has no key."""
     content: dict[str, Any] = {"points": recovery.points}
-    for name in ("triangles", "quads", "tetrahedra", "hexahedra", "mid_nodes"):
+    for name in ("triangles", "quads", "tetrahedra", "hexahedra", "mid_nodes", "lines"):
         if getattr(recovery, name).size:
             content[name] = getattr(recovery, name)
     if recovery.n_polygons:
@@ -89,9 +90,9 @@ def to_meshio(recovery: Recovery) -> meshio.Mesh:
 
     Point data, all scalar: ``row`` of the matrix, ``component``, ``boundary`` (1 on the outside of the mesh, else 0),
     and where present ``node_status``, ``standard_deviation_x`` and ``standard_deviation_y``. Of vector-valued
-    matrices there are ``row_x``, ``row_y`` and ``row_z`` instead of ``row``, with -1 for unknowns that the matrix
-    lacks. Nodes without cells are cells of kind ``vertex``, so that they show. Undivided cells are blocks of kind
-    ``polygon``, one for each number of vertices.
+    matrices there are ``row_x``, ``row_y``, ``row_z``, and of rotations ``row_rx``, ``row_ry``, ``row_rz``, instead of
+    ``row``, with -1 for unknowns that the matrix lacks. Nodes without cells are cells of kind ``vertex``, so that they
+    show. Undivided cells are blocks of kind ``polygon``, one for each number of vertices.
     """
     return _mesh(recovery, 3, _point_data(recovery), polygons=True)
 
@@ -143,7 +144,9 @@ def _rows(recovery: Recovery) -> dict[str, NDArray]:
         return {"row": np.arange(recovery.n_points)}
     rows = np.full((direction.max() + 1, recovery.n_points), -1)
     rows[direction, node] = np.arange(len(node))
-    return {f"row_{name}": row for name, row in zip("xyz", rows, strict=False)}
+    layout = layout_named(recovery.operator)
+    names = "xyz" if layout is None else layout.names
+    return {f"row_{name}": row for name, row in zip(names, rows, strict=False)}
 
 
 def _boundary_flag(recovery: Recovery) -> NDArray[np.int64]:
@@ -153,7 +156,7 @@ def _boundary_flag(recovery: Recovery) -> NDArray[np.int64]:
         from .elasticity.surface import outer_nodes
 
         for kind, cells in recovery.cells.items():
-            flag[outer_nodes(kind, cells)] = 1
+            flag[cells if kind == "line" else outer_nodes(kind, cells)] = 1
     return flag
 
 

@@ -19,6 +19,7 @@ _HALFWAY = frozenset({"triangle6", "quad8", "tetra10", "hexahedron20"})
 _QUADRATIC = _HALFWAY | {"quad9", "hexahedron27"}
 _EVERY = _ALL | _QUADRATIC
 _TRIANGLES = frozenset({"triangle"})
+_LINES = frozenset({"line"})
 
 
 @dataclass(frozen=True)
@@ -69,13 +70,13 @@ _NOT_COMPRESSED = "meshio writes it without compressing: write {} and compress t
 
 # XML inside the one file: heavy data in a side file could not be renamed into place together with it.
 # (meshio imports h5py even then.)
-_XDMF = MeshFormat("xdmf", cells=_EVERY, undetermined=True, options={"data_format": "XML"}, needs="h5py")
-_EXODUS = MeshFormat("exodus", cells=_EVERY, dimension=2, undetermined=True, needs="netCDF4")
+_XDMF = MeshFormat("xdmf", cells=_EVERY | _LINES, undetermined=True, options={"data_format": "XML"}, needs="h5py")
+_EXODUS = MeshFormat("exodus", cells=_EVERY | _LINES, dimension=2, undetermined=True, needs="netCDF4")
 # Eleven significant digits are what the sixteen columns of a field hold at any sign and exponent.
-_NASTRAN = MeshFormat("nastran", cells=_ALL | _HALFWAY | {"quad9"}, data="none", digits=11)
+_NASTRAN = MeshFormat("nastran", cells=_ALL | _HALFWAY | _LINES | {"quad9"}, data="none", digits=11)
 # meshio turns the nodes of quadratic cells when it writes this one, and not when it reads.
-_PERMAS = MeshFormat("permas", data="none")
-_NETGEN = MeshFormat("netgen", cells=_ALL | _HALFWAY, data="none")
+_PERMAS = MeshFormat("permas", cells=_ALL | _LINES, data="none")
+_NETGEN = MeshFormat("netgen", cells=_ALL | _HALFWAY | _LINES, data="none")
 _TECPLOT = MeshFormat("tecplot", dimension=2, cells=_CELLS)
 _TETGEN = MeshFormat("tetgen", cannot=_TWO_FILES)
 _UGRID = MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True)
@@ -83,7 +84,7 @@ _UGRID_SINGLE = MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True
 
 FORMATS: Mapping[str, MeshFormat] = {
     ".npz": MeshFormat("", dimension=2, undetermined=True),
-    ".avs": MeshFormat("avsucd"),
+    ".avs": MeshFormat("avsucd", cells=_ALL | _LINES),
     ".bdf": _NASTRAN,
     ".cgns": MeshFormat("cgns", cells=frozenset({"tetra"}), data="none", needs="h5py"),
     ".dat": _TECPLOT,
@@ -96,18 +97,18 @@ FORMATS: Mapping[str, MeshFormat] = {
     ".f3grid": MeshFormat("flac3d", cells=_SOLID, data="none"),
     ".fem": _NASTRAN,
     ".h5m": MeshFormat("h5m", cells=frozenset({"triangle", "tetra"}), undetermined=True, needs="h5py"),
-    ".hmf": MeshFormat("hmf", cells=_EVERY, undetermined=True, needs="h5py"),
-    ".inp": MeshFormat("abaqus", cells=_CELLS | _HALFWAY | {"quad9"}, data="none"),
-    ".mdpa": MeshFormat("mdpa", cells=_EVERY, data="none"),
-    ".med": MeshFormat("med", cells=_ALL | _HALFWAY, dimension=2, undetermined=True, needs="h5py"),
-    ".mesh": MeshFormat("medit", dimension=2, cells=_CELLS, data="boundary"),
-    ".meshb": MeshFormat("medit", dimension=2, cells=_CELLS, data="boundary", undetermined=True),
+    ".hmf": MeshFormat("hmf", cells=_EVERY | _LINES, undetermined=True, needs="h5py"),
+    ".inp": MeshFormat("abaqus", cells=_CELLS | _HALFWAY | _LINES | {"quad9"}, data="none"),
+    ".mdpa": MeshFormat("mdpa", cells=_EVERY | _LINES, data="none"),
+    ".med": MeshFormat("med", cells=_ALL | _HALFWAY | _LINES, dimension=2, undetermined=True, needs="h5py"),
+    ".mesh": MeshFormat("medit", dimension=2, cells=_CELLS | _LINES, data="boundary"),
+    ".meshb": MeshFormat("medit", dimension=2, cells=_CELLS | _LINES, data="boundary", undetermined=True),
     ".msh": MeshFormat("gmsh", cells=_EVERY, undetermined=True),  # Gmsh, not ANSYS, which shares the extension
     ".nas": _NASTRAN,
     ".node": _TETGEN,
     ".obj": MeshFormat("obj", cells=_FLAT, data="none"),
     ".off": MeshFormat("off", cells=_TRIANGLES, data="none"),
-    ".ply": MeshFormat("ply", cells=_FLAT | {"vertex"}, undetermined=True),
+    ".ply": MeshFormat("ply", cells=_FLAT | _LINES | {"vertex"}, undetermined=True),
     ".post": _PERMAS,
     ".post.gz": MeshFormat("permas", cannot=_NOT_COMPRESSED.format(".post")),
     ".stl": MeshFormat("stl", cells=_TRIANGLES, data="none", keeps_rows=False),
@@ -127,8 +128,8 @@ FORMATS: Mapping[str, MeshFormat] = {
     **{f".{kind}.ugrid": _UGRID_SINGLE for kind in ("b4", "lb4", "r4", "lr4")},
     ".vol": _NETGEN,
     ".vol.gz": _NETGEN,
-    ".vtk": MeshFormat("vtk", cells=_EVERY, undetermined=True),
-    ".vtu": MeshFormat("vtu", cells=_EVERY, polygons=True, undetermined=True),
+    ".vtk": MeshFormat("vtk", cells=_EVERY | _LINES, undetermined=True),
+    ".vtu": MeshFormat("vtu", cells=_EVERY | _LINES, polygons=True, undetermined=True),
     ".wkt": MeshFormat("wkt", cells=_TRIANGLES, data="none", keeps_rows=False),
     ".xdmf": _XDMF,
     ".xml": MeshFormat("dolfin-xml", dimension=2, cells=frozenset({"triangle", "tetra"}), data="none"),

@@ -60,6 +60,8 @@ class Inspection:
         How its unknowns stand; empty for a scalar matrix.
     coupled : bool
         Whether its directions are coupled.
+    structure : str
+        Kind of structure whose nodes have rotations too; empty for others.
     n_polygons : int
         Cells of more than three vertices, whose diagonals have no entry.
     n_vanished_sides : int
@@ -95,6 +97,7 @@ class Inspection:
     n_nodes: int = 0
     numbering: str = ""
     coupled: bool = True
+    structure: str = ""
     n_polygons: int = 0
     n_vanished_sides: int = 0
     cells_from: str = ""
@@ -102,6 +105,8 @@ class Inspection:
     @property
     def operator(self) -> str:
         """The operator that the matrix likely belongs to, or why none."""
+        if self.structure:
+            return f"{self.structure}: displacements and rotations, {self.block_size} unknowns per node"
         if self.n_nodes:
             kind = "elasticity, if the material is isotropic" if self.coupled else "laplacian in each direction"
             return f"vector-valued, {self.block_size} components, {self.numbering}: {kind}"
@@ -114,6 +119,8 @@ class Inspection:
     @property
     def recoverable(self) -> str:
         """What :func:`unassemble.recover` can make of the matrix."""
+        if self.structure:
+            return f"coordinates of {count_of(self.n_nodes, 'node')} in true size, up to position; members and cells"
         if self.n_nodes and self.coupled:
             return (
                 f"coordinates of {count_of(self.n_nodes, 'node')} in {self.block_size}D, up to position and size, and "

@@ -55,8 +55,16 @@ def no_mesh(obstacle: str, planar: bool, witness: tuple[tuple[int, int], ...]) -
 def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]:
     """Of a vector-valued matrix."""
     from .elasticity.nodal import nodal_matrix, uncoupled
+    from .structures import StructuralNumbering
 
     found = vector.numbering
+    if isinstance(found, StructuralNumbering):
+        return {
+            "block_size": found.block_size,
+            "n_nodes": found.n_nodes,
+            "numbering": found.kind,
+            "structure": found.layout.name,
+        }
     words = {"pattern": "in an order found by the pattern"}
     return {
         "block_size": found.block_size,

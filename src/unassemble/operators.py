@@ -7,15 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import InputError, RecoveryError
+from .errors import GeometryError, InputError, RecoveryError
 from .matrix import OperatorMatrix
 
 if TYPE_CHECKING:
     from .elasticity import Numbering
+    from .structures import StructuralNumbering
 
 OPERATORS = ("auto", "laplacian", "elasticity")
 NUMBERINGS = ("interleaved", "by component")
 _ANNIHILATED = 0.05  # share of rows and directions that annihilate constants; in scalar matrices there are none
+_TURNING = 6  # unknowns of a node that has rotations, in space
 _COMMON = 0.8  # how far the rows of a node couple to the same nodes
 
 
@@ -25,12 +27,13 @@ class VectorReading:
 
     Attributes
     ----------
-    numbering : Numbering
+    numbering : Numbering or StructuralNumbering
+        Of solids, or of frames, shells and plates, whose nodes have rotations too.
     why : str
         What speaks for it; empty where the caller asked for it.
     """
 
-    numbering: Numbering
+    numbering: Numbering | StructuralNumbering
     why: str
 
 
@@ -51,19 +54,28 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
         If no numbering makes rows annihilate translations.
     """
     from .elasticity.unknowns import find_numbering, given_numbering, regular_numbering
+    from .structures import find_structure, given_structure
 
     whole = matrix.csr()
-    if numbering is None:
-        return VectorReading(find_numbering(whole, block_size), "")
-    if isinstance(numbering, str):
-        if numbering not in NUMBERINGS:
+    if numbering is None or isinstance(numbering, str):
+        if numbering not in (None, *NUMBERINGS):
             raise InputError(f"the numbering is {' or '.join(map(repr, NUMBERINGS))}, not {numbering!r}")
-        return VectorReading(regular_numbering(whole, numbering, block_size), "")
+        structure = find_structure(whole, numbering, block_size)
+        if structure is not None:
+            return VectorReading(structure, "")
+        if block_size == _TURNING:
+            raise GeometryError(
+                "with 6 unknowns per node, three displacements and three rotations, no row annihilates translations"
+            )
+        solid = (
+            find_numbering(whole, block_size) if numbering is None else regular_numbering(whole, numbering, block_size)
+        )
+        return VectorReading(solid, "")
     try:
         node, direction = numbering
     except (TypeError, ValueError) as error:
         raise InputError("a numbering is two arrays: the node and the direction of each row") from error
-    found = given_numbering(whole, node, direction)
+    found = given_structure(whole, node, direction) or given_numbering(whole, node, direction)
     if block_size not in (None, found.block_size):
         raise InputError(f"the numbering has {found.block_size} directions, and the block size is {block_size}")
     return VectorReading(found, "")
@@ -78,8 +90,15 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
     if not crowded and not _twins_interleaved(matrix):
         return None
     from .elasticity.unknowns import numbering_at_sight
+    from .structures import find_structure
 
-    found = numbering_at_sight(matrix.csr())
+    whole = matrix.csr()
+    structure = find_structure(whole) if crowded else None
+    if structure is not None:
+        return VectorReading(
+            structure, f"the graph has more edges than a planar one can have, and {_evidence(structure)}"
+        )
+    found = numbering_at_sight(whole)
     if found is None or found.share < _ANNIHILATED or found.common < _COMMON:
         return None
     graph = "the graph has more edges than a planar one can have" if crowded else "no even row is coupled to an odd one"
@@ -90,10 +109,14 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     """Read a matrix as vector-valued after it turned out not to be a planar mesh; None where little speaks for it."""
     from .elasticity.sampling import promising
     from .elasticity.unknowns import find_numbering
+    from .structures import find_structure
 
     if not matrix.diagonal.all():  # every unknown of an elastic body has a stiffness
         return None
     whole = matrix.csr()
+    structure = find_structure(whole)
+    if structure is not None:
+        return VectorReading(structure, f"it is no planar mesh, and {_evidence(structure)}")
     try:
         found = find_numbering(whole) if promising(whole, (3, 2)) else None
     except RecoveryError:
@@ -116,7 +139,7 @@ def refuse(**options: Any) -> None:
                              "vector-valued: leave it out, or choose the operator 'laplacian'")  # fmt: skip
 
 
-def _evidence(found: Numbering) -> str:
+def _evidence(found: Numbering | StructuralNumbering) -> str:
     order = {"pattern": "in no regular order"}.get(found.kind, found.kind)
     return (
         f"its rows form {found.n_nodes} nodes with {found.block_size} unknowns each, {order}, whose sums by direction "

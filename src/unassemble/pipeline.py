@@ -45,7 +45,8 @@ def recover(
     Scalar: A = c L + D, where L is the stiffness matrix of the Laplacian with linear elements on triangles in the
     plane and natural boundary conditions, c any nonzero number and D any diagonal matrix, both unknown.
     Vector-valued: isotropic linear elasticity in the plane or in space, with supports; see
-    :func:`unassemble.elasticity.recover_elasticity`.
+    :func:`unassemble.elasticity.recover_elasticity`. And frames, shells and plates, whose nodes have rotations beside
+    displacements; see :mod:`unassemble.structures`.
 
     Parameters
     ----------
@@ -82,8 +83,8 @@ def recover(
     triangulate : bool
         Divide cells of more than three vertices into triangles; the vertices lie on a circle, so that every division
         is a Delaunay triangulation and the matrix does not prefer one.
-    block_size : {2, 3}, optional
-        Vector-valued matrices: unknowns per node; found where it is not given.
+    block_size : {2, 3, 6}, optional
+        Vector-valued matrices: unknowns per node; found where it is not given. Six are displacements and rotations.
     numbering : {"interleaved", "by component"} or (node_of_row, direction_of_row), optional
         Vector-valued matrices: how the unknowns stand; found where it is not given.
     cells : bool
@@ -150,8 +151,11 @@ def recover(
 
     def vector(reading: VectorReading) -> Recovery:
         from .elasticity.serving import serve
+        from .structures import StructuralNumbering, serve_structure
 
         refuse(**scalar_only)
+        if isinstance(reading.numbering, StructuralNumbering):
+            return serve_structure(checked, reading.numbering, clock, anchors=anchors, choice=reading.why, cells=cells)
         return serve(checked, reading.numbering, clock, anchors=anchors, choice=reading.why, cells=cells, scalar=scalar)
 
     with thread_limit(threads):

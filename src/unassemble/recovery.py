@@ -54,7 +54,8 @@ class Recovery:
         Why, in one sentence.
     operator : str
         ``"laplacian"``, or ``"anisotropic laplacian"`` where a tensor was undone; ``"elasticity"``, or ``"vector
-        laplacian"`` where the directions of a vector-valued matrix are not coupled.
+        laplacian"`` where the directions of a vector-valued matrix are not coupled; ``"frame or shell"``, ``"plane
+        frame"`` or ``"plate"`` where nodes have rotations too.
     backward_error : float
         Largest difference between an off-diagonal entry and the re-assembled one, relative to the
         largest off-diagonal entry of its row. For elasticity whose cells are not recognised the largest residual of
@@ -77,6 +78,8 @@ class Recovery:
     quads, tetrahedra, hexahedra : (m, 4), (m, 4), (m, 8) int64
         Further cells, in meshio's order and positively oriented; empty where there are none. Of quadratic cells these
         are the corners.
+    lines : (m, 2) int64
+        Members of frames.
     mid_nodes : (m, k) int64
         Quadratic cells: the nodes that each has besides its corners, in meshio's order; else empty.
     node_of_row, direction_of_row : (N,) int64 or None
@@ -127,6 +130,7 @@ class Recovery:
     quads: NDArray[np.int64] = field(default_factory=lambda: _no_cells(4))
     tetrahedra: NDArray[np.int64] = field(default_factory=lambda: _no_cells(4))
     hexahedra: NDArray[np.int64] = field(default_factory=lambda: _no_cells(8))
+    lines: NDArray[np.int64] = field(default_factory=lambda: _no_cells(2))
     mid_nodes: NDArray[np.int64] = field(default_factory=lambda: _no_cells(0))
     node_of_row: NDArray[np.int64] | None = None
     direction_of_row: NDArray[np.int64] | None = None
@@ -165,6 +169,7 @@ class Recovery:
     def cells(self) -> dict[str, NDArray[np.int64]]:
         """Cells of each kind that occurs, all their nodes, by meshio's names; polygons are not among them."""
         kinds = {
+            "line": self.lines,
             "triangle": self.triangles,
             "quad": self.quads,
             "tetra": self.tetrahedra,
@@ -199,6 +204,11 @@ class Recovery:
     def vector_valued(self) -> bool:
         """Whether the matrix has several rows per node."""
         return self.node_of_row is not None
+
+    @property
+    def mechanical(self) -> bool:
+        """Whether the matrix is a stiffness matrix of a solid or a structure, not of a scalar field or several."""
+        return bool(self.evidence)
 
     @property
     def n_components(self) -> int:

@@ -149,7 +149,7 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
     ]
     if recovery.n_holes is not None:
         rows.append(("holes", f"{recovery.n_holes:,}"))
-    if recovery.operator == "elasticity":
+    if recovery.mechanical:
         rows += _elastic_rows(recovery)
     else:
         rows.append(("scale c", scale_text(recovery)))
@@ -178,7 +178,13 @@ def numbering_text(recovery: Recovery) -> str:
     return words.get(recovery.numbering, recovery.numbering)
 
 
-_KINDS = {"triangle": "triangles", "quad": "quadrilaterals", "tetra": "tetrahedra", "hexahedron": "hexahedra"}
+_KINDS = {
+    "line": "members",
+    "triangle": "triangles",
+    "quad": "quadrilaterals",
+    "tetra": "tetrahedra",
+    "hexahedron": "hexahedra",
+}
 
 
 def _kind_text(kind: str) -> str:

@@ -16,12 +16,11 @@ import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..errors import GeometryError
-from ..linalg import Factorisation, UpperTriangle, factorisation
+from ..linalg import Factorisation, UpperTriangle, nearly_singular
 from .identities import Identities, identities
 from .nodal import NodalMatrix
 
-_SHIFT = 1e-12  # above the rounding of the normal matrix, below every eigenvalue that is not zero
+_SHIFTS = (1e-12, 3e-11, 1e-9)  # above the rounding of the normal matrix, below every eigenvalue that is not zero
 _STEPS = 2  # each divides what is not wanted by its eigenvalue over the shift, 1e4 and more
 _STIFF = 1e-4  # fields whose singular value is larger need no place in a chart of several
 
@@ -67,36 +66,18 @@ def chart(
     n, d = len(local.columns), local.dim
     if not n:
         return Chart(local.columns, np.empty((0, d, 0)), np.empty(0), 0)
-    solver = _shifted(local.normal_matrix())
     count = min(4 * d, n * d)
-    while True:
-        fields, values = _least_fields(local, solver, count)
-        if count == n * d or count >= 256 or values[-1] > (1e-7 if whole else _STIFF):
-            break
-        count = min(2 * count, n * d)
-    if not whole:
-        keep = values < 1e3 * _STIFF
-        fields, values = fields[..., keep], values[keep]
-    fields, values = _refine(local, solver, fields, values)
-    solver.release()
+    with nearly_singular(_upper(local.normal_matrix()), _SHIFTS) as solver:
+        while True:
+            fields, values = _least_fields(local, solver, count)
+            if count == n * d or count >= 256 or values[-1] > (1e-7 if whole else _STIFF):
+                break
+            count = min(2 * count, n * d)
+        if not whole:
+            keep = values < 1e3 * _STIFF
+            fields, values = fields[..., keep], values[keep]
+        fields, values = _refine(local, solver, fields, values)
     return Chart(local.columns, fields, values, len(local.rows))
-
-
-def _shifted(normal: sp.bsr_array) -> Factorisation:
-    """Factorise the normal matrix, made definite by a small multiple of the identity."""
-    d = normal.blocksize[0]
-    typical = float(np.median(normal.diagonal()))
-    for shift in (_SHIFT, 30 * _SHIFT, 1000 * _SHIFT):
-        shifted = normal + shift * typical * sp.eye_array(normal.shape[0], format="bsr")  # no diagonal block is missing
-        matrix = _upper(sp.bsr_array(shifted.tobsr((d, d))))
-        solver = factorisation(matrix, definite=True)
-        try:
-            solver.factorise(matrix)
-        except ArithmeticError:  # rounding made a pivot vanish
-            solver.release()
-            continue
-        return solver
-    raise GeometryError("the normal matrix of the identities is not positive; the entries may differ too much in size")
 
 
 def _upper(matrix: sp.bsr_array) -> UpperTriangle:

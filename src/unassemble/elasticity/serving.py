@@ -14,6 +14,7 @@ from ..clock import Clock
 from ..errors import RecoveryError
 from ..matrix import OperatorMatrix, check_matrix
 from ..recovery import Recovery
+from ..structures.trusses import bars_of, serve_truss
 from .anchoring import anchored, checked_anchors
 from .cells import Cells
 from .kinds import KINDS
@@ -59,6 +60,9 @@ def serve(
     if uncoupled(nodal):
         parts = parts_of(whole, nodal, numbering)
         return replace(_vector_laplacian(parts, matrix, anchors, scalar), choice=choice, timings=clock.timings)
+    bars = bars_of(nodal)
+    if bars is not None:
+        return serve_truss(matrix, nodal, numbering, bars, clock, anchors=anchors, choice=choice)
     del whole
     checked_anchors(anchors, numbering.node_of_row, numbering.block_size)  # before the long work
     found = place_nodes(nodal, numbering, clock, cells=cells)

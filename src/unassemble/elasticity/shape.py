@@ -68,7 +68,7 @@ def shape(
     null = fields[..., values <= EXACT] if exact else fields[..., : d + 1]
     loose = np.zeros(n, dtype=bool)
     if null.shape[2] > d + 1:
-        shared, apart = _set_aside(null)
+        shared, apart = set_aside(null, d + 1)
         if 2 * np.count_nonzero(told & apart) <= np.count_nonzero(apart):
             null, loose = shared, apart
     kept = null[~loose]
@@ -79,21 +79,21 @@ def shape(
     return Shape(points, loose, dimension, freedom, bool(exact))
 
 
-def _set_aside(null: NDArray) -> tuple[NDArray, NDArray[np.bool_]]:
-    """Find nodes that carry fields of their own, and the fields that the other nodes share.
+def set_aside(null: NDArray, common: int) -> tuple[NDArray, NDArray[np.bool_]]:
+    """Find nodes that carry fields of their own, and the fields, so many in number, that the other nodes share.
 
     Loose nodes move more than others in the null fields, and their own fields vanish at the others exactly. So the
     fields that the least mobile nodes share are the body's, and what vanishes at all of these is loose.
     """
-    n, d, k = null.shape
+    n, _d, k = null.shape
     calm = np.argsort((null**2).sum(axis=(1, 2)), kind="stable")
     for share in (0.75, 0.5, 0.25, 0.12):
-        some = calm[: max(int(share * n), min(n, d + 2))]
+        some = calm[: max(int(share * n), min(n, common + 1))]
         _, s, v = scipy.linalg.svd(null[some].reshape(-1, k), full_matrices=False)
-        if (s > _LOOSE * s[0]).sum() == d + 1:
+        if (s > _LOOSE * s[0]).sum() == common:
             own = np.einsum("nak,lk->nal", null, v[s <= _LOOSE * s[0]])
             loose = np.abs(own).max(axis=(1, 2)) > 10 * _LOOSE
-            return _orthonormal(np.einsum("nak,lk->nal", null, v[: d + 1]), ~loose), loose
+            return _orthonormal(np.einsum("nak,lk->nal", null, v[:common]), ~loose), loose
     return null, np.zeros(n, dtype=bool)
 
 

@@ -1,6 +1,7 @@
 """Sparse linear algebra behind one small interface."""
 
 from .ahead import AnalysisAhead
+from .definite import nearly_singular
 from .factorisation import Factorisation, backend, factorisation
 from .threads import blas_threads, threads
 from .upper import UpperTriangle, upper_from_edges
@@ -12,6 +13,7 @@ __all__ = [
     "backend",
     "blas_threads",
     "factorisation",
+    "nearly_singular",
     "threads",
     "upper_from_edges",
 ]

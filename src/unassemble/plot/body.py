@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from . import style
 from .canvas import footer, header, panels
 from .mesh import line_handle
+from .structure import draw_structure
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -44,6 +45,8 @@ def plot_body(recovery: Recovery, headline: str, details: str) -> Figure:
     if not recovery.n_cells:
         ax.plot(*shown.T, "o", markersize=float(np.clip(120 / np.sqrt(len(shown)), 1, 4)), color=style.EDGE)
         handles.append(line_handle(style.EDGE, "nodes; no elements were recognised", width=3))
+    elif len(recovery.lines) or (recovery.dim == 3 and not (len(recovery.tetrahedra) or len(recovery.hexahedra))):
+        handles += draw_structure(ax, recovery, flat, depth)
     elif recovery.dim == 3:
         _draw_surface(ax, recovery, flat, depth)
         handles.append(line_handle(style.OUTER, "outer surface of the recognised cells"))

@@ -39,7 +39,7 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     """
     if path is not None:
         check_plot(path)
-    if recovery.operator == "elasticity":
+    if recovery.mechanical:
         figure = plot_body(recovery, recovery.status, details(recovery))
         if path is not None:
             write_figure(figure, path)
@@ -68,7 +68,7 @@ def details(recovery: Recovery) -> str:
     missing = int(np.count_nonzero(recovery.node_status))
     if missing:
         parts.append(f"{missing:,} not determined")
-    if recovery.operator != "elasticity":
+    if not recovery.mechanical:
         parts.append(f"c = {scale_text(recovery, 6)}")
     elif recovery.poisson_ratio is not None:
         parts.append(f"Poisson's ratio {recovery.poisson_ratio:.6g}")

@@ -1,0 +1,50 @@
+"""Factorisation of a semidefinite matrix, made definite by a small multiple of the identity."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+
+from ..errors import GeometryError, SolverError
+from .factorisation import Factorisation, factorisation
+from .upper import UpperTriangle
+
+
+@contextmanager
+def nearly_singular(matrix: UpperTriangle, shifts: Sequence[float]) -> Iterator[Factorisation]:
+    """Cholesky factor of a positive semidefinite matrix plus the least multiple of the identity that rounding allows.
+
+    Parameters
+    ----------
+    matrix : UpperTriangle
+        Real; a normal matrix, for example.
+    shifts : sequence of float
+        To be tried one after the other, in units of the median of the diagonal.
+
+    Raises
+    ------
+    GeometryError
+        If a pivot vanishes even with the largest.
+    """
+    block = matrix.block
+    start = matrix.indptr[:-1]
+    own = matrix.data[start].reshape(-1, block, block)
+    typical = float(np.median(np.diagonal(own, axis1=1, axis2=2)))
+    for shift in shifts:
+        data = matrix.data.copy()
+        data[start] = (own + shift * typical * np.eye(block)).reshape(data[start].shape)
+        shifted = UpperTriangle(data, matrix.indices, matrix.indptr)
+        solver = factorisation(shifted, definite=True)
+        try:
+            solver.factorise(shifted)
+        except SolverError:  # rounding made a pivot vanish
+            solver.release()
+            continue
+        try:
+            yield solver
+        finally:
+            solver.release()
+        return
+    raise GeometryError("the normal matrix of the equations is not positive; the entries may differ too much in size")

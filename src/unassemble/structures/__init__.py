@@ -1,0 +1,15 @@
+"""Frames, shells and plates, whose nodes have rotations beside displacements; and trusses, which consist of bars."""
+
+from .frames import serve_structure
+from .layouts import LAYOUTS, Layout, layout_named
+from .recognise import StructuralNumbering, find_structure, given_structure
+
+__all__ = [
+    "LAYOUTS",
+    "Layout",
+    "StructuralNumbering",
+    "find_structure",
+    "given_structure",
+    "layout_named",
+    "serve_structure",
+]

@@ -1,0 +1,76 @@
+"""What the unknowns of a node of a frame, shell or plate are: displacements and rotations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Unknowns of each node, in the order of their directions.
+
+    Attributes
+    ----------
+    name : str
+    dim : {2, 3}
+        Coordinates of a node.
+    displacements : tuple of int
+        Axis of each displacement; direction k of a node is ``displacements[k]``.
+    rotations : tuple of int
+        Axes of the rotations, which follow the displacements.
+    """
+
+    name: str
+    dim: int
+    displacements: tuple[int, ...]
+    rotations: tuple[int, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the directions: ``x``, ``y``, ``z``, and ``rx``, ``ry``, ``rz`` of the rotations."""
+        return (*("xyz"[k] for k in self.displacements), *("r" + "xyz"[k] for k in self.rotations))
+
+    @property
+    def block_size(self) -> int:
+        """Unknowns per node."""
+        return len(self.displacements) + len(self.rotations)
+
+    def turned(self, axis: int) -> list[tuple[int, int, int]]:
+        """What a unit rotation about an axis does: the displacement e_axis x point, term by term.
+
+        Returns
+        -------
+        list of (direction, coordinate, sign)
+            The displacement of this direction is sign times the coordinate.
+        """
+        after, last = (axis + 1) % 3, (axis + 2) % 3
+        terms = ((after, last, -1), (last, after, 1))
+        return [
+            (self.displacements.index(moved), coordinate, sign)
+            for moved, coordinate, sign in terms
+            if moved in self.displacements and coordinate < self.dim
+        ]
+
+    def rigid_motions(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, block size, motions) translations, then rotations about the origin, of nodes at `points` (n, dim)."""
+        moves = len(self.displacements)
+        motions = np.zeros((len(points), self.block_size, self.block_size))
+        motions[:, range(self.block_size), range(self.block_size)] = 1
+        for k, axis in enumerate(self.rotations, start=moves):
+            for direction, coordinate, sign in self.turned(axis):
+                motions[:, direction, k] = sign * points[:, coordinate]
+        return motions
+
+
+SPACE = Layout("frame or shell", 3, (0, 1, 2), (0, 1, 2))
+PLANE = Layout("plane frame", 2, (0, 1), (2,))
+PLATE = Layout("plate", 2, (2,), (0, 1))
+LAYOUTS = (SPACE, PLANE, PLATE)
+
+
+def layout_named(name: str) -> Layout | None:
+    """The layout of an operator's name; None for other operators."""
+    return next((layout for layout in LAYOUTS if layout.name == name), None)

@@ -1,0 +1,117 @@
+"""The matrix of a structure node by node, and which of its equations are whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .layouts import Layout
+
+_ROUNDING = 1e-9  # a row that annihilates a translation does so to rounding; supports leave 1e-3 and more
+_NOTHING = 1e-14  # of sqrt(A_ii A_jj), which bounds an entry of a definite matrix: rounding
+_PENALTY = 1e3  # a diagonal entry this many times the rest of its row is a penalty
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """Unknowns of a matrix by node and direction.
+
+    Attributes
+    ----------
+    layout : Layout
+    matrix : (n b, n b) sparse
+        Row ``i b + k`` belongs to direction k of node i; empty where the matrix has no such unknown.
+    row_of : (n, b) int64
+        Row of the given matrix, -1 where there is none, or only that of an identity.
+    """
+
+    layout: Layout
+    matrix: sp.csr_array
+    row_of: NDArray[np.int64]
+
+    @property
+    def n(self) -> int:
+        """Number of nodes."""
+        return len(self.row_of)
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """(n, b) unknowns that the matrix has."""
+        return self.row_of >= 0
+
+    @cached_property
+    def graph(self) -> sp.csr_array:
+        """(n, n) pattern of coupled nodes, with the diagonal."""
+        coo, b = self.matrix.tocoo(), self.layout.block_size
+        own = np.arange(self.n)
+        place = np.concatenate([coo.row // b, own]), np.concatenate([coo.col // b, own])
+        pattern = sp.csr_array((np.ones(len(place[0]), np.int32), place), shape=(self.n, self.n))
+        pattern.data[:] = 1
+        return pattern
+
+    def direction(self, k: int) -> sp.csr_array:
+        """(n b, n) the columns of one direction."""
+        return sp.csr_array(self.matrix[:, k :: self.layout.block_size])
+
+    def annihilates(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """(n b, b) rows whose entries of one direction add up to zero, and those that have such entries."""
+        zero, some = [], []
+        for k in range(self.layout.block_size):
+            columns = self.direction(k)
+            size = np.asarray(abs(columns).sum(axis=1)).ravel()
+            zero.append(np.abs(np.asarray(columns.sum(axis=1)).ravel()) <= _ROUNDING * size)
+            some.append(size > 0)
+        return np.stack(zero, axis=1), np.stack(some, axis=1)
+
+    def whole(self) -> NDArray[np.bool_]:
+        """(n, b, rotations) rows in which the equation of a rotation holds every coefficient that assembly gave it.
+
+        It needs the displacements across the axis, and the rotation, of all coupled nodes. Displacements that were
+        taken away leave a trace, since translations are no longer annihilated; rotations do not, and are looked up.
+        A penalty on a rotation spoils the equations of its own row.
+        """
+        layout, b = self.layout, self.layout.block_size
+        zero = self.annihilates()[0].reshape(self.n, b, b)
+        lacking = self.graph @ (~self.present).astype(np.int32) > 0
+        sound = self.present & ~self._penalised()
+        valid = np.zeros((self.n, b, len(layout.rotations)), dtype=bool)
+        for k, axis in enumerate(layout.rotations):
+            across = [direction for direction, _, _ in layout.turned(axis)]
+            needed = [*across, len(layout.displacements) + k]
+            rows = zero[:, :, across].all(axis=2) & sound
+            valid[:, :, k] = rows & ~lacking[:, needed].any(axis=1)[:, None]
+        return valid
+
+    def _penalised(self) -> NDArray[np.bool_]:
+        """(n, b) unknowns with a penalty on the diagonal."""
+        diagonal = np.abs(self.matrix.diagonal())
+        rest = np.asarray(abs(self.matrix).sum(axis=1)).ravel() - diagonal
+        return np.asarray((diagonal > _PENALTY * rest).reshape(self.n, -1))
+
+
+def nodes_of(matrix: sp.csr_array, layout: Layout, node: NDArray[np.int64], direction: NDArray[np.int64]) -> Nodes:
+    """Order a matrix by nodes; entries that are rounding and rows of the identity are left out.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+    layout : Layout
+    node, direction : (N,) int64
+    """
+    b = layout.block_size
+    coo = matrix.tocoo()
+    diagonal = np.abs(matrix.diagonal())
+    real = np.abs(coo.data) > _NOTHING * np.sqrt(diagonal[coo.row] * diagonal[coo.col])
+    coupled = np.zeros(len(node), dtype=bool)
+    coupled[coo.row[real & (coo.row != coo.col)]] = True
+    keep = real & coupled[coo.row] & coupled[coo.col]
+    place = node * b + direction
+    n = int(node.max()) + 1
+    ordered = sp.csr_array((coo.data[keep], (place[coo.row[keep]], place[coo.col[keep]])), shape=(n * b, n * b))
+    row_of = np.full(n * b, -1)
+    row_of[place[coupled]] = np.flatnonzero(coupled)
+    return Nodes(layout, ordered, row_of.reshape(n, b))

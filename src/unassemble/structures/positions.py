@@ -1,0 +1,132 @@
+"""Least-squares coordinates of a structure's nodes, and how uniquely its equations determine them."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..elasticity.shape import EXACT, set_aside
+from ..errors import GeometryError
+from ..linalg import Factorisation, UpperTriangle, nearly_singular
+from .equations import Equations
+
+_SHIFTS = (1e-15, 1e-13, 1e-11)  # of the typical diagonal of the normal matrix: the least at which no pivot vanishes
+_STEPS = 3
+_REFINEMENTS = 30
+_SPARE = 6  # fields to look at beyond translations; doubled while all of them are null
+_MOST = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Positions:
+    """Coordinates of one piece.
+
+    Attributes
+    ----------
+    points : (n, d) float64
+        Centroid at the origin; NaN where loose.
+    dimension : int
+        Of the null space, loose nodes left out: that of the translations, unless more remains free.
+    gap : float
+        Singular value of the best field that is no null field.
+    residual : float
+        Largest residual of an equation, relative to the largest coordinate difference along an edge.
+    """
+
+    points: NDArray[np.float64]
+    dimension: int
+    gap: float
+    residual: float
+
+
+def positions(given: Equations, d: int, edges: NDArray[np.int64]) -> Positions:
+    """Solve for the coordinates of a connected piece.
+
+    Parameters
+    ----------
+    given : Equations
+        On n d unknowns.
+    d : int
+    edges : (e, 2) int64
+        Coupled nodes.
+
+    Raises
+    ------
+    GeometryError
+        If there are fewer equations than unknowns leave room for, or far more is free than translations.
+    """
+    operator, right = given.operator, given.right
+    n = operator.shape[1] // d
+    if n < 2 or operator.shape[0] < (n - 1) * d:
+        raise GeometryError(f"{operator.shape[0]} equations are too few for {n} nodes: too much lies next to supports")
+    with _normal_solver(operator) as solver:
+        fields, values = _least_fields(operator, solver, d)
+        x = np.zeros(n * d)
+        for _ in range(_REFINEMENTS):
+            step = solver.solve(operator.T @ (right - operator @ x))
+            step -= np.tile(step.reshape(n, d).mean(axis=0), n)
+            x += step
+            if np.abs(step).max() <= 1e-15 * np.abs(x).max():
+                break
+    null, gap = fields[..., values <= EXACT], values[values > EXACT]
+    loose = np.zeros(n, dtype=bool)
+    if null.shape[2] > d:
+        null, loose = set_aside(null, d)
+    x = x.reshape(n, d)
+    span = np.linalg.norm(x[edges[:, 0]] - x[edges[:, 1]], axis=1).max(initial=0)
+    residual = float(np.abs(operator @ x.ravel() - right).max()) / (span or 1.0)
+    points = np.where(loose[:, None], np.nan, x - x[~loose].mean(axis=0))
+    return Positions(points, null.shape[2], float(gap[0]) if len(gap) else float("inf"), residual)
+
+
+def null_fields(operator: sp.csr_array, d: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Fields that an operator on n d unknowns maps to least.
+
+    Returns
+    -------
+    fields : (n, d, k) float64
+        Orthonormal: all null fields, and some more.
+    values : (k,) float64
+        Their singular values, increasing.
+
+    Raises
+    ------
+    GeometryError
+        If there are far more null fields than translations and enlargements.
+    """
+    with _normal_solver(operator) as solver:
+        return _least_fields(operator, solver, d)
+
+
+def _normal_solver(operator: sp.csr_array) -> AbstractContextManager[Factorisation]:
+    normal = operator.T @ operator
+    stored = sp.eye_array(normal.shape[0]) * np.finfo(float).tiny  # coordinates in no equation have a diagonal too
+    return nearly_singular(_upper(sp.csr_array(normal + stored)), _SHIFTS)
+
+
+def _least_fields(operator: sp.csr_array, solver: Factorisation, d: int) -> tuple[NDArray, NDArray]:
+    order = operator.shape[1]
+    count = min(d + _SPARE, order)
+    while True:
+        x = np.random.default_rng(0).standard_normal((order, count))
+        for _ in range(_STEPS):
+            x = np.linalg.qr(solver.solve(x))[0]
+        triangle = np.linalg.qr(operator @ x, mode="r")
+        _, values, v = scipy.linalg.svd(triangle)
+        values = np.concatenate([values, np.zeros(count - len(values))])[::-1]
+        if values[-1] > EXACT or count == order:
+            return (x @ v[::-1].T).reshape(-1, d, count), values
+        if count >= _MOST:
+            raise GeometryError("the equations away from supports leave most of the structure free")
+        count = min(2 * count, order)
+
+
+def _upper(matrix: sp.csr_array) -> UpperTriangle:
+    upper = sp.triu(matrix, format="csr")
+    upper.sort_indices()
+    return UpperTriangle(upper.data, upper.indices.astype(np.int32), upper.indptr.astype(np.int32))

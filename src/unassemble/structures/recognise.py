@@ -1,0 +1,141 @@
+"""Whether a matrix is that of a frame, shell or plate, and how its unknowns stand.
+
+The displacements of one direction, all the same, cost nothing: a row away from supports annihilates them. Rotations,
+all the same and without displacements, bend everything. This tells the layouts from one another, and from solids.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .layouts import LAYOUTS, SPACE, Layout
+
+ORDERS = ("interleaved", "by component")
+_ROUNDING = 1e-9
+_SAMPLE = 2000  # rows to ask
+# On regular meshes some of a solid's rows annihilate whatever is asked; read as what it is it has more of them.
+_SOLIDS = (Layout("solid", 3, (0, 1, 2), ()), Layout("solid", 2, (0, 1), ()))
+_MOST = 0.1  # rows of a rotation that may annihilate it; where they are solids' all do
+_LEAST = 0.05  # rows that have to annihilate translations
+
+
+@dataclass(frozen=True, eq=False)
+class StructuralNumbering:
+    """Nodes and directions of the rows of a structure's matrix.
+
+    Attributes
+    ----------
+    layout : Layout
+    node_of_row, direction_of_row : (N,) int64
+    kind : {"interleaved", "by component", "given"}
+    share : float
+        Share of the rows that annihilate all translations.
+    """
+
+    layout: Layout
+    node_of_row: NDArray[np.int64]
+    direction_of_row: NDArray[np.int64]
+    kind: str
+    share: float
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return int(self.node_of_row.max()) + 1
+
+    @property
+    def block_size(self) -> int:
+        """Unknowns per node."""
+        return self.layout.block_size
+
+
+def find_structure(
+    matrix: sp.csr_array, kind: str | None = None, block_size: int | None = None
+) -> StructuralNumbering | None:
+    """Recognise the matrix of a structure whose nodes have all their rows; None if it is none.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+        Symmetric.
+    kind : {None, "interleaved", "by component"}
+    block_size : int, optional
+    """
+    order = matrix.shape[0]
+    best, most = None, _LEAST
+    for layout in (*_SOLIDS, *LAYOUTS):
+        b = layout.block_size
+        if order % b or order < 2 * b or block_size not in (None, b):
+            continue
+        for name in ORDERS if kind is None else (kind,):
+            node, direction = _regular(order, b, name)
+            share = _share(matrix, layout, direction)
+            if share > most:
+                best, most = StructuralNumbering(layout, node, direction, name, share), share
+    return best if best is not None and best.layout.rotations else None
+
+
+def _regular(order: int, b: int, kind: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Nodes and directions of rows in one of the two orders."""
+    row = np.arange(order)
+    return (row // b, row % b) if kind == "interleaved" else (row % (order // b), row // (order // b))
+
+
+def given_structure(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> StructuralNumbering | None:
+    """A numbering that the caller knows, if it is that of a structure; None for those of solids.
+
+    Directions count displacements first, then rotations; nodes may lack some.
+
+    Raises
+    ------
+    InputError
+        If there are four or five directions, or rows do not fit the matrix.
+    """
+    node, direction = np.asarray(node, dtype=np.int64), np.asarray(direction, dtype=np.int64)
+    if node.shape != direction.shape or node.shape != matrix.shape[:1] or not len(node) or direction.min() < 0:
+        return None  # elasticity says what is wrong
+    size = int(direction.max()) + 1
+    if size in (4, 5):
+        raise InputError(f"nodes with {size} unknowns are not known: frames and shells have 6, solids 2 or 3")
+    _, node = np.unique(node, return_inverse=True)
+    first = np.full(node.max() + 1, len(node))
+    np.minimum.at(first, node, np.arange(len(node)))
+    node = np.argsort(np.argsort(first))[node]
+    if len(np.unique(node * size + direction)) < len(node):
+        return None
+    fitting = [layout for layout in LAYOUTS if layout.block_size == size]
+    shares = [_share(matrix, layout, direction) for layout in fitting]
+    if size != SPACE.block_size and max(shares, default=0) <= _LEAST:
+        return None
+    if not fitting:
+        return None
+    best = int(np.argmax(shares))
+    return StructuralNumbering(fitting[best], node, direction, "given", shares[best])
+
+
+def _share(matrix: sp.csr_array, layout: Layout, direction: NDArray) -> float:
+    """Share of rows that annihilate all displacements, of forces or of moments, whichever is less.
+
+    None do if rotations are annihilated like displacements.
+    """
+    rows = np.arange(len(direction))
+    if len(rows) > _SAMPLE:
+        rows = np.sort(np.random.default_rng(0).choice(rows, _SAMPLE, replace=False))
+    rows = rows[np.diff(matrix.indptr)[rows] > 1]
+    some = sp.csr_array(matrix[rows])
+    labels = (direction[:, None] == np.arange(layout.block_size)).astype(float)
+    size = abs(some) @ labels
+    zero = np.abs(some @ labels) <= _ROUNDING * size
+    coupled = size > 0
+    moves = len(layout.displacements)
+    turning = direction[rows] >= moves
+    own = zero[np.arange(len(rows)), direction[rows]]
+    if not len(rows) or (layout.rotations and (not turning.any() or own[turning].mean() > _MOST)):
+        return 0.0
+    good = (zero | ~coupled)[:, :moves].all(axis=1) & coupled[:, :moves].any(axis=1)
+    return float(min(good[kind].mean() for kind in (turning, ~turning) if kind.any()))

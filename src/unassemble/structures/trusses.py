@@ -1,0 +1,230 @@
+"""Pin-jointed trusses: the block of two nodes is that of a bar, and tells its direction.
+
+A bar between nodes i and j with direction e has A_ij = - k e e^T, and nothing else has. So for every bar, whatever its
+stiffness, next to supports as well, (I - e e^T) (x_i - x_j) = 0: linear in the coordinates. All solutions have the
+bars' directions; where the truss has enough of them, these are its translations and enlargements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..clock import Clock
+from ..elasticity.anchoring import anchored, checked_anchors
+from ..elasticity.nodal import NodalMatrix, determined
+from ..elasticity.results import Evidence
+from ..elasticity.shape import EXACT, in_gauge, shape
+from ..elasticity.unknowns import Numbering
+from ..errors import GeometryError
+from ..matrix import OperatorMatrix
+from ..recovery import Recovery
+from .positions import null_fields
+
+CERTIFIED = 1e-9
+_RANK_ONE = 1e-9  # how much of a bar's block may be left, relative to the bar
+
+
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """Bars of a truss, and their directions.
+
+    Attributes
+    ----------
+    ends : (m, 2) int64
+        Nodes of each bar, the lesser first.
+    directions : (m, d) float64
+        Unit vectors, sign arbitrary.
+    known : (m,) bool
+        False for bars both of whose ends lack unknowns, so that only a part of the direction shows.
+    """
+
+    ends: NDArray[np.int64]
+    directions: NDArray[np.float64]
+    known: NDArray[np.bool_]
+
+
+def bars_of(nodal: NodalMatrix) -> Bars | None:
+    """The bars, if every pair of coupled nodes is one; None for other matrices.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    """
+    upper = (nodal.node < nodal.indices) & (np.abs(nodal.data).max(axis=(1, 2)) > 0)
+    blocks = nodal.data[upper]
+    if not len(blocks):
+        return None
+    i, j = nodal.node[upper].astype(np.int64), nodal.indices[upper].astype(np.int64)
+    left, size, right = np.linalg.svd(blocks)
+    if (size[:, 1] > _RANK_ONE * size[:, 0]).any():
+        return None
+    whole = nodal.row_of.min(axis=1) >= 0
+    # Rows belong to i, columns to j: whichever has all its unknowns shows all of the direction.
+    directions = np.where(whole[j][:, None], right[:, 0], left[:, :, 0])
+    known = whole[i] | whole[j]
+    both = whole[i] & whole[j]
+    aligned = (left[both, :, 0] * right[both, 0]).sum(axis=1)
+    if not both.any() or np.abs(np.abs(aligned) - 1).max() > _RANK_ONE:
+        return None
+    return Bars(np.column_stack([i, j]), directions, known)
+
+
+def serve_truss(
+    matrix: OperatorMatrix,
+    nodal: NodalMatrix,
+    numbering: Numbering,
+    bars: Bars,
+    clock: Clock,
+    *,
+    anchors: Sequence[Any] | None,
+    choice: str,
+) -> Recovery:
+    """Recover a truss, up to the size of each piece.
+
+    Raises
+    ------
+    InputError
+        For anchors that do not fit.
+    RecoveryError
+        If no piece is determined.
+    """
+    known = checked_anchors(anchors, numbering.node_of_row, nodal.dim)
+    with clock("solve"):
+        found = place_joints(bars, nodal.n)
+    with clock("certify"):
+        error = largest_misfit(nodal, found.points)
+    loose = ~determined(found.points)
+    points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
+    if loose.any():
+        notes.append(f"{loose.sum()} of {nodal.n} nodes can move while all bars keep their directions, and stay "
+                     "undetermined")  # fmt: skip
+    if np.isnan(factor).any():
+        notes.append("the sign of the scale is free: the point reflection of a truss has the same matrix")
+    free = [name for name in found.freedoms if name]
+    status, reason = "certified", "bars along these directions re-assemble to the matrix, and these determine the nodes"
+    if free:
+        status, reason = "uncertified", "the directions of the bars leave more free than translations and size"
+    elif error > CERTIFIED:
+        status, reason = "uncertified", f"a block differs from that of a bar by {error:.1e} of the row's largest entry"
+    return Recovery(
+        points=points,
+        triangles=np.empty((0, 3), np.int64),
+        lines=bars.ends[~loose[bars.ends].any(axis=1)],
+        component=found.component,
+        hinges=np.empty(0, np.int64),
+        scale=np.full(len(found.evidence), np.nan),
+        boundary=np.empty((0, 2), np.int64),
+        boundary_offsets=np.zeros(1, np.int64),
+        node_status=np.asarray(loose, dtype=np.int8),
+        status=status,
+        reason=reason,
+        operator="truss",
+        backward_error=error,
+        timings=clock.timings,
+        warnings=(*matrix.warnings, *found.warnings, *notes),
+        node_of_row=numbering.node_of_row,
+        direction_of_row=numbering.direction_of_row,
+        numbering=numbering.kind,
+        choice=choice,
+        evidence=found.evidence,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Truss:
+    """Positions of the nodes of a truss.
+
+    Attributes
+    ----------
+    points : (n, d) float64
+        Per piece the centroid at the origin, mean length of a bar 1; NaN where not determined.
+    component : (n,) int64
+        Piece of each node, -1 where not determined.
+    evidence : tuple of Evidence
+        One per piece.
+    freedoms : tuple of str
+        Of each piece, what beyond translation and enlargement remains free; mostly empty.
+    warnings : tuple of str
+    """
+
+    points: NDArray[np.float64]
+    component: NDArray[np.int64]
+    evidence: tuple[Evidence, ...]
+    freedoms: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def place_joints(bars: Bars, n: int) -> Truss:
+    """Find positions for which all bars have their directions.
+
+    Raises
+    ------
+    GeometryError
+        If no piece is determined: its bars may turn against each other.
+    """
+    d = bars.directions.shape[1]
+    ends, directions = bars.ends[bars.known], bars.directions[bars.known]
+    graph = sp.csr_array((np.ones(len(ends)), ends.T), shape=(n, n))
+    graph = sp.csr_array(graph + graph.T)
+    _, label = sp.csgraph.connected_components(graph, directed=False)
+    points, component = np.full((n, d), np.nan), np.full(n, -1)
+    evidence: list[Evidence] = []
+    freedoms, warnings = [], []
+    failure: GeometryError | None = None
+    for piece in np.flatnonzero(np.bincount(label) > 1):
+        body = np.flatnonzero(label == piece)
+        inside = np.flatnonzero(label[ends[:, 0]] == piece)
+        operator = _across(np.searchsorted(body, ends[inside]), directions[inside], len(body))
+        links = graph[body][:, body]
+        try:
+            fields, values = null_fields(operator, d)
+            one = shape(fields, values, links, np.zeros(len(body), dtype=bool))
+        except GeometryError as error:
+            failure = failure or error
+            warnings.append(f"the piece with node {body[0]}: {error}")
+            continue
+        points[body] = in_gauge(one.points, links)
+        component[body[~one.loose]] = len(evidence)
+        gap = values[values > EXACT]
+        evidence.append(
+            Evidence(one.dimension, float(values[d]), float(gap[0]) if len(gap) else float("inf"), len(inside))
+        )
+        freedoms.append(one.freedom)
+    if not evidence:
+        raise failure or GeometryError("no two nodes are joined by a bar whose direction shows")
+    return Truss(points, component, tuple(evidence), tuple(freedoms), tuple(warnings))
+
+
+def _across(ends: NDArray[np.int64], directions: NDArray[np.float64], n: int) -> sp.csr_array:
+    """(m d, n d) what a field moves the ends of each bar against each other across its direction."""
+    m, d = directions.shape
+    across = np.eye(d) - directions[:, :, None] * directions[:, None, :]
+    blocks = np.stack([across, -across], axis=1).reshape(2 * m, d, d)
+    return sp.bsr_array((blocks, ends.ravel(), np.arange(0, 2 * m + 1, 2)), shape=(m * d, n * d)).tocsr()
+
+
+def largest_misfit(nodal: NodalMatrix, points: NDArray[np.float64]) -> float:
+    """Largest entry that is left of a block once the bar between the given points is taken away.
+
+    Relative to the largest off-diagonal entry of the node's rows; pairs with undetermined nodes do not count.
+    """
+    known = determined(points)
+    i, j = nodal.node, nodal.indices
+    off = (i != j) & known[i] & known[j]
+    blocks, i, j = nodal.data[off], i[off], j[off]
+    along = points[i] - points[j]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    present = nodal.row_of >= 0
+    bar = along[:, :, None] * along[:, None, :] * (present[i][:, :, None] & present[j][:, None, :])
+    weight = (bar * bar).sum(axis=(1, 2))
+    force = (blocks * bar).sum(axis=(1, 2)) / np.where(weight > 0, weight, 1)
+    left = np.abs(blocks - force[:, None, None] * bar).max(axis=(1, 2), initial=0)
+    size = np.zeros(nodal.n)
+    np.maximum.at(size, i, np.abs(blocks).max(axis=(1, 2), initial=0))
+    return float((left / np.where(size[i] > 0, size[i], 1)).max(initial=0.0))
