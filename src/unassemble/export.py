@@ -143,7 +143,8 @@ def _rows(recovery: Recovery) -> dict[str, NDArray]:
     if node is None or direction is None:
         return {"row": np.arange(recovery.n_points)}
     rows = np.full((direction.max() + 1, recovery.n_points), -1)
-    rows[direction, node] = np.arange(len(node))
+    told = direction >= 0
+    rows[direction[told], node[told]] = np.flatnonzero(told)
     layout = layout_named(recovery.operator)
     names = "xyz" if layout is None else layout.names
     return {f"row_{name}": row for name, row in zip(names, rows, strict=False)}

@@ -93,8 +93,12 @@ def add_members(model: FEModel3D, ends, seed: int, *, turned: bool = True, pinne
 def grid(counts) -> tuple[np.ndarray, np.ndarray]:
     """Points of a lattice of unit steps, and pairs of neighbours."""
     points = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), -1).reshape(-1, len(counts)).astype(float)
-    near = [(i, j) for i, j in combinations(range(len(points)), 2) if np.abs(points[i] - points[j]).sum() == 1]
-    return points, np.array(near)
+    place = np.arange(len(points)).reshape(counts)
+    near = [
+        np.stack([place.take(range(k - 1), a).ravel(), place.take(range(1, k), a).ravel()], 1)
+        for a, k in enumerate(counts)
+    ]
+    return points, np.concatenate(near)
 
 
 def frame(counts=(4, 3, 3), seed: int = 0) -> Built:

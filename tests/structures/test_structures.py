@@ -111,6 +111,25 @@ def test_given_numbering_with_pinned_supports():
     assert error(found.points, given.points) < 1e-10
 
 
+@pytest.mark.parametrize("make", [frame, plane_frame])
+def test_pins_are_found_by_the_pattern(make):
+    given = make()
+    low = np.flatnonzero(lowest(given.points, given.points.shape[1] - 1))
+    d = 3 if given.block == 6 else 2
+    gone = (given.block * low[:, None] + np.arange(d)).ravel()
+    kept = np.setdiff1d(np.arange(given.matrix.shape[0]), gone)
+    found = recover(given.matrix[kept][:, kept])
+    assert found.certified
+    assert sorted(np.flatnonzero(found.node_status)) == sorted(low)
+    assert error(found.points, given.points) < 1e-10
+    assert any("does not tell" in note for note in found.warnings)
+    np.testing.assert_array_equal(found.node_of_row, kept // given.block)
+    told = found.direction_of_row >= 0
+    np.testing.assert_array_equal(found.direction_of_row[told], (kept % given.block)[told])
+    assert not found.rigid_body_modes()[~told].any()
+    found.to_meshio()
+
+
 def test_identity_rows_and_penalties():
     given = frame()
     low = np.flatnonzero(lowest(given.points, 2))

@@ -66,6 +66,7 @@ def turning_modes(
     points : (n, d) float64
         NaN rows get what they have without moving: translations, and rotations of the node itself.
     node_of_row, direction_of_row : (N,) int64
+        A direction of -1 is not known, and gets zeros.
 
     Returns
     -------
@@ -77,7 +78,7 @@ def turning_modes(
     radius = float(np.sqrt((x[known] ** 2).sum(axis=1).mean())) or 1.0
     motions = layout.rigid_motions(np.where(known[:, None], x, 0.0))
     motions[:, :, len(layout.displacements) :] /= radius
-    return np.asarray(motions[node_of_row, direction_of_row])
+    return np.asarray(motions[node_of_row, direction_of_row] * (direction_of_row >= 0)[:, None])
 
 
 def modes_of(recovery: Recovery) -> NDArray[np.float64]:

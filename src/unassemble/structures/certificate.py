@@ -26,6 +26,7 @@ def largest_force(
         As it was given.
     layout : Layout
     node_of_row, direction_of_row : (N,) int64
+        Rows whose direction is -1 do not move.
     points : (n, d) float64
         NaN where not determined; rows that touch such nodes do not count.
     counted : (N, rotations) bool
@@ -34,7 +35,7 @@ def largest_force(
     moves = len(layout.displacements)
     known = determined(points)
     motions = layout.rigid_motions(np.where(known[:, None], points, 0.0))[:, :, moves:]
-    field = motions[node_of_row, direction_of_row]
+    field = motions[node_of_row, direction_of_row] * (direction_of_row >= 0)[:, None]
     force, size = matrix @ field, abs(matrix) @ np.abs(field)
     touched = abs(matrix) @ (~known[node_of_row]).astype(float) > 0
     used = counted & ~touched[:, None] & (size > 0)

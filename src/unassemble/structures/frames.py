@@ -81,6 +81,10 @@ def serve_structure(
         notes.append("members and cells were read off the graph; what is certified is the coordinates")
     if springs:
         notes.append("moments do not balance alone: rotations are tied to the ground by springs, as against drilling")
+    untold = np.unique(node[direction < 0])
+    if len(untold):
+        notes.append(f"{len(untold)} nodes lack unknowns, and which ones the pattern does not tell: their rows were "
+                     "left out; give the numbering if it is known")  # fmt: skip
     loose = ~determined(points)
     if loose.any():
         notes.append(f"{loose.sum()} of {nodes.n} nodes lie at supports, or are tied to these only, and stay "

@@ -101,6 +101,7 @@ def nodes_of(matrix: sp.csr_array, layout: Layout, node: NDArray[np.int64], dire
     matrix : (N, N) sparse
     layout : Layout
     node, direction : (N,) int64
+        Rows whose direction is -1 are left out, as if they had been eliminated.
     """
     b = layout.block_size
     coo = matrix.tocoo()
@@ -108,6 +109,7 @@ def nodes_of(matrix: sp.csr_array, layout: Layout, node: NDArray[np.int64], dire
     real = np.abs(coo.data) > _NOTHING * np.sqrt(diagonal[coo.row] * diagonal[coo.col])
     coupled = np.zeros(len(node), dtype=bool)
     coupled[coo.row[real & (coo.row != coo.col)]] = True
+    coupled &= direction >= 0
     keep = real & coupled[coo.row] & coupled[coo.col]
     place = node * b + direction
     n = int(node.max()) + 1

@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .gaps import with_gaps
 from .layouts import LAYOUTS, SPACE, Layout
 
 ORDERS = ("interleaved", "by component")
@@ -32,6 +33,7 @@ class StructuralNumbering:
     ----------
     layout : Layout
     node_of_row, direction_of_row : (N,) int64
+        A direction of -1 is not known.
     kind : {"interleaved", "by component", "given"}
     share : float
         Share of the rows that annihilate all translations.
@@ -57,7 +59,7 @@ class StructuralNumbering:
 def find_structure(
     matrix: sp.csr_array, kind: str | None = None, block_size: int | None = None
 ) -> StructuralNumbering | None:
-    """Recognise the matrix of a structure whose nodes have all their rows; None if it is none.
+    """Recognise the matrix of a structure; None if it is none.
 
     Parameters
     ----------
@@ -77,7 +79,22 @@ def find_structure(
             share = _share(matrix, layout, direction)
             if share > most:
                 best, most = StructuralNumbering(layout, node, direction, name, share), share
+    if best is None and kind != "by component":
+        best = _interleaved_with_gaps(matrix, block_size)
     return best if best is not None and best.layout.rotations else None
+
+
+def _interleaved_with_gaps(matrix: sp.csr_array, block_size: int | None) -> StructuralNumbering | None:
+    best, most = None, _LEAST
+    for b in {layout.block_size for layout in LAYOUTS} & ({block_size} if block_size else {3, 6}):
+        found = with_gaps(matrix, b)
+        if found is None:
+            continue
+        for layout in (*_SOLIDS, *LAYOUTS):
+            share = _share(matrix, layout, found[1]) if layout.block_size == b else 0.0
+            if share > most:
+                best, most = StructuralNumbering(layout, *found, "interleaved", share), share
+    return best
 
 
 def _regular(order: int, b: int, kind: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -126,7 +143,7 @@ def _share(matrix: sp.csr_array, layout: Layout, direction: NDArray) -> float:
     rows = np.arange(len(direction))
     if len(rows) > _SAMPLE:
         rows = np.sort(np.random.default_rng(0).choice(rows, _SAMPLE, replace=False))
-    rows = rows[np.diff(matrix.indptr)[rows] > 1]
+    rows = rows[(np.diff(matrix.indptr)[rows] > 1) & (direction[rows] >= 0)]
     some = sp.csr_array(matrix[rows])
     labels = (direction[:, None] == np.arange(layout.block_size)).astype(float)
     size = abs(some) @ labels

@@ -1,0 +1,65 @@
+"""Coordinates of frames and shells: time beside one direct solve with the same matrix, and growth.
+
+Run ``python benchmarks/structures.py``; option ``--sizes 6 12 24`` (nodes per edge of the frame; the shell has about as
+many nodes). Element matrices are Pynite's; one end is clamped and eliminated, nodes are numbered at random.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+import scipy.sparse as sp
+
+from unassemble import recover
+from unassemble.linalg import UpperTriangle, factorisation
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "structures"))
+from built import Built, error, frame, shell
+
+
+def direct_solve(matrix: sp.csr_array) -> float:
+    """Seconds for one factorisation, ordering included, and one solve."""
+    start = perf_counter()
+    upper = sp.csr_array(sp.triu(matrix, format="csr"))
+    upper.sort_indices()
+    triangle = UpperTriangle(upper.data, upper.indices.astype(np.int32), upper.indptr.astype(np.int32))
+    solver = factorisation(triangle, definite=True)
+    solver.factorise(triangle)
+    solver.solve(np.ones(matrix.shape[0]))
+    solver.release()
+    return perf_counter() - start
+
+
+def measure(name: str, given: Built, axis: int) -> str:
+    low = given.points[:, axis] < given.points[:, axis].min() + 0.05 * np.ptp(given.points[:, axis])
+    given = given.clamped(low).permuted()
+    matrix = sp.csr_array(given.matrix)
+    unit = min(direct_solve(matrix) for _ in range(3))
+    seconds = []
+    for _ in range(3):
+        start = perf_counter()
+        found = recover(matrix)
+        seconds.append(perf_counter() - start)
+    cells = ", ".join(f"{len(cells)} {kind}" for kind, cells in found.cells.items())
+    return (
+        f"{name:6} {len(given.points):6d} nodes, {matrix.shape[0]:6d} rows: {min(seconds):6.2f} s, "
+        f"{min(seconds) / unit:5.1f} direct solves; {cells}; {found.status}, "
+        f"error {error(found.points, given.points):.0e}, gap {min(one.gap for one in found.evidence):.0e}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--sizes", nargs="+", type=int, default=[6, 9, 14, 20])
+    for size in parser.parse_args().sizes:
+        print(measure("frame", frame((size,) * 3), 2), flush=True)
+        side = round(size**1.5)
+        print(measure("shell", shell(counts=(side, side)), 2), flush=True)
+
+
+if __name__ == "__main__":
+    main()
