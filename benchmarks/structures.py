@@ -24,9 +24,7 @@ from built import Built, error, frame, shell
 def direct_solve(matrix: sp.csr_array) -> float:
     """Seconds for one factorisation, ordering included, and one solve."""
     start = perf_counter()
-    upper = sp.csr_array(sp.triu(matrix, format="csr"))
-    upper.sort_indices()
-    triangle = UpperTriangle(upper.data, upper.indices.astype(np.int32), upper.indptr.astype(np.int32))
+    triangle = UpperTriangle.of(matrix)
     solver = factorisation(triangle, definite=True)
     solver.factorise(triangle)
     solver.solve(np.ones(matrix.shape[0]))

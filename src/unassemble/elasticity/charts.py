@@ -67,7 +67,7 @@ def chart(
     if not n:
         return Chart(local.columns, np.empty((0, d, 0)), np.empty(0), 0)
     count = min(4 * d, n * d)
-    with nearly_singular(_upper(local.normal_matrix()), _SHIFTS) as solver:
+    with nearly_singular(UpperTriangle.of(local.normal_matrix()), _SHIFTS) as solver:
         while True:
             fields, values = _least_fields(local, solver, count)
             if count == n * d or count >= 256 or values[-1] > (1e-7 if whole else _STIFF):
@@ -78,15 +78,6 @@ def chart(
             fields, values = fields[..., keep], values[keep]
         fields, values = _refine(local, solver, fields, values)
     return Chart(local.columns, fields, values, len(local.rows))
-
-
-def _upper(matrix: sp.bsr_array) -> UpperTriangle:
-    matrix.sort_indices()
-    n = len(matrix.indptr) - 1
-    row = np.repeat(np.arange(n), np.diff(matrix.indptr))
-    upper = matrix.indices >= row
-    indptr = np.concatenate([[0], np.cumsum(np.bincount(row[upper], minlength=n))]).astype(np.int32)
-    return UpperTriangle(np.ascontiguousarray(matrix.data[upper]), matrix.indices[upper].astype(np.int32), indptr)
 
 
 def _least_fields(local: Identities, solver: Factorisation, count: int) -> tuple[NDArray, NDArray]:

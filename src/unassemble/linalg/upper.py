@@ -49,6 +49,20 @@ class UpperTriangle:
                 f"row {int(np.argmax(wrong))} of the upper triangle does not start with its diagonal entry"
             )
 
+    @classmethod
+    def of(cls, matrix: sp.csr_array | sp.bsr_array) -> UpperTriangle:
+        """Of a whole matrix, whose diagonal has to be stored; blocks where it is in BSR form."""
+        if matrix.format == "csr":
+            upper = sp.csr_array(sp.triu(matrix, format="csr"))
+            upper.sort_indices()
+            return cls(upper.data, upper.indices, upper.indptr)
+        matrix.sort_indices()
+        n = len(matrix.indptr) - 1
+        row = np.repeat(np.arange(n), np.diff(matrix.indptr))
+        upper = matrix.indices >= row
+        indptr = np.concatenate([[0], np.cumsum(np.bincount(row[upper], minlength=n))])
+        return cls(np.ascontiguousarray(matrix.data[upper]), matrix.indices[upper], indptr)
+
     @property
     def n(self) -> int:
         """Order of the matrix, counted in entries or in blocks."""

@@ -106,7 +106,7 @@ def null_fields(operator: sp.csr_array, d: int) -> tuple[NDArray[np.float64], ND
 def _normal_solver(operator: sp.csr_array) -> AbstractContextManager[Factorisation]:
     normal = operator.T @ operator
     stored = sp.eye_array(normal.shape[0]) * np.finfo(float).tiny  # coordinates in no equation have a diagonal too
-    return nearly_singular(_upper(sp.csr_array(normal + stored)), _SHIFTS)
+    return nearly_singular(UpperTriangle.of(sp.csr_array(normal + stored)), _SHIFTS)
 
 
 def _least_fields(operator: sp.csr_array, solver: Factorisation, d: int) -> tuple[NDArray, NDArray]:
@@ -124,9 +124,3 @@ def _least_fields(operator: sp.csr_array, solver: Factorisation, d: int) -> tupl
         if count >= _MOST:
             raise GeometryError("the equations away from supports leave most of the structure free")
         count = min(2 * count, order)
-
-
-def _upper(matrix: sp.csr_array) -> UpperTriangle:
-    upper = sp.triu(matrix, format="csr")
-    upper.sort_indices()
-    return UpperTriangle(upper.data, upper.indices.astype(np.int32), upper.indptr.astype(np.int32))
