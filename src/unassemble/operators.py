@@ -54,7 +54,7 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
         If no numbering makes rows annihilate translations.
     """
     from .elasticity.unknowns import find_numbering, given_numbering, regular_numbering
-    from .structures import find_structure, given_structure
+    from .structures import find_structure, given_structure, truss_numbering
 
     whole = matrix.csr()
     if numbering is None or isinstance(numbering, str):
@@ -67,10 +67,15 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
             raise GeometryError(
                 "with 6 unknowns per node, three displacements and three rotations, no row annihilates translations"
             )
-        solid = (
-            find_numbering(whole, block_size) if numbering is None else regular_numbering(whole, numbering, block_size)
-        )
-        return VectorReading(solid, "")
+        try:
+            if numbering is None:
+                return VectorReading(find_numbering(whole, block_size), "")
+            return VectorReading(regular_numbering(whole, numbering, block_size), "")
+        except RecoveryError:
+            truss = truss_numbering(whole, block_size, numbering)
+            if truss is None:
+                raise
+            return VectorReading(truss, "")
     try:
         node, direction = numbering
     except (TypeError, ValueError) as error:
@@ -100,7 +105,7 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
         )
     found = numbering_at_sight(whole)
     if found is None or found.share < _ANNIHILATED or found.common < _COMMON:
-        return None
+        return _truss(whole, "the graph has more edges than a planar one can have") if crowded else None
     graph = "the graph has more edges than a planar one can have" if crowded else "no even row is coupled to an odd one"
     return VectorReading(found, f"{graph}, and {_evidence(found)}")
 
@@ -120,10 +125,20 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     try:
         found = find_numbering(whole) if promising(whole, (3, 2)) else None
     except RecoveryError:
-        return None
+        found = None
     if found is None or found.share < _ANNIHILATED or found.common < _COMMON:
-        return None
+        return _truss(whole, "it is no planar mesh")
     return VectorReading(found, f"it is no planar mesh, and {_evidence(found)}")
+
+
+def _truss(whole: Any, reason: str) -> VectorReading | None:
+    from .structures import truss_numbering
+
+    found = truss_numbering(whole)
+    if found is None:
+        return None
+    bars = f"{found.n_nodes} nodes with {found.block_size} unknowns each, {found.kind}, whose blocks are those of bars"
+    return VectorReading(found, f"{reason}, and its rows form {bars}")
 
 
 def refuse(**options: Any) -> None:

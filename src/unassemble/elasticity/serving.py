@@ -14,7 +14,8 @@ from ..clock import Clock
 from ..errors import RecoveryError
 from ..matrix import OperatorMatrix, check_matrix
 from ..recovery import Recovery
-from ..structures.trusses import bars_of, serve_truss
+from ..structures.bars import bars_of
+from ..structures.trusses import serve_truss
 from .anchoring import anchored, checked_anchors
 from .cells import Cells
 from .kinds import KINDS

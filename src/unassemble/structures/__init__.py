@@ -1,5 +1,6 @@
 """Frames, shells and plates, whose nodes have rotations beside displacements; and trusses, which consist of bars."""
 
+from .bars import truss_numbering
 from .frames import serve_structure
 from .layouts import LAYOUTS, Layout, layout_named
 from .recognise import StructuralNumbering, find_structure, given_structure
@@ -12,4 +13,5 @@ __all__ = [
     "given_structure",
     "layout_named",
     "serve_structure",
+    "truss_numbering",
 ]

@@ -30,7 +30,7 @@ def largest_force(
     points : (n, d) float64
         NaN where not determined; rows that touch such nodes do not count.
     counted : (N, rotations) bool
-        Rows and rotations away from supports.
+        Rows and rotations away from supports; without any the answer is infinite.
     """
     moves = len(layout.displacements)
     known = determined(points)
@@ -39,4 +39,4 @@ def largest_force(
     force, size = matrix @ field, abs(matrix) @ np.abs(field)
     touched = abs(matrix) @ (~known[node_of_row]).astype(float) > 0
     used = counted & ~touched[:, None] & (size > 0)
-    return float((np.abs(force[used]) / size[used]).max(initial=0.0))
+    return float((np.abs(force[used]) / size[used]).max(initial=0.0)) if used.any() else float("inf")

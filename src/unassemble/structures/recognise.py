@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .gaps import with_gaps
 from .layouts import LAYOUTS, SPACE, Layout
+from .orders import ORDERS, regular
 
-ORDERS = ("interleaved", "by component")
 _ROUNDING = 1e-9
 _SAMPLE = 2000  # rows to ask
 # On regular meshes some of a solid's rows annihilate whatever is asked; read as what it is it has more of them.
@@ -75,7 +75,7 @@ def find_structure(
         if order % b or order < 2 * b or block_size not in (None, b):
             continue
         for name in ORDERS if kind is None else (kind,):
-            node, direction = _regular(order, b, name)
+            node, direction = regular(order, b, name)
             share = _share(matrix, layout, direction)
             if share > most:
                 best, most = StructuralNumbering(layout, node, direction, name, share), share
@@ -95,12 +95,6 @@ def _interleaved_with_gaps(matrix: sp.csr_array, block_size: int | None) -> Stru
             if share > most:
                 best, most = StructuralNumbering(layout, *found, "interleaved", share), share
     return best
-
-
-def _regular(order: int, b: int, kind: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Nodes and directions of rows in one of the two orders."""
-    row = np.arange(order)
-    return (row // b, row % b) if kind == "interleaved" else (row % (order // b), row // (order // b))
 
 
 def given_structure(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> StructuralNumbering | None:

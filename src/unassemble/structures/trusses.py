@@ -24,55 +24,10 @@ from ..elasticity.unknowns import Numbering
 from ..errors import GeometryError
 from ..matrix import OperatorMatrix
 from ..recovery import Recovery
+from .bars import Bars
 from .positions import null_fields
 
 CERTIFIED = 1e-9
-_RANK_ONE = 1e-9  # how much of a bar's block may be left, relative to the bar
-
-
-@dataclass(frozen=True, eq=False)
-class Bars:
-    """Bars of a truss, and their directions.
-
-    Attributes
-    ----------
-    ends : (m, 2) int64
-        Nodes of each bar, the lesser first.
-    directions : (m, d) float64
-        Unit vectors, sign arbitrary.
-    known : (m,) bool
-        False for bars both of whose ends lack unknowns, so that only a part of the direction shows.
-    """
-
-    ends: NDArray[np.int64]
-    directions: NDArray[np.float64]
-    known: NDArray[np.bool_]
-
-
-def bars_of(nodal: NodalMatrix) -> Bars | None:
-    """The bars, if every pair of coupled nodes is one; None for other matrices.
-
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    """
-    upper = (nodal.node < nodal.indices) & (np.abs(nodal.data).max(axis=(1, 2)) > 0)
-    blocks = nodal.data[upper]
-    if not len(blocks):
-        return None
-    i, j = nodal.node[upper].astype(np.int64), nodal.indices[upper].astype(np.int64)
-    left, size, right = np.linalg.svd(blocks)
-    if (size[:, 1] > _RANK_ONE * size[:, 0]).any():
-        return None
-    whole = nodal.row_of.min(axis=1) >= 0
-    # Rows belong to i, columns to j: whichever has all its unknowns shows all of the direction.
-    directions = np.where(whole[j][:, None], right[:, 0], left[:, :, 0])
-    known = whole[i] | whole[j]
-    both = whole[i] & whole[j]
-    aligned = (left[both, :, 0] * right[both, 0]).sum(axis=1)
-    if not both.any() or np.abs(np.abs(aligned) - 1).max() > _RANK_ONE:
-        return None
-    return Bars(np.column_stack([i, j]), directions, known)
 
 
 def serve_truss(

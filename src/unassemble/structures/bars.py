@@ -1,0 +1,100 @@
+"""Bars of a truss: the block of two nodes is that of one bar, and tells its direction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..elasticity.nodal import NodalMatrix, nodal_matrix
+from ..elasticity.unknowns import Numbering
+from .orders import ORDERS, regular
+
+_RANK_ONE = 1e-9  # how much of a bar's block may be left, relative to the bar
+_SAMPLE = 64  # nodes to look at before all are
+
+
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """Bars of a truss, and their directions.
+
+    Attributes
+    ----------
+    ends : (m, 2) int64
+        Nodes of each bar, the lesser first.
+    directions : (m, d) float64
+        Unit vectors, sign arbitrary.
+    known : (m,) bool
+        False for bars both of whose ends lack unknowns, so that only a part of the direction shows.
+    """
+
+    ends: NDArray[np.int64]
+    directions: NDArray[np.float64]
+    known: NDArray[np.bool_]
+
+
+def bars_of(nodal: NodalMatrix) -> Bars | None:
+    """The bars, if every pair of coupled nodes is one; None for other matrices.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    """
+    upper = (nodal.node < nodal.indices) & (np.abs(nodal.data).max(axis=(1, 2)) > 0)
+    blocks = nodal.data[upper]
+    if not len(blocks):
+        return None
+    i, j = nodal.node[upper].astype(np.int64), nodal.indices[upper].astype(np.int64)
+    left, size, right = np.linalg.svd(blocks)
+    if (size[:, 1] > _RANK_ONE * size[:, 0]).any():
+        return None
+    whole = nodal.row_of.min(axis=1) >= 0
+    # Rows belong to i, columns to j: whichever has all its unknowns shows all of the direction.
+    directions = np.where(whole[j][:, None], right[:, 0], left[:, :, 0])
+    known = whole[i] | whole[j]
+    both = whole[i] & whole[j]
+    aligned = (left[both, :, 0] * right[both, 0]).sum(axis=1)
+    if not both.any() or np.abs(np.abs(aligned) - 1).max() > _RANK_ONE:
+        return None
+    return Bars(np.column_stack([i, j]), directions, known)
+
+
+def truss_numbering(matrix: sp.csr_array, block_size: int | None = None, kind: str | None = None) -> Numbering | None:
+    """The usual numbering in which all blocks are those of bars, however many supports there are; None if none is.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+    block_size : {2, 3}, optional
+    kind : {None, "interleaved", "by component"}
+    """
+    order = matrix.shape[0]
+    for d in (3, 2) if block_size is None else (block_size,):
+        if order % d or order < 2 * d:
+            continue
+        for name in ORDERS if kind is None else (kind,):
+            node, direction = regular(order, d, name)
+            if not _like_bars(matrix, node, direction, d):
+                continue
+            lone = np.asarray(abs(matrix).sum(axis=1)).ravel() == np.abs(matrix.diagonal())
+            numbering = Numbering(d, node, direction, lone, name, 0.0, 1.0)
+            if bars_of(nodal_matrix(matrix, numbering)) is not None:
+                return numbering
+    return None
+
+
+def _like_bars(matrix: sp.csr_array, node: NDArray, direction: NDArray, d: int) -> bool:
+    """Whether the blocks of a few nodes are those of bars, not all of them along the axes."""
+    n = matrix.shape[0] // d
+    place = np.empty((n, d), np.int64)
+    place[node, direction] = np.arange(len(node))
+    some = np.random.default_rng(0).choice(n, min(n, _SAMPLE), replace=False)
+    blocks = sp.csr_array(matrix[place[some].ravel()][:, place.ravel()]).tobsr((d, d))
+    row = np.repeat(some, np.diff(blocks.indptr))
+    size = np.linalg.svd(blocks.data[row != blocks.indices], compute_uv=False)
+    if not size.size or (size[:, 1] > _RANK_ONE * size[:, 0]).any():
+        return False
+    off = np.abs(blocks.data[row != blocks.indices]) > _RANK_ONE * size[:, :1, None]
+    return bool((off.sum(axis=(1, 2)) > 1).any())

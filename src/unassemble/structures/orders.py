@@ -1,0 +1,14 @@
+"""The two usual orders of unknowns."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+ORDERS = ("interleaved", "by component")
+
+
+def regular(order: int, b: int, kind: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Node and direction of each row of a matrix whose nodes have all their b unknowns, in one of the two orders."""
+    row = np.arange(order)
+    return (row // b, row % b) if kind == "interleaved" else (row % (order // b), row // (order // b))
