@@ -61,7 +61,7 @@ class Inspection:
     coupled : bool
         Whether its directions are coupled.
     structure : str
-        Kind of structure whose nodes have rotations too; empty for others.
+        ``"truss"``, or the kind of structure whose nodes have rotations too; empty for others.
     n_polygons : int
         Cells of more than three vertices, whose diagonals have no entry.
     n_vanished_sides : int
@@ -105,6 +105,8 @@ class Inspection:
     @property
     def operator(self) -> str:
         """The operator that the matrix likely belongs to, or why none."""
+        if self.structure == "truss":
+            return f"truss: bars between nodes of {self.block_size} displacements"
         if self.structure:
             return f"{self.structure}: displacements and rotations, {self.block_size} unknowns per node"
         if self.n_nodes:
@@ -120,7 +122,8 @@ class Inspection:
     def recoverable(self) -> str:
         """What :func:`unassemble.recover` can make of the matrix."""
         if self.structure:
-            return f"coordinates of {count_of(self.n_nodes, 'node')} in true size, up to position; members and cells"
+            size = "up to position and size" if self.structure == "truss" else "in true size, up to position"
+            return f"coordinates of {count_of(self.n_nodes, 'node')} {size}; members and cells"
         if self.n_nodes and self.coupled:
             return (
                 f"coordinates of {count_of(self.n_nodes, 'node')} in {self.block_size}D, up to position and size, and "

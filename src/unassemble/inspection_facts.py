@@ -56,6 +56,7 @@ def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]
     """Of a vector-valued matrix."""
     from .elasticity.nodal import nodal_matrix, uncoupled
     from .structures import StructuralNumbering
+    from .structures.bars import bars_of
 
     found = vector.numbering
     if isinstance(found, StructuralNumbering):
@@ -65,12 +66,14 @@ def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]
             "numbering": found.kind,
             "structure": found.layout.name,
         }
+    nodal = nodal_matrix(matrix.csr(), found)
     words = {"pattern": "in an order found by the pattern"}
     return {
         "block_size": found.block_size,
         "n_nodes": found.n_nodes,
         "numbering": words.get(found.kind, found.kind),
-        "coupled": not uncoupled(nodal_matrix(matrix.csr(), found)),
+        "coupled": not uncoupled(nodal),
+        "structure": "" if uncoupled(nodal) or bars_of(nodal) is None else "truss",
     }
 
 

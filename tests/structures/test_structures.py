@@ -5,7 +5,7 @@ import pytest
 import scipy.sparse as sp
 from built import cells_of, error, flat, frame, plane_frame, plate, shell, truss
 
-from unassemble import InputError, RecoveryError, recover
+from unassemble import InputError, RecoveryError, inspect_matrix, recover
 
 CASES = {
     "frame": (frame, "frame or shell", 2),
@@ -180,6 +180,17 @@ def test_rigid_modes_cost_nothing():
         force = abs(given.matrix @ modes).max() / (abs(given.matrix) @ abs(modes)).max()
         assert force < 1e-12
         assert np.linalg.matrix_rank(modes) == given.block
+
+
+def test_inspection_names_structures():
+    for make, operator in (
+        (frame, "frame or shell: "),
+        (plane_frame, "plane frame: "),
+        (lambda: truss(3, 40), "truss: "),
+    ):
+        facts = inspect_matrix(make().matrix)
+        assert facts.operator.startswith(operator)
+        assert facts.recoverable.startswith(f"coordinates of {facts.n_nodes} nodes")
 
 
 def test_a_wrong_entry_spoils_the_certificate():
