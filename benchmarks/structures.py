@@ -1,7 +1,8 @@
 """Coordinates of frames and shells: time beside one direct solve with the same matrix, and growth.
 
 Run ``python benchmarks/structures.py``; option ``--sizes 6 12 24`` (nodes per edge of the frame; the shell has about as
-many nodes). Element matrices are Pynite's; one end is clamped and eliminated, nodes are numbered at random.
+many nodes); with ``--multigrid`` the iterations that PyAMG takes without and with the recovered rigid-body modes.
+Element matrices are Pynite's; one end is clamped and eliminated, nodes are numbered at random.
 """
 
 from __future__ import annotations
@@ -32,9 +33,30 @@ def direct_solve(matrix: sp.csr_array) -> float:
     return perf_counter() - start
 
 
-def measure(name: str, given: Built, axis: int) -> str:
-    low = given.points[:, axis] < given.points[:, axis].min() + 0.05 * np.ptp(given.points[:, axis])
-    given = given.clamped(low).permuted()
+def standing(given: Built) -> Built:
+    """Clamped at the foot, nodes at random."""
+    height = given.points[:, 2]
+    return given.clamped(height < height.min() + 0.05 * np.ptp(height)).permuted()
+
+
+def iterations(name: str, given: Built) -> str:
+    """Of conjugate gradients to 1e-8, smoothed aggregation as preconditioner."""
+    import pyamg
+
+    matrix = sp.csr_array(given.matrix)
+    modes = recover(matrix, cells=False).rigid_body_modes()
+    rhs = np.random.default_rng(0).standard_normal(matrix.shape[0])
+    blocks = sp.bsr_matrix(matrix, blocksize=(given.block, given.block))
+    counts = []
+    for operator, options in ((sp.csr_matrix(matrix), {}), (blocks, {}), (blocks, {"B": modes})):
+        residuals: list[float] = []
+        solver = pyamg.smoothed_aggregation_solver(operator, **options)
+        solver.solve(rhs, tol=1e-8, accel="cg", residuals=residuals, maxiter=5000)
+        counts.append(len(residuals) - 1)
+    return f"{name:6} {matrix.shape[0]:6d} rows: iterations plain {counts[0]}, block {counts[1]}, modes {counts[2]}"
+
+
+def measure(name: str, given: Built) -> str:
     matrix = sp.csr_array(given.matrix)
     unit = min(direct_solve(matrix) for _ in range(3))
     seconds = []
@@ -53,10 +75,12 @@ def measure(name: str, given: Built, axis: int) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--sizes", nargs="+", type=int, default=[6, 9, 14, 20])
-    for size in parser.parse_args().sizes:
-        print(measure("frame", frame((size,) * 3), 2), flush=True)
+    parser.add_argument("--multigrid", action="store_true")
+    chosen = parser.parse_args()
+    for size in chosen.sizes:
         side = round(size**1.5)
-        print(measure("shell", shell(counts=(side, side)), 2), flush=True)
+        for name, given in (("frame", frame((size,) * 3)), ("shell", shell(counts=(side, side), thickness=0.05))):
+            print((iterations if chosen.multigrid else measure)(name, standing(given)), flush=True)
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ class Bars:
 
 
 def bars_of(nodal: NodalMatrix) -> Bars | None:
-    """The bars, if every pair of coupled nodes is one; None for other matrices.
+    """The bars, if every pair of coupled nodes is one, and they span space; None for other matrices.
 
     Parameters
     ----------
@@ -57,6 +57,10 @@ def bars_of(nodal: NodalMatrix) -> Bars | None:
     both = whole[i] & whole[j]
     aligned = (left[both, :, 0] * right[both, 0]).sum(axis=1)
     if not both.any() or np.abs(np.abs(aligned) - 1).max() > _RANK_ONE:
+        return None
+    spread = np.linalg.eigvalsh(directions[known].T @ directions[known] / known.sum())
+    pulls = np.trace(blocks[both], axis1=1, axis2=2) > 0
+    if spread[0] < _RANK_ONE or 0 < pulls.sum() < len(pulls):  # bars all in line or in a plane; of stiffness below zero
         return None
     return Bars(np.column_stack([i, j]), directions, known)
 
