@@ -53,10 +53,11 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
     RecoveryError
         If no numbering makes rows annihilate translations.
     """
+    from .elasticity.rounded import with_exact_sums
     from .elasticity.unknowns import find_numbering, given_numbering, regular_numbering
     from .structures import find_structure, given_structure, truss_numbering
 
-    whole = matrix.csr()
+    whole, _ = with_exact_sums(matrix.csr())
     if numbering is None or isinstance(numbering, str):
         if numbering not in (None, *NUMBERINGS):
             raise InputError(f"the numbering is {' or '.join(map(repr, NUMBERINGS))}, not {numbering!r}")
@@ -94,10 +95,11 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
     crowded = matrix.n >= 3 and len(matrix.edges) > 3 * matrix.n - 6
     if not crowded and not _twins_interleaved(matrix):
         return None
+    from .elasticity.rounded import with_exact_sums
     from .elasticity.unknowns import numbering_at_sight
     from .structures import find_structure
 
-    whole = matrix.csr()
+    whole, _ = with_exact_sums(matrix.csr())
     structure = find_structure(whole) if crowded else None
     if structure is not None:
         return VectorReading(
@@ -112,13 +114,14 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
 
 def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     """Read a matrix as vector-valued after it turned out not to be a planar mesh; None where little speaks for it."""
+    from .elasticity.rounded import with_exact_sums
     from .elasticity.sampling import promising
     from .elasticity.unknowns import find_numbering
     from .structures import find_structure
 
     if not matrix.diagonal.all():  # every unknown of an elastic body has a stiffness
         return None
-    whole = matrix.csr()
+    whole, _ = with_exact_sums(matrix.csr())
     structure = find_structure(whole)
     if structure is not None:
         return VectorReading(structure, f"it is no planar mesh, and {_evidence(structure)}")

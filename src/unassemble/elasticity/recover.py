@@ -16,9 +16,12 @@ from .material import poisson_ratio
 from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled, without_trace
 from .positions import Solution, solve
 from .results import ElasticityRecovery, ScalarParts
+from .rounded import with_exact_sums
 from .unknowns import Numbering, find_numbering
 
 CERTIFIED = 1e-9
+_NEAR = 1e-6  # residual up to which positions are good enough to look for elements
+_SPREADS = 20  # times the rounding of the entries: what an identity may be off by
 
 
 def scalar_parts(matrix: sp.csr_array, *, block_size: int | None = None) -> ScalarParts | None:
@@ -68,7 +71,7 @@ def recover_elasticity(
     """
     clock = Clock()
     with clock("check"):
-        whole = check_matrix(matrix).csr()
+        whole, rounding = with_exact_sums(check_matrix(matrix).csr())
     with clock("numbering"):
         numbering = numbering or find_numbering(whole, block_size)
         nodal = nodal_matrix(whole, numbering)
@@ -77,13 +80,22 @@ def recover_elasticity(
         raise GeometryError(
             "the directions are not coupled: these are scalar matrices side by side; recover one of them by itself"
         )
-    return place_nodes(nodal, numbering, clock, cells=cells, patch=patch)
+    return place_nodes(nodal, numbering, clock, cells=cells, patch=patch, rounding=rounding)
 
 
 def place_nodes(
-    nodal: NodalMatrix, numbering: Numbering, clock: Clock, *, cells: bool = True, patch: int | None = None
+    nodal: NodalMatrix,
+    numbering: Numbering,
+    clock: Clock,
+    *,
+    cells: bool = True,
+    patch: int | None = None,
+    rounding: float = 0.0,
 ) -> ElasticityRecovery:
-    """The recovery once the nodes are known: null space, certificate, cells; see :func:`recover_elasticity`."""
+    """The recovery once the nodes are known: null space, certificate, cells; see :func:`recover_elasticity`.
+
+    `rounding` is that of the entries, where they have few digits.
+    """
     with clock("null space"), blas_threads(1):
         try:
             solution = solve(nodal, patch)
@@ -108,23 +120,26 @@ def place_nodes(
         if better is not None:
             nodal, numbering = better
             solution = solve(nodal, patch)
-    return _describe(nodal, numbering, solution, clock, cells)
+    return _describe(nodal, numbering, solution, clock, cells, rounding)
 
 
 def _describe(
-    nodal: NodalMatrix, numbering: Numbering, solution: Solution, clock: Clock, want_cells: bool
+    nodal: NodalMatrix, numbering: Numbering, solution: Solution, clock: Clock, want_cells: bool, rounding: float
 ) -> ElasticityRecovery:
     """Certificate, material, cells and the sentences that go with them."""
     points = solution.points
     with clock("certify"):
         error = largest_residual(nodal, solution.valid, points, solution.ratio)
-        ratio = poisson_ratio(nodal, solution.valid, points) if error < 1e-6 else None
+        near = error < max(_NEAR, _SPREADS * rounding)
+        ratio = poisson_ratio(nodal, solution.valid, points) if near else None
     found = no_cells(nodal.dim)
-    if want_cells and error < 1e-6:
+    if want_cells and near:
         with clock("cells"):
             found = recognise_cells(nodal, points, None if ratio is None else 2 * ratio / (1 - 2 * ratio))
     backward = found.backward_error if found.certified else error
     status, reason = _verdict(nodal, solution, error, found, numbering)
+    if rounding and near:
+        status, reason = "uncertified", _of_few_digits(rounding, error)
     loose = ~determined(points)
     warnings = list(solution.warnings)
     if want_cells:
@@ -157,6 +172,13 @@ def _about_cells(found: Cells) -> list[str]:
     if found.varying:
         return ["the material differs within elements: their Lame coefficients are means"]
     return []
+
+
+def _of_few_digits(rounding: float, error: float) -> str:
+    return (
+        f"the entries are rounded to {rounding:.0e} of themselves, and the identities hold to {error:.1e}, which is "
+        "what that leaves; rows away from supports were made to annihilate translations exactly"
+    )
 
 
 _FREEDOMS = {

@@ -22,6 +22,7 @@ from .kinds import KINDS
 from .nodal import nodal_matrix, uncoupled
 from .recover import parts_of, place_nodes
 from .results import ElasticityRecovery, ScalarParts
+from .rounded import with_exact_sums
 from .surface import boundary_loops
 from .unknowns import Numbering
 
@@ -56,7 +57,7 @@ def serve(
         Recovers a scalar matrix with anchors, for directions that are not coupled.
     """
     with clock("numbering"):
-        whole = matrix.csr()
+        whole, rounding = with_exact_sums(matrix.csr())
         nodal = nodal_matrix(whole, numbering)
     if uncoupled(nodal):
         parts = parts_of(whole, nodal, numbering)
@@ -66,7 +67,7 @@ def serve(
         return serve_truss(matrix, nodal, numbering, bars, clock, anchors=anchors, choice=choice)
     del whole
     checked_anchors(anchors, numbering.node_of_row, numbering.block_size)  # before the long work
-    found = place_nodes(nodal, numbering, clock, cells=cells)
+    found = place_nodes(nodal, numbering, clock, cells=cells, rounding=rounding)
     known = checked_anchors(anchors, found.node_of_row, numbering.block_size)
     points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
     lame, scale = _in_units(found, factor)

@@ -9,8 +9,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..elasticity.nodal import NodalMatrix, nodal_matrix
+from ..elasticity.orders import ORDERS, regular
 from ..elasticity.unknowns import Numbering
-from .orders import ORDERS, regular
 
 _RANK_ONE = 1e-9  # how much of a bar's block may be left, relative to the bar
 _SAMPLE = 64  # nodes to look at before all are

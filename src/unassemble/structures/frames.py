@@ -13,6 +13,7 @@ from ..clock import Clock
 from ..elasticity.anchoring import checked_anchors
 from ..elasticity.nodal import determined
 from ..elasticity.results import Evidence
+from ..elasticity.rounded import with_exact_sums
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
@@ -25,6 +26,7 @@ from .positions import positions
 from .recognise import StructuralNumbering
 
 CERTIFIED = 1e-9
+_SPREADS = 20  # times the rounding of the entries: what a sum of forces may be off by
 _SURE = 1e-6  # of the diameter: how far off the points of a certified structure may be
 
 
@@ -61,7 +63,7 @@ def serve_structure(
     layout = numbering.layout
     node, direction = numbering.node_of_row, numbering.direction_of_row
     known = checked_anchors(anchors, node, layout.dim)
-    whole = matrix.csr()
+    whole, rounding = with_exact_sums(matrix.csr())
     nodes = nodes_of(whole, layout, node, direction)
     valid = nodes.whole()
     with clock("solve"), blas_threads(1):
@@ -90,7 +92,7 @@ def serve_structure(
         notes.append(f"{loose.sum()} of {nodes.n} nodes lie at supports, or are tied to these only, and stay "
                      "undetermined")  # fmt: skip
     points, more = _moved(points, component, known)
-    status, reason = _verdict(error, evidence, layout.dim)
+    status, reason = _verdict(error, evidence, layout.dim, rounding)
     return Recovery(
         **fields,
         points=points,
@@ -190,12 +192,17 @@ def _moved(
     return points, notes
 
 
-def _verdict(error: float, evidence: tuple[Evidence, ...], d: int) -> tuple[str, str]:
+def _verdict(error: float, evidence: tuple[Evidence, ...], d: int, rounding: float) -> tuple[str, str]:
     free = [one.null_dimension for one in evidence if one.null_dimension > d]
     if free:
         return "uncertified", (
             f"the null space has dimension {free[0]} where {d} translations are expected: supports leave too few whole "
             "rows"
+        )
+    if error < _SPREADS * rounding:
+        return "uncertified", (
+            f"the entries are rounded to {rounding:.0e} of themselves, and rigid rotations cause forces of {error:.1e} "
+            "of those that make them up, which is what that leaves"
         )
     loosest = min((one.gap for one in evidence), default=np.inf)
     if error > _SURE * loosest:

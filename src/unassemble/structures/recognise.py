@@ -12,10 +12,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..elasticity.orders import ORDERS, regular
 from ..errors import InputError
 from .gaps import with_gaps
 from .layouts import LAYOUTS, SPACE, Layout
-from .orders import ORDERS, regular
 
 _ROUNDING = 1e-9
 _SAMPLE = 2000  # rows to ask

@@ -1,0 +1,66 @@
+"""Matrices in single precision, or written with few digits."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from assembled import box, eliminated, error, on_plane, permuted_nodes, stiffness
+
+from unassemble import recover
+from unassemble.elasticity.rounded import rounding_of, with_exact_sums
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "structures"))
+from built import error as size_and_error
+from built import frame, plane_frame
+
+ROUNDED = {
+    "single": lambda values: values.astype(np.float32).astype(float),
+    "6 digits": lambda values: np.array([float(f"{x:.5e}") for x in values]),
+    "8 digits": lambda values: np.array([float(f"{x:.7e}") for x in values]),
+}
+LEVEL = {"single": 2.0**-24, "6 digits": 5e-6, "8 digits": 5e-8}
+
+
+def rounded(matrix, how):
+    matrix = sp.csr_array(matrix)
+    return sp.csr_array((ROUNDED[how](matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
+@pytest.mark.parametrize("how", ROUNDED)
+@pytest.mark.parametrize(("kind", "counts"), [("tri-p1", (12, 12)), ("hex-q1", (6, 6, 7)), ("tet-p1", (6, 6, 6))])
+def test_positions_are_as_good_as_the_entries(kind, counts, how):
+    given = permuted_nodes(stiffness(kind, box(kind, counts, perturb=0.2)))
+    matrix, nodes = eliminated(given, np.repeat(on_plane(given, 0)[:, None], given.dim, axis=1))
+    found = recover(rounded(matrix, how), operator="elasticity")
+    assert found.status == "uncertified"
+    assert f"rounded to {LEVEL[how]:.0e}" in found.reason
+    assert not found.node_status.any()
+    assert error(found.points, given.points[nodes]) < LEVEL[how]
+
+
+@pytest.mark.parametrize("how", ROUNDED)
+@pytest.mark.parametrize("make", [frame, plane_frame])
+def test_structures_too(make, how):
+    given = make()
+    found = recover(rounded(given.matrix, how))
+    assert found.operator in ("frame or shell", "plane frame")
+    assert found.status == "uncertified"
+    assert "rounded to" in found.reason
+    assert size_and_error(found.points, given.points) < LEVEL[how]
+
+
+@pytest.mark.parametrize("how", ROUNDED)
+def test_rounding_shows(how):
+    values = np.random.default_rng(0).standard_normal(300)
+    assert rounding_of(ROUNDED[how](values)) == pytest.approx(LEVEL[how])
+    assert rounding_of(values) == 0
+    assert rounding_of(np.arange(10.0)) == 0
+
+
+def test_full_precision_is_left_alone():
+    given = stiffness("tri-p1", box("tri-p1", (5, 5), perturb=0.2)).matrix
+    same, rounding = with_exact_sums(given)
+    assert same is given
+    assert rounding == 0
