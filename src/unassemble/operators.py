@@ -57,15 +57,15 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
         return VectorReading(find_numbering(whole, block_size), "")
     if isinstance(numbering, str):
         if numbering not in NUMBERINGS:
-            raise InputError(f"the numbering is {' or '.join(map(repr, NUMBERINGS))}, not {numbering!r}")
+            raise InputError(f"`numbering` is {' or '.join(map(repr, NUMBERINGS))}, not {numbering!r}")
         return VectorReading(regular_numbering(whole, numbering, block_size), "")
     try:
         node, direction = numbering
     except (TypeError, ValueError) as error:
-        raise InputError("a numbering is two arrays: the node and the direction of each row") from error
+        raise InputError("`numbering` is two arrays: the node and the direction of each row") from error
     found = given_numbering(whole, node, direction)
     if block_size not in (None, found.block_size):
-        raise InputError(f"the numbering has {found.block_size} directions, and the block size is {block_size}")
+        raise InputError(f"`numbering` has {found.block_size} directions, and `block_size` is {block_size}")
     return VectorReading(found, "")
 
 
@@ -112,8 +112,8 @@ def refuse(**options: Any) -> None:
     """
     for name, value in options.items():
         if value is not None and value is not False:
-            raise InputError(f"the option {name.replace('_', '-')} is for scalar matrices, and this one is read as "
-                             "vector-valued: leave it out, or choose the operator 'laplacian'")  # fmt: skip
+            raise InputError(f"`{name}` is for scalar matrices, and this one is read as "
+                             "vector-valued: leave it out, or choose `operator='laplacian'`")  # fmt: skip
 
 
 def _evidence(found: Numbering) -> str:

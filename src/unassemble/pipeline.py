@@ -180,15 +180,15 @@ def _check_options(
 ) -> None:
     if operator not in OPERATORS:
         known = " or ".join(map(repr, OPERATORS))
-        raise InputError(f"the operator {operator!r} is not available in this version: use {known}")
+        raise InputError(f"`operator={operator}` is not available in this version: use {known}")
     if vector and operator == "laplacian":
-        raise InputError("block size and numbering belong to vector-valued matrices, not to the operator 'laplacian'")
+        raise InputError("`block_size` and `numbering` belong to vector-valued matrices, not to `operator='laplacian'`")
     if method not in (None, "conformal", "angles"):
-        raise InputError(f"the method {method!r} is not available in this version: use 'conformal' or 'angles'")
+        raise InputError(f"`method={method}` is not available in this version: use 'conformal' or 'angles'")
     if scale is not None and not (np.isfinite(scale) and scale != 0):
-        raise InputError(f"the scale is a finite nonzero number, not {scale}")
+        raise InputError(f"`scale` is a finite nonzero number, not {scale}")
     if noise is not None and not (np.isfinite(noise) and noise > 0):
-        raise InputError(f"the noise is a positive standard deviation, not {noise}")
+        raise InputError(f"`noise` is a positive standard deviation, not {noise}")
 
 
 def _is_matrix(A: Any) -> bool:

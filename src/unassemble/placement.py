@@ -22,6 +22,12 @@ def _converted(
     anchors: Sequence[Anchor] | None, direction: Direction | None
 ) -> tuple[tuple[Anchor, ...], Direction | None]:
     """Rows as integers, coordinates as floats."""
+    for one in anchors or ():
+        if np.ndim(one) == 1 and len(one) == 4:
+            raise InputError(
+                f"the anchor of row {one[0]} has three coordinates, and this matrix belongs to a mesh in the plane: "
+                "leave out the third"
+            )
     try:
         placed = tuple((operator.index(row), float(x), float(y)) for row, x, y in anchors or ())
         if direction is not None:
@@ -29,7 +35,7 @@ def _converted(
             direction = operator.index(first), operator.index(second), float(degrees)
     except (TypeError, ValueError) as error:
         raise InputError(
-            "anchors are triples (row, x, y) and a direction is a triple (row, row, degrees), with whole rows"
+            "`anchors` are triples (row, x, y) and `direction` is a triple (row, row, degrees), with whole rows"
         ) from error
     return placed, direction
 
@@ -81,13 +87,13 @@ class Placement:
         if len({t[1:] for t in placed}) < len(placed):
             raise InputError("two anchors have the same position: different rows are different points")
         if direction and (direction[0] == direction[1] or not np.isfinite(direction[2])):
-            raise InputError(f"the direction {direction} needs two different rows and a finite angle")
+            raise InputError("`direction` needs two different rows and a finite angle")
         if handed not in (None, "left", "right"):
-            raise InputError(f"handedness is 'left' or 'right', not {handed!r}")
+            raise InputError(f"`handed` is 'left' or 'right', not {handed!r}")
         if direction and len(placed) > 1:
-            raise InputError("a direction and two or more anchors fix the same freedom: give one of them")
+            raise InputError("`direction` and two or more anchors fix the same freedom: give one of them")
         if handed and not direction and len(placed) < 2:
-            raise InputError("handedness needs a line to refer to: give a direction or two anchors as well")
+            raise InputError("`handed` needs a line to refer to: give `direction` or two anchors as well")
         return cls(placed, ConstantTensor(*tensor) if tensor is not None else None, direction, handed)
 
     def apply(self, piece: Piece, z: NDArray) -> tuple[NDArray, list[str]]:
@@ -113,8 +119,8 @@ class Placement:
             notes: list[str] = []
         elif self.tensor:
             raise InputError(
-                f"the tensor cannot be undone for the piece of row {piece.vertices.min()} without its orientation: "
-                "give three anchors that are not in line, or --direction ROW,ROW,DEGREES with --handed left|right"
+                f"`tensor` cannot be undone for the piece of row {piece.vertices.min()} without its orientation: "
+                "give three anchors that are not in line, or `direction` and `handed`"
             )
         else:
             frame, note = canonical_frame(z, piece.edges)
@@ -135,7 +141,7 @@ class Placement:
         if lost:
             notes.append(f"the anchors of rows {', '.join(map(str, lost))} belong to no triangle and were not used")
         if self.direction and not any(np.isin(self.direction[:2], p.vertices).all() for p in topology.pieces):
-            notes.append("the direction joins rows of different pieces and was not used")
+            notes.append("`direction` joins rows of different pieces and was not used")
         return notes
 
     def _anchors_of(self, piece: Piece) -> tuple[NDArray, NDArray]:
@@ -154,13 +160,11 @@ class Placement:
         if len(rows) > 2 and not collinear(known):
             frame = min(fits, key=lambda fit: fit[1])[0]
             if self.handed:
-                notes.append("three or more anchors fix the mirror image; the handedness was not used")
+                notes.append("three or more anchors fix the mirror image; `handed` was not used")
         elif self.handed:
             frame = self._handed([fit[0] for fit in fits], z, rows[:2])
         elif self.tensor:
-            raise InputError(
-                "two anchors leave the mirror image open: give a third, not in line, or --handed left|right"
-            )
+            raise InputError("two anchors leave the mirror image open: give a third, not in line, or `handed`")
         else:
             frame = fits[canonical_frame(z, piece.edges)[0].mirror][0]
             notes.append("the anchors leave two mirror images; the choice between them is by convention")
@@ -181,7 +185,7 @@ class Placement:
         if self.handed:
             frame = self._handed(frames, z, ends)
         elif self.tensor:
-            raise InputError("a direction leaves the mirror image open: add --handed left|right")
+            raise InputError("`direction` leaves the mirror image open: add `handed`")
         else:
             frame = frames[canonical_frame(z, piece.edges)[0].mirror]
         placed = frame(z)
@@ -195,7 +199,7 @@ class Placement:
         side = (np.conj(line) * offset).imag
         if abs(side) < 1e-9 * abs(line) * np.abs(z - z.mean()).max():
             raise InputError(
-                "the piece's centroid lies on the line that the handedness refers to: "
+                "the piece's centroid lies on the line that `handed` refers to: "
                 "choose other rows, or give three anchors that are not in line"
             )
         return frames[0] if (side > 0) == (self.handed == "left") else frames[1]

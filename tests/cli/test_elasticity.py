@@ -163,7 +163,7 @@ def test_options_of_scalar_matrices(work, one_sentence):
     work.write("E.mtx", body("tri-p1").matrix)
     result = work.recover("--noise", "1e-3", matrix="E.mtx")
     assert result.exit_code == 2
-    assert "the option noise is for scalar matrices" in one_sentence(result)
+    assert "--noise is for scalar matrices" in one_sentence(result)
     assert work.recover("--no-refine", "--threads", "1", matrix="E.mtx").exit_code == 0
 
 

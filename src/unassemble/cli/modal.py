@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .options import matrix_options, nodes_options, spelled_numbering
-from .status import CERTIFIED, UNCERTIFIED, say
+from .status import outcome
 from .values import OptionalTolerance
 
 if TYPE_CHECKING:
@@ -49,14 +49,7 @@ def modes(
             raise
         display("write")
         _write(recovery, files)
-    if not quiet:
-        from ..report import summary
-
-        written = ", ".join(click.format_filename(name) for name in files.values() if name is not None)
-        say(summary(recovery) + f"\n  {'written':<15} {written}")
-    elif not recovery.certified:
-        click.echo(f"unassemble: not certified: {recovery.reason}", err=True)
-    return CERTIFIED if recovery.certified else UNCERTIFIED
+    return outcome(recovery, [name for name in files.values() if name is not None], quiet=quiet)
 
 
 def _check_files(matrix: str, files: dict[str, str | None]) -> None:

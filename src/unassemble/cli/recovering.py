@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .options import matrix_options, nodes_options, spelled_numbering
-from .status import CERTIFIED, UNCERTIFIED, say
+from .status import outcome
 from .values import Number, Numbers, OptionalTolerance, check_anchors, check_orientation, check_tensor
 
 if TYPE_CHECKING:
@@ -98,13 +98,7 @@ def recover(matrix: str, out: str, report: str | None, plot: str | None, quiet: 
     with StageDisplay(enabled=not quiet) as display:
         recovery = _recovered(files, display, options)
         _write(recovery, files, display)
-    if not quiet:
-        from ..report import summary
-
-        say(summary(recovery) + f"\n  {'written':<15} {', '.join(map(click.format_filename, files.written))}")
-    elif not recovery.certified:
-        click.echo(f"unassemble: not certified: {recovery.reason}", err=True)
-    return CERTIFIED if recovery.certified else UNCERTIFIED
+    return outcome(recovery, files.written, quiet=quiet)
 
 
 def _check_available(realise: bool, operator: str, method: str | None) -> None:

@@ -77,7 +77,7 @@ def _read(stream: Any, name: str, variable: str | None) -> Any:
     if kind is None:
         raise MatrixFileError(f"{name} {foreign(_head(stream))}")
     if variable is not None and kind != "mat":
-        raise InputError(f"{name} is {_FORMATS[kind]}, and only .mat files have variables to choose from")
+        raise InputError(f"{name} is {_FORMATS[kind]}, and only .mat files have variables: leave out `variable`")
     if kind == "mat":
         return read_mat(stream, name, variable)
     return read_npz(stream, name) if kind == "npz" else read_market(stream, name)

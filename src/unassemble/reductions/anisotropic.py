@@ -34,7 +34,7 @@ class ConstantTensor:
         values = (self.kxx, self.kxy, self.kyy)
         positive = np.isfinite(values).all() and self.kxx > 0 and self.kyy > 0
         if not positive or abs(self.kxy) >= np.sqrt(self.kxx) * np.sqrt(self.kyy):
-            raise InputError(f"the tensor {values} is not positive definite: KXX > 0 and KXX KYY > KXY^2 are needed")
+            raise InputError(f"`tensor` {values} is not positive definite: KXX > 0 and KXX KYY > KXY^2 are needed")
 
     @property
     def root_determinant(self) -> float:
