@@ -27,7 +27,7 @@ def topology_notes(topology: Topology) -> list[str]:
         )
     if k := len(topology.undetermined):
         notes.append(
-            f"{count_of(k, 'row belongs', 'rows belong')} to no triangle, so that nothing is known of the position: "
+            f"{count_of(k, 'row belongs to no triangle and has', 'rows belong to no triangle and have')} no position: "
             f"{_some(topology.undetermined)}"
         )
     return notes

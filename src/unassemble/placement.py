@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 from .planar.frame import Similarity, canonical_frame, collinear, fit_similarity
+from .planar.hinges import groups
 from .reductions import ConstantTensor
 from .topology import Piece, Topology
 
@@ -96,8 +97,22 @@ class Placement:
             raise InputError("`handed` needs a line to refer to: give `direction` or two anchors as well")
         return cls(placed, ConstantTensor(*tensor) if tensor is not None else None, direction, handed)
 
-    def apply(self, piece: Piece, z: NDArray) -> tuple[NDArray, list[str]]:
-        """True positions of a piece from its positions z (n,) in any frame of the Laplacian's.
+    def origins(self, topology: Topology) -> NDArray[np.complex128]:
+        """(number of pieces,) points that positions of each piece are found relative to; of joined pieces the same.
+
+        The mean of the anchors, 0 where there are none: far from the origin coordinates have few digits left, which
+        only the mesh as it is written should suffer from.
+        """
+        group = groups(topology)
+        total, count = np.zeros(len(group), np.complex128), np.zeros(len(group))
+        for label, piece in zip(group, topology.pieces, strict=True):
+            targets = self._anchors_of(piece)[1]
+            total[label] += targets.sum()
+            count[label] += len(targets)
+        return np.asarray((total / np.maximum(count, 1))[group])
+
+    def apply(self, piece: Piece, z: NDArray, origin: complex = 0j) -> tuple[NDArray, list[str]]:
+        """True positions of a piece, relative to a point, from its positions z (n,) in any frame of the Laplacian's.
 
         Returns
         -------
@@ -111,6 +126,7 @@ class Placement:
             If a tensor is to be undone and the orientation is not known.
         """
         rows, targets = self._anchors_of(piece)
+        targets = targets - origin
         if len(rows) >= 2:
             return self._by_anchors(piece, z, rows, targets)
         if self.direction and np.isin(self.direction[:2], piece.vertices).all():

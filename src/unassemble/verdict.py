@@ -101,8 +101,8 @@ def _misfit(
     if evidence.digits and not evidence.certain:
         return (
             f"the entries are {evidence.digits}, and the re-assembled matrix differs by no more than that, at most by "
-            f"{misfit:.1e} of a row's largest ({CERTIFIED:g} is allowed): give it as `noise`, {evidence.rounding:.2g} "
-            "for the largest entries, to have it tested"
+            f"{misfit:.1e} of a row's largest ({CERTIFIED:g} is allowed): to have it tested give "
+            f"`noise={evidence.rounding:.2g}`, the size of the rounding errors of the largest entries"
         )
     differs = (
         f"the re-assembled matrix differs, most in the entry of rows {i} and {j} (by {misfit:.1e} of the row's "
@@ -126,6 +126,16 @@ def ambiguous(others: list[Alternative], certificate: Certificate) -> tuple[str,
     return "uncertified", (
         f"the mesh gives the matrix back to {certificate.backward_error:.1e}, {claim}: {order}the cells "
         f"{_cells(first.other_cells)} in place of {_cells(first.cells)}{more}{factor}"
+    )
+
+
+def far_away(origins: NDArray, written: Certificate, near: Certificate) -> tuple[str, str]:
+    """The status and reason of a mesh that fits until its coordinates are written, too far from the origin."""
+    origin = complex(origins[np.abs(origins).argmax()])
+    return "uncertified", (
+        f"the mesh gives the matrix back to {near.backward_error:.1e}, but its coordinates lie so far from the origin "
+        f"that they have too few digits left: as written they give it back to {written.backward_error:.1e}; subtract a "
+        f"point near ({origin.real:.6g}, {origin.imag:.6g}) from all of `anchors`"
     )
 
 
