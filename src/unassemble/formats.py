@@ -141,7 +141,7 @@ def _unknown(path: str) -> str:
     """The sentence about an extension that no format has: the nearest ones, and where all stand."""
     suffix = PurePath(path).suffix.lower()
     what = f"no mesh format has the extension {suffix!r}" if suffix else "it has no extension, which names the format"
-    near = [known for known in get_close_matches(suffix, FORMATS, n=3, cutoff=0.6) if not FORMATS[known].cannot]
+    near = [known for known in get_close_matches(suffix, FORMATS, n=3, cutoff=0.7) if not FORMATS[known].cannot]
     which = f"did you mean {' or '.join(near)}?" if near else "use .npz, .vtu, .msh, .obj or .stl, for instance"
     return f"cannot write {path!r}: {what}; {which} (the list is on the page 'Command line and files' of the manual)"
 

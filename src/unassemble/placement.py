@@ -31,13 +31,14 @@ def _converted(
             )
     try:
         placed = tuple((operator.index(row), float(x), float(y)) for row, x, y in anchors or ())
+    except (TypeError, ValueError) as error:
+        raise InputError("`anchors` of a mesh in the plane are triples (row, x, y), with whole rows") from error
+    try:
         if direction is not None:
             first, second, degrees = direction
             direction = operator.index(first), operator.index(second), float(degrees)
     except (TypeError, ValueError) as error:
-        raise InputError(
-            "`anchors` are triples (row, x, y) and `direction` is a triple (row, row, degrees), with whole rows"
-        ) from error
+        raise InputError("`direction` is a triple (row, row, degrees), with whole rows") from error
     return placed, direction
 
 

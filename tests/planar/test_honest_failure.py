@@ -115,7 +115,7 @@ def test_options_that_cannot_be_used_are_reported_or_refused():
     with pytest.raises(InputError, match="same position"):
         recover(known.matrix, anchors=[(1, 1.0, 1.0), (2, 1.0, 1.0)])
     for wrong in ({"anchors": [(0, 1)]}, {"anchors": "abc"}, {"direction": (0.5, 1, 30.0)}):
-        with pytest.raises(InputError, match="triple"):
+        with pytest.raises(InputError, match="whole rows"):
             recover(known.matrix, **wrong)
     three = [(row, *known.points[row]) for row in (0, 40, 80)]
     assert any("`handed` was not used" in w for w in recover(known.matrix, anchors=three, handed="left").warnings)

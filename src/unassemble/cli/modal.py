@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import matrix_options, nodes_options, spelled_numbering
+from .options import matrix_options, nodes_options, refuse_shared, spelled_numbering
 from .status import outcome
 from .values import OptionalTolerance
 
@@ -59,15 +58,10 @@ def _check_files(matrix: str, files: dict[str, str | None]) -> None:
     from ..report import check_report
 
     checks = {"OUT": check_modes, "--petsc": check_target, "--amgcl": check_target, "--report": check_report}
-    roles: dict[Path, str] = {} if matrix == "-" else {Path(matrix).resolve(): "MATRIX"}
     for role, name in files.items():
-        if name is None:
-            continue
-        checks[role](name)
-        path = Path(name).resolve()
-        if path in roles:
-            raise click.UsageError(f"{roles[path]} and {role} are the same file, {click.format_filename(name)!r}")
-        roles[path] = role
+        if name is not None:
+            checks[role](name)
+    refuse_shared({"MATRIX": matrix, **files})
 
 
 def _write(recovery: Recovery, files: dict[str, str | None]) -> None:

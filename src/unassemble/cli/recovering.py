@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import matrix_options, nodes_options, spelled_numbering
+from .options import matrix_options, nodes_options, refuse_shared, spelled_numbering
 from .status import outcome
 from .values import Number, Numbers, OptionalTolerance, check_anchors, check_orientation, check_tensor
 
@@ -125,15 +124,9 @@ def _check_files(files: _Files) -> None:
         from ..plot.canvas import check_plot
 
         check_plot(files.plot)
-    names = [("MATRIX", files.matrix), ("OUT", files.out), ("--report", files.report), ("--plot", files.plot)]
-    seen: dict[Path, str] = {}
-    for role, name in names:
-        if name is None or (role == "MATRIX" and name == "-"):
-            continue
-        path = Path(name).resolve()
-        if path in seen:
-            raise click.UsageError(f"{seen[path]} and {role} are the same file, {click.format_filename(name)!r}")
-        seen[path] = role
+    refuse_shared(
+        {"MATRIX": files.matrix, "OUT": files.out, "--report": files.report, "--plot": files.plot},
+    )
 
 
 def _recovered(files: _Files, display: StageDisplay, options: dict[str, Any]) -> Recovery:

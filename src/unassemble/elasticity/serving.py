@@ -135,7 +135,9 @@ def _vector_laplacian(
     nodes = parts.nodes[lead]
     place = np.full(numbering.n_nodes, -1)
     place[nodes] = np.arange(len(nodes))
-    known = [(int(place[numbering.node_of_row[row]]), *where) for row, *where in anchors or ()]
+    anchor_nodes, where = checked_anchors(anchors, numbering.node_of_row, 2)
+    here = place[anchor_nodes] >= 0
+    known = [(int(k), *xy) for k, xy in zip(place[anchor_nodes[here]], where[here].tolist(), strict=True)]
     try:
         mesh = scalar(check_matrix(parts.matrices[lead]), known)
         others = [

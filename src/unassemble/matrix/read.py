@@ -122,6 +122,8 @@ def _open_path(path: Any) -> BinaryIO:
     if not isinstance(path, (str, bytes, os.PathLike)):
         raise InputError(f"a matrix file is given by its path, '-' or an open file, not by {type(path).__name__}")
     name = os.fsdecode(path)
+    if not name:
+        raise MatrixFileError("the name of the matrix file is empty")
     try:
         if Path(name).is_dir():
             raise MatrixFileError(f"{name!r} is a directory: name the matrix file in it")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..errors import NotPlanarError, RecoveryError, TopologyError
+from ..words import count_of
 from . import planarity
 from .boundary import boundary_corners, following, loops
 from .cycles import three_cycles
@@ -159,8 +160,8 @@ def _recognise_whole(n: int, edges: NDArray) -> Topology:
     triangles, opposite = triangular_faces(n, edges)
     if not len(triangles):
         raise TopologyError(
-            f"the graph of the matrix ({n} vertices, {len(edges)} edges) is planar but has no triangle: "
-            "no element can be recognised (if zero entries were dropped, keep them stored)"
+            f"the graph of the matrix ({count_of(n, 'vertex', 'vertices')}, {count_of(len(edges), 'edge')}) is planar "
+            "but has no triangle: no element can be recognised (if zero entries were dropped, keep them stored)"
         )
     pieces = planar_pieces(n, edges, triangles, opposite)
     if pieces is None:
