@@ -61,15 +61,18 @@ def vanished_notes(topology: Topology) -> list[str]:
     return notes
 
 
-def elimination_notes(matrix: OperatorMatrix) -> list[str]:
-    """What row sums say of unknowns that were taken out, where no mesh fits."""
+def elimination_notes(matrix: OperatorMatrix, suspects: NDArray) -> list[str]:
+    """What row sums say of unknowns that were taken out, where no mesh fits.
+
+    Nothing if the entries that stand out, (k, 2), are in all of these rows: a wrong entry spoils two sums.
+    """
     size = np.abs(matrix.diagonal)
     sums = matrix.diagonal.copy()
     for end in matrix.edges.T:
         sums += np.bincount(end, matrix.entries, matrix.n)
         size += np.bincount(end, np.abs(matrix.entries), matrix.n)
     rest = np.flatnonzero(np.abs(sums) > _SUM * size)
-    if not 0 < len(rest) < _MANY * matrix.n:
+    if not 0 < len(rest) < _MANY * matrix.n or np.isin(rest, suspects).all():
         return []
     return [
         f"all rows add up to zero but for {len(rest):,}: {_some(rest)}; unknowns next to these seem to have been "

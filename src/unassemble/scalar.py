@@ -108,8 +108,8 @@ def recover_scalar(
     )
     if chi_square and evidence.noise is not None and evidence.noise < 0.5 * chi_square["sigma"]:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
-    if status == "uncertified" and not others and not chi_square and not distant:
-        notes += elimination_notes(stored)
+    if status == "uncertified" and not (others or chi_square or distant):
+        notes += elimination_notes(stored, evidence.suspects)
     polygons = Polygons.none() if triangulate else mesh.polygons
     return Recovery(
         points=points,

@@ -164,3 +164,13 @@ def test_eliminated_boundary_is_suspected():
     assert taken.status == "uncertified"
     assert any("seem to have been eliminated" in note for note in taken.warnings)
     assert not any("eliminated" in note for note in found.warnings)
+
+
+def test_a_wrong_entry_is_not_taken_for_an_elimination():
+    known = specimen(*random_mesh(220, seed=1))
+    spoilt = known.matrix.tolil()
+    i, j = np.argwhere(np.triu(known.matrix.toarray(), 1))[100]
+    spoilt[i, j] = spoilt[j, i] = 1.01 * spoilt[i, j]
+    found = recover(spoilt)
+    assert found.reason.startswith(f"the entry of rows {i} and {j} stands out")
+    assert not [note for note in found.warnings if "eliminated" in note]
