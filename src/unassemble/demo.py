@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .errors import InputError
-from .files import made_folder
+from .files import made_folder, whole_file
 from .pipeline import recover
 from .plot import plot_comparison
 from .recovery import Recovery
@@ -59,7 +59,8 @@ def run(folder: str | Path = "demo-output", *, echo: Callable[[str], None] = lam
     recoveries = []
     for specimen in (unit_square(), lake()):
         file = folder / f"{specimen.name}.mtx"
-        scipy.io.mmwrite(file, specimen.matrix, symmetry="symmetric", precision=17)
+        with whole_file(file, ".mtx") as draft, draft.open("wb") as stream:  # given a name, scipy misses a full disk
+            scipy.io.mmwrite(stream, specimen.matrix, symmetry="symmetric", precision=17)
         echo(f"{specimen.name}: {specimen.origin}\n")
         recovery = recover(file)
         recovery.save(folder / f"{specimen.name}.vtu")

@@ -89,4 +89,6 @@ def check_target(path: str | os.PathLike[str]) -> None:
 
 
 def _reason(error: BaseException) -> str:
+    if isinstance(error, OSError) and error.errno is None and "written" in str(error):  # so says numpy
+        return "it could not be written whole; the disk may be full"
     return (getattr(error, "strerror", None) or str(error)).lower()

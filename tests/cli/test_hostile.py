@@ -56,6 +56,32 @@ def test_values_of_a_wrong_type(work, wrong):
     assert f"`{name}`" in str(caught.value) or name == "numbering"
 
 
+@pytest.mark.parametrize("out", ["mesh.npz", "mesh.vtu"])
+def test_a_disk_that_is_full(work, one_sentence, monkeypatch, out):
+    """Files may not grow beyond a few kilobytes, which the system reports as it reports a full disk."""
+    resource = pytest.importorskip("resource")
+    (work.folder / out).write_bytes(b"old")
+    import unassemble.export as export
+
+    whole = export.whole_file
+
+    def limited(*arguments):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+        return whole(*arguments)
+
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    monkeypatch.setattr(export, "whole_file", limited)
+    try:
+        result = work.recover(out=out)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert result.exit_code == 2
+    assert "cannot write" in one_sentence(result)
+    assert "requested" not in result.stderr
+    assert (work.folder / out).read_bytes() == b"old"
+    assert work.files() == {"A.mtx", out}
+
+
 def test_inspection_of_a_wrong_tolerance(work):
     with pytest.raises(InputError, match="drop_zeros"):
         inspect_matrix(work.true.matrix, drop_zeros="x")
