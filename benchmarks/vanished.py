@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from noise import noisy
+from bound import noisy
 
 from unassemble import RecoveryError, recover
 

@@ -45,7 +45,7 @@ def test_nonplanar_graphs_have_a_witness():
     facts = inspect_matrix(np.full((5, 5), -1.0))
     assert not facts.planar
     assert sorted(facts.witness) == [(i, j) for i in range(5) for j in range(i + 1, 5)]
-    assert "subdivision of K5 or K3,3" in str(facts)
+    assert "subdivision of K5" in str(facts)
     assert facts.n_triangles == 0
     assert facts.recoverable.startswith("nothing")
 
@@ -160,7 +160,7 @@ def test_square_with_a_vanished_diagonal():
     square = specimen(np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]), np.array([[0, 1, 2], [0, 2, 3]]))
     facts = inspect_matrix(square.matrix)
     assert facts.n_vanished == 1
-    assert "1 of these are zero" in str(facts)
+    assert "1 of these is zero" in str(facts)
 
 
 @needs_shared

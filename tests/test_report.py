@@ -7,7 +7,8 @@ import pytest
 
 from handmade import lake, two_pieces, with_loose_row
 from unassemble.errors import NotPlanarError, OutputError
-from unassemble.report import build_report, check_report, failure_report, summary, write_report
+from unassemble.report import build_report, check_report, failure_report, write_report
+from unassemble.summary import summary
 
 STABLE = {
     "status",

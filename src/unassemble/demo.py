@@ -12,10 +12,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .errors import InputError
+from .files import made_folder, whole_file
 from .pipeline import recover
 from .plot import plot_comparison
 from .recovery import Recovery
-from .report import summary, write_report
+from .report import write_report
+from .summary import summary
 
 _MISSING = "the demonstration needs {name}: pip install 'unassemble[demo]'"
 
@@ -51,14 +53,14 @@ def run(folder: str | Path = "demo-output", *, echo: Callable[[str], None] = lam
     Raises
     ------
     InputError
-        If a package that meshes or assembles is not installed.
+        If a package that meshes or assembles is not installed, or the folder cannot be written into.
     """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = made_folder(folder)
     recoveries = []
     for specimen in (unit_square(), lake()):
         file = folder / f"{specimen.name}.mtx"
-        scipy.io.mmwrite(file, specimen.matrix, symmetry="symmetric", precision=17)
+        with whole_file(file, ".mtx") as draft, draft.open("wb") as stream:  # given a name, scipy misses a full disk
+            scipy.io.mmwrite(stream, specimen.matrix, symmetry="symmetric", precision=17)
         echo(f"{specimen.name}: {specimen.origin}\n")
         recovery = recover(file)
         recovery.save(folder / f"{specimen.name}.vtu")

@@ -35,7 +35,7 @@ class NotPlanarError(RecoveryError):
     witness : tuple of (int, int)
         Edges of a subdivision of K5 or K3,3 in the graph.
     why : str
-        The reason without the witness.
+        What the message says before the witness; it may be empty.
     """
 
     def __init__(self, message: str, witness: tuple[tuple[int, int], ...] = (), why: str = ""):

@@ -43,6 +43,26 @@ def whole_file(path: str | os.PathLike[str], suffix: str) -> Iterator[Path]:
         raise OutputError(f"cannot write {os.fspath(path)!r}: {_reason(error)}") from error
 
 
+def made_folder(path: str | os.PathLike[str]) -> Path:
+    """A folder to write into, made where it does not exist.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be made, or nothing can be written there.
+    """
+    name, folder = os.fspath(path), Path(path)
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise OutputError(f"cannot write into {name!r}: it is a file, and a folder is needed")
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=_DRAFT, dir=folder):
+            pass  # permissions are best judged by trying
+    except (OSError, ValueError, RuntimeError) as error:
+        raise OutputError(f"cannot make the folder {name!r}, or write into it: {_reason(error)}") from error
+    return folder
+
+
 def check_target(path: str | os.PathLike[str]) -> None:
     """Find out, before long work, whether a file can be written.
 
@@ -69,4 +89,6 @@ def check_target(path: str | os.PathLike[str]) -> None:
 
 
 def _reason(error: BaseException) -> str:
+    if isinstance(error, OSError) and error.errno is None and "written" in str(error):  # so says numpy
+        return "it could not be written whole; the disk may be full"
     return (getattr(error, "strerror", None) or str(error)).lower()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from importlib.util import find_spec
 from pathlib import PurePath
 from typing import Any
@@ -137,6 +138,15 @@ FORMATS: Mapping[str, MeshFormat] = {
 }
 
 
+def _unknown(path: str) -> str:
+    """The sentence about an extension that no format has: the nearest ones, and where all stand."""
+    suffix = PurePath(path).suffix.lower()
+    what = f"no mesh format has the extension {suffix!r}" if suffix else "it has no extension, which names the format"
+    near = [known for known in get_close_matches(suffix, FORMATS, n=3, cutoff=0.7) if not FORMATS[known].cannot]
+    which = f"did you mean {' or '.join(near)}?" if near else "use .npz, .vtu, .msh, .obj or .stl, for instance"
+    return f"cannot write {path!r}: {what}; {which} (the list is on the page 'Command line and files' of the manual)"
+
+
 def format_of(path: str | os.PathLike[str]) -> tuple[str, MeshFormat]:
     """Extension and format that a file name asks for; upper and lower case are alike.
 
@@ -150,9 +160,7 @@ def format_of(path: str | os.PathLike[str]) -> tuple[str, MeshFormat]:
     name = PurePath(path).name.lower()
     fitting = [suffix for suffix in FORMATS if name.endswith(suffix) and name != suffix]
     if not fitting:
-        raise OutputError(
-            f"cannot tell the format of {os.fspath(path)!r} from its extension: known are {', '.join(sorted(FORMATS))}"
-        )
+        raise OutputError(_unknown(os.fspath(path)))
     suffix = max(fitting, key=len)
     mesh_format = FORMATS[suffix]
     if mesh_format.cannot:

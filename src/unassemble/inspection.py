@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from .cells import guessed
 from .errors import NotPlanarError, TopologyError
 from .inspection_facts import matrix_facts, mesh_facts, no_mesh, nodes_facts
-from .inspection_text import count_of, lines_of, mesh_text
+from .inspection_text import lines_of, mesh_text
 from .matrix import OperatorMatrix, load
 from .operators import vector_valued
 from .topology import Topology, recognise, surfaces
+from .words import count_of
 
 
 @dataclass(frozen=True, eq=False)

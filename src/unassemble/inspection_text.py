@@ -6,6 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .matrix.symmetry import ORDINARY
+from .topology.obstruction import obstruction_text
+from .words import count_of
+
 if TYPE_CHECKING:
     from .inspection import Inspection
 
@@ -13,15 +17,15 @@ if TYPE_CHECKING:
 def lines_of(facts: Inspection) -> list[tuple[str, str]]:
     """Names and values, in the order in which they are shown."""
     lines = [
-        ("matrix", f"{facts.n_rows:,} rows, {facts.n_edges:,} off-diagonal entries above the diagonal"),
-        ("symmetry", f"symmetric up to {facts.asymmetry:.1e}" if facts.asymmetry else "symmetric"),
+        ("matrix", f"{count_of(facts.n_rows, 'row')}, {_above(facts.n_edges)} above the diagonal"),
+        ("symmetry", _symmetry(facts.asymmetry)),
         ("graph", _graph(facts)),
-        ("vanished", f"{facts.n_vanished:,} of these are zero up to rounding" if facts.n_vanished else "none of these"),
+        ("vanished", _vanished(facts.n_vanished)),
         ("row sums", _row_sums(facts)),
         ("planar", _planar(facts)),
     ]
     if facts.n_nodes:
-        nodes = f"{facts.n_nodes:,} nodes with {facts.block_size} unknowns each, {facts.numbering}"
+        nodes = f"{count_of(facts.n_nodes, 'node')} with {facts.block_size} unknowns each, {facts.numbering}"
         lines.append(("nodes", nodes))
     if not facts.obstacle:
         lines += [
@@ -35,9 +39,18 @@ def lines_of(facts: Inspection) -> list[tuple[str, str]]:
     return lines + [("note", warning) for warning in facts.warnings]
 
 
-def count_of(number: int, noun: str) -> str:
-    """A number with its noun."""
-    return f"{number:,} {noun}" + ("" if number == 1 else "s")
+def _above(number: int) -> str:
+    return count_of(number, "off-diagonal entry", "off-diagonal entries")
+
+
+def _symmetry(asymmetry: float) -> str:
+    if not asymmetry:
+        return "symmetric"
+    return "symmetric up to rounding" if asymmetry <= ORDINARY else f"symmetric up to {asymmetry:.1e}"
+
+
+def _vanished(number: int) -> str:
+    return count_of(number, "of these is", "of these are") + " zero up to rounding" if number else "none of these"
 
 
 def _graph(facts: Inspection) -> str:
@@ -58,8 +71,7 @@ def _planar(facts: Inspection) -> str:
         return "yes"
     if facts.n_nodes:
         return "not looked for, since the rows form nodes of several unknowns"
-    shown = ", ".join(f"{i}-{j}" for i, j in facts.witness[:12]) + (", ..." if len(facts.witness) > 12 else "")
-    return f"no: the edges {shown} form a subdivision of K5 or K3,3"
+    return f"no: {obstruction_text(facts.witness)}"
 
 
 def mesh_text(facts: Inspection) -> str:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from .matrix import OperatorMatrix
 from .topology import Topology
+from .words import count_of
 
 _SUM = 1e-10  # sum of a row, relative to its entries, that is rounding
 _MANY = 0.7  # share of rows; more would be a mass matrix that was added, or no Laplacian at all
@@ -20,11 +21,13 @@ def topology_notes(topology: Topology) -> list[str]:
             f"{len(topology.pieces)} pieces: the matrix does not say how they lie relative to each other, "
             "so each has a frame of its own"
         )
-    if len(topology.hinges):
-        notes.append(f"{len(topology.hinges)} vertices join pieces that share nothing else: {_some(topology.hinges)}")
-    if len(topology.undetermined):
+    if k := len(topology.hinges):
         notes.append(
-            f"{len(topology.undetermined)} rows belong to no triangle and have no position: "
+            f"{count_of(k, 'vertex joins', 'vertices join')} pieces that share nothing else: {_some(topology.hinges)}"
+        )
+    if k := len(topology.undetermined):
+        notes.append(
+            f"{count_of(k, 'row belongs to no triangle and has', 'rows belong to no triangle and have')} no position: "
             f"{_some(topology.undetermined)}"
         )
     return notes
@@ -43,30 +46,36 @@ def vanished_notes(topology: Topology) -> list[str]:
     """Cells that stay undivided, boundary edges without an entry."""
     notes = []
     polygons = topology.polygons
-    if polygons.count:
+    if k := polygons.count:
         notes.append(
-            f"{polygons.count} cells have more than three vertices, on one circle: entries on their diagonals "
-            "vanish whichever way they are divided, so any division into triangles gives the same matrix"
+            f"{count_of(k, 'cell has', 'cells have')} more than three vertices, on one circle: entries on diagonals "
+            "vanish whichever way such a cell is divided, so any division into triangles gives the same matrix"
         )
     diagonals = int((polygons.size - 3).sum())
     if len(topology.vanished) > diagonals:
         count = len(topology.vanished) - diagonals
-        notes.append(f"{count} boundary edges, which face right angles, have no entry in the matrix")
+        notes.append(
+            count_of(count, "boundary edge faces a right angle and has", "boundary edges face right angles and have")
+            + " no entry in the matrix"
+        )
     return notes
 
 
-def elimination_notes(matrix: OperatorMatrix) -> list[str]:
-    """What row sums say of unknowns that were taken out, where no mesh fits."""
+def elimination_notes(matrix: OperatorMatrix, suspects: NDArray) -> list[str]:
+    """What row sums say of unknowns that were taken out, where no mesh fits.
+
+    Nothing if the entries that stand out, (k, 2), are in all of these rows: a wrong entry spoils two sums.
+    """
     size = np.abs(matrix.diagonal)
     sums = matrix.diagonal.copy()
     for end in matrix.edges.T:
         sums += np.bincount(end, matrix.entries, matrix.n)
         size += np.bincount(end, np.abs(matrix.entries), matrix.n)
     rest = np.flatnonzero(np.abs(sums) > _SUM * size)
-    if not 0 < len(rest) < _MANY * matrix.n:
+    if not 0 < len(rest) < _MANY * matrix.n or np.isin(rest, suspects).all():
         return []
     return [
-        f"all rows add up to zero but for {len(rest)}: {_some(rest)}; unknowns next to these seem to have been "
+        f"all rows add up to zero but for {len(rest):,}: {_some(rest)}; unknowns next to these seem to have been "
         "eliminated, on a boundary for one, and entries still contain triangles whose vertices are gone: keep all rows "
         "and columns"
     ]

@@ -60,7 +60,7 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
     whole, _ = with_exact_sums(matrix.csr())
     if numbering is None or isinstance(numbering, str):
         if numbering not in (None, *NUMBERINGS):
-            raise InputError(f"the numbering is {' or '.join(map(repr, NUMBERINGS))}, not {numbering!r}")
+            raise InputError(f"`numbering` is {' or '.join(map(repr, NUMBERINGS))}, not {numbering!r}")
         structure = find_structure(whole, numbering, block_size)
         if structure is not None:
             return VectorReading(structure, "")
@@ -80,10 +80,10 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
     try:
         node, direction = numbering
     except (TypeError, ValueError) as error:
-        raise InputError("a numbering is two arrays: the node and the direction of each row") from error
+        raise InputError("`numbering` is two arrays: the node and the direction of each row") from error
     found = given_structure(whole, node, direction) or given_numbering(whole, node, direction)
     if block_size not in (None, found.block_size):
-        raise InputError(f"the numbering has {found.block_size} directions, and the block size is {block_size}")
+        raise InputError(f"`numbering` has {found.block_size} directions, and `block_size` is {block_size}")
     return VectorReading(found, "")
 
 
@@ -153,8 +153,8 @@ def refuse(**options: Any) -> None:
     """
     for name, value in options.items():
         if value is not None and value is not False:
-            raise InputError(f"the option {name.replace('_', '-')} is for scalar matrices, and this one is read as "
-                             "vector-valued: leave it out, or choose the operator 'laplacian'")  # fmt: skip
+            raise InputError(f"`{name}` is for scalar matrices, and this one is read as "
+                             "vector-valued: leave it out, or choose `operator='laplacian'`")  # fmt: skip
 
 
 def _evidence(found: Numbering | StructuralNumbering) -> str:

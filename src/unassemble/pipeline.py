@@ -6,13 +6,12 @@ from collections.abc import Callable, Sequence
 from os import PathLike
 from typing import Any
 
-import numpy as np
-
 from .clock import Clock
 from .errors import InputError, RecoveryError
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, read_matrix
-from .operators import OPERATORS, VectorReading, asked_for, refuse, second_reading, vector_valued
+from .operators import VectorReading, asked_for, refuse, second_reading, vector_valued
+from .options import check_options, listed_anchors
 from .placement import Direction, Placement
 from .recovery import Recovery
 from .scalar import recover_scalar
@@ -123,7 +122,18 @@ def recover(
     >>> square.status, len(square.triangles), float(round(square.scale[0], 12))
     ('certified', 2, 1.0)
     """
-    _check_options(operator, method, scale, noise, vector=block_size is not None or numbering is not None)
+    check_options(
+        operator=operator,
+        method=method,
+        scale=scale,
+        noise=noise,
+        drop_zeros=drop_zeros,
+        tensor=tensor,
+        block_size=block_size,
+        numbering=numbering,
+        threads=threads,
+    )
+    anchors = listed_anchors(anchors)
     clock = Clock(progress)
     with clock("read"):
         matrix = A if _is_matrix(A) else read_matrix(A, variable=variable)
@@ -177,22 +187,6 @@ def recover(
                 return vector(second)
             except (RecoveryError, InputError):  # options may be for scalar matrices only
                 raise error from None
-
-
-def _check_options(
-    operator: str, method: str | None, scale: float | None, noise: float | None, *, vector: bool
-) -> None:
-    if operator not in OPERATORS:
-        known = " or ".join(map(repr, OPERATORS))
-        raise InputError(f"the operator {operator!r} is not available in this version: use {known}")
-    if vector and operator == "laplacian":
-        raise InputError("block size and numbering belong to vector-valued matrices, not to the operator 'laplacian'")
-    if method not in (None, "conformal", "angles"):
-        raise InputError(f"the method {method!r} is not available in this version: use 'conformal' or 'angles'")
-    if scale is not None and not (np.isfinite(scale) and scale != 0):
-        raise InputError(f"the scale is a finite nonzero number, not {scale}")
-    if noise is not None and not (np.isfinite(noise) and noise > 0):
-        raise InputError(f"the noise is a positive standard deviation, not {noise}")
 
 
 def _is_matrix(A: Any) -> bool:

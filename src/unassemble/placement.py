@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 from .planar.frame import Similarity, canonical_frame, collinear, fit_similarity
+from .planar.hinges import groups
 from .reductions import ConstantTensor
 from .topology import Piece, Topology
 
@@ -22,15 +23,22 @@ def _converted(
     anchors: Sequence[Anchor] | None, direction: Direction | None
 ) -> tuple[tuple[Anchor, ...], Direction | None]:
     """Rows as integers, coordinates as floats."""
+    for one in anchors or ():
+        if np.ndim(one) == 1 and len(one) == 4:
+            raise InputError(
+                f"the anchor of row {one[0]} has three coordinates, and this matrix belongs to a mesh in the plane: "
+                "leave out the third"
+            )
     try:
         placed = tuple((operator.index(row), float(x), float(y)) for row, x, y in anchors or ())
+    except (TypeError, ValueError) as error:
+        raise InputError("`anchors` of a mesh in the plane are triples (row, x, y), with whole rows") from error
+    try:
         if direction is not None:
             first, second, degrees = direction
             direction = operator.index(first), operator.index(second), float(degrees)
     except (TypeError, ValueError) as error:
-        raise InputError(
-            "anchors are triples (row, x, y) and a direction is a triple (row, row, degrees), with whole rows"
-        ) from error
+        raise InputError("`direction` is a triple (row, row, degrees), with whole rows") from error
     return placed, direction
 
 
@@ -81,17 +89,31 @@ class Placement:
         if len({t[1:] for t in placed}) < len(placed):
             raise InputError("two anchors have the same position: different rows are different points")
         if direction and (direction[0] == direction[1] or not np.isfinite(direction[2])):
-            raise InputError(f"the direction {direction} needs two different rows and a finite angle")
+            raise InputError("`direction` needs two different rows and a finite angle")
         if handed not in (None, "left", "right"):
-            raise InputError(f"handedness is 'left' or 'right', not {handed!r}")
+            raise InputError(f"`handed` is 'left' or 'right', not {handed!r}")
         if direction and len(placed) > 1:
-            raise InputError("a direction and two or more anchors fix the same freedom: give one of them")
+            raise InputError("`direction` and two or more anchors fix the same freedom: give one of them")
         if handed and not direction and len(placed) < 2:
-            raise InputError("handedness needs a line to refer to: give a direction or two anchors as well")
+            raise InputError("`handed` needs a line to refer to: give `direction` or two anchors as well")
         return cls(placed, ConstantTensor(*tensor) if tensor is not None else None, direction, handed)
 
-    def apply(self, piece: Piece, z: NDArray) -> tuple[NDArray, list[str]]:
-        """True positions of a piece from its positions z (n,) in any frame of the Laplacian's.
+    def origins(self, topology: Topology) -> NDArray[np.complex128]:
+        """(number of pieces,) points that positions of each piece are found relative to; of joined pieces the same.
+
+        The mean of the anchors, 0 where there are none: far from the origin coordinates have few digits left, which
+        only the mesh as it is written should suffer from.
+        """
+        group = groups(topology)
+        total, count = np.zeros(len(group), np.complex128), np.zeros(len(group))
+        for label, piece in zip(group, topology.pieces, strict=True):
+            targets = self._anchors_of(piece)[1]
+            total[label] += targets.sum()
+            count[label] += len(targets)
+        return np.asarray((total / np.maximum(count, 1))[group])
+
+    def apply(self, piece: Piece, z: NDArray, origin: complex = 0j) -> tuple[NDArray, list[str]]:
+        """True positions of a piece, relative to a point, from its positions z (n,) in any frame of the Laplacian's.
 
         Returns
         -------
@@ -105,6 +127,7 @@ class Placement:
             If a tensor is to be undone and the orientation is not known.
         """
         rows, targets = self._anchors_of(piece)
+        targets = targets - origin
         if len(rows) >= 2:
             return self._by_anchors(piece, z, rows, targets)
         if self.direction and np.isin(self.direction[:2], piece.vertices).all():
@@ -113,8 +136,8 @@ class Placement:
             notes: list[str] = []
         elif self.tensor:
             raise InputError(
-                f"the tensor cannot be undone for the piece of row {piece.vertices.min()} without its orientation: "
-                "give three anchors that are not in line, or --direction ROW,ROW,DEGREES with --handed left|right"
+                f"`tensor` cannot be undone for the piece of row {piece.vertices.min()} without its orientation: "
+                "give three anchors that are not in line, or `direction` and `handed`"
             )
         else:
             frame, note = canonical_frame(z, piece.edges)
@@ -135,7 +158,7 @@ class Placement:
         if lost:
             notes.append(f"the anchors of rows {', '.join(map(str, lost))} belong to no triangle and were not used")
         if self.direction and not any(np.isin(self.direction[:2], p.vertices).all() for p in topology.pieces):
-            notes.append("the direction joins rows of different pieces and was not used")
+            notes.append("`direction` joins rows of different pieces and was not used")
         return notes
 
     def _anchors_of(self, piece: Piece) -> tuple[NDArray, NDArray]:
@@ -154,13 +177,11 @@ class Placement:
         if len(rows) > 2 and not collinear(known):
             frame = min(fits, key=lambda fit: fit[1])[0]
             if self.handed:
-                notes.append("three or more anchors fix the mirror image; the handedness was not used")
+                notes.append("three or more anchors fix the mirror image; `handed` was not used")
         elif self.handed:
             frame = self._handed([fit[0] for fit in fits], z, rows[:2])
         elif self.tensor:
-            raise InputError(
-                "two anchors leave the mirror image open: give a third, not in line, or --handed left|right"
-            )
+            raise InputError("two anchors leave the mirror image open: give a third, not in line, or `handed`")
         else:
             frame = fits[canonical_frame(z, piece.edges)[0].mirror][0]
             notes.append("the anchors leave two mirror images; the choice between them is by convention")
@@ -181,7 +202,7 @@ class Placement:
         if self.handed:
             frame = self._handed(frames, z, ends)
         elif self.tensor:
-            raise InputError("a direction leaves the mirror image open: add --handed left|right")
+            raise InputError("`direction` leaves the mirror image open: add `handed`")
         else:
             frame = frames[canonical_frame(z, piece.edges)[0].mirror]
         placed = frame(z)
@@ -195,7 +216,7 @@ class Placement:
         side = (np.conj(line) * offset).imag
         if abs(side) < 1e-9 * abs(line) * np.abs(z - z.mean()).max():
             raise InputError(
-                "the piece's centroid lies on the line that the handedness refers to: "
+                "the piece's centroid lies on the line that `handed` refers to: "
                 "choose other rows, or give three anchors that are not in line"
             )
         return frames[0] if (side > 0) == (self.handed == "left") else frames[1]

@@ -1,4 +1,4 @@
-"""What there is to say about a recovery: for programs as JSON, for people as a few lines."""
+"""What there is to say about a recovery, for programs: JSON."""
 
 from __future__ import annotations
 
@@ -15,11 +15,10 @@ import numpy as np
 from ._version import __version__
 from .errors import OutputError, UnassembleError
 from .files import check_target, whole_file
+from .summary import block_size, largest_deviation
 
 if TYPE_CHECKING:
     from .recovery import Recovery
-
-_SHOWN = 3
 
 
 def build_report(recovery: Recovery) -> dict[str, Any]:
@@ -51,7 +50,7 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
             "backward_error": recovery.backward_error,
             "chi_square": recovery.chi_square,
             "estimated_noise": recovery.estimated_noise,
-            "largest_standard_deviation": _largest_deviation(recovery),
+            "largest_standard_deviation": largest_deviation(recovery),
             "worst_entries": [
                 {"row": i, "column": j, "misfit": misfit}
                 for (i, j), misfit in zip(recovery.worst_entries, recovery.worst_misfits, strict=True)
@@ -75,18 +74,13 @@ def _vector_facts(recovery: Recovery) -> dict[str, Any]:
     """
     return {
         "dimension": recovery.dim,
-        "block_size": _block_size(recovery),
+        "block_size": block_size(recovery),
         "numbering": recovery.numbering,
         "operator_choice": recovery.choice,
         "cells": {kind: len(cells) for kind, cells in recovery.cells.items()},
         "poisson_ratio": recovery.poisson_ratio,
         "evidence": [asdict(one) for one in recovery.evidence],
     }
-
-
-def _block_size(recovery: Recovery) -> int:
-    direction = recovery.direction_of_row
-    return 1 if direction is None else int(direction.max()) + 1
 
 
 def failure_report(error: UnassembleError) -> dict[str, Any]:
@@ -130,128 +124,6 @@ def write_report(recovery: Recovery | Mapping[str, Any], path: str | os.PathLike
     text = json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False)
     with whole_file(path, ".json") as draft:
         draft.write_text(text + "\n", encoding="utf-8")
-
-
-def summary(recovery: Recovery) -> str:
-    """A few aligned lines for a person."""
-    lines = [f"{recovery.status}: {recovery.reason}"]
-    lines += [f"  {name:<15} {value}" for name, value in _rows(recovery)]
-    return "\n".join(lines)
-
-
-def _rows(recovery: Recovery) -> list[tuple[str, str]]:
-    rows = [
-        ("operator", _operator(recovery)),
-        *([("chosen since", recovery.choice)] if recovery.choice else []),
-        ("points", _points(recovery)),
-        *_cell_rows(recovery),
-        ("pieces", _pieces(recovery)),
-    ]
-    if recovery.n_holes is not None:
-        rows.append(("holes", f"{recovery.n_holes:,}"))
-    if recovery.mechanical:
-        rows += _elastic_rows(recovery)
-    else:
-        rows.append(("scale c", scale_text(recovery)))
-    rows.append(("backward error", f"{recovery.backward_error:.1e}"))
-    if recovery.estimated_noise is not None and recovery.backward_error > 1e-12:
-        rows.append(("noise", f"the misfit is that of a standard deviation of {recovery.estimated_noise:.1e}"))
-    deviation = _largest_deviation(recovery)
-    if deviation is not None:
-        rows.append(("std deviation", f"at most {deviation:.1e} in a coordinate"))
-    if recovery.status == "uncertified" and len(recovery.worst_entries):
-        rows += [("worst fit", line) for line in _worst(recovery)]
-    if recovery.timings:
-        rows.append(("time", _timings(recovery.timings)))
-    return rows + [("note", warning) for warning in recovery.warnings]
-
-
-def _operator(recovery: Recovery) -> str:
-    if not recovery.vector_valued:
-        return recovery.operator
-    return f"{recovery.operator}, {_block_size(recovery)} unknowns per node, {numbering_text(recovery)}"
-
-
-def numbering_text(recovery: Recovery) -> str:
-    """How the unknowns of a vector-valued matrix stand, in words."""
-    words = {"pattern": "in an order found by the pattern", "given": "in the given order"}
-    return words.get(recovery.numbering, recovery.numbering)
-
-
-_KINDS = {
-    "line": "members",
-    "triangle": "triangles",
-    "quad": "quadrilaterals",
-    "tetra": "tetrahedra",
-    "hexahedron": "hexahedra",
-}
-
-
-def _kind_text(kind: str) -> str:
-    """Cells of a meshio kind in words, with the number of nodes of quadratic ones."""
-    base = kind.rstrip("0123456789")
-    nodes = kind[len(base) :]
-    return _KINDS[base] + (f" of {nodes} nodes" if nodes else "")
-
-
-def cells_text(recovery: Recovery) -> list[tuple[str, int]]:
-    """Kinds of cells and their numbers; triangles, if there are none, of scalar matrices."""
-    known = [(_kind_text(kind), len(cells)) for kind, cells in recovery.cells.items()]
-    if recovery.n_polygons:
-        known.append(("polygons", recovery.n_polygons))
-    return known or [("cells" if recovery.vector_valued else "triangles", 0)]
-
-
-def _cell_rows(recovery: Recovery) -> list[tuple[str, str]]:
-    return [(kind, f"{count:,}" if count or kind != "cells" else "none recognised") for kind, count in
-            cells_text(recovery)]  # fmt: skip
-
-
-def _elastic_rows(recovery: Recovery) -> list[tuple[str, str]]:
-    rows = []
-    if recovery.poisson_ratio is not None:
-        rows.append(("Poisson's ratio", f"{recovery.poisson_ratio:.10g}"))
-    if np.isfinite(recovery.scale).any():
-        rows.append(("shear modulus", scale_text(recovery)))
-    for one in recovery.evidence[:_SHOWN]:
-        text = f"dimension {one.null_dimension}, residual {one.residual:.1e}, next {one.gap:.1e}"
-        rows.append(("null space", text))
-    return rows
-
-
-def _points(recovery: Recovery) -> str:
-    missing = int(np.count_nonzero(recovery.node_status))
-    return f"{recovery.n_points:,}" + (f", of which {missing:,} not determined" if missing else "")
-
-
-def _pieces(recovery: Recovery) -> str:
-    hinges = len(recovery.hinges)
-    return f"{recovery.n_components:,}" + (f", meeting in {hinges:,} hinge{'s' * (hinges > 1)}" if hinges else "")
-
-
-def scale_text(recovery: Recovery, digits: int = 10) -> str:
-    """The factor c, or the range of those of all pieces."""
-    known = recovery.scale[np.isfinite(recovery.scale)]
-    low, high = (float(f(known)) if len(known) else math.nan for f in (np.min, np.max))
-    # Pieces of one matrix mostly share c, up to rounding.
-    return f"{low:.{digits}g}" if high - low <= 1e-9 * abs(low) else f"{low:.{digits}g} to {high:.{digits}g}"
-
-
-def _worst(recovery: Recovery) -> list[str]:
-    pairs = zip(recovery.worst_entries[:_SHOWN], recovery.worst_misfits[:_SHOWN], strict=True)
-    return [f"rows {i} and {j}, off by {misfit:.1e} of the row's largest entry" for (i, j), misfit in pairs]
-
-
-def _timings(timings: Mapping[str, float]) -> str:
-    stages = ", ".join(f"{stage} {seconds:.2g}" for stage, seconds in timings.items() if seconds >= 0.005)
-    return f"{sum(timings.values()):.2f} s" + (f" ({stages})" if stages else "")
-
-
-def _largest_deviation(recovery: Recovery) -> float | None:
-    deviations = recovery.standard_deviations
-    if deviations is None or not np.isfinite(deviations).any():
-        return None
-    return float(np.nanmax(deviations))
 
 
 def _plain(value: Any) -> Any:

@@ -21,7 +21,7 @@ from .planar.piece import PieceMesh
 from .recovery import Recovery
 from .solving import solve
 from .topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
-from .verdict import ambiguous, passes, verdict
+from .verdict import ambiguous, far_away, passes, verdict
 
 _SIGMAS = 10.0  # noise by which numbers that a reading takes for equal may differ
 
@@ -62,19 +62,14 @@ def recover_scalar(
         analyse=analyse or factorisation,
     )
     with clock("place"):
-        placed, notes = _place(topology, placement, meshes)
+        origins = placement.origins(topology)
+        placed, notes = _place(topology, placement, origins, meshes)
         mesh = JoinedMesh.of(topology, placed, np.array([m.scale for m in meshes]) / stretch)
+        shift = origins[mesh.component]
+        points = mesh.points + np.column_stack([shift.real, shift.imag])
     with clock("certify"):
-        certificate = certificates.certify(
-            stored.edges,
-            stored.entries,
-            mesh.points,
-            mesh.triangles,
-            mesh.scale[mesh.triangle_piece],
-            (placement.tensor.kxx, placement.tensor.kxy, placement.tensor.kyy) if placement.tensor else None,
-        )
         freedom = _freedom(topology, scale)
-        chi_square = certificates.chi_square_verdict(certificate.differences, noise, freedom) if noise else None
+        certificate, chi_square = _held_against(stored, mesh, mesh.points, placement, noise, freedom)
         factors = np.array([m.scale for m in meshes])
         # A misfit at rounding level, or one that noise explains, hides no wrong entry.
         search = not passes(certificate, chi_square, factors)
@@ -102,14 +97,22 @@ def recover_scalar(
             others = _alternatives(topology, stored, placement, mesh, stretch, noise, known)
         if others:
             status, reason = ambiguous(others, certificate)
-    worst, misfits = certificate.worst(10 if status == "uncertified" else 0, noise=noise, first=evidence.suspects)
+    distant = False
+    if origins.any():
+        near, (certificate, chi_square) = certificate, _held_against(stored, mesh, points, placement, noise, freedom)
+        distant = status == "certified" and not passes(certificate, chi_square, factors)
+        if distant:
+            status, reason = far_away(origins, certificate, near)
+    worst, misfits = certificate.worst(
+        10 if status == "uncertified" and not distant else 0, noise=noise, first=evidence.suspects
+    )
     if chi_square and evidence.noise is not None and evidence.noise < 0.5 * chi_square["sigma"]:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
-    if status == "uncertified" and not others and not chi_square:
-        notes += elimination_notes(stored)
+    if status == "uncertified" and not (others or chi_square or distant):
+        notes += elimination_notes(stored, evidence.suspects)
     polygons = Polygons.none() if triangulate else mesh.polygons
     return Recovery(
-        points=mesh.points,
+        points=points,
         triangles=mesh.triangles if triangulate else mesh.triangles[~mesh.in_polygon],
         component=mesh.component,
         hinges=topology.hinges,
@@ -160,11 +163,34 @@ def _alternatives(
     return alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
 
 
-def _place(topology: Topology, placement: Placement, meshes: list[PieceMesh]) -> tuple[list[NDArray], list[str]]:
-    """Every piece in its final frame, hinges joined; and what is to be said about it."""
+def _held_against(
+    stored: OperatorMatrix,
+    mesh: JoinedMesh,
+    points: NDArray,
+    placement: Placement,
+    noise: float | None,
+    freedom: int,
+) -> tuple[certificates.Certificate, dict[str, float] | None]:
+    """The certificate of a mesh with these points, and the test against noise."""
+    tensor = placement.tensor
+    certificate = certificates.certify(
+        stored.edges,
+        stored.entries,
+        points,
+        mesh.triangles,
+        mesh.scale[mesh.triangle_piece],
+        (tensor.kxx, tensor.kxy, tensor.kyy) if tensor else None,
+    )
+    return certificate, certificates.chi_square_verdict(certificate.differences, noise, freedom) if noise else None
+
+
+def _place(
+    topology: Topology, placement: Placement, origins: NDArray, meshes: list[PieceMesh]
+) -> tuple[list[NDArray], list[str]]:
+    """Every piece in its final frame, relative to its origin, hinges joined; and what is to be said about it."""
     placed, notes = [], []
     for label, (piece, mesh) in enumerate(zip(topology.pieces, meshes, strict=True)):
-        z, remarks = placement.apply(piece, mesh.z)
+        z, remarks = placement.apply(piece, mesh.z, origins[label])
         placed.append(z)
         prefix = f"piece {label}: " if len(meshes) > 1 else ""
         notes += [prefix + remark for remark in (*mesh.notes, *remarks)]

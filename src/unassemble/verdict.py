@@ -13,6 +13,7 @@ from .evidence import Evidence
 from .matrix import OperatorMatrix
 from .planar.hinges import groups
 from .topology import Topology
+from .words import count_of
 
 _SAME_SCALE = 1e-6
 _SCALE_ERROR = 1e5  # relative error of c in small pieces, over that of the entries, at most
@@ -84,11 +85,14 @@ def _misfit(
 ) -> str:
     """What does not fit, the gravest first."""
     if topology.failures:
-        return f"{len(topology.failures)} part of the matrix has no mesh: {topology.failures[0]}"
+        parts = count_of(len(topology.failures), "part of the matrix has", "parts of the matrix have")
+        return f"{parts} no mesh: {topology.failures[0]}"
     bare = topology.bare_edges[matrix.entries[topology.bare_edges] != 0]
     if len(bare):
         i, j = topology.edges[bare[0]]
-        return f"{len(bare)} nonzero entries belong to no triangle, the first between rows {i} and {j}"
+        if len(bare) == 1:
+            return f"the nonzero entry of rows {i} and {j} belongs to no triangle"
+        return f"{len(bare):,} nonzero entries belong to no triangle, the first that of rows {i} and {j}"
     if not np.isfinite(certificate.backward_error):
         return "the mesh has triangles that are flat, or points that are not finite"
     if len(certificate.flipped):
@@ -97,20 +101,20 @@ def _misfit(
     if evidence.digits and not evidence.certain:
         return (
             f"the entries are {evidence.digits}, and the re-assembled matrix differs by no more than that, at most by "
-            f"{misfit:.1e} of a row's largest ({CERTIFIED:g} is allowed): give it as noise, {evidence.rounding:.2g} "
-            "for the largest entries, to have it tested"
+            f"{misfit:.1e} of a row's largest ({CERTIFIED:g} is allowed): to have it tested give "
+            f"`noise={evidence.rounding:.2g}`, the size of the rounding errors of the largest entries"
         )
     differs = (
         f"the re-assembled matrix differs, most in the entry of rows {i} and {j} (by {misfit:.1e} of the row's "
         f"largest; {CERTIFIED:g} is allowed)"
     )
-    return differs + _culprits(evidence) + _like_noise(certificate, evidence) + _because(notes)
+    return _culprits(evidence) + differs + _like_noise(certificate, evidence) + _because(notes)
 
 
 def ambiguous(others: list[Alternative], certificate: Certificate) -> tuple[str, str]:
     """The status and reason of a mesh that fits, where others do as well."""
     first = others[0]
-    more = f"; and likewise in {len(others) - 1} more places" if len(others) > 1 else ""
+    more = f"; and likewise in {count_of(len(others) - 1, 'more place')}" if len(others) > 1 else ""
     order = (
         f"the rows {_words(first.found)}, joined to {_words(first.around)}, can as well stand in the order "
         f"{_words(first.other)}, with "
@@ -122,6 +126,16 @@ def ambiguous(others: list[Alternative], certificate: Certificate) -> tuple[str,
     return "uncertified", (
         f"the mesh gives the matrix back to {certificate.backward_error:.1e}, {claim}: {order}the cells "
         f"{_cells(first.other_cells)} in place of {_cells(first.cells)}{more}{factor}"
+    )
+
+
+def far_away(origins: NDArray, written: Certificate, near: Certificate) -> tuple[str, str]:
+    """The status and reason of a mesh that fits until its coordinates are written, too far from the origin."""
+    origin = complex(origins[np.abs(origins).argmax()])
+    return "uncertified", (
+        f"the mesh gives the matrix back to {near.backward_error:.1e}, but its coordinates lie so far from the origin "
+        f"that they have too few digits left: as written they give it back to {written.backward_error:.1e}; subtract a "
+        f"point near ({origin.real:.6g}, {origin.imag:.6g}) from all of `anchors`"
     )
 
 
@@ -141,12 +155,13 @@ def _rounded(evidence: Evidence) -> str:
 
 
 def _culprits(evidence: Evidence) -> str:
+    """The beginning of a sentence where entries stand out."""
     if not len(evidence.suspects):
         return ""
     k, (i, j) = len(evidence.suspects), evidence.suspects[0]
     if k == 1:
-        return f"; the entry of rows {i} and {j} stands out: the mesh would fit the others far better without it"
-    return f"; {k} entries stand out, first that of rows {i} and {j}: the mesh would fit the others far better without"
+        return f"the entry of rows {i} and {j} stands out: the mesh would fit the others far better without it; "
+    return f"{k} entries stand out, first that of rows {i} and {j}: the mesh would fit the others far better without; "
 
 
 def _like_noise(certificate: Certificate, evidence: Evidence) -> str:
@@ -205,11 +220,12 @@ def _with_noise(
         return _turned_over(topology, certificate) + _because(notes)
     if test["p_value"] < CONFIDENCE:
         more = f"the misfit is more than noise of standard deviation {sigma:.3g} explains {figures}"
-        return more + _culprits(evidence) + _because(notes)
+        return _culprits(evidence) + more + _because(notes)
     if test["largest_p_value"] < CONFIDENCE:
         i, j = certificate.pairs[np.abs(certificate.differences).argmax()]
-        return (
+        more = (
             f"the entry of rows {i} and {j} is off by {test['largest']:.1f} standard deviations of the noise, "
-            f"{sigma:.3g}, more than the largest of {len(certificate.pairs)} would be{_culprits(evidence)}"
-        ) + _rounded(evidence)
+            f"{sigma:.3g}, more than the largest of {len(certificate.pairs)} would be"
+        )
+        return _culprits(evidence) + more + _rounded(evidence)
     return f"noise of standard deviation {sigma:.3g} explains the misfit {figures}"

@@ -135,6 +135,17 @@ def test_anchors_fix_size_and_sign(work):
     assert mesh["scale"] == pytest.approx(1.0)  # the shear modulus that the matrix was assembled with
 
 
+@pytest.mark.parametrize(("far", "status"), [(0.0, "certified"), (100.0, "certified"), (1e8, "uncertified")])
+def test_anchors_far_from_the_origin(far, status):
+    given = body("tet-p1")
+    points = 0.3 * given.points + far
+    anchors = [(3 * node, *points[node]) for node in (2, 11)]
+    found = recover(given.matrix, anchors=anchors)
+    assert found.status == status
+    assert ("too few digits" in found.reason) == (status == "uncertified")
+    assert np.abs(found.points - points).max() < 1e-15 * far + 1e-10
+
+
 def test_anchors_that_do_not_fit(work, one_sentence):
     work.write("E.mtx", body("tet-p1").matrix)
     for words, why in (
@@ -163,7 +174,7 @@ def test_options_of_scalar_matrices(work, one_sentence):
     work.write("E.mtx", body("tri-p1").matrix)
     result = work.recover("--noise", "1e-3", matrix="E.mtx")
     assert result.exit_code == 2
-    assert "the option noise is for scalar matrices" in one_sentence(result)
+    assert "--noise is for scalar matrices" in one_sentence(result)
     assert work.recover("--no-refine", "--threads", "1", matrix="E.mtx").exit_code == 0
 
 

@@ -137,7 +137,7 @@ def test_2_not_a_matrix_file(work, one_sentence, name, content):
         (FormatError("too small"), 4, "too small"),
         (UnassembleError("odd"), 1, "odd"),
         (MemoryError(), 1, "not enough memory"),
-        (PermissionError(13, "Permission denied", "A.mtx"), 2, "Permission denied"),
+        (PermissionError(13, "Permission denied", "A.mtx"), 2, "permission denied"),
         (ZeroDivisionError("by zero"), 1, "internal error, please report it (ZeroDivisionError: by zero)"),
         (EOFError("end"), 1, "internal error, please report it (EOFError: end)"),
         (KeyboardInterrupt(), 130, "interrupted"),

@@ -147,7 +147,7 @@ def test_endless_device(refused) -> None:
 def test_paths_that_cannot_be_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused) -> None:
     refused(MatrixFileError, ("none.mtx", "does not exist"), read_matrix, tmp_path / "none.mtx")
     refused(MatrixFileError, "directory", read_matrix, tmp_path)
-    refused(MatrixFileError, "directory", read_matrix, "")
+    refused(MatrixFileError, "empty", read_matrix, "")
     refused(MatrixFileError, "cannot be opened", read_matrix, "a\0b")
     refused(MatrixFileError, "cannot be opened", read_matrix, "n" * 300)
     (tmp_path / "A.mtx").write_bytes(VALID["A.mtx"])

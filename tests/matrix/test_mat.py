@@ -72,7 +72,7 @@ def test_suitesparse_problem_with_its_zeros(options: dict[str, Any]) -> None:
 
 def test_choice_of_variable(refused) -> None:
     variables = {"A": A, "B": 2 * A, "rectangle": A[:2], "dense": np.eye(3)}
-    message = refused(MatrixFileError, ("'A'", "'B'", "`variable`"), read_matrix, mat(variables))
+    message = refused(MatrixFileError, ("'A'", "'B'", "`variable=NAME`"), read_matrix, mat(variables))
     assert "dense" not in message
     assert read_matrix(mat(variables), variable="B")[0, 0] == 4
     refused(MatrixFileError, ("'C'", "'A' of size 3 x 3"), read_matrix, mat(variables), variable="C")

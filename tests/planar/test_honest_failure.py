@@ -114,11 +114,11 @@ def test_options_that_cannot_be_used_are_reported_or_refused():
     n = len(known.points)
     with pytest.raises(InputError, match="same position"):
         recover(known.matrix, anchors=[(1, 1.0, 1.0), (2, 1.0, 1.0)])
-    for wrong in ({"anchors": [(0, 1, 2, 3)]}, {"anchors": "abc"}, {"direction": (0.5, 1, 30.0)}):
-        with pytest.raises(InputError, match="triple"):
+    for wrong in ({"anchors": [(0, 1)]}, {"anchors": "abc"}, {"direction": (0.5, 1, 30.0)}):
+        with pytest.raises(InputError, match="whole rows"):
             recover(known.matrix, **wrong)
     three = [(row, *known.points[row]) for row in (0, 40, 80)]
-    assert any("handedness was not used" in w for w in recover(known.matrix, anchors=three, handed="left").warnings)
+    assert any("`handed` was not used" in w for w in recover(known.matrix, anchors=three, handed="left").warnings)
     alone = sp.block_diag([known.matrix, sp.eye_array(1)], format="csr")
     assert any("not used" in w for w in recover(alone, anchors=[(n, 0.0, 0.0)]).warnings)
     in_line = [(1, 0.0, 0.0), (2, 1.0, 0.0), (3, 5.0, 0.0), (4, -3.0, 0.0)]
@@ -164,3 +164,13 @@ def test_eliminated_boundary_is_suspected():
     assert taken.status == "uncertified"
     assert any("seem to have been eliminated" in note for note in taken.warnings)
     assert not any("eliminated" in note for note in found.warnings)
+
+
+def test_a_wrong_entry_is_not_taken_for_an_elimination():
+    known = specimen(*random_mesh(220, seed=1))
+    spoilt = known.matrix.tolil()
+    i, j = np.argwhere(np.triu(known.matrix.toarray(), 1))[100]
+    spoilt[i, j] = spoilt[j, i] = 1.01 * spoilt[i, j]
+    found = recover(spoilt)
+    assert found.reason.startswith(f"the entry of rows {i} and {j} stands out")
+    assert not [note for note in found.warnings if "eliminated" in note]

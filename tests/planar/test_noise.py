@@ -138,9 +138,9 @@ def test_entries_of_few_digits(stored, digits, size):
     found = recover(matrix)
     assert found.status == "uncertified"
     assert f"of {digits}" in found.reason
-    assert "give it as noise" in found.reason
+    assert "to have it tested give `noise=" in found.reason
     assert largest_error(found.points, known.points) < size
-    noise = float(found.reason.split("give it as noise, ")[1].split(" ")[0])
+    noise = float(found.reason.split("`noise=")[1].split("`")[0])
     tested = recover(matrix, noise=noise)
     assert tested.certified, tested.reason
     assert largest_error(tested.points, known.points) < size

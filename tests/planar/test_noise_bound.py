@@ -1,6 +1,6 @@
 """The Cramér-Rao bound from 500 to 50,000 vertices, and the unpolished null vector beside it.
 
-The mesh, the bound and the draws are those of ``benchmarks/noise.py``, which differentiates the weights by itself. The
+The mesh, the bound and the draws are those of ``benchmarks/bound.py``, which differentiates the weights by itself. The
 bound is the expectation of the mean square error of the best linear estimate. A few smooth displacements carry most of
 either error, so both are compared draw by draw: that ratio settles where the one to the expectation still scatters.
 """
@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from bound import Bound, mean_square, mesh_of_at_least, noisy
 from irregular import laplacian
-from noise import Bound, mean_square, mesh_of_at_least, noisy
 
 from unassemble.matrix import check_matrix
 from unassemble.planar.conformal import conformal_map

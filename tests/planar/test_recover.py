@@ -318,3 +318,28 @@ def test_threads_and_progress():
 def test_options_that_make_no_sense(options):
     with pytest.raises(InputError):
         recover(specimen(*random_mesh(50)).matrix, **options)
+
+
+@pytest.mark.parametrize("noise", [None, 1e-9])
+def test_anchors_far_from_the_origin(noise):
+    """Where coordinates lose their digits it is they that are at fault, not the matrix."""
+    known = specimen(*random_mesh(200, seed=3))
+    for far, certified in ((0.0, True), (1e4, True), (1e9, False)):
+        points = known.points + [far, -far]
+        found = recover(known.matrix, anchors=[(row, *points[row]) for row in (0, 80, 160)], noise=noise)
+        assert found.certified == certified, found.reason
+        assert np.abs(found.points - points).max() < 4e-16 * far + 1e-7
+        if not certified:
+            assert "too few digits" in found.reason
+            assert "the entry" not in found.reason
+            assert not len(found.worst_entries)
+
+
+def test_far_anchors_of_one_piece_leave_the_others_alone():
+    one, other = specimen(*random_mesh(120, seed=4)), specimen(*random_mesh(90, seed=5))
+    both = sp.block_diag([one.matrix, other.matrix], format="csr")
+    free = recover(both)
+    found = recover(both, anchors=[(0, 1e3, 0.0), (7, 1e3 + 1, 0.0)])
+    assert found.certified
+    rest = slice(one.matrix.shape[0], None)
+    assert np.abs(found.points[rest] - free.points[rest]).max() < 1e-14

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import matrix_options, nodes_options, spelled_numbering
-from .status import CERTIFIED, UNCERTIFIED, say
+from .options import matrix_options, nodes_options, refuse_shared, spelled_numbering
+from .status import outcome
 from .values import OptionalTolerance
 
 if TYPE_CHECKING:
@@ -49,14 +48,7 @@ def modes(
             raise
         display("write")
         _write(recovery, files)
-    if not quiet:
-        from ..report import summary
-
-        written = ", ".join(click.format_filename(name) for name in files.values() if name is not None)
-        say(summary(recovery) + f"\n  {'written':<15} {written}")
-    elif not recovery.certified:
-        click.echo(f"unassemble: not certified: {recovery.reason}", err=True)
-    return CERTIFIED if recovery.certified else UNCERTIFIED
+    return outcome(recovery, [name for name in files.values() if name is not None], quiet=quiet)
 
 
 def _check_files(matrix: str, files: dict[str, str | None]) -> None:
@@ -66,15 +58,10 @@ def _check_files(matrix: str, files: dict[str, str | None]) -> None:
     from ..report import check_report
 
     checks = {"OUT": check_modes, "--petsc": check_target, "--amgcl": check_target, "--report": check_report}
-    roles: dict[Path, str] = {} if matrix == "-" else {Path(matrix).resolve(): "MATRIX"}
     for role, name in files.items():
-        if name is None:
-            continue
-        checks[role](name)
-        path = Path(name).resolve()
-        if path in roles:
-            raise click.UsageError(f"{roles[path]} and {role} are the same file, {click.format_filename(name)!r}")
-        roles[path] = role
+        if name is not None:
+            checks[role](name)
+    refuse_shared({"MATRIX": matrix, **files})
 
 
 def _write(recovery: Recovery, files: dict[str, str | None]) -> None:

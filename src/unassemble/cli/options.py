@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
@@ -48,6 +49,26 @@ def nodes_options(command: _Command) -> _Command:
     ):
         command = decorate(command)
     return command
+
+
+def refuse_shared(names: Mapping[str, str | None]) -> None:
+    """Refuse one file in two roles; a matrix named "-" is standard input.
+
+    Raises
+    ------
+    click.UsageError
+    """
+    seen: dict[Path, str] = {}
+    for role, name in names.items():
+        if name is None or (role == "MATRIX" and name == "-"):
+            continue
+        try:
+            path = Path(name).resolve()
+        except (OSError, RuntimeError, ValueError):  # whoever opens it will say what is wrong
+            continue
+        if path in seen:
+            raise click.UsageError(f"{seen[path]} and {role} are the same file, {click.format_filename(name)!r}")
+        seen[path] = role
 
 
 def spelled_numbering(word: str | None) -> str | None:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import matrix_options, nodes_options, spelled_numbering
-from .status import CERTIFIED, UNCERTIFIED, say
+from .options import matrix_options, nodes_options, refuse_shared, spelled_numbering
+from .status import outcome
 from .values import Number, Numbers, OptionalTolerance, check_anchors, check_orientation, check_tensor
 
 if TYPE_CHECKING:
@@ -98,13 +97,7 @@ def recover(matrix: str, out: str, report: str | None, plot: str | None, quiet: 
     with StageDisplay(enabled=not quiet) as display:
         recovery = _recovered(files, display, options)
         _write(recovery, files, display)
-    if not quiet:
-        from ..report import summary
-
-        say(summary(recovery) + f"\n  {'written':<15} {', '.join(map(click.format_filename, files.written))}")
-    elif not recovery.certified:
-        click.echo(f"unassemble: not certified: {recovery.reason}", err=True)
-    return CERTIFIED if recovery.certified else UNCERTIFIED
+    return outcome(recovery, files.written, quiet=quiet)
 
 
 def _check_available(realise: bool, operator: str, method: str | None) -> None:
@@ -131,15 +124,9 @@ def _check_files(files: _Files) -> None:
         from ..plot.canvas import check_plot
 
         check_plot(files.plot)
-    names = [("MATRIX", files.matrix), ("OUT", files.out), ("--report", files.report), ("--plot", files.plot)]
-    seen: dict[Path, str] = {}
-    for role, name in names:
-        if name is None or (role == "MATRIX" and name == "-"):
-            continue
-        path = Path(name).resolve()
-        if path in seen:
-            raise click.UsageError(f"{seen[path]} and {role} are the same file, {click.format_filename(name)!r}")
-        seen[path] = role
+    refuse_shared(
+        {"MATRIX": files.matrix, "OUT": files.out, "--report": files.report, "--plot": files.plot},
+    )
 
 
 def _recovered(files: _Files, display: StageDisplay, options: dict[str, Any]) -> Recovery:

@@ -8,11 +8,15 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from ..errors import InputError, OutputError, RecoveryError, UnassembleError
+from .spelling import as_typed
+
+if TYPE_CHECKING:
+    from ..recovery import Recovery
 
 CERTIFIED, BUG, USAGE, UNCERTIFIED, NOTHING, INTERRUPTED = 0, 1, 2, 3, 4, 130
 
@@ -47,8 +51,12 @@ class CommandLine(click.Group):
             if debug and not isinstance(error, (SystemExit, click.exceptions.ClickException)):
                 traceback.print_exception(error)
             if sentence:
-                click.echo(f"unassemble: {sentence}", err=True)
+                click.echo(f"unassemble: {as_typed(sentence, self.in_use(given))}", err=True)
         sys.exit(status or CERTIFIED)
+
+    def in_use(self, words: Sequence[str]) -> list[click.Command]:
+        """All commands, the one that is called first."""
+        return sorted(self.commands.values(), key=lambda command: command.name != next(iter(words), None))
 
 
 def verdict(error: BaseException) -> tuple[int, str]:
@@ -71,7 +79,7 @@ def verdict(error: BaseException) -> tuple[int, str]:
         case UnassembleError():
             return BUG, _one_line(str(error))
         case OSError():
-            return USAGE, _one_line(str(error))
+            return USAGE, _one_line(system_sentence(error))
         case MemoryError():
             return BUG, "there is not enough memory for a matrix of this size"
         case _:
@@ -79,6 +87,25 @@ def verdict(error: BaseException) -> tuple[int, str]:
             return BUG, f"internal error, please report it ({_one_line(f'{type(cause).__name__}: {cause}')}); " + (
                 "--debug shows where"
             )
+
+
+def outcome(recovery: Recovery, written: Sequence[str], *, quiet: bool) -> int:
+    """Say what came of a recovery, and return the exit status."""
+    commands = [click.get_current_context().command]
+    if not quiet:
+        from ..summary import summary
+
+        files = ", ".join(map(click.format_filename, written))
+        say(as_typed(summary(recovery), commands) + f"\n  {'written':<15} {files}")
+    elif not recovery.certified:
+        click.echo(f"unassemble: not certified: {as_typed(recovery.reason, commands)}", err=True)
+    return CERTIFIED if recovery.certified else UNCERTIFIED
+
+
+def system_sentence(error: OSError) -> str:
+    """What the system refused, without its number."""
+    why = (error.strerror or str(error)).lower()
+    return f"{os.fsdecode(error.filename)!r}: {why}" if isinstance(error.filename, (str, bytes)) else why
 
 
 def say(text: str) -> None:

@@ -77,3 +77,26 @@ def anchored(
         if here.sum() > 1 and misfit > 1e-6 * np.linalg.norm(y, axis=1).max():
             notes.append(f"the anchors do not fit the mesh: one is missed by {misfit:.3g}")
     return points, factor, notes
+
+
+def digits_lost(
+    points: NDArray[np.float64], before: NDArray[np.float64], component: NDArray[np.int64], factor: NDArray[np.float64]
+) -> float:
+    """Largest error that moving a mesh far from the origin has left in its coordinates, in mean edge lengths.
+
+    Parameters
+    ----------
+    points, before : (n, d) float64
+        Of :func:`anchored`, and what it moved, whose mean edge length is 1.
+    component, factor
+        Of :func:`anchored`.
+    """
+    worst = 0.0
+    for piece, size in enumerate(np.where(np.isnan(factor), 1.0, factor)):
+        body = component == piece
+        if not body.any():
+            continue
+        shape = size * before[body]
+        shift = np.median(points[body] - shape, axis=0)  # these differences round to the shift: they hide the errors
+        worst = max(worst, float(np.abs((points[body] - shift) - shape).max() / abs(size)))
+    return worst

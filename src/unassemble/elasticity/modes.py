@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import FormatError, InputError, OutputError
 from ..files import check_target, whole_file
+from ..words import count_of
 from .nodal import determined
 
 if TYPE_CHECKING:
@@ -148,7 +149,7 @@ def _determined(points: NDArray[np.float64]) -> NDArray[np.float64]:
     loose = np.flatnonzero(~determined(points))
     if len(loose):
         raise FormatError(
-            f"node {loose[0]} and {len(loose) - 1} more have no coordinates, and this format has no way to say so: "
-            "write the .npz, or the modes, in which these nodes have translations only"
+            f"{count_of(len(loose), 'node has', 'nodes have')} no coordinates (node {loose[0]} for one), and this "
+            "format has no way to say so: write the .npz, or the modes, in which such nodes have translations only"
         )
     return points

@@ -9,6 +9,7 @@ from ..clock import Clock
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..matrix import check_matrix
+from ..words import count_of
 from .cells import Cells, no_cells, recognise_cells
 from .certificate import largest_residual
 from .halves import joined
@@ -145,7 +146,9 @@ def _describe(
     if want_cells:
         warnings += _about_cells(found)
     if loose.any():
-        warnings.append(f"{loose.sum()} of {nodal.n} nodes are tied to eliminated unknowns only and stay undetermined")
+        warnings.append(
+            f"{count_of(int(loose.sum()), 'node is', 'nodes are')} tied to eliminated unknowns only and not determined"
+        )
     if solution.planes:
         warnings.append(
             "nodes that lack a direction were taken to lie in planes across it, which fits, to determine others"
@@ -214,12 +217,13 @@ def _verdict(
             "nodes came out as separate pieces; give the numbering if it is known"
         )
     if found.certified and found.backward_error <= CERTIFIED:
-        return "certified", f"the matrix re-assembled on the {found.n_cells} elements is the given one"
+        return "certified", f"the matrix re-assembled on the {count_of(found.n_cells, 'element')} is the given one"
     odd = int(without_trace(nodal).any(axis=1).sum())
     if odd:
         return "uncertified", (
-            f"{odd} nodes lack directions although no row next to them misses anything: their rows belong to other "
-            "nodes, and neither pattern nor positions tell to which; give the numbering if it is known"
+            f"{count_of(odd, 'node lacks', 'nodes lack')} directions although no row next to it misses anything: its "
+            "rows belong to other nodes, and neither pattern nor positions tell to which; give the numbering if it is "
+            "known"
         )
     if numbering.incomplete and numbering.kind != "given" and numbering.common < 1:
         return "uncertified", (

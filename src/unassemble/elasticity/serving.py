@@ -16,7 +16,7 @@ from ..matrix import OperatorMatrix, check_matrix
 from ..recovery import Recovery
 from ..structures.bars import bars_of
 from ..structures.trusses import serve_truss
-from .anchoring import anchored, checked_anchors
+from .anchoring import anchored, checked_anchors, digits_lost
 from .cells import Cells
 from .kinds import KINDS
 from .nodal import nodal_matrix, uncoupled
@@ -26,6 +26,7 @@ from .rounded import with_exact_sums
 from .surface import boundary_loops
 from .unknowns import Numbering
 
+_LOST = 1e-11  # rounding errors of coordinates, in edge lengths; entries of flat elements have a hundred times as much
 _SAME = 1e-12  # relative difference up to which the matrices of two directions are one
 
 Scalar = Callable[[OperatorMatrix, Sequence[Any]], Recovery]
@@ -70,6 +71,14 @@ def serve(
     found = place_nodes(nodal, numbering, clock, cells=cells, rounding=rounding)
     known = checked_anchors(anchors, found.node_of_row, numbering.block_size)
     points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
+    status, reason = found.status, found.reason
+    lost = digits_lost(points, found.points, found.component, factor) if len(known[0]) else 0.0
+    if status == "certified" and lost > _LOST:
+        status = "uncertified"
+        reason = (
+            f"{reason}, but the anchors lie so far from the origin that coordinates have too few digits left: as "
+            f"written they are off by {lost:.1e} edge lengths; subtract a point near the anchors from all of `anchors`"
+        )
     lame, scale = _in_units(found, factor)
     fields: dict[str, Any] = {"triangles": np.empty((0, 3), np.int64), **_cell_fields(found.cells)}
     boundary, offsets = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
@@ -86,8 +95,8 @@ def serve(
         boundary=boundary,
         boundary_offsets=offsets,
         node_status=found.node_status,
-        status=found.status,
-        reason=found.reason,
+        status=status,
+        reason=reason,
         operator="elasticity",
         backward_error=found.backward_error,
         timings=clock.timings,
@@ -141,7 +150,9 @@ def _vector_laplacian(
     nodes = parts.nodes[lead]
     place = np.full(numbering.n_nodes, -1)
     place[nodes] = np.arange(len(nodes))
-    known = [(int(place[numbering.node_of_row[row]]), *where) for row, *where in anchors or ()]
+    anchor_nodes, where = checked_anchors(anchors, numbering.node_of_row, 2)
+    here = place[anchor_nodes] >= 0
+    known = [(int(k), *xy) for k, xy in zip(place[anchor_nodes[here]], where[here].tolist(), strict=True)]
     try:
         mesh = scalar(check_matrix(parts.matrices[lead]), known)
         others = [

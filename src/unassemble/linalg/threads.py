@@ -16,7 +16,7 @@ def threads(count: int | None) -> AbstractContextManager[Any]:
     if count is None:
         return nullcontext()
     if count < 1:
-        raise InputError(f"the number of threads is at least 1, not {count}")
+        raise InputError(f"`threads` is at least 1, not {count}")
     backend()  # loads MKL, so that the limit reaches it
     return threadpool_limits(count)
 

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import MatrixError
+from ..words import count_of
 
 # Above this many rows for each stored entry, a matrix is a wrong header rather than a mesh.
 _ROWS_PER_ENTRY = 100
@@ -58,8 +59,9 @@ def refuse_mostly_empty(n: int, n_stored: int) -> None:
     """
     if n > _ROWS_PER_ENTRY * (n_stored + 10):
         raise MatrixError(
-            f"at least {n - n_stored} of the {n} rows have no off-diagonal entry (only {n_stored} entries are "
-            "stored), so that this is no matrix of a mesh: check its size, or leave the empty rows out"
+            f"at least {n - n_stored} of the {n} rows have no off-diagonal entry (only "
+            f"{count_of(n_stored, 'entry is', 'entries are')} stored), so that this is no matrix of a mesh: check its "
+            "size, or leave the empty rows out"
         )
 
 

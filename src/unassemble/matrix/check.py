@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError, MatrixError
+from ..words import count_of
 from .canonical import canonical, place, working_dtype
 from .operator import OperatorMatrix, row_sizes
 from .symmetry import symmetric_entries, triangles
@@ -69,10 +70,10 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
 
 
 def _check_options(drop_zeros: float | None, noise: float | None) -> None:
-    if drop_zeros is not None and (isinstance(drop_zeros, bool) or not 0 <= drop_zeros < 1):
-        raise InputError(f"drop_zeros is a relative tolerance, at least 0 and below 1 (say 1e-12), not {drop_zeros}")
+    if drop_zeros is not None and (isinstance(drop_zeros, (bool, str)) or not 0 <= drop_zeros < 1):
+        raise InputError(f"`drop_zeros` is a relative tolerance, at least 0 and below 1 (say 1e-12), not {drop_zeros}")
     if noise is not None and not (noise >= 0 and np.isfinite(noise)):
-        raise InputError(f"the noise is a standard deviation, finite and not negative, not {noise}")
+        raise InputError(f"`noise` is a standard deviation, finite and not negative, not {noise}")
 
 
 def _as_sparse(A: Any) -> Any:
@@ -104,7 +105,7 @@ def _check_dimensions(ndim: int) -> None:
 def _check_shape(shape: tuple[int, int]) -> None:
     rows, columns = shape
     if rows != columns:
-        raise MatrixError(f"the matrix is not square: it has {rows} rows and {columns} columns")
+        raise MatrixError(f"the matrix is not square: it has {count_of(rows, 'row')} and {count_of(columns, 'column')}")
     if rows == 0:
         raise MatrixError("the matrix is empty: it has 0 rows")
 
@@ -128,7 +129,7 @@ def _check_entries(csr: sp.csr_array) -> None:
         k = int(np.argmin(finite))
         i, j = place(csr, k)
         more = len(finite) - np.count_nonzero(finite) - 1
-        others = f" (and {more} more entries are not finite)" if more else ""
+        others = f" (and {count_of(int(more), 'more entry is', 'more entries are')} not finite)" if more else ""
         raise MatrixError(
             f"the entry at row {i}, column {j} is {csr.data[k]}{others}: every entry must be a finite number"
         )
@@ -157,7 +158,7 @@ def _without_zeros(
     if not dropped:
         return edges, entries, ()
     sentence = (
-        f"{dropped} of {len(edges)} stored pairs of off-diagonal entries were forgotten: they are at most "
+        f"{dropped} of {count_of(len(edges), 'stored pair')} of off-diagonal entries forgotten: at most "
         f"{tolerance:g} times the largest off-diagonal entry of their row and of their transpose's"
     )
     return edges[keep], entries[keep], (sentence,)

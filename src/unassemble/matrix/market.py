@@ -18,6 +18,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import MatrixError, MatrixFileError
+from ..words import count_of
 
 _BLOCK = 1 << 18  # characters; larger ones are slower
 _FIELDS = ("real", "double", "integer", "unsigned-integer", "complex", "pattern")
@@ -198,10 +199,11 @@ def _values(columns: NDArray, header: _Header) -> NDArray:
 
 
 def _check_count(seen: int, header: _Header) -> None:
+    announced = count_of(header.count, "entry", "entries")
     if seen < header.count:
-        raise header.error(f"announces {header.count} entries and holds {seen}: it is truncated")
+        raise header.error(f"announces {announced} and holds {seen}: it is truncated")
     if seen > header.count:
-        raise header.error(f"announces {header.count} entries and holds more: its size line is wrong")
+        raise header.error(f"announces {announced} and holds more: its size line is wrong")
 
 
 def _blocks(text: io.TextIOWrapper, header: _Header) -> Iterator[NDArray[np.float64]]:

@@ -57,7 +57,7 @@ def read_mat(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
     if not candidates:
         raise MatrixFileError(f"{name} holds no sparse variable (it holds {held}): make one by sparse(A) and save it")
     if len(candidates) > 1:
-        raise MatrixFileError(f"{name} holds several sparse variables ({held}): choose one by the option `variable`")
+        raise MatrixFileError(f"{name} holds several sparse variables ({held}): choose one by `variable=NAME`")
     return candidates[0]
 
 

@@ -77,7 +77,7 @@ def _read(stream: Any, name: str, variable: str | None) -> Any:
     if kind is None:
         raise MatrixFileError(f"{name} {foreign(_head(stream))}")
     if variable is not None and kind != "mat":
-        raise InputError(f"{name} is {_FORMATS[kind]}, and only .mat files have variables to choose from")
+        raise InputError(f"{name} is {_FORMATS[kind]}, and only .mat files have variables: leave out `variable`")
     if kind == "mat":
         return read_mat(stream, name, variable)
     return read_npz(stream, name) if kind == "npz" else read_market(stream, name)
@@ -122,6 +122,8 @@ def _open_path(path: Any) -> BinaryIO:
     if not isinstance(path, (str, bytes, os.PathLike)):
         raise InputError(f"a matrix file is given by its path, '-' or an open file, not by {type(path).__name__}")
     name = os.fsdecode(path)
+    if not name:
+        raise MatrixFileError("the name of the matrix file is empty")
     try:
         if Path(name).is_dir():
             raise MatrixFileError(f"{name!r} is a directory: name the matrix file in it")

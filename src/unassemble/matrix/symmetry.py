@@ -9,11 +9,14 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import MatrixError
+from ..words import count_of
 from .canonical import entry_rows
 from .operator import row_sizes
 
 # Assembly in floating point sums the contributions to A_ij and A_ji in different orders.
 ROUNDING = 1e-10
+# Assemblers leave differences of this size in nearly every matrix: there is nothing to say about them.
+ORDINARY = 1e-12
 # Ten standard deviations: independent noise in both triangles stays below for any size of matrix.
 NOISE = 10.0
 
@@ -64,6 +67,7 @@ def symmetric_entries(
     asymmetry : float
         Largest difference relative to the largest off-diagonal entry of the two rows.
     warnings : tuple of str
+        What was added or averaged, but for differences as rounding leaves them in nearly every matrix.
 
     Raises
     ------
@@ -88,9 +92,11 @@ def symmetric_entries(
     entries = pairs.upper.copy()
     entries[differing] += 0.5 * (lower - upper)
     worst = int(np.argmax(relative))
+    if relative[worst] <= ORDINARY:
+        return entries, float(relative[worst]), warnings
     average = (
-        f"{len(differing)} pairs of entries differ from their transposes, by at most {relative[worst]:.1e} of the "
-        f"largest off-diagonal entry of their rows (rows {i[worst]} and {j[worst]}), and were averaged"
+        f"{count_of(len(differing), 'entry was', 'entries were')} averaged with the transpose: they differ by up to "
+        f"{relative[worst]:.1e} of the largest off-diagonal entry of the rows ({i[worst]} and {j[worst]})"
     )
     return entries, float(relative[worst]), (*warnings, average)
 
@@ -117,7 +123,7 @@ def _not_symmetric(A: sp.csr_array, pairs: Triangles, i: int, j: int, noise: flo
         for which, held in (("upper", (A.indices >= rows).all()), ("lower", (A.indices <= rows).all())):
             if held:
                 return _one_triangle(A, which, *((i, j) if which == "upper" else (j, i)))
-    remedy = "" if noise is not None else " (give the noise if the entries are measured)"
+    remedy = "" if noise is not None else " (if the entries are measured, give their `noise`)"
     return MatrixError(
         f"the matrix is not symmetric, most at row {i}, column {j}: that entry is {_shown(A, i, j)} and its transpose, "
         f"row {j}, column {i}, is {_shown(A, j, i)}; both must be the same number{remedy}"

@@ -32,7 +32,7 @@ def check_plot(path: str | os.PathLike[str]) -> None:
         If the extension is not ``.png``, ``.svg`` or ``.pdf``, or the file cannot be written.
     """
     if PurePath(path).suffix.lower() not in _METADATA:
-        raise OutputError(f"a picture is a {', '.join(_METADATA)} file, not {os.fspath(path)!r}")
+        raise OutputError(f"a picture is a {' or '.join(_METADATA)} file, not {os.fspath(path)!r}")
     check_target(path)
 
 

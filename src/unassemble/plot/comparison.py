@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..report import cells_text
+from ..summary import counted_cells
+from ..words import count_of
 from . import style
 from .canvas import check_plot, footer, header, panels, write_figure
 from .mesh import draw_mesh, extent, outer_loops
@@ -86,9 +87,7 @@ def _fit(points: NDArray, truth: NDArray) -> NDArray:
 
 
 def _words(recovery: Recovery, error: float) -> tuple[str, str]:
-    sizes = "  ·  ".join(
-        [f"{recovery.n_points:,} points", *(f"{count:,} {kind}" for kind, count in cells_text(recovery))]
-    )
+    sizes = "  ·  ".join([count_of(recovery.n_points, "point"), *counted_cells(recovery)])
     return (
         f"{recovery.status}, largest error {error:.1e} of the diameter",
         f"{sizes}  ·  backward error {recovery.backward_error:.1e}",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..words import count_of
 from . import style
 from .ink import ink
 
@@ -74,7 +75,7 @@ def draw_mesh(
         )
     n_holes = int(np.count_nonzero(~outer))
     return [line_handle(style.OUTER, "outer boundary")] + (
-        [line_handle(style.HOLE, f"{n_holes:,} hole{'s' * (n_holes > 1)}")] if n_holes else []
+        [line_handle(style.HOLE, count_of(n_holes, "hole"))] if n_holes else []
     )
 
 
@@ -92,7 +93,7 @@ def draw_hinges(ax: Axes, points: NDArray, hinges: NDArray, count: int) -> list[
     ax.plot(x, y, linestyle="none", markersize=5.5, zorder=5, **marks)
     from matplotlib.lines import Line2D
 
-    label = f"{count:,} hinge{'s' * (count > 1)}"
+    label = count_of(count, "hinge")
     return [Line2D([], [], linestyle="none", markersize=5, label=label, **marks)]
 
 

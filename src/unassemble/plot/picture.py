@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..report import cells_text, scale_text
+from ..summary import counted_cells, scale_text
+from ..words import count_of
 from . import style
 from .body import plot_body
 from .canvas import check_plot, footer, header, panels, write_figure
@@ -62,9 +63,9 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
 
 def details(recovery: Recovery) -> str:
     """Sizes, factor and certificate in one line."""
-    parts = [f"{recovery.n_points:,} points", *(f"{count:,} {kind}" for kind, count in cells_text(recovery))]
+    parts = [count_of(recovery.n_points, "point"), *counted_cells(recovery)]
     if recovery.n_components > 1:
-        parts.append(f"{recovery.n_components:,} pieces")
+        parts.append(count_of(recovery.n_components, "piece"))
     missing = int(np.count_nonzero(recovery.node_status))
     if missing:
         parts.append(f"{missing:,} not determined")

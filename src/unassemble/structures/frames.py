@@ -18,6 +18,7 @@ from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..recovery import Recovery
+from ..words import count_of
 from .certificate import largest_force
 from .equations import Equations, equations
 from .members import members_and_cells
@@ -85,12 +86,12 @@ def serve_structure(
         notes.append("moments do not balance alone: rotations are tied to the ground by springs, as against drilling")
     untold = np.unique(node[direction < 0])
     if len(untold):
-        notes.append(f"{len(untold)} nodes lack unknowns, and which ones the pattern does not tell: their rows were "
+        notes.append(f"which unknowns {count_of(len(untold), 'node')} lack the pattern does not tell: their rows were "
                      "left out; give the numbering if it is known")  # fmt: skip
     loose = ~determined(points)
     if loose.any():
-        notes.append(f"{loose.sum()} of {nodes.n} nodes lie at supports, or are tied to these only, and stay "
-                     "undetermined")  # fmt: skip
+        notes.append(f"{loose.sum()} of {count_of(nodes.n, 'node')} cannot be determined: at supports, or tied to "
+                     "these only")  # fmt: skip
     points, more = _moved(points, component, known)
     status, reason = _verdict(error, evidence, layout.dim, rounding)
     return Recovery(

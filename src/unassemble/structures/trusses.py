@@ -24,6 +24,7 @@ from ..elasticity.unknowns import Numbering
 from ..errors import GeometryError
 from ..matrix import OperatorMatrix
 from ..recovery import Recovery
+from ..words import count_of
 from .bars import Bars
 from .positions import null_fields
 
@@ -57,8 +58,8 @@ def serve_truss(
     loose = ~determined(found.points)
     points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
     if loose.any():
-        notes.append(f"{loose.sum()} of {nodal.n} nodes can move while all bars keep their directions, and stay "
-                     "undetermined")  # fmt: skip
+        notes.append(f"{loose.sum()} of {count_of(nodal.n, 'node')} cannot be determined: the directions of all bars "
+                     "leave them room")  # fmt: skip
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: the point reflection of a truss has the same matrix")
     free = [name for name in found.freedoms if name]

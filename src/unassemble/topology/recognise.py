@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..errors import NotPlanarError, RecoveryError, TopologyError
+from ..words import count_of
 from . import planarity
 from .boundary import boundary_corners, following, loops
 from .cycles import three_cycles
 from .embedding import triangular_faces
 from .keys import distinct
 from .numbering import Numbering
+from .obstruction import obstruction_text
 from .orientation import Gluing, glue, orient, reglue
 from .separating import not_faces
 from .surface import Piece, Topology
@@ -138,7 +140,7 @@ def triangulated(n: int, edges: NDArray) -> tuple[Piece, ...] | None:
         If there are more edges than a planar graph can have.
     """
     if n >= 3 and len(edges) > 3 * n - 6:
-        raise _not_planar(n, edges, f"it has {len(edges)} edges, and a planar graph has at most 3 n - 6 = {3 * n - 6}")
+        raise _not_planar(n, edges, f"{len(edges)} edges on {n} rows are more than 3 n - 6; for one, ")
     triangles, opposite = three_cycles(n, edges)
     if (np.bincount(opposite.ravel(), minlength=1) > 2).any():
         face = ~not_faces(n, edges, triangles, opposite)
@@ -152,14 +154,14 @@ def _recognise_whole(n: int, edges: NDArray) -> Topology:
     if pieces is not None and sum(len(piece.edges) for piece in pieces) == len(edges):
         return Topology(n, edges, pieces, "3-cycles")
     if not planarity.is_planar(n, edges):
-        raise _not_planar(n, edges, "it contains the subdivision of K5 or K3,3 on these edges")
+        raise _not_planar(n, edges, "")
     if pieces is not None:  # edges without a triangle do not hinder the rest
         return Topology(n, edges, pieces, "3-cycles")
     triangles, opposite = triangular_faces(n, edges)
     if not len(triangles):
         raise TopologyError(
-            f"the graph of the matrix ({n} vertices, {len(edges)} edges) is planar but has no triangle: "
-            "no element can be recognised (if zero entries were dropped, keep them stored)"
+            f"the graph of the matrix ({count_of(n, 'vertex', 'vertices')}, {count_of(len(edges), 'edge')}) is planar "
+            "but has no triangle: no element can be recognised (if zero entries were dropped, keep them stored)"
         )
     pieces = planar_pieces(n, edges, triangles, opposite)
     if pieces is None:
@@ -175,10 +177,8 @@ def _not_planar(n: int, edges: NDArray, why: str) -> NotPlanarError:
 
 
 def _not_planar_witness(where: str, why: str, witness: tuple[tuple[int, int], ...]) -> NotPlanarError:
-    shown = ", ".join(f"{a}-{b}" for a, b in witness[:12]) + (", ..." if len(witness) > 12 else "")
-    return NotPlanarError(
-        f"{where}the graph of the matrix is not planar: {why} (rows joined by nonzero entries: {shown})", witness, why
-    )
+    text = obstruction_text(witness)
+    return NotPlanarError(f"{where}the graph of the matrix is not planar: {why}{text}", witness, why)
 
 
 def planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> tuple[Piece, ...] | None:

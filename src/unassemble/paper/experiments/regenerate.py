@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from os import PathLike
 from pathlib import Path
 
+from ...files import made_folder
 from .cases import Case, Direct, Run, cases
 from .claims import Claim, claims
 from .convergence import Comparison, Histories, compare, histories
@@ -65,8 +66,7 @@ def regenerate(directory: str | PathLike[str], direct: Direct) -> Regenerated:
     """
     from . import figures  # drawing is not needed to measure
 
-    folder = Path(directory)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = made_folder(directory)
     measured = measure(direct)
     cases_of = {c.name: c for c in measured.cases}
     h = measured.histories

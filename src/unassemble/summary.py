@@ -1,0 +1,158 @@
+"""What there is to say about a recovery, for people: a few lines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .words import count_of
+
+if TYPE_CHECKING:
+    from .recovery import Recovery
+
+_SHOWN = 3
+
+
+def summary(recovery: Recovery) -> str:
+    """A few aligned lines for a person."""
+    lines = [f"{recovery.status}: {recovery.reason}"]
+    lines += [f"  {name:<15} {value}" for name, value in _rows(recovery)]
+    return "\n".join(lines)
+
+
+def _rows(recovery: Recovery) -> list[tuple[str, str]]:
+    rows = [
+        ("operator", _operator(recovery)),
+        *([("chosen since", recovery.choice)] if recovery.choice else []),
+        ("points", _points(recovery)),
+        *_cell_rows(recovery),
+        ("pieces", _pieces(recovery)),
+    ]
+    if recovery.n_holes is not None:
+        rows.append(("holes", f"{recovery.n_holes:,}"))
+    if recovery.mechanical:
+        rows += _elastic_rows(recovery)
+    else:
+        rows.append(("scale c", scale_text(recovery)))
+    rows.append(("backward error", f"{recovery.backward_error:.1e}"))
+    if recovery.estimated_noise is not None and recovery.backward_error > 1e-12:
+        rows.append(("noise", f"the misfit is that of a standard deviation of {recovery.estimated_noise:.1e}"))
+    deviation = largest_deviation(recovery)
+    if deviation is not None:
+        rows.append(("std deviation", f"at most {deviation:.1e} in a coordinate"))
+    if recovery.status == "uncertified" and len(recovery.worst_entries):
+        rows += _worst(recovery)
+    if recovery.timings:
+        rows.append(("time", _timings(recovery.timings)))
+    return rows + [("note", warning) for warning in recovery.warnings]
+
+
+def _operator(recovery: Recovery) -> str:
+    if not recovery.vector_valued:
+        return recovery.operator
+    return f"{recovery.operator}, {block_size(recovery)} unknowns per node, {numbering_text(recovery)}"
+
+
+def numbering_text(recovery: Recovery) -> str:
+    """How the unknowns of a vector-valued matrix stand, in words."""
+    words = {"pattern": "in an order found by the pattern", "given": "in the given order"}
+    return words.get(recovery.numbering, recovery.numbering)
+
+
+_KINDS = {
+    "line": ("member", "members"),
+    "triangle": ("triangle", "triangles"),
+    "quad": ("quadrilateral", "quadrilaterals"),
+    "tetra": ("tetrahedron", "tetrahedra"),
+    "hexahedron": ("hexahedron", "hexahedra"),
+    "polygon": ("polygon", "polygons"),
+    "": ("cell", "cells"),
+}
+
+
+def _cell_counts(recovery: Recovery) -> list[tuple[tuple[str, str], str, int]]:
+    """One cell and several in words, what they have besides, and their number; triangles where there are none."""
+    known = []
+    for kind, cells in recovery.cells.items():
+        base = kind.rstrip("0123456789")
+        nodes = kind[len(base) :]  # of quadratic ones
+        known.append((_KINDS[base], f" of {nodes} nodes" if nodes else "", len(cells)))
+    if recovery.n_polygons:
+        known.append((_KINDS["polygon"], "", recovery.n_polygons))
+    return known or [(_KINDS["" if recovery.vector_valued else "triangle"], "", 0)]
+
+
+def counted_cells(recovery: Recovery) -> list[str]:
+    """Kinds of cells with their numbers; triangles, if there are none, of scalar matrices."""
+    return [count_of(count, *kind) + more for kind, more, count in _cell_counts(recovery)]
+
+
+def _cell_rows(recovery: Recovery) -> list[tuple[str, str]]:
+    return [
+        (several + more, f"{count:,}" if count or several != "cells" else "none recognised")
+        for (_, several), more, count in _cell_counts(recovery)
+    ]
+
+
+def _elastic_rows(recovery: Recovery) -> list[tuple[str, str]]:
+    rows = []
+    if recovery.poisson_ratio is not None:
+        rows.append(("Poisson's ratio", f"{recovery.poisson_ratio:.10g}"))
+    if np.isfinite(recovery.scale).any():
+        rows.append(("shear modulus", scale_text(recovery)))
+    for one in recovery.evidence[:_SHOWN]:
+        text = f"dimension {one.null_dimension}, residual {one.residual:.1e}, next {one.gap:.1e}"
+        rows.append(("null space", text))
+    return rows
+
+
+def _points(recovery: Recovery) -> str:
+    missing = int(np.count_nonzero(recovery.node_status))
+    return f"{recovery.n_points:,}" + (f", of which {missing:,} not determined" if missing else "")
+
+
+def _pieces(recovery: Recovery) -> str:
+    hinges = len(recovery.hinges)
+    return f"{recovery.n_components:,}" + (f", meeting in {count_of(hinges, 'hinge')}" if hinges else "")
+
+
+def scale_text(recovery: Recovery, digits: int = 10) -> str:
+    """The factor c, or the range of those of all pieces."""
+    known = recovery.scale[np.isfinite(recovery.scale)]
+    low, high = (float(f(known)) if len(known) else math.nan for f in (np.min, np.max))
+    # Pieces of one matrix mostly share c, up to rounding.
+    return f"{low:.{digits}g}" if high - low <= 1e-9 * abs(low) else f"{low:.{digits}g} to {high:.{digits}g}"
+
+
+def _worst(recovery: Recovery) -> list[tuple[str, str]]:
+    """Entries that stand out, then those that fit worst, which are often only their neighbours."""
+    apart = {tuple(pair) for pair in recovery.suspects.tolist()}
+    misfits = dict(zip(map(tuple, recovery.worst_entries.tolist()), recovery.worst_misfits.tolist(), strict=True))
+    rest = sorted((pair for pair in misfits if pair not in apart), key=misfits.__getitem__, reverse=True)
+    named = [("stands out", pair) for pair in misfits if pair in apart][:_SHOWN]
+    named += [("worst fit", pair) for pair in rest][: max(1, _SHOWN - len(named))]
+    return [
+        (name, f"rows {i} and {j}, off by {misfits[i, j]:.1e} of the row's largest entry") for name, (i, j) in named
+    ]
+
+
+def _timings(timings: Mapping[str, float]) -> str:
+    stages = ", ".join(f"{stage} {seconds:.2g}" for stage, seconds in timings.items() if seconds >= 0.005)
+    return f"{sum(timings.values()):.2f} s" + (f" ({stages})" if stages else "")
+
+
+def block_size(recovery: Recovery) -> int:
+    """Unknowns per node."""
+    direction = recovery.direction_of_row
+    return 1 if direction is None else int(direction.max()) + 1
+
+
+def largest_deviation(recovery: Recovery) -> float | None:
+    """The largest error bar of a coordinate, where there are any."""
+    deviations = recovery.standard_deviations
+    if deviations is None or not np.isfinite(deviations).any():
+        return None
+    return float(np.nanmax(deviations))
