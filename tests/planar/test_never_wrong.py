@@ -60,8 +60,29 @@ def test_one_entry_changed(options, relative, edge):
         assert f"entry of rows {i} and {j} stands out" in found.reason
 
 
+def redundancy():
+    """(e,) how much of an error in an entry the others leave in its misfit, by differences of assembled entries."""
+    points = np.column_stack([KNOWN.points, np.zeros(len(KNOWN.points))])
+    step = 1e-6
+
+    def entries(moved):
+        return np.asarray(surface_matrix(moved, KNOWN.triangles)[EDGES[:, 0], EDGES[:, 1]]).ravel()
+
+    columns = [entries(points)]  # the factor c is unknown too
+    for vertex, axis in np.ndindex(len(points), 2):
+        away = np.zeros_like(points)
+        away[vertex, axis] = step
+        columns.append((entries(points + away) - entries(points - away)) / (2 * step))
+    u, size, _ = np.linalg.svd(np.array(columns).T, full_matrices=False)
+    kept = u[:, size > 1e-6 * size[0]]
+    return 1 - (kept**2).sum(axis=1)
+
+
+CHECKED = np.flatnonzero(redundancy() > 0.2)  # errors of the others hide in the position of a vertex
+
+
 @settings(max_examples=15, deadline=None)
-@given(edge=st.integers(0, len(EDGES) - 1), exponent=st.floats(-8, -0.5), sign=st.sampled_from([-1, 1]))
+@given(edge=st.sampled_from(CHECKED.tolist()), exponent=st.floats(-7.5, -0.5), sign=st.sampled_from([-1, 1]))
 def test_any_entry_changed_by_any_amount(edge, exponent, sign):
     """Of size one, that is: the change is relative to the typical entry."""
     i, j = map(int, EDGES[edge])
