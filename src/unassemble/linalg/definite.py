@@ -21,7 +21,7 @@ def nearly_singular(matrix: UpperTriangle, shifts: Sequence[float]) -> Iterator[
     matrix : UpperTriangle
         Real; a normal matrix, for example.
     shifts : sequence of float
-        To be tried one after the other, in units of the median of the diagonal.
+        To be tried one after the other, in units of the median of the positive entries of the diagonal.
 
     Raises
     ------
@@ -31,7 +31,8 @@ def nearly_singular(matrix: UpperTriangle, shifts: Sequence[float]) -> Iterator[
     block = matrix.block
     start = matrix.indptr[:-1]
     own = matrix.data[start].reshape(-1, block, block)
-    typical = float(np.median(np.diagonal(own, axis1=1, axis2=2)))
+    diagonal = np.diagonal(own, axis1=1, axis2=2)
+    typical = float(np.median(diagonal[diagonal > 0])) if (diagonal > 0).any() else 1.0
     for shift in shifts:
         data = matrix.data.copy()
         data[start] = (own + shift * typical * np.eye(block)).reshape(data[start].shape)
