@@ -23,7 +23,7 @@ from ..planar.cautious import count_flipped
 from ..planar.conformal import ConformalOptions, conformal_map
 from ..planar.cotangent import edge_weights
 from ..topology.keys import with_sides
-from ..topology.recognise import planar_pieces
+from ..topology.pieces import planar_pieces
 from .corners import Alternative, Corners, cell
 from .hubs import Hub
 

@@ -16,7 +16,7 @@ from ..planar.hinges import gap
 from ..planar.piece import PieceMesh
 from ..topology import Piece, Topology
 from ..topology.keys import contains, pair_keys, with_sides
-from ..topology.recognise import planar_pieces
+from ..topology.pieces import planar_pieces
 from .candidates import Candidates
 from .small import SMALL, small_map
 

@@ -1,9 +1,9 @@
 """From the sparsity graph to faces, orientation, boundary loops and pieces; no coordinates here."""
 
 from .cycles import triangles_everywhere
-from .numbering import Numbering, local_numbering
+from .numbering import Numbering, components, local_numbering
 from .polygons import Polygons
-from .recognise import components, located, recognise, surfaces
+from .recognise import located, recognise, surfaces
 from .surface import Piece, Topology
 
 __all__ = [
