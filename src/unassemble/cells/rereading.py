@@ -17,6 +17,7 @@ from .search import read_cells
 
 _MOST_VERTICES = 60
 _ORDERS = 5
+_WORK = 3000  # vertices times orders; every component is read once again at least
 _SAME_SCALE = 1e-6
 
 
@@ -30,8 +31,9 @@ def other_readings(
     rng = np.random.default_rng(0)
     others = []
     small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= _MOST_VERTICES]
+    n_orders = int(np.clip(_WORK // max(sum(len(part.vertices) for part in small), 1), 1, _ORDERS))
     for part, own in zip(small, _own_cells(stored.n, small, mesh), strict=True):
-        for _ in range(_ORDERS):
+        for _ in range(n_orders):
             shuffled = part.then(_shuffled(part, rng))
             weights = -stored.entries[shuffled.edge_rows]
             reading = read_cells(len(shuffled.vertices), shuffled.edges, weights, scale)
