@@ -15,7 +15,7 @@ from .matrix import OperatorMatrix, check_matrix, read_matrix
 from .operators import OPERATORS, VectorReading, asked_for, refuse, second_reading, vector_valued
 from .placement import Direction, Placement
 from .recovery import Recovery
-from .scalar import recover_scalar
+from .scalar import ScalarOptions, recover_scalar
 
 
 def recover(
@@ -135,18 +135,16 @@ def recover(
 
     def scalar(part: OperatorMatrix, known: Sequence[Any] | None) -> Recovery:
         placement = Placement.checked(part.n, known, tensor, direction, handed)
-        return recover_scalar(
-            part,
-            placement,
-            clock,
+        options = ScalarOptions(
             method or "conformal",
-            refine,
-            scale,
-            noise,
-            standard_deviations,
-            threads,
-            triangulate,
+            refine=refine,
+            scale=scale,
+            noise=noise,
+            standard_deviations=standard_deviations,
+            threads=threads,
+            triangulate=triangulate,
         )
+        return recover_scalar(part, placement, clock, options)
 
     def vector(reading: VectorReading) -> Recovery:
         from .elasticity.serving import serve

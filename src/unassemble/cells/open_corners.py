@@ -143,15 +143,15 @@ def _in_strips(whole: FaceComplex, corners: NDArray) -> NDArray[np.bool_]:
     the distance from a root.
     """
     bridge = whole.face == whole.face[np.arange(len(whole.face)) ^ 1]
-    lone = np.bincount(whole.tail, minlength=whole.n_vertices)[whole.head[corners]] == 2
-    inside = lone & bridge[corners] & bridge[whole.successor[corners]]
+    two = np.bincount(whole.tail, minlength=whole.n_vertices) == 2
+    inside = two[whole.head[corners]] & bridge[corners] & bridge[whole.successor[corners]]
     if not inside.any():
         return inside
     n = whole.n_vertices
     graph = sp.coo_array((np.ones(len(whole.edges)), whole.edges.T), shape=(n, n)).tocsr()
     # One root for each component, or parts without one would have no distance; never inside a path.
     label = csgraph.connected_components(graph, directed=False)[1]
-    order = np.argsort(2 * label + (np.diff(graph.indptr) == 2), kind="stable")
+    order = np.argsort(2 * label + two, kind="stable")
     root = order[np.flatnonzero(np.diff(label[order], prepend=-1))]
     depth = csgraph.dijkstra(graph, directed=False, indices=root, unweighted=True, min_only=True).astype(np.int64)
     outwards = depth[whole.tail[corners]] < depth[whole.head[corners]]

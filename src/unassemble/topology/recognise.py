@@ -135,15 +135,14 @@ def _recognise_whole(n: int, edges: NDArray) -> Topology:
     pieces = triangulated(n, edges)
     if pieces is not None and sum(len(piece.edges) for piece in pieces) == len(edges):
         return Topology(n, edges, pieces, "3-cycles")
-    if not planarity.is_planar(n, edges):
-        raise _not_planar(n, edges, "it contains the subdivision of K5 or K3,3 on these edges")
+    require_planar(n, edges)
     if pieces is not None:  # edges without a triangle do not hinder the rest
         return Topology(n, edges, pieces, "3-cycles")
     triangles, opposite = triangular_faces(n, edges)
     if not len(triangles):
         raise TopologyError(
-            f"the graph of the matrix ({n} vertices, {len(edges)} edges) is planar but has no triangle: "
-            "no element can be recognised (if zero entries were dropped, keep them stored)"
+            f"the graph of the matrix ({n} vertices, {len(edges)} edges) is planar, but without the entries no cell "
+            "shows in it: no cycle has three edges"
         )
     pieces = planar_pieces(n, edges, triangles, opposite)
     if pieces is None:
@@ -152,6 +151,20 @@ def _recognise_whole(n: int, edges: NDArray) -> Topology:
             "a hole or an outer boundary of three edges may have been taken for an element"
         )
     return Topology(n, edges, pieces, "embedding")
+
+
+def require_planar(n: int, edges: NDArray) -> None:
+    """Do nothing for a planar graph.
+
+    Raises
+    ------
+    NotPlanarError
+        With a Kuratowski subgraph as witness.
+    """
+    if n >= 3 and len(edges) > 3 * n - 6:
+        raise _not_planar(n, edges, f"it has {len(edges)} edges, and a planar graph has at most 3 n - 6 = {3 * n - 6}")
+    if not planarity.is_planar(n, edges):
+        raise _not_planar(n, edges, "it contains the subdivision of K5 or K3,3 on these edges")
 
 
 def _not_planar(n: int, edges: NDArray, why: str) -> NotPlanarError:
