@@ -48,6 +48,8 @@ class Candidates:
     corner : (cells,) bool
         Triangles a-b-c of two edges a-b, b-c of an empty face; the third has vanished from the boundary, which it
         does if the angle at b is a right one.
+    strip : (cells,) bool
+        Corners inside paths, all of them right angles if the path is a strip, none if pieces hang together there.
     turns : Turns
         Parts that can be turned over; its corners are numbered after the faces.
     """
@@ -63,6 +65,7 @@ class Candidates:
     first: NDArray[np.bool_]
     outer: NDArray[np.bool_]
     corner: NDArray[np.bool_]
+    strip: NDArray[np.bool_]
     turns: Turns
 
     @classmethod
@@ -101,6 +104,7 @@ class Candidates:
             first=np.r_[(blocks.size <= _SHORT)[faces] & ~outer[faces], np.zeros(len(corners), bool)],
             outer=np.r_[outer[faces], np.zeros(len(corners), bool)],
             corner=np.r_[np.zeros(len(faces), bool), np.ones(len(corners), bool)],
+            strip=np.r_[np.zeros(len(faces), bool), corners.in_strip],
             turns=corners.turns,
         )
 
@@ -133,6 +137,7 @@ class Candidates:
         corners = [self.corner & (self.belief > 0.5 + excess / np.pi) for excess in _INNER]
         faces = (self.first, (self.first & (self.size == 3)) | (by_angles & ~self.outer))
         none = np.zeros_like(self.corner)
+        corners += [chosen & ~self.strip for chosen in corners]
         tried = {(chosen | extra).tobytes(): chosen | extra for chosen in faces for extra in (*corners, none)}
         seen = set()
         for chosen in sorted(tried.values(), key=self._strain):
