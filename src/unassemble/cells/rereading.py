@@ -13,7 +13,7 @@ from ..matrix import OperatorMatrix
 from ..topology import Numbering, components
 from .corners import Alternative, OrientedMesh
 from .reading import Reading
-from .search import read_cells
+from .search import fitting_starts, read_cells
 
 _MOST_VERTICES = 60
 _ORDERS = 5
@@ -35,15 +35,28 @@ def other_readings(
     for part, own in zip(small, _own_cells(stored.n, small, mesh), strict=True):
         for _ in range(n_orders):
             shuffled = part.then(_shuffled(part, rng))
-            weights = -stored.entries[shuffled.edge_rows]
-            reading = read_cells(len(shuffled.vertices), shuffled.edges, weights, scale)
-            if reading is not None and reading.fits and (cells := _cells(reading, shuffled)) != own:
+            other = _other_reading(shuffled, -stored.entries[shuffled.edge_rows], own, scale)
+            if other is not None:
+                cells, c = other
                 gone, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
-                c = next(solved.scale for solved in reading.meshes if solved)
                 same = abs(c / factors[part.vertices[0]] - 1) < _SAME_SCALE
                 others.append(Alternative((), (), (), gone, new, same_scale=same))
                 break
     return others
+
+
+def _other_reading(
+    part: Numbering, weights: NDArray, own: set[tuple[int, ...]], scale: float | None
+) -> tuple[set[tuple[int, ...]], float] | None:
+    """Other cells that fit, and their c: among all starts, and what the search makes of them where none fits."""
+    graph = len(part.vertices), part.edges, weights, scale
+    found = list(fitting_starts(*graph))
+    if not found and (reading := read_cells(*graph)) is not None and reading.fits:
+        found = [reading]
+    for reading in found:
+        if (cells := _cells(reading, part)) != own:
+            return cells, next(solved.scale for solved in reading.meshes if solved)
+    return None
 
 
 def _own_cells(n: int, parts: list[Numbering], mesh: OrientedMesh) -> list[set[tuple[int, ...]]]:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..planar.piece import PieceMesh
-from ..topology.embedding import face_complexes
+from ..topology.embedding import drawing_with_corners, face_complexes
 from .candidates import Candidates
+from .crosses import Crosses
 from .evidence import label_changes
 from .proposals import proposals
 from .reading import Reading
@@ -83,12 +85,12 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
     """
     best: Reading | None = None
     effort = Effort.for_graph(n)
-    drawings = face_complexes(n, edges)
+    drawings = _drawings(n, edges, weights, scale)
     # Repairs take most of the effort: small graphs are begun with in all drawings before.
     for some in [list(drawings)] if n <= _BEGUN else ([drawing] for drawing in drawings):
         begun = []
         for drawing in some:
-            starts, settled = _begun(Candidates.of(drawing, weights, scale), effort)
+            starts, settled = _begun(drawing, effort)
             if settled:
                 return starts[0] if starts[0].fits else _better(best, starts[0])
             begun.append(starts)
@@ -97,6 +99,17 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
             if best is not None and (best.fits or best.like_noise):
                 return best
     return best if best is not None and best.pieces else None
+
+
+def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Iterator[Candidates]:
+    """What may be cells in each drawing; first in one about the vertices that their numbers make crosses."""
+    if n <= _RELAXED:
+        crosses = Crosses.of(n, edges, weights, scale)
+        drawing = drawing_with_corners(n, edges, crosses.wedges) if crosses.unique.any() else None
+        if drawing is not None:
+            yield Candidates.of(drawing, weights, scale, crosses)
+    for drawing in face_complexes(n, edges):
+        yield Candidates.of(drawing, weights, scale)
 
 
 def _begun(candidates: Candidates, effort: Effort) -> tuple[list[Reading], bool]:
@@ -130,6 +143,19 @@ def _finished(best: Reading | None, starts: list[Reading], effort: Effort) -> Re
             break
         effort.solves += max(share.solves, 0)
     return best
+
+
+def fitting_starts(n: int, edges: NDArray, weights: NDArray, scale: float | None = None) -> Iterator[Reading]:
+    """All readings to begin with that fit as they are, in all drawings.
+
+    Parameters are those of :func:`read_cells`.
+    """
+    known: dict[bytes, PieceMesh | None] = {}
+    for candidates in _drawings(n, edges, weights, scale):
+        for labels in candidates.starts():
+            reading = Reading.of(candidates, labels, known)
+            if reading.fits:
+                yield reading
 
 
 def first_reading(n: int, edges: NDArray, weights: NDArray) -> Reading | None:
