@@ -27,6 +27,7 @@ _SUSPECT = 0.3  # change of the label of a lone triangular hole: it was 0.4 or m
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 _BEGUN = 1000  # vertices up to which all drawings are begun with before one is repaired
 _SOLVES = 180
+_TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
 _RELAXED = 20_000  # vertices up to which labels are relaxed
 _WIDE = 20  # vertices of the largest piece below which trying labels one by one is as good
@@ -90,7 +91,7 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
     for some in [list(drawings)] if n <= _BEGUN else ([drawing] for drawing in drawings):
         begun = []
         for drawing in some:
-            starts, settled = _begun(drawing, effort)
+            starts, settled = _begun(drawing, effort, int(_TURNING * effort.solves / len(some)))
             if settled:
                 return starts[0] if starts[0].fits else _better(best, starts[0])
             begun.append(starts)
@@ -112,7 +113,7 @@ def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> 
         yield Candidates.of(drawing, weights, scale)
 
 
-def _begun(candidates: Candidates, effort: Effort) -> tuple[list[Reading], bool]:
+def _begun(candidates: Candidates, effort: Effort, turns: int) -> tuple[list[Reading], bool]:
     """Starts in one drawing that are worth repairing; and whether the first settles it, since it fits or none will."""
     starts = []
     for labels in candidates.starts():
@@ -123,7 +124,7 @@ def _begun(candidates: Candidates, effort: Effort) -> tuple[list[Reading], bool]
         return starts[:1], True
     starts = sorted(starts, key=lambda reading: reading.size)[:_STARTS]
     for k, start in enumerate(starts):
-        starts[k] = _turned_over(start, effort)
+        starts[k] = _turned_over(start, effort, turns // len(starts))
         if starts[k].fits:
             return [starts[k]], True
     return starts, False
@@ -195,9 +196,9 @@ def _relaxed(reading: Reading, effort: Effort) -> list[Reading]:
     return [] if labels is None else [effort.reading(reading.candidates, labels)]
 
 
-def _turned_over(reading: Reading, effort: Effort) -> Reading:
-    """Parts of the drawing turned over, each because that lowers the misfit; at no more than a third of the effort."""
-    least = 2 * effort.solves // 3
+def _turned_over(reading: Reading, effort: Effort, solves: int) -> Reading:
+    """Parts of the drawing turned over, each because that lowers the misfit; at no more than so many solves."""
+    least = effort.solves - solves
     trials = reading.candidates.turned(reading.labels)
     while reading.pieces and not reading.fits and effort.solves > least and (labels := next(trials, None)) is not None:
         trial = effort.reading(reading.candidates, labels)
