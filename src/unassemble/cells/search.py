@@ -95,7 +95,7 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
             if settled:
                 return starts[0] if starts[0].fits else _better(best, starts[0])
             begun.append(starts)
-        for starts in sorted(begun, key=lambda starts: min((start.size for start in starts), default=np.inf)):
+        for starts in begun:
             best = _finished(best, starts, effort)
             if best is not None and (best.fits or best.like_noise):
                 return best
