@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..topology.adjacency import adjacency
+from ..topology.keys import distinct
 
 _AGREE = 1e-7
 _LEAST = 2  # crosses that must agree in c where it is not known
@@ -94,9 +95,8 @@ def _most_frequent(factors: NDArray) -> float | None:
     row, value = row[order], value[order]
     # Runs of values that follow each other closely, each row counted once.
     run = np.cumsum(np.append(0, np.abs(np.diff(value)) > _AGREE * np.abs(value[1:]))) if len(value) else value
-    pairs = np.unique(np.column_stack([run, row]), axis=0)[:, 0].astype(np.int64)
-    if not len(pairs):
+    count = np.bincount(distinct(run.astype(np.int64) * len(factors) + row) // max(len(factors), 1))
+    if not len(count):
         return None
-    count = np.bincount(pairs)
     best = int(count.argmax())
     return float(np.median(value[run == best])) if count[best] >= _LEAST else None

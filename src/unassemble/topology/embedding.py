@@ -73,10 +73,11 @@ def _drawings(n: int, edges: NDArray, cycles: list[NDArray]) -> Iterator[FaceCom
 
 
 def drawing_with_corners(n: int, edges: NDArray, corners: NDArray) -> FaceComplex | None:
-    """A drawing in which the edges a-h and h-b of some corners follow each other about h; None if there is none.
+    """A drawing in which the edges a-h and h-b of some corners follow each other about h.
 
     A corner that one more vertex closes to a 4-cycle makes that a face; one that none does is closed by an edge a-b,
-    which is taken away again; others are drawn as they come.
+    which is taken away again; others are drawn as they come. None if there is no such drawing, or all corners belong
+    to 4-cycles, which are faces without that.
 
     Parameters
     ----------
@@ -97,7 +98,7 @@ def drawing_with_corners(n: int, edges: NDArray, corners: NDArray) -> FaceComple
     _, once = np.unique(np.sort(quads, axis=1), axis=0, return_index=True)
     whole, _, _ = with_sides(n, edges, open_ones)
     cycles = [cycle for cycle in (open_ones, quads[once]) if len(cycle)]
-    if len(whole) > 3 * n - 6 or not cycles:
+    if len(whole) > 3 * n - 6 or not len(open_ones):
         return None
     rotation = _with_faces(n, whole, cycles)
     if rotation is None:
