@@ -4,7 +4,7 @@
 
 The meshes are those of tests/families.py, assembled by scikit-fem, vanishing entries dropped, rows in random order. An
 answer counts as right if every edge-connected piece of the mesh comes back to 1e-9 of its diameter; certified answers
-that are not right are listed as WRONG. Ambiguous ones name rows that can change places.
+that are not right are listed as WRONG. Ambiguous ones name cells that others can take the place of.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def outcome(known: Specimen, scale: float | None) -> str:
     except RecoveryError:
         return "refused"
     if found.status == "uncertified":
-        return "ambiguous" if "in the order" in found.reason else "uncertified"
+        return "ambiguous" if found.alternatives else "uncertified"
     wrong = [rows for rows in pieces(known.triangles) if error(found.points[rows], known.points[rows]) > 1e-9]
     return "WRONG" if wrong else "certified"
 

@@ -15,7 +15,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from unassemble.planar.cotangent import edge_weights
-from unassemble.topology.recognise import planar_pieces
+from unassemble.topology.pieces import planar_pieces
 
 Cell = tuple[int, ...]
 LONGEST = 6

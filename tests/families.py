@@ -28,6 +28,20 @@ def crossed(rng: np.random.Generator) -> Mesh:
     return squares(_mask(rng, 2, 9, rng.uniform(0, 0.7)), crossed=True)
 
 
+def kites(rng: np.random.Generator) -> Mesh:
+    """Four right triangles of arbitrary legs about each of some points, every other one of a grid of uneven steps."""
+    k, m = rng.integers(3, 12, 2)
+    x, y = (np.cumsum(rng.uniform(0.5, 1.5, count)) for count in (k, m))
+    i, j = (index.ravel() for index in np.meshgrid(np.arange(1, k - 1), np.arange(1, m - 1), indexing="ij"))
+    hub = ((i + j) % 2 == 0) & (rng.random(len(i)) >= rng.uniform(0, 0.6))
+    hub[0] |= not hub.any()
+    i, j = i[hub], j[hub]
+    rim = [(i + 1) * m + j, i * m + j + 1, (i - 1) * m + j, i * m + j - 1]
+    triangles = [np.column_stack([i * m + j, one, two]) for one, two in zip(rim, [*rim[1:], rim[0]], strict=True)]
+    points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    return used(points, np.concatenate(triangles))
+
+
 def lattice(rng: np.random.Generator) -> Mesh:
     """Lattices of equilateral, right or arbitrary triangles with many holes, and pieces that hang by a vertex."""
     k = int(rng.integers(4, 14))
@@ -96,7 +110,7 @@ def scattered(rng: np.random.Generator) -> Mesh:
 
 FAMILIES: dict[str, Callable[[np.random.Generator], Mesh]] = {
     family.__name__: family
-    for family in (pierced, crossed, lattice, ring, grid, adaptive, separate_holes, polygon, scattered)
+    for family in (pierced, crossed, kites, lattice, ring, grid, adaptive, separate_holes, polygon, scattered)
 }
 
 

@@ -54,7 +54,7 @@ def test_planar_graphs_without_cells():
     facts = inspect_matrix(sp.diags_array([[1.0], [1.0]], offsets=[-1, 1]))
     assert facts.planar
     assert facts.cells_from == ""
-    assert "no triangle" in facts.recoverable
+    assert "no cell shows" in facts.recoverable
     assert facts.operator == "none that this version knows"
 
 

@@ -17,6 +17,8 @@ from .operators import vector_valued
 from .topology import Topology, recognise, surfaces
 from .words import count_of
 
+_IF = "if the entries agree, which recovery tells"
+
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
@@ -121,14 +123,14 @@ class Inspection:
 
     @property
     def recoverable(self) -> str:
-        """What :func:`unassemble.recover` can make of the matrix."""
+        """What :func:`unassemble.recover` may make of the matrix; only that tells whether its entries are a mesh's."""
         if self.structure:
             size = "up to position and size" if self.structure == "truss" else "in true size, up to position"
             return f"coordinates of {count_of(self.n_nodes, 'node')} {size}; members and cells"
         if self.n_nodes and self.coupled:
             return (
-                f"coordinates of {count_of(self.n_nodes, 'node')} in {self.block_size}D, up to position and size, and "
-                "elements that the matrix re-assembles from"
+                f"coordinates of {count_of(self.n_nodes, 'node')} in {self.block_size}D, up to position and size, "
+                f"and elements that the matrix re-assembles from, {_IF}"
             )
         if self.n_nodes:
             return "what each direction's scalar matrix holds"
@@ -140,7 +142,7 @@ class Inspection:
         if self.mixed_signs:
             return f"{mesh}, but no positions that could be certified: look at row {self.mixed_signs[0]}"
         each = f", each of the {self.n_pieces:,} pieces by itself" if self.n_pieces > 1 else ""
-        return f"{mesh}, up to position, rotation, size and mirror image{each}"
+        return f"{mesh}, up to position, rotation, size and mirror image{each}, {_IF}"
 
     @property
     def _n_rows_used(self) -> int:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .topology import Polygons, Topology
+from .topology.together import Together, reversed_within
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,33 +47,31 @@ class JoinedMesh:
     @classmethod
     def of(cls, topology: Topology, placed: list[NDArray], scale: NDArray) -> JoinedMesh:
         """Join pieces at positions `placed`, turning over those that are mirrored."""
+        pieces = Together(topology.pieces)
+        z = np.concatenate(placed)
+        label = np.repeat(np.arange(len(placed)), pieces.n_vertices)[::-1]  # the first piece at a hinge comes last
         points = np.full((topology.n_vertices, 2), np.nan)
+        points[pieces.vertices[::-1]] = np.column_stack([z.real, z.imag])[::-1]
         component = np.full(topology.n_vertices, -1, dtype=np.int64)
-        triangles, divided, boundaries, lengths = [], [], [], []
+        component[pieces.vertices[::-1]] = label
+        a, b, c = z[pieces.triangles].T
+        mirrored = np.bincount(pieces.triangle_piece, (np.conj(b - a) * (c - a)).imag, len(placed)) < 0
+        turned = mirrored[pieces.triangle_piece, None]
+        triangles = np.where(turned, pieces.triangles[:, [0, 2, 1]], pieces.triangles)
+        boundary = pieces.boundary[reversed_within(pieces.n_boundary, mirrored)]
+        boundary = np.where(np.repeat(mirrored, pieces.n_boundary)[:, None], boundary[:, ::-1], boundary)
         vanished = np.zeros(len(topology.edges), dtype=bool)
         vanished[topology.vanished] = True
-        for label, (piece, z) in reversed(list(enumerate(zip(topology.pieces, placed, strict=True)))):
-            points[piece.vertices] = np.column_stack([z.real, z.imag])
-            component[piece.vertices] = label
-        for piece, z in zip(topology.pieces, placed, strict=True):
-            a, b, c = z[piece.triangles].T
-            mirrored = float((np.conj(b - a) * (c - a)).imag.sum()) < 0
-            local = piece.triangles[:, [0, 2, 1]] if mirrored else piece.triangles
-            ring = piece.boundary[::-1, ::-1] if mirrored else piece.boundary
-            triangles.append(piece.vertices[local])
-            diagonal = vanished[piece.edge_rows] & (piece.facing[:, 1] >= 0)
-            divided.append(diagonal[piece.opposite].any(axis=1))
-            boundaries.append(piece.vertices[ring])
-            loop_lengths = np.diff(piece.loop_offsets)
-            lengths.append(loop_lengths[::-1] if mirrored else loop_lengths)
+        diagonal = vanished[pieces.edge_rows] & pieces.inner
+        lengths = pieces.loop_lengths[reversed_within(pieces.n_loops, mirrored)]
         return cls(
             points=points,
-            triangles=np.concatenate(triangles),
-            triangle_piece=np.repeat(np.arange(len(placed)), [len(t) for t in triangles]),
-            in_polygon=np.concatenate(divided),
+            triangles=pieces.vertices[triangles],
+            triangle_piece=pieces.triangle_piece,
+            in_polygon=np.asarray(diagonal[pieces.opposite].any(axis=1)),
             polygons=topology.polygons.counter_clockwise(points),
             component=component,
             scale=scale,
-            boundary=np.concatenate(boundaries),
-            boundary_offsets=np.append(0, np.cumsum(np.concatenate(lengths))),
+            boundary=pieces.vertices[boundary],
+            boundary_offsets=np.append(0, np.cumsum(lengths)),
         )

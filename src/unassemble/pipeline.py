@@ -14,7 +14,7 @@ from .operators import VectorReading, asked_for, refuse, second_reading, vector_
 from .options import check_options, listed_anchors
 from .placement import Direction, Placement
 from .recovery import Recovery
-from .scalar import recover_scalar
+from .scalar import ScalarOptions, recover_scalar
 
 
 def recover(
@@ -146,18 +146,16 @@ def recover(
 
     def scalar(part: OperatorMatrix, known: Sequence[Any] | None) -> Recovery:
         placement = Placement.checked(part.n, known, tensor, direction, handed)
-        return recover_scalar(
-            part,
-            placement,
-            clock,
+        options = ScalarOptions(
             method or "conformal",
-            refine,
-            scale,
-            noise,
-            standard_deviations,
-            threads,
-            triangulate,
+            refine=refine,
+            scale=scale,
+            noise=noise,
+            standard_deviations=standard_deviations,
+            threads=threads,
+            triangulate=triangulate,
         )
+        return recover_scalar(part, placement, clock, options)
 
     def vector(reading: VectorReading) -> Recovery:
         from .elasticity.serving import serve
@@ -177,16 +175,26 @@ def recover(
         at_sight = vector_valued(checked) if operator == "auto" else None
         if at_sight is not None:
             return vector(at_sight)
+        found: Recovery | None = None
+        failure: RecoveryError | None = None
         try:
-            return scalar(checked, anchors)
+            found = scalar(checked, anchors)
         except RecoveryError as error:
-            second = second_reading(checked) if operator == "auto" else None
-            if second is None:
-                raise
+            failure = error
+        # Rows that no mesh explains may be those of nodes: a straight beam's fall apart into planar graphs.
+        doubtful = found is None or (not found.certified and found.node_status.any())
+        second = second_reading(checked) if operator == "auto" and doubtful else None
+        if second is not None:
             try:
-                return vector(second)
+                other = vector(second)
             except (RecoveryError, InputError):  # options may be for scalar matrices only
-                raise error from None
+                pass
+            else:
+                found = other if found is None or other.certified else found
+        if found is None:
+            assert failure is not None
+            raise failure
+        return found
 
 
 def _is_matrix(A: Any) -> bool:

@@ -165,10 +165,10 @@ class Placement:
         """Local rows and complex targets of the anchors in a piece."""
         rows = np.array([row for row, _, _ in self.anchors], dtype=np.int64)
         targets = np.array([complex(x, y) for _, x, y in self.anchors], dtype=np.complex128)
+        if not len(rows):
+            return rows, targets
         here = np.isin(rows, piece.vertices)
-        if not here.any():
-            return rows[here], targets[here]
-        return piece.local(rows[here]), targets[here]
+        return (piece.local(rows[here]) if here.any() else rows[here]), targets[here]
 
     def _by_anchors(self, piece: Piece, z: NDArray, rows: NDArray, targets: NDArray) -> tuple[NDArray, list[str]]:
         known = self.tensor.to_laplacian(targets) if self.tensor else targets

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,19 +28,22 @@ from .verdict import ambiguous, far_away, passes, verdict
 _SIGMAS = 10.0  # noise by which numbers that a reading takes for equal may differ
 
 
-def recover_scalar(
-    stored: OperatorMatrix,
-    placement: Placement,
-    clock: Clock,
-    method: str,
-    refine: bool,
-    scale: float | None,
-    noise: float | None,
-    standard_deviations: bool,
-    threads: int | None,
-    triangulate: bool,
-) -> Recovery:
-    """The mesh of a checked scalar matrix; options as for :func:`unassemble.recover`."""
+@dataclass(frozen=True)
+class ScalarOptions:
+    """Those options of :func:`unassemble.recover` that a scalar matrix takes, by the same names."""
+
+    method: str = "conformal"
+    refine: bool = True
+    scale: float | None = None
+    noise: float | None = None
+    standard_deviations: bool = False
+    threads: int | None = None
+    triangulate: bool = False
+
+
+def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, options: ScalarOptions) -> Recovery:
+    """The mesh of a checked scalar matrix."""
+    scale, noise = options.scale, options.noise
     # With a tensor, c L is what is left of c div(K grad): its factor is c sqrt(det K).
     stretch = placement.tensor.root_determinant if placement.tensor else 1.0
     known = None if scale is None else scale * stretch
@@ -47,17 +52,17 @@ def recover_scalar(
         analyse: AnalysisAhead | None = None
         # Most matrices are those of a single piece, and its pencil has their pattern. Others may be large and dense,
         # or lack the diagonals of their cells.
-        planar = method == "conformal" and len(stored.edges) < 3 * stored.n
+        planar = options.method == "conformal" and len(stored.edges) < 3 * stored.n
         if planar and triangles_everywhere(stored.n, numbering.edges):
-            analyse = AnalysisAhead(pencil_pattern(stored.n, numbering.edges), threads)
+            analyse = AnalysisAhead(pencil_pattern(stored.n, numbering.edges), options.threads)
         topology = surfaces(stored.n, stored.edges, numbering)
     matrix, topology, meshes = solve(
         topology,
         stored,
         clock,
-        method=method,
+        method=options.method,
         scale=known,
-        refine=refine,
+        refine=options.refine,
         rounding=noise is None,
         analyse=analyse or factorisation,
     )
@@ -85,7 +90,7 @@ def recover_scalar(
             rounding=noise is None,
         )
     deviations = None
-    if standard_deviations:
+    if options.standard_deviations:
         with clock("deviations"):
             sigma = noise or pooled_noise(topology, matrix, meshes, freedom)
             deviations = _deviations(topology, placement, placed, meshes, sigma, scale is None)
@@ -110,10 +115,10 @@ def recover_scalar(
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
     if status == "uncertified" and not (others or chi_square or distant):
         notes += elimination_notes(stored, evidence.suspects)
-    polygons = Polygons.none() if triangulate else mesh.polygons
+    polygons = Polygons.none() if options.triangulate else mesh.polygons
     return Recovery(
         points=points,
-        triangles=mesh.triangles if triangulate else mesh.triangles[~mesh.in_polygon],
+        triangles=mesh.triangles if options.triangulate else mesh.triangles[~mesh.in_polygon],
         component=mesh.component,
         hinges=topology.hinges,
         scale=mesh.scale,

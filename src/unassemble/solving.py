@@ -14,7 +14,8 @@ from .cells import Outcome, completed, in_doubt
 from .errors import GeometryError, RecoveryError, SolverError
 from .linalg import Factorisation, UpperTriangle, factorisation
 from .matrix import OperatorMatrix
-from .planar.piece import PieceMesh, positions, refined
+from .planar.piece import EXACT, PieceMesh, positions, refined
+from .planar.triangles import lone_triangles
 from .topology import Piece, Topology
 
 Clock = Callable[[str], AbstractContextManager[None]]
@@ -46,9 +47,12 @@ def solve(
     RecoveryError
         If no piece has positions.
     """
+    lone = lone_triangles(topology.pieces, -matrix.entries, scale) if method == "conformal" else {}
 
     @cache
     def start(piece: Piece) -> Outcome:
+        if piece in lone:
+            return lone[piece]
         try:
             weights = -matrix.entries[piece.edge_rows]
             return _start(piece, weights, method, scale, sharp=not refine, analyse=analyse)
@@ -70,8 +74,11 @@ def solve(
         vanished = np.zeros(len(matrix.edges), dtype=bool)
         vanished[topology.vanished] = True
         with clock("polish"):
+            errors = None if rounding else np.where(vanished, EXACT, 1.0)
+            exact = lone_triangles(topology.pieces, -matrix.entries, scale, errors)
             meshes = [
-                refined(
+                exact.get(piece)
+                or refined(
                     piece,
                     -matrix.entries[piece.edge_rows],
                     mesh,

@@ -58,7 +58,7 @@ BROKEN = {
     "diagonal": sp.coo_array(np.eye(4)),
     "not planar": sp.coo_array(np.full((6, 6), -1.0)),
     # A star of nine: right angles at its centre, all that could explain it, have room for four, and thus eight rows.
-    "no triangle": sp.coo_array(-np.array([[0] + [1] * 9, *([[1] + [0] * 9] * 9)], dtype=float)),
+    "none has its entries": sp.coo_array(-np.array([[0] + [1] * 9, *([[1] + [0] * 9] * 9)], dtype=float)),
 }
 
 

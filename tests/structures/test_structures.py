@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from built import cells_of, error, flat, frame, plane_frame, plate, shell, truss
+from built import add_members, assembled, cells_of, error, flat, frame, model_on, plane_frame, plate, shell, truss
 
 from unassemble import InputError, RecoveryError, inspect_matrix, recover
 
@@ -121,6 +121,17 @@ def test_given_numbering_with_pinned_supports():
     assert found.certified
     assert found.numbering == "given"
     assert error(found.points, given.points) < 1e-10
+
+
+def test_a_straight_beam_is_no_planar_mesh():
+    """Its unknowns fall apart into paths and ladders."""
+    points = np.array([[0.0, 0.0, z] for z in (0, 1, 2.5, 3, 4.2, 5)])
+    model = model_on(points)
+    add_members(model, [(k, k + 1) for k in range(5)], 0, turned=False)
+    found = recover(assembled(model, points).matrix)
+    assert found.certified
+    assert found.operator == "frame or shell"
+    assert error(found.points, points) < 1e-12
 
 
 @pytest.mark.parametrize("make", [frame, plane_frame])

@@ -4,8 +4,9 @@ Where entries vanish the graph alone does not tell: see the page on theory in th
 """
 
 from .ambiguity import AGREE, alternatives
-from .completion import Attempt, Outcome, completed, guessed, in_doubt
+from .completion import completed, guessed
 from .corners import Alternative, OrientedMesh
+from .doubt import Attempt, Outcome, in_doubt
 from .search import read_cells
 
 __all__ = [

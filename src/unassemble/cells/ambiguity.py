@@ -13,6 +13,7 @@ from ..matrix import OperatorMatrix
 from ..topology import Topology
 from .corners import Alternative, Corners, OrientedMesh
 from .flips import turned_over
+from .hinged import as_one_piece
 from .hubs import Hub, hubs, rearranged
 from .loose import is_loose, other_reading
 from .rereading import other_readings
@@ -64,6 +65,7 @@ def _by_rules(
     found += turned_over(corners, mesh.z, agree)
     if not scale_known:
         found += _loose_pieces(stored, topology, corners, around)
+        found += as_one_piece(stored, topology, corners, around)
     return _each_once(found)
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..topology.faces import FaceComplex
 
 _SAMPLE = 2000
+_SHORT = 4
 
 
 def facing_angles(cotangents: NDArray) -> NDArray[np.float64]:
@@ -35,7 +36,7 @@ def vertex_excess(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]
 
 
 def likeliest_scale(complex_: FaceComplex, weights: NDArray) -> float:
-    """The c for which half of the short faces have an angle sum below pi, weights being shared equally.
+    """The c for which half of the short faces, or the shortest, have angle sums below pi, weights being shared equally.
 
     Parameters
     ----------
@@ -46,18 +47,20 @@ def likeliest_scale(complex_: FaceComplex, weights: NDArray) -> float:
     unit = float(np.median(np.abs(weights[weights != 0]))) * np.sign(weights.sum())
     if not unit:
         return 1.0
-    short = np.flatnonzero(complex_.simple & (complex_.size <= 4))
-    if not len(short):
+    length = complex_.size[complex_.simple]
+    if not len(length):
         return unit
+    short = np.flatnonzero(complex_.simple & (complex_.size <= max(_SHORT, length.min())))
     faces = short[np.linspace(0, len(short) - 1, min(len(short), _SAMPLE)).astype(int)]
-    start, size = complex_.offsets[faces], complex_.size[faces]
-    place = np.column_stack([start, start + 1, start + 2, start + size - 1])  # of a triangle the last one twice
+    size = complex_.size[faces]
+    first = np.cumsum(size) - size
+    face = np.repeat(np.arange(len(faces)), size)
+    place = np.arange(len(face)) + (complex_.offsets[faces] - first)[face]
     share = (weights / unit)[complex_.order[place] >> 1]
-    counted = np.column_stack([np.ones((len(faces), 3), bool), size == 4])
     low, high = np.full(len(faces), -8.0), np.full(len(faces), 8.0)
     for _ in range(40):
         middle = (low + high) / 2
-        angle = facing_angles(share / np.exp(middle)[:, None])
-        above = (angle * counted).sum(axis=1) > np.pi  # angles grow with c
+        angle = facing_angles(share / np.exp(middle)[face])
+        above = np.add.reduceat(angle, first) > np.pi  # angles grow with c
         low, high = np.where(above, low, middle), np.where(above, middle, high)
     return unit * float(np.exp(np.median((low + high) / 2)))

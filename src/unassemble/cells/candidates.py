@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..topology import Polygons
 from ..topology.faces import FaceComplex
 from .angles import face_sums, facing_angles, likeliest_scale, vertex_excess
+from .crosses import Crosses
 from .open_corners import OpenCorners
 from .turning import Turns
 
@@ -48,6 +49,8 @@ class Candidates:
     corner : (cells,) bool
         Triangles a-b-c of two edges a-b, b-c of an empty face; the third has vanished from the boundary, which it
         does if the angle at b is a right one.
+    strip : (cells,) bool
+        Corners inside paths, all of them right angles if the path is a strip, none if pieces hang together there.
     turns : Turns
         Parts that can be turned over; its corners are numbered after the faces.
     """
@@ -63,25 +66,32 @@ class Candidates:
     first: NDArray[np.bool_]
     outer: NDArray[np.bool_]
     corner: NDArray[np.bool_]
+    strip: NDArray[np.bool_]
     turns: Turns
 
     @classmethod
-    def of(cls, drawing: FaceComplex, weights: NDArray, scale: float | None = None) -> Candidates:
-        """All candidates of one drawing of the graph."""
+    def of(
+        cls, drawing: FaceComplex, weights: NDArray, scale: float | None = None, crosses: Crosses | None = None
+    ) -> Candidates:
+        """All candidates of one drawing of the graph; the corners about some crosses are right angles."""
         blocks = drawing.split()
-        relative = weights / (scale or likeliest_scale(blocks, weights))
+        relative = weights / (scale or (crosses and crosses.scale) or likeliest_scale(blocks, weights))
         angles = np.repeat(facing_angles(relative), 2)
         sums = face_sums(blocks, angles)
         outer = _longest(blocks, sums)
         faces = np.flatnonzero(blocks.simple)
         outside = (blocks.size > _SHORT) | outer | ~blocks.simple
-        corners = OpenCorners.of(blocks.joined(outside), outside[blocks.face])
+        # How parts hang together at crosses is known, and at other vertices a guess.
+        whole = blocks.joined(outside) if crosses is None else drawing
+        corners = OpenCorners.of(whole, outside[blocks.face])
         size = np.r_[blocks.size[faces], np.full(len(corners), 3)]
         chosen = np.isin(blocks.face[blocks.order], faces)
         number = np.full(len(blocks.size), -1)
         number[faces] = np.arange(len(faces))
         excess = vertex_excess(blocks, angles)[corners.vertices[:, 1]]
         belief = np.where(corners.in_strip, 1.0, 0.5 - np.abs(excess) / np.pi) - np.where(corners.turned, _TURNED, 0.0)
+        if crosses is not None:
+            belief[np.isin(corners.vertices[:, 1], crosses.hub) & ~corners.turned] = 1.0
         return cls(
             n_vertices=drawing.n_vertices,
             edges=drawing.edges,
@@ -101,6 +111,7 @@ class Candidates:
             first=np.r_[(blocks.size <= _SHORT)[faces] & ~outer[faces], np.zeros(len(corners), bool)],
             outer=np.r_[outer[faces], np.zeros(len(corners), bool)],
             corner=np.r_[np.zeros(len(faces), bool), np.ones(len(corners), bool)],
+            strip=np.r_[np.zeros(len(faces), bool), corners.in_strip],
             turns=corners.turns,
         )
 
@@ -133,6 +144,7 @@ class Candidates:
         corners = [self.corner & (self.belief > 0.5 + excess / np.pi) for excess in _INNER]
         faces = (self.first, (self.first & (self.size == 3)) | (by_angles & ~self.outer))
         none = np.zeros_like(self.corner)
+        corners += [chosen & ~self.strip for chosen in (*corners, self.corner & (self.belief == 1.0))]
         tried = {(chosen | extra).tobytes(): chosen | extra for chosen in faces for extra in (*corners, none)}
         seen = set()
         for chosen in sorted(tried.values(), key=self._strain):

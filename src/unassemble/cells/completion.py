@@ -7,33 +7,17 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
-from ..errors import GeometryError, RecoveryError, SolverError
+from ..errors import GeometryError, RecoveryError
 from ..matrix import OperatorMatrix
-from ..planar.piece import PieceMesh
-from ..planar.polish import PolishOptions, polish
-from ..topology import Numbering, Piece, Polygons, Topology, components, local_numbering, located, recognise
+from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar, settled_numbering
 from ..topology.keys import contains, distinct, pair_keys
-from .reading import FITS, Reading, even, misfits
+from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained
+from .reading import Reading
 from .search import first_reading, read_cells
 
 _BETTER = 0.1  # a reading that does not fit replaces the triangles only if its misfit is below this times theirs
-
-_WIDE = 200  # rows of a matrix on which the misfit of a wrong cell stays near it
-_SURE = 1e-3  # misfit that no wrong cell is known to leave
-
-_SHORT = PolishOptions(max_steps=8, max_factorisations=3)
-
-Outcome = PieceMesh | RecoveryError
-"""Positions of a piece, or why there are none."""
-
-Attempt = Callable[[Piece], Outcome]
-"""Solves a piece, each only once."""
-
-Solved = list[tuple[Piece, Outcome]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,44 +27,6 @@ class _Part:
     pieces: Solved
     vanished: NDArray[np.int64]
     polygons: Polygons
-
-
-def in_doubt(matrix: OperatorMatrix, topology: Topology, attempt: Attempt) -> NDArray[np.bool_]:
-    """(n,) rows of components with nonzero entries on no triangle, or entries that do not fit.
-
-    A misfit that is small and spread evenly, at the latest after a short polish, is that of errors in the entries, and
-    raises no doubt. Pieces of components that are in doubt without it are not solved.
-    """
-    doubtful = _unexplained(matrix, topology)
-    solved = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
-    rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
-    misfit = _misfits(matrix, solved)[rest]
-    wrong = misfit > FITS
-    if not wrong.any() or _like_noise(misfit, matrix.n):
-        return doubtful
-    if _like_noise(_misfits(matrix, _shortly_polished(matrix, solved))[rest], matrix.n):
-        return doubtful
-    return doubtful | _components_of(matrix, rest[wrong])
-
-
-def _like_noise(misfit: NDArray, n: int) -> bool:
-    """Whether a misfit is that of errors in the entries; small meshes spread that of a wrong cell as evenly."""
-    return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < _SURE)
-
-
-def _shortly_polished(matrix: OperatorMatrix, solved: Solved) -> Solved:
-    polished: Solved = []
-    for piece, mesh in solved:
-        if isinstance(mesh, PieceMesh):
-            try:
-                found = polish(piece, -matrix.entries[piece.edge_rows], mesh.z, options=_SHORT)
-            except SolverError as error:
-                polished.append((piece, error))
-                continue
-            polished.append((piece, PieceMesh(found.z, found.scale)))
-        else:
-            polished.append((piece, mesh))
-    return polished
 
 
 def completed(
@@ -125,7 +71,7 @@ def completed(
 
     @cache
     def misfit_of_triangles() -> NDArray[np.float64]:
-        return _misfits(matrix, [(piece, attempt(piece)) for piece in topology.pieces])
+        return misfits_of(matrix, [(piece, attempt(piece)) for piece in topology.pieces])
 
     label = np.full(matrix.n, -1)
     for k, part in enumerate(numberings):
@@ -134,7 +80,7 @@ def completed(
         if not doubtful[part.vertices[0]]:
             continue
         own = [piece for piece in topology.pieces if label[piece.vertices[0]] == k]
-        near = part.then(local_numbering(len(part.vertices), part.edges))
+        near = _near(matrix, part)
         try:
             parts.append(_read_again(matrix, near, own, attempt, misfit_of_triangles, scale))
         except RecoveryError as error:
@@ -149,44 +95,22 @@ def guessed(matrix: OperatorMatrix, topology: Topology) -> tuple[OperatorMatrix,
 
     Parameters and results are those of :func:`completed`, without positions.
     """
-    doubtful = _unexplained(matrix, topology)
+    doubtful = unexplained(matrix, topology)
     unsolved = GeometryError("not solved")
     kept: Solved = [(piece, unsolved) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
     parts = [_Part(kept, np.empty((0, 2), np.int64), Polygons.none())]
     for part in components(matrix.n, matrix.edges):
         if doubtful[part.vertices[0]]:
-            near = part.then(local_numbering(len(part.vertices), part.edges))
+            near = _near(matrix, part)
             reading = first_reading(len(near.vertices), near.edges, -matrix.entries[near.edge_rows])
             if reading is not None:
                 parts.append(_part(matrix, near, reading))
     return _merged(matrix, topology, parts, ())[:2]
 
 
-def _misfits(matrix: OperatorMatrix, solved: Solved) -> NDArray[np.float64]:
-    """(e,) as :func:`unassemble.cells.reading.misfits`."""
-    return misfits(
-        matrix.n,
-        matrix.edges,
-        -matrix.entries,
-        [(piece, mesh) for piece, mesh in solved if isinstance(mesh, PieceMesh)],
-    )
-
-
-def _unexplained(matrix: OperatorMatrix, topology: Topology) -> NDArray[np.bool_]:
-    """(n,) rows of components with nonzero entries on no triangle."""
-    bare = topology.bare_edges
-    return _components_of(matrix, bare[matrix.entries[bare] != 0])
-
-
-def _components_of(matrix: OperatorMatrix, rows: NDArray) -> NDArray[np.bool_]:
-    """(n,) rows of the connected components that have one of the given edges."""
-    chosen = np.zeros(matrix.n, dtype=bool)
-    if not len(rows):
-        return chosen
-    graph = sp.coo_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
-    label = csgraph.connected_components(graph, directed=False)[1]
-    chosen[label[matrix.edges[rows, 0]]] = True
-    return chosen[label]
+def _near(matrix: OperatorMatrix, part: Numbering) -> Numbering:
+    """A component in a numbering that does not depend on the order of the rows, as far as it is small."""
+    return part.then(settled_numbering(len(part.vertices), part.edges, -matrix.entries[part.edge_rows]))
 
 
 def _read_again(
@@ -205,11 +129,19 @@ def _read_again(
     before = float(np.sqrt(np.mean(misfit_of_triangles()[numbering.edge_rows] ** 2)))
     if reading is not None and reading.size < _BETTER * before and reading.misfit.max() < 1:
         return _part(matrix, numbering, reading)
+    n, e = len(numbering.vertices), len(numbering.edges)
     if reading is None or not own:
-        recognise(len(numbering.vertices), numbering.edges)  # says what is wrong with the graph, if that is it
+        require_planar(n, numbering.edges)
     if own:
         return _Part([(piece, attempt(piece)) for piece in own], np.empty((0, 2), np.int64), Polygons.none())
-    raise GeometryError("no choice of cells and holes on the graph fits the entries: they belong to no planar mesh")
+    if reading is None:
+        raise GeometryError(
+            f"no cells can be put on the graph of the matrix ({n} rows, {e} entries above the diagonal)"
+        )
+    raise GeometryError(
+        f"of the meshes tried on the graph of the matrix, which is planar ({n} rows, {e} entries above the diagonal), "
+        "none has its entries: they may belong to no mesh, as those of a network, or lack zeros that should be stored"
+    )
 
 
 def _part(matrix: OperatorMatrix, numbering: Numbering, reading: Reading) -> _Part:

@@ -23,13 +23,13 @@ from ..planar.cautious import count_flipped
 from ..planar.conformal import ConformalOptions, conformal_map
 from ..planar.cotangent import edge_weights
 from ..topology.keys import with_sides
-from ..topology.recognise import planar_pieces
+from ..topology.pieces import planar_pieces
 from .corners import Alternative, Corners, cell
 from .hubs import Hub
 
 _WORK = 4e5  # vertices times trials
-_MOST_TRIALS = 60
-_SURE = 40  # triangles; the map of long strips of right triangles loses too many digits
+MOST_TRIALS = 60
+SURE = 40  # triangles; the map of long strips of right triangles loses too many digits
 _FITS = 1e-6
 _OPTIONS = ConformalOptions(max_factorisations=4)
 
@@ -59,7 +59,7 @@ def other_reading(
     fits : float
         Largest misfit, relative to the row, of cells that fit.
     """
-    trials = int(np.clip(_WORK / max(len(triangles), 1), 2, _MOST_TRIALS))
+    trials = int(np.clip(_WORK / max(len(triangles), 1), 2, MOST_TRIALS))
     whole = np.sort(triangles, axis=1)
     others = list(islice(chain(_orders(hubs), _folds(corners)), trials + 1))
     for alternative in others[:trials]:
@@ -68,9 +68,9 @@ def other_reading(
         kept = np.delete(triangles, [k for k in near if tuple(whole[k].tolist()) in gone], axis=0)
         fans = [(c[0], one, two) for c in alternative.other_cells for one, two in pairwise(c[1:])]
         added = np.array(fans, dtype=np.int64).reshape(-1, 3)
-        if _fit(stored, np.concatenate([kept, added]), alternative.around, fits):
+        if fits_as_one(stored, np.concatenate([kept, added]), alternative.around, fits):
             return alternative
-    doubtful = len(others) > trials or (others and len(triangles) > _SURE)
+    doubtful = len(others) > trials or (others and len(triangles) > SURE)
     return replace(others[0], tested=False) if doubtful else None
 
 
@@ -99,7 +99,7 @@ def _both_ways(corners: Corners, k: int) -> tuple[tuple[int, int], tuple[int, in
     return (p, q), (q, p)
 
 
-def _fit(stored: OperatorMatrix, triangles: NDArray, around: tuple[int, ...], most: float) -> bool:
+def fits_as_one(stored: OperatorMatrix, triangles: NDArray, around: tuple[int, ...], most: float = _FITS) -> bool:
     """Whether these triangles make one planar piece that reproduces the entries."""
     rows, corner = np.unique(triangles, return_inverse=True)
     n, triangles = len(rows), corner.reshape(-1, 3)

@@ -52,7 +52,8 @@ class OpenCorners:
         half = half[drawn.open]
         number = np.full(len(outside), -1)
         number[half] = np.arange(len(half))
-        arriving = _passed_twice(whole, outside)
+        arriving, pivot = _passed_twice(whole, outside)
+        pivots, arriving = arriving[pivot], arriving[~pivot]
         leaving = whole.successor[arriving]
         crossed = [_Wedges.of(whole, *pair.T) for pair in (arriving, leaving)]
         possible = np.column_stack([wedges.open for wedges in crossed])
@@ -73,6 +74,7 @@ class OpenCorners:
                 faces=whole.face[arriving],
                 rank=rank[arriving[:, 0]],
                 far=np.stack([whole.tail[arriving], whole.head[leaving]], axis=-1),
+                pivoted=_same_rows(whole.face[arriving], whole.face[pivots]),
             ),
         )
 
@@ -108,8 +110,12 @@ class _Wedges:
         return _Wedges(*(getattr(self, name)[self.open] for name in self.__dataclass_fields__))
 
 
-def _passed_twice(whole: FaceComplex, outside: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(k, 2) half-edges that arrive at vertices which empty faces pass twice, with four different neighbours there."""
+def _passed_twice(whole: FaceComplex, outside: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """(k, 2) half-edges that arrive at vertices which empty faces pass twice, by the numbers of the faces.
+
+    And whether there are fewer than four different neighbours there, so that nothing changes where a part is turned
+    over.
+    """
     half = np.flatnonzero(outside)
     half = half[np.lexsort((whole.face[half], whole.head[half]))]
     at = whole.head[half]
@@ -117,7 +123,15 @@ def _passed_twice(whole: FaceComplex, outside: NDArray[np.bool_]) -> NDArray[np.
     twice = first[np.diff(np.append(first, len(at))) == 2]
     arriving = np.column_stack([half[twice], half[twice + 1]])
     far = np.column_stack([whole.tail[arriving], whole.head[whole.successor[arriving]]])
-    return arriving[(np.diff(np.sort(far, axis=1), axis=1) > 0).all(axis=1)]
+    return arriving, np.asarray((np.diff(np.sort(far, axis=1), axis=1) == 0).any(axis=1))
+
+
+def _same_rows(pairs: NDArray, others: NDArray) -> NDArray[np.bool_]:
+    """Whether each pair is among the others."""
+    if not len(others):
+        return np.zeros(len(pairs), dtype=bool)
+    size = int(max(pairs.max(initial=0), others.max())) + 1
+    return np.isin(pairs @ [size, 1], others @ [size, 1])
 
 
 def _sides(
@@ -143,15 +157,15 @@ def _in_strips(whole: FaceComplex, corners: NDArray) -> NDArray[np.bool_]:
     the distance from a root.
     """
     bridge = whole.face == whole.face[np.arange(len(whole.face)) ^ 1]
-    lone = np.bincount(whole.tail, minlength=whole.n_vertices)[whole.head[corners]] == 2
-    inside = lone & bridge[corners] & bridge[whole.successor[corners]]
+    two = np.bincount(whole.tail, minlength=whole.n_vertices) == 2
+    inside = two[whole.head[corners]] & bridge[corners] & bridge[whole.successor[corners]]
     if not inside.any():
         return inside
     n = whole.n_vertices
     graph = sp.coo_array((np.ones(len(whole.edges)), whole.edges.T), shape=(n, n)).tocsr()
     # One root for each component, or parts without one would have no distance; never inside a path.
     label = csgraph.connected_components(graph, directed=False)[1]
-    order = np.argsort(2 * label + (np.diff(graph.indptr) == 2), kind="stable")
+    order = np.argsort(2 * label + two, kind="stable")
     root = order[np.flatnonzero(np.diff(label[order], prepend=-1))]
     depth = csgraph.dijkstra(graph, directed=False, indices=root, unweighted=True, min_only=True).astype(np.int64)
     outwards = depth[whole.tail[corners]] < depth[whole.head[corners]]

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from ..errors import GeometryError, SolverError
 from ..matrix.operator import row_sizes
 from ..planar.conformal import ConformalOptions, conformal_map
-from ..planar.cotangent import edge_weights
+from ..planar.cotangent import weights_of_all
 from ..planar.hinges import gap
 from ..planar.piece import PieceMesh
+from ..planar.triangles import lone_triangles
 from ..topology import Piece, Topology
 from ..topology.keys import contains, pair_keys, with_sides
-from ..topology.recognise import planar_pieces
+from ..topology.pieces import planar_pieces
 from .candidates import Candidates
 from .small import SMALL, small_map
 
@@ -75,16 +76,18 @@ class Reading:
         bare = cls.unsolved(candidates, labels)
         n, edges, weights = candidates.n_vertices, bare.edges, bare.weights
         known = {} if known is None else known
-        names = [_key_of(piece) for piece in bare.pieces]
-        for name, piece in zip(names, bare.pieces, strict=True):
-            if name not in known:
-                known[name] = _solved(piece, weights[piece.edge_rows])
-        meshes = [known[name] for name in names]
-        solved = [(piece, mesh) for piece, mesh in zip(bare.pieces, meshes, strict=True) if mesh]
+        meshes: dict[Piece, PieceMesh | None] = {**lone_triangles(bare.pieces, weights)}
+        for piece in bare.pieces:
+            if piece not in meshes:
+                name = _key_of(piece)
+                if name not in known:
+                    known[name] = _solved(piece, weights[piece.edge_rows])
+                meshes[piece] = known[name]
+        solved = [(piece, mesh) for piece in bare.pieces if (mesh := meshes[piece])]
         misfit = misfits(n, edges, weights, solved)
         _add_discord(n, edges, solved, misfit, candidates.scale)
         misfit[np.isin(edges, _crowded(candidates, labels)).any(axis=1)] = 1.0
-        return replace(bare, meshes=tuple(meshes), misfit=misfit)
+        return replace(bare, meshes=tuple(meshes[piece] for piece in bare.pieces), misfit=misfit)
 
     @property
     def fits(self) -> bool:
@@ -114,12 +117,15 @@ def misfits(n: int, edges: NDArray, weights: NDArray, solved: list[tuple[Piece, 
     """(e,) |c w - a| relative to the smaller of both rows' largest entries, at most 1; 1 on edges of no piece."""
     misfit = np.where(weights != 0, 1.0, 0.0)
     size = row_sizes(n, edges, np.abs(weights))
-    for piece, mesh in solved:
-        rows = piece.edge_rows
-        smaller = size[edges[rows]].min(axis=1)
-        with np.errstate(all="ignore"):  # flat triangles fit nothing
-            left = np.abs(mesh.scale * edge_weights(piece, mesh.z) - weights[rows]) / smaller
-        misfit[rows] = np.where(left < 1, left, 1.0)
+    if not solved:
+        return misfit
+    rows = np.concatenate([piece.edge_rows for piece, _ in solved])
+    scale = np.repeat([mesh.scale for _, mesh in solved], [len(piece.edge_rows) for piece, _ in solved])
+    smaller = size[edges[rows]].min(axis=1)
+    with np.errstate(all="ignore"):  # flat triangles fit nothing
+        fitted = weights_of_all(*zip(*((piece, mesh.z) for piece, mesh in solved), strict=True))
+        left = np.abs(scale * fitted - weights[rows]) / smaller
+    misfit[rows] = np.where(left < 1, left, 1.0)
     return misfit
 
 
@@ -133,9 +139,9 @@ def _add_discord(
     if not solved or (len(solved) == 1 and scale is None):
         return
     scale = scale or max(solved, key=lambda item: item[0].n_vertices)[1].scale
-    for piece, mesh in solved:
-        rows = piece.edge_rows
-        misfit[rows] = np.maximum(misfit[rows], min(abs(mesh.scale / scale - 1), 1.0))
+    apart = np.minimum(np.abs(np.array([mesh.scale for _, mesh in solved]) / scale - 1), 1.0)
+    rows = np.concatenate([piece.edge_rows for piece, _ in solved])
+    misfit[rows] = np.maximum(misfit[rows], np.repeat(apart, [len(piece.edge_rows) for piece, _ in solved]))
     if (misfit > FITS).any():  # whether rings close is the last question, and the dearest
         return
     topology = Topology(n, edges, tuple(piece for piece, _ in solved), "")

@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
 from ..topology import Numbering, components
+from ..topology.faces import joined
 from .corners import Alternative, OrientedMesh
 from .reading import Reading
-from .search import read_cells
+from .search import fitting_starts, read_cells
 
 _MOST_VERTICES = 60
 _ORDERS = 5
+_WORK = 3000  # vertices times orders; every component is read once again at least
 _SAME_SCALE = 1e-6
 
 
@@ -30,18 +32,47 @@ def other_readings(
     rng = np.random.default_rng(0)
     others = []
     small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= _MOST_VERTICES]
+    n_orders = int(np.clip(_WORK // max(sum(len(part.vertices) for part in small), 1), 1, _ORDERS))
+    half = _with_vanished_sides(stored, mesh)
     for part, own in zip(small, _own_cells(stored.n, small, mesh), strict=True):
-        for _ in range(_ORDERS):
+        supposed = bool(half[part.vertices].any())
+        for _ in range(n_orders):
             shuffled = part.then(_shuffled(part, rng))
-            weights = -stored.entries[shuffled.edge_rows]
-            reading = read_cells(len(shuffled.vertices), shuffled.edges, weights, scale)
-            if reading is not None and reading.fits and (cells := _cells(reading, shuffled)) != own:
+            other = _other_reading(shuffled, -stored.entries[shuffled.edge_rows], own, scale, supposed=supposed)
+            if other is not None:
+                cells, c = other
                 gone, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
-                c = next(solved.scale for solved in reading.meshes if solved)
                 same = abs(c / factors[part.vertices[0]] - 1) < _SAME_SCALE
                 others.append(Alternative((), (), (), gone, new, same_scale=same))
                 break
     return others
+
+
+def _with_vanished_sides(stored: OperatorMatrix, mesh: OrientedMesh) -> NDArray[np.bool_]:
+    """(n,) rows of triangles with a side that has no entry."""
+    rows = np.zeros(stored.n, dtype=bool)
+    for k in range(3):
+        one, two = mesh.triangles[:, k], mesh.triangles[:, (k + 1) % 3]
+        rows[mesh.triangles[~joined(stored.n, stored.edges, one, two)]] = True
+    return rows
+
+
+def _other_reading(
+    part: Numbering, weights: NDArray, own: set[tuple[int, ...]], scale: float | None, *, supposed: bool
+) -> tuple[set[tuple[int, ...]], float] | None:
+    """Other cells that fit, and their c.
+
+    Among all starts if vanished sides have been `supposed` in these cells, as they are not where something fits without
+    them; else, or where no start fits, by the search.
+    """
+    graph = len(part.vertices), part.edges, weights, scale
+    found = list(fitting_starts(*graph)) if supposed else []
+    if not found and (reading := read_cells(*graph)) is not None and reading.fits:
+        found = [reading]
+    for reading in found:
+        if (cells := _cells(reading, part)) != own:
+            return cells, next(solved.scale for solved in reading.meshes if solved)
+    return None
 
 
 def _own_cells(n: int, parts: list[Numbering], mesh: OrientedMesh) -> list[set[tuple[int, ...]]]:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..planar.piece import PieceMesh
-from ..topology.embedding import face_complexes
+from ..topology.embedding import drawing_with_corners, face_complexes
 from .candidates import Candidates
+from .crosses import Crosses
 from .evidence import label_changes
 from .proposals import proposals
 from .reading import Reading
@@ -23,7 +25,9 @@ _WORK = 1.2e5  # vertices times solves that repairs may take altogether
 _FEW = 100  # vertices below which all is tried before the entries are blamed
 _SUSPECT = 0.3  # change of the label of a lone triangular hole: it was 0.4 or more in all that were tried
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
+_BEGUN = 1000  # vertices up to which all drawings are begun with before one is repaired
 _SOLVES = 180
+_TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
 _RELAXED = 20_000  # vertices up to which labels are relaxed
 _WIDE = 20  # vertices of the largest piece below which trying labels one by one is as good
@@ -82,31 +86,77 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
     """
     best: Reading | None = None
     effort = Effort.for_graph(n)
-    for drawing in face_complexes(n, edges):
-        candidates = Candidates.of(drawing, weights, scale)
-        starts = []
-        for labels in candidates.starts():
-            starts.append(effort.reading(candidates, labels))
-            if starts[-1].fits:
-                return starts[-1]
-        if starts and _entries_are_to_blame(starts[0]):
-            return _better(best, starts[0])
-        starts = sorted(starts, key=lambda reading: reading.size)[:_STARTS]
-        for k, start in enumerate(starts):
-            starts[k] = _turned_over(start, effort)
-            if starts[k].fits:
-                return starts[k]
-        if starts and not starts[0].like_noise:
-            triangles = 2 * (candidates.first & (candidates.size == 3)).sum() > candidates.first.sum()
-            place = 0 if n >= _FEW and triangles else len(starts)
-            starts[place:place] = _relaxed(starts[0], effort)
-        for number, start in enumerate(starts):
-            share = effort.share(_FIRST if number == 0 and len(starts) > 1 else 1 / (len(starts) - number))
-            best = _better(best, start if start.like_noise else _repaired(start, share))
-            if best.fits or best.like_noise:
+    drawings = _drawings(n, edges, weights, scale)
+    # Repairs take most of the effort: small graphs are begun with in all drawings before.
+    for some in [list(drawings)] if n <= _BEGUN else ([drawing] for drawing in drawings):
+        begun = []
+        for drawing in some:
+            starts, settled = _begun(drawing, effort, int(_TURNING * effort.solves / len(some)))
+            if settled:
+                return starts[0] if starts[0].fits else _better(best, starts[0])
+            begun.append(starts)
+        for starts in begun:
+            best = _finished(best, starts, effort)
+            if best is not None and (best.fits or best.like_noise):
                 return best
-            effort.solves += max(share.solves, 0)
     return best if best is not None and best.pieces else None
+
+
+def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Iterator[Candidates]:
+    """What may be cells in each drawing; first in one about the vertices that their numbers make crosses."""
+    if n <= _RELAXED:
+        crosses = Crosses.of(n, edges, weights, scale)
+        drawing = drawing_with_corners(n, edges, crosses.wedges) if crosses.unique.any() else None
+        if drawing is not None:
+            yield Candidates.of(drawing, weights, scale, crosses)
+    for drawing in face_complexes(n, edges):
+        yield Candidates.of(drawing, weights, scale)
+
+
+def _begun(candidates: Candidates, effort: Effort, turns: int) -> tuple[list[Reading], bool]:
+    """Starts in one drawing that are worth repairing; and whether the first settles it, since it fits or none will."""
+    starts = []
+    for labels in candidates.starts():
+        starts.append(effort.reading(candidates, labels))
+        if starts[-1].fits:
+            return starts[-1:], True
+    if starts and _entries_are_to_blame(starts[0]):
+        return starts[:1], True
+    starts = sorted(starts, key=lambda reading: reading.size)[:_STARTS]
+    for k, start in enumerate(starts):
+        starts[k] = _turned_over(start, effort, turns // len(starts))
+        if starts[k].fits:
+            return [starts[k]], True
+    return starts, False
+
+
+def _finished(best: Reading | None, starts: list[Reading], effort: Effort) -> Reading | None:
+    """The best of what repairs make of the starts in one drawing, and of a former one."""
+    if starts and not starts[0].like_noise:
+        candidates = starts[0].candidates
+        triangles = 2 * (candidates.first & (candidates.size == 3)).sum() > candidates.first.sum()
+        place = 0 if candidates.n_vertices >= _FEW and triangles else len(starts)
+        starts[place:place] = _relaxed(starts[0], effort)
+    for number, start in enumerate(starts):
+        share = effort.share(_FIRST if number == 0 and len(starts) > 1 else 1 / (len(starts) - number))
+        best = _better(best, start if start.like_noise else _repaired(start, share))
+        if best.fits or best.like_noise:
+            break
+        effort.solves += max(share.solves, 0)
+    return best
+
+
+def fitting_starts(n: int, edges: NDArray, weights: NDArray, scale: float | None = None) -> Iterator[Reading]:
+    """All readings to begin with that fit as they are, in all drawings.
+
+    Parameters are those of :func:`read_cells`.
+    """
+    known: dict[bytes, PieceMesh | None] = {}
+    for candidates in _drawings(n, edges, weights, scale):
+        for labels in candidates.starts():
+            reading = Reading.of(candidates, labels, known)
+            if reading.fits:
+                yield reading
 
 
 def first_reading(n: int, edges: NDArray, weights: NDArray) -> Reading | None:
@@ -146,9 +196,9 @@ def _relaxed(reading: Reading, effort: Effort) -> list[Reading]:
     return [] if labels is None else [effort.reading(reading.candidates, labels)]
 
 
-def _turned_over(reading: Reading, effort: Effort) -> Reading:
-    """Parts of the drawing turned over, each because that lowers the misfit; at no more than a third of the effort."""
-    least = 2 * effort.solves // 3
+def _turned_over(reading: Reading, effort: Effort, solves: int) -> Reading:
+    """Parts of the drawing turned over, each because that lowers the misfit; at no more than so many solves."""
+    least = effort.solves - solves
     trials = reading.candidates.turned(reading.labels)
     while reading.pieces and not reading.fits and effort.solves > least and (labels := next(trials, None)) is not None:
         trial = effort.reading(reading.candidates, labels)

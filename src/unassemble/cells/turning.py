@@ -31,6 +31,8 @@ class Turns:
         Place of u along the first of them.
     far : (k, 2, 2) int64
         Vertices a1, b1 and a2, b2.
+    pivoted : (k,) bool
+        Whether the same two faces pass a vertex where nothing changes when a part is turned over.
     """
 
     drawn: NDArray[np.int64]
@@ -38,6 +40,7 @@ class Turns:
     faces: NDArray[np.int64]
     rank: NDArray[np.int64]
     far: NDArray[np.int64]
+    pivoted: NDArray[np.bool_]
 
     def turned(self, labels: NDArray[np.bool_]) -> Iterator[NDArray[np.bool_]]:
         """Labels with one part turned over, where that changes them.
@@ -62,6 +65,7 @@ class Turns:
             if k and self.faces[vertices[0], 0] == self.faces[vertices[0], 1]:
                 yield from vertices[:, None]
                 continue
+            yield from vertices[self.pivoted[vertices]][:, None]
             for step in range(1, k // 2 + 1):
                 for i in range(k if 2 * step < k else k // 2):
                     one, other = vertices[i], vertices[(i + step) % k]

@@ -6,10 +6,13 @@ and right. The angle at the left apex lies between t - a and h - a, that at the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..topology import Piece
+from ..topology.together import Together
 
 
 def _sides(piece: Piece, z: NDArray) -> tuple[tuple[NDArray, NDArray], tuple[NDArray, NDArray]]:
@@ -32,6 +35,16 @@ def edge_weights(piece: Piece, z: NDArray) -> NDArray[np.float64]:
     """w_e: half the sum of the cotangents that face each edge (e,), for positions z (n,) complex."""
     left, right = _sides(piece, z)
     return _halved(piece, _cotangent(*left), _cotangent(*right))
+
+
+def weights_of_all(pieces: Sequence[Piece], positions: Sequence[NDArray]) -> NDArray[np.float64]:
+    """The weights of several pieces, each at its positions, one after the other."""
+    if len(pieces) == 1:
+        return edge_weights(pieces[0], positions[0])
+    union = Together(pieces)
+    corners = np.concatenate(positions)[union.triangles]
+    cotangents = _cotangent(np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners)
+    return np.bincount(union.opposite.ravel(), cotangents.ravel(), len(union.edge_rows)) / 2
 
 
 def weight_roundings(piece: Piece, z: NDArray) -> NDArray[np.float64]:

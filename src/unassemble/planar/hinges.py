@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import breadth_first_order, connected_components
 from scipy.sparse.linalg import lsqr
 
 from ..topology import Topology
@@ -39,7 +39,10 @@ def join(topology: Topology, positions: list[NDArray], known: NDArray | None = N
         return positions
     n = len(positions)
     known = np.zeros(n, dtype=np.int64) if known is None else known
-    held = _held(groups(topology), known)
+    group = groups(topology)
+    held = _held(group, known)
+    if _rings(topology) <= 0 and np.count_nonzero(held) == group.max() + 1:
+        return _along_trees(topology, positions, held)
     positions = _matching_images(topology, positions, held)
     joined, _ = _joined(topology, positions, held)
     # Once more from there: turns and shifts of small pieces in a large mesh differ in size by many digits.
@@ -70,7 +73,7 @@ def free_images(topology: Topology, joined: list[NDArray]) -> NDArray[np.int64]:
 
 def gap(topology: Topology, positions: list[NDArray]) -> float:
     """How far apart the pieces stay at shared vertices when they are joined, relative to the largest piece."""
-    if not len(topology.hinges):
+    if _rings(topology) <= 0:
         return 0.0
     held = _held(groups(topology), np.zeros(len(positions), dtype=np.int64))
     return _joined(topology, _matching_images(topology, positions, held), held)[1]
@@ -142,13 +145,44 @@ def groups(topology: Topology) -> NDArray[np.int64]:
     return np.asarray(connected_components(graph, directed=False)[1][:n])
 
 
+def _along_trees(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> list[NDArray]:
+    """Shifts alone, from piece to piece, where no pieces close a ring and one of each group is held."""
+    piece, vertex, at = _visits(topology, positions)
+    n, root = len(positions), len(positions) + topology.n_vertices
+    rows, columns = np.r_[piece, np.full(held.sum(), root)], np.r_[n + vertex, np.flatnonzero(held)]
+    tree = coo_array((np.ones(len(rows)), (rows, columns)), shape=(root + 1,) * 2).tocsr()
+    above = breadth_first_order(tree, root, directed=False)[1].astype(np.int64)
+    # Of each piece that is not held the hinge on the way to it, and the piece before that.
+    reached = np.flatnonzero(~held)
+    hinge = above[reached] - n
+    before = above[hinge + n]
+    visit = piece * topology.n_vertices + vertex
+    order = np.argsort(visit)
+    here, there = (
+        at[order[np.searchsorted(visit, p * topology.n_vertices + hinge, sorter=order)]] for p in (reached, before)
+    )
+    shift = np.zeros(n, dtype=np.complex128)
+    shift[reached] = there - here
+    pointer = np.arange(n)
+    pointer[reached] = before
+    while (pointer != pointer[pointer]).any():  # sums along paths by doubling; at the held pieces shifts are zero
+        shift = shift + shift[pointer]
+        pointer = pointer[pointer]
+    return [z + s for z, s in zip(positions, shift, strict=True)]
+
+
+def _visits(topology: Topology, positions: list[NDArray]) -> tuple[NDArray, NDArray, NDArray]:
+    """Piece, vertex and position in that piece for each time that a piece has a hinge."""
+    shared = [np.flatnonzero(topology.multiplicity[p.vertices] > 1) for p in topology.pieces]
+    piece = np.repeat(np.arange(len(positions)), [len(s) for s in shared])
+    vertex = np.concatenate([p.vertices[s] for p, s in zip(topology.pieces, shared, strict=True)])
+    return piece, vertex, np.concatenate([z[s] for z, s in zip(positions, shared, strict=True)])
+
+
 def _equations(topology: Topology, positions: list[NDArray]) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """One equation for each piece at a hinge after the first: (t_p - 1) z_p + s_p - ... = z_q - z_p."""
     n = len(positions)
-    shared = [np.flatnonzero(topology.multiplicity[p.vertices] > 1) for p in topology.pieces]
-    piece = np.repeat(np.arange(n), [len(s) for s in shared])
-    vertex = np.concatenate([p.vertices[s] for p, s in zip(topology.pieces, shared, strict=True)])
-    at = np.concatenate([z[s] for z, s in zip(positions, shared, strict=True)])
+    piece, vertex, at = _visits(topology, positions)
     order = np.lexsort((piece, vertex))
     piece, vertex, at = piece[order], vertex[order], at[order]
     p = np.flatnonzero(vertex[1:] == vertex[:-1])

@@ -18,7 +18,7 @@ from .polish import PolishedMesh, polish
 
 _ROUNDING = 1e-12
 """Errors of the weights that may be rounding."""
-_EXACT = 1e-3
+EXACT = 1e-3
 """Standard deviation of entries without noise, relative to that of the others: next to none, and safe to divide by."""
 _CAUTIOUS_LIMIT = 200_000
 """Most vertices for which a polish that fails is tried again with a factorisation in every step."""
@@ -74,7 +74,7 @@ def refined(
     that and more likely to be noise of one size. Noise leaves the entries `exact`, (e,) bool, as they are: these have
     vanished.
     """
-    noise = None if exact is None or not exact.any() else np.where(exact, _EXACT, 1.0)
+    noise = None if exact is None or not exact.any() else np.where(exact, EXACT, 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         flat = not np.isfinite(edge_weights(piece, mesh.z)).all()
     if flat:

@@ -38,6 +38,11 @@ class Layout:
         """Unknowns per node."""
         return len(self.displacements) + len(self.rotations)
 
+    @property
+    def twisting(self) -> float:
+        """Share of the rotations that a straight line of members annihilates: that about its own axis."""
+        return max(axis < self.dim for axis in self.rotations) / len(self.rotations)
+
     def turned(self, axis: int) -> list[tuple[int, int, int]]:
         """What a unit rotation about an axis does: the displacement e_axis x point, term by term.
 

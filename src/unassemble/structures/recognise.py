@@ -21,7 +21,7 @@ _ROUNDING = 1e-9
 _SAMPLE = 2000  # rows to ask
 # On regular meshes some of a solid's rows annihilate whatever is asked; read as what it is it has more of them.
 _SOLIDS = (Layout("solid", 3, (0, 1, 2), ()), Layout("solid", 2, (0, 1), ()))
-_MOST = 0.1  # rows of a rotation that may annihilate it; where they are solids' all do
+_MOST = 0.1  # of that share: rows that annihilate their rotation by chance; where they are solids' all do
 _LEAST = 0.05  # rows that have to annihilate translations
 
 
@@ -146,7 +146,10 @@ def _share(matrix: sp.csr_array, layout: Layout, direction: NDArray) -> float:
     moves = len(layout.displacements)
     turning = direction[rows] >= moves
     own = zero[np.arange(len(rows)), direction[rows]]
-    if not len(rows) or (layout.rotations and (not turning.any() or own[turning].mean() > _MOST)):
+    if not len(rows) or (layout.rotations and not turning.any()):
         return 0.0
-    good = (zero | ~coupled)[:, :moves].all(axis=1) & coupled[:, :moves].any(axis=1)
-    return float(min(good[kind].mean() for kind in (turning, ~turning) if kind.any()))
+    good = (zero | ~coupled)[:, :moves].all(axis=1)
+    tells = coupled[:, :moves].any(axis=1)
+    kinds = [kind & tells for kind in (turning, ~turning) if kind.any()]
+    share = float(min(good[kind].mean() if kind.any() else 0.0 for kind in kinds))
+    return 0.0 if layout.rotations and own[turning].mean() > (_MOST + layout.twisting) * share else share

@@ -1,9 +1,10 @@
 """From the sparsity graph to faces, orientation, boundary loops and pieces; no coordinates here."""
 
+from .canonical import settled_numbering
 from .cycles import triangles_everywhere
-from .numbering import Numbering, local_numbering
+from .numbering import Numbering, components, local_numbering
 from .polygons import Polygons
-from .recognise import components, located, recognise, surfaces
+from .recognise import located, recognise, require_planar, surfaces
 from .surface import Piece, Topology
 
 __all__ = [
@@ -15,6 +16,8 @@ __all__ = [
     "local_numbering",
     "located",
     "recognise",
+    "require_planar",
+    "settled_numbering",
     "surfaces",
     "triangles_everywhere",
 ]

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import planarity
+from .adjacency import adjacency, neighbours
 from .cycles import three_cycles
-from .faces import FaceComplex, around, from_cycles, from_rotation
-from .keys import distinct
+from .faces import FaceComplex, around, from_cycles, from_rotation, joined
+from .keys import contains, distinct, pair_keys, with_sides
 from .separating import not_faces
 from .short_cycles import chordless_four_cycles
 
@@ -69,6 +70,42 @@ def _drawings(n: int, edges: NDArray, cycles: list[NDArray]) -> Iterator[FaceCom
     rotation = planarity.rotation_system(n, edges)
     if rotation is not None:
         yield from_rotation(n, edges, *rotation)
+
+
+def drawing_with_corners(n: int, edges: NDArray, corners: NDArray) -> FaceComplex | None:
+    """A drawing in which the edges a-h and h-b of some corners follow each other about h.
+
+    A corner that one more vertex closes to a 4-cycle makes that a face; one that none does is closed by an edge a-b,
+    which is taken away again; others are drawn as they come. None if there is no such drawing, or all corners belong
+    to 4-cycles, which are faces without that.
+
+    Parameters
+    ----------
+    n : int
+    edges : (e, 2) int64
+        Pairs i < j in lexicographic order.
+    corners : (k, 3) int64
+        a, h, b.
+    """
+    a, h, b = corners.T
+    place, fourth = neighbours(adjacency(n, edges), a)
+    closing = (fourth != h[place]) & joined(n, edges, fourth, b[place])
+    place, fourth = place[closing], fourth[closing]
+    count = np.bincount(place, minlength=len(corners))
+    open_ones = corners[(count == 0) & ~joined(n, edges, a, b)]
+    one = count[place] == 1
+    quads = np.column_stack([corners[place[one]], fourth[one]])
+    _, once = np.unique(np.sort(quads, axis=1), axis=0, return_index=True)
+    whole, _, _ = with_sides(n, edges, open_ones)
+    cycles = [cycle for cycle in (open_ones, quads[once]) if len(cycle)]
+    if len(whole) > 3 * n - 6 or not len(open_ones):
+        return None
+    rotation = _with_faces(n, whole, cycles)
+    if rotation is None:
+        return None
+    tail, head = rotation
+    kept = contains(edges[:, 0] * n + edges[:, 1], pair_keys(n, tail, head))
+    return from_rotation(n, edges, tail[kept], head[kept])
 
 
 def _fingerprint(drawing: FaceComplex) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Sets of integers as sorted arrays, and the keys of pairs of vertices."""
+"""Sets of integers as sorted arrays, the keys of pairs of vertices, and rows grouped by label."""
 
 from __future__ import annotations
 
@@ -52,3 +52,25 @@ def with_sides(n: int, edges: NDArray, triangles: NDArray) -> tuple[NDArray[np.i
     sides = pair_keys(n, triangles[:, [1, 2, 0]], triangles[:, [2, 0, 1]])
     keys = distinct(np.concatenate([known, sides.ravel()]))
     return np.column_stack([keys // n, keys % n]), np.searchsorted(keys, known), np.searchsorted(keys, sides)
+
+
+class Grouped:
+    """Rows sorted by label; negative labels are left out.
+
+    Attributes
+    ----------
+    order : (k,) int64
+        Rows with label 0, 1, ..., each in increasing order.
+    start : (labels + 1,) int64
+        Those with label j are ``order[start[j]:start[j + 1]]``.
+    rank : (rows,) int64
+        Place of each among those with the same label.
+    """
+
+    def __init__(self, label: NDArray, n_labels: int):
+        order = np.argsort(label, kind="stable")
+        start = np.searchsorted(label[order], np.arange(n_labels + 1))
+        self.order = order[start[0] :]
+        self.start = start - start[0]
+        self.rank = np.full(len(label), -1)
+        self.rank[self.order] = np.arange(len(self.order)) - self.start[label[self.order]]

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse import csgraph
 
+from .keys import Grouped
 from .search import breadth_first
 
 
@@ -57,3 +59,28 @@ def local_numbering(n: int, edges: NDArray) -> Numbering:
     by_low = sp.coo_array((np.arange(len(edges), dtype=np.int32), (high, low)), shape=(n, n)).tocsc()
     low = np.repeat(np.arange(n), np.diff(by_low.indptr))
     return Numbering(vertices.astype(np.int64), by_low.data.astype(np.int64), np.column_stack([low, by_low.indices]))
+
+
+def components(n: int, edges: NDArray) -> list[Numbering]:
+    """Connected components with edges, each in a numbering of its own, largest first.
+
+    Parameters
+    ----------
+    n : int
+        Number of vertices.
+    edges : (e, 2) int64
+        Pairs i < j in lexicographic order.
+    """
+    graph = sp.coo_array((np.ones(len(edges), np.int8), edges.T), shape=(n, n))
+    count, label = csgraph.connected_components(graph, directed=False)
+    used = np.zeros(n, dtype=bool)
+    used[edges] = True
+    vertices, rows = Grouped(np.where(used, label, -1), count), Grouped(label[edges[:, 0]], count)
+    local = vertices.rank[edges[rows.order]]
+    size = np.diff(rows.start)
+    order = np.argsort(-size, kind="stable")[: np.count_nonzero(size)]
+    v, e = vertices.start.tolist(), rows.start.tolist()
+    return [
+        Numbering(vertices.order[v[k] : v[k + 1]], rows.order[e[k] : e[k + 1]], local[e[k] : e[k + 1]])
+        for k in order.tolist()
+    ]

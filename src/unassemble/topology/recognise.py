@@ -5,20 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from ..errors import NotPlanarError, RecoveryError, TopologyError
 from ..words import count_of
 from . import planarity
-from .boundary import boundary_corners, following, loops
 from .cycles import three_cycles
 from .embedding import triangular_faces
-from .keys import distinct
-from .numbering import Numbering
+from .numbering import Numbering, components
 from .obstruction import obstruction_text
-from .orientation import Gluing, glue, orient, reglue
+from .pieces import planar_pieces
 from .separating import not_faces
 from .surface import Piece, Topology
 
@@ -89,18 +85,6 @@ def in_whole(piece: Piece, part: Numbering) -> Piece:
     return replace(piece, vertices=part.vertices[piece.vertices], edge_rows=part.edge_rows[piece.edge_rows])
 
 
-def components(n: int, edges: NDArray) -> list[Numbering]:
-    """Connected components with edges, each in a numbering of its own, largest first."""
-    graph = sp.coo_array((np.ones(len(edges), np.int8), edges.T), shape=(n, n))
-    count, label = csgraph.connected_components(graph, directed=False)
-    parts = []
-    for rows in sorted(_groups(label[edges[:, 0]], count), key=len, reverse=True):
-        if len(rows):
-            vertices, ends = np.unique(edges[rows], return_inverse=True)
-            parts.append(Numbering(vertices, rows, ends.reshape(-1, 2)))
-    return parts
-
-
 def _recognise_numbered(n: int, edges: NDArray, parts: list[Numbering]) -> Topology:
     """Parts of the graph one by one, in the numbering of each; an error where none has a mesh."""
     pieces: list[Piece] = []
@@ -153,15 +137,14 @@ def _recognise_whole(n: int, edges: NDArray) -> Topology:
     pieces = triangulated(n, edges)
     if pieces is not None and sum(len(piece.edges) for piece in pieces) == len(edges):
         return Topology(n, edges, pieces, "3-cycles")
-    if not planarity.is_planar(n, edges):
-        raise _not_planar(n, edges, "")
+    require_planar(n, edges)
     if pieces is not None:  # edges without a triangle do not hinder the rest
         return Topology(n, edges, pieces, "3-cycles")
     triangles, opposite = triangular_faces(n, edges)
     if not len(triangles):
         raise TopologyError(
-            f"the graph of the matrix ({count_of(n, 'vertex', 'vertices')}, {count_of(len(edges), 'edge')}) is planar "
-            "but has no triangle: no element can be recognised (if zero entries were dropped, keep them stored)"
+            f"the graph of the matrix ({count_of(n, 'vertex', 'vertices')}, {count_of(len(edges), 'edge')}) is planar, "
+            "but without the entries no cell shows in it: no cycle has three edges"
         )
     pieces = planar_pieces(n, edges, triangles, opposite)
     if pieces is None:
@@ -172,6 +155,20 @@ def _recognise_whole(n: int, edges: NDArray) -> Topology:
     return Topology(n, edges, pieces, "embedding")
 
 
+def require_planar(n: int, edges: NDArray) -> None:
+    """Do nothing for a planar graph.
+
+    Raises
+    ------
+    NotPlanarError
+        With a Kuratowski subgraph as witness.
+    """
+    if n >= 3 and len(edges) > 3 * n - 6:
+        raise _not_planar(n, edges, f"{len(edges)} edges on {n} rows are more than 3 n - 6; for one, ")
+    if not planarity.is_planar(n, edges):
+        raise _not_planar(n, edges, "")
+
+
 def _not_planar(n: int, edges: NDArray, why: str) -> NotPlanarError:
     return _not_planar_witness("", why, planarity.kuratowski_edges(n, edges))
 
@@ -179,130 +176,3 @@ def _not_planar(n: int, edges: NDArray, why: str) -> NotPlanarError:
 def _not_planar_witness(where: str, why: str, witness: tuple[tuple[int, int], ...]) -> NotPlanarError:
     text = obstruction_text(witness)
     return NotPlanarError(f"{where}the graph of the matrix is not planar: {why}{text}", witness, why)
-
-
-def planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> tuple[Piece, ...] | None:
-    """Cut triangles into oriented pieces; None where one of them is not a sphere with holes.
-
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-    triangles : (m, 3) int64
-        In any orientation.
-    opposite : (m, 3) int64
-        Rows of `edges` that face the corners.
-    """
-    if not len(triangles):
-        return ()
-    gluing = glue(len(edges), opposite)
-    if (gluing.count > 2).any():
-        return None
-    flip, piece, orientable = orient(triangles, gluing)
-    if not orientable.all():
-        return None
-    triangles = np.where(flip[:, None], triangles[:, [0, 2, 1]], triangles)
-    opposite = np.where(flip[:, None], opposite[:, [0, 2, 1]], opposite)
-    gluing = reglue(gluing, flip)
-    corners = boundary_corners(gluing)
-    loop, order = loops(following(triangles, opposite, gluing, corners))
-    if not _spheres_with_holes(n, edges, triangles, gluing, piece, corners, loop):
-        return None
-    return _cut(n, edges, triangles, opposite, gluing, piece, corners[order], loop[order])
-
-
-def _spheres_with_holes(
-    n: int, edges: NDArray, triangles: NDArray, gluing: Gluing, piece: NDArray, corners: NDArray, loop: NDArray
-) -> bool:
-    """Euler's formula for every piece, with a vertex counted once for each fan of triangles about it.
-
-    A vertex with p boundary edges leaving it in a piece has p fans, one if p = 0. A second closed
-    fan would be missed here, but counting it could only raise v - e + m, which is at most 2 - loops.
-    """
-    n_pieces = int(piece.max()) + 1
-    n_loops = np.zeros(n_pieces, dtype=np.int64)
-    n_edges = np.bincount(piece[gluing.first[gluing.count > 0] // 3], minlength=n_pieces)
-    n_triangles = np.bincount(piece, minlength=n_pieces)
-    at = _vertices_of_pieces(n, triangles, piece)
-    n_vertices = np.bincount(at // n, minlength=n_pieces)
-    if len(corners):
-        _, one_of_each = np.unique(loop, return_index=True)
-        n_loops = np.bincount(piece[corners[one_of_each] // 3], minlength=n_pieces)
-        tails = triangles.ravel()[3 * (corners // 3) + (corners + 1) % 3]
-        fans = piece[corners // 3] * n + tails
-        n_vertices = n_vertices + np.bincount(fans // n, minlength=n_pieces)
-        n_vertices -= np.bincount(distinct(fans) // n, minlength=n_pieces)
-    return bool(((n_vertices - n_edges + n_triangles == 2 - n_loops) & (n_loops > 0)).all())
-
-
-def _vertices_of_pieces(n: int, triangles: NDArray, piece: NDArray) -> NDArray:
-    """Sorted keys piece * n + vertex of all pairs that occur."""
-    if not piece.any():
-        seen = np.zeros(n, dtype=bool)
-        seen[triangles] = True
-        return np.flatnonzero(seen)
-    return distinct(piece[:, None] * n + triangles)
-
-
-def _cut(
-    n: int,
-    edges: NDArray,
-    triangles: NDArray,
-    opposite: NDArray,
-    gluing: Gluing,
-    piece: NDArray,
-    corners: NDArray,
-    loop: NDArray,
-) -> tuple[Piece, ...]:
-    """Number each piece by itself."""
-    base = 3 * (corners // 3)
-    flat = triangles.ravel()
-    boundary = np.column_stack([flat[base + (corners + 1) % 3], flat[base + (corners + 2) % 3]])
-    n_pieces = int(piece.max()) + 1
-    edge_piece = np.where(gluing.count > 0, piece[gluing.first // 3], -1)
-    if n_pieces == 1 and len(edges) == (edge_piece == 0).sum() and len(_vertices_of_pieces(n, triangles, piece)) == n:
-        offsets = np.append(np.flatnonzero(np.diff(loop, prepend=-1)), len(loop))
-        return (
-            Piece(np.arange(n), np.arange(len(edges)), edges, triangles, opposite, gluing.faces, boundary, offsets),
-        )
-    return tuple(
-        _local_piece(n, edges, triangles, opposite, boundary, loop, rows)
-        for rows in zip(
-            _groups(piece, n_pieces),
-            _groups(edge_piece, n_pieces),
-            _groups(piece[corners // 3], n_pieces),
-            strict=True,
-        )
-    )
-
-
-def _groups(label: NDArray, n_labels: int) -> list[NDArray]:
-    """Rows with label 0, 1, ..., each in increasing order; negative labels are left out."""
-    order = np.argsort(label, kind="stable")
-    start = np.searchsorted(label[order], np.arange(n_labels + 1))
-    return [order[start[k] : start[k + 1]] for k in range(n_labels)]
-
-
-def _local_piece(
-    n: int,
-    edges: NDArray,
-    triangles: NDArray,
-    opposite: NDArray,
-    boundary: NDArray,
-    loop: NDArray,
-    rows: tuple[NDArray, NDArray, NDArray],
-) -> Piece:
-    of_triangles, of_edges, of_boundary = rows
-    vertices, corner_vertices = np.unique(triangles[of_triangles], return_inverse=True)
-    local_opposite = np.searchsorted(of_edges, opposite[of_triangles])
-    ring = loop[of_boundary]
-    return Piece(
-        vertices=vertices,
-        edge_rows=of_edges,
-        edges=np.searchsorted(vertices, edges[of_edges]),
-        triangles=corner_vertices.reshape(-1, 3),
-        opposite=local_opposite,
-        facing=glue(len(of_edges), local_opposite).faces,
-        boundary=np.searchsorted(vertices, boundary[of_boundary]),
-        loop_offsets=np.append(np.flatnonzero(np.diff(ring, prepend=-1)), len(ring)),
-    )

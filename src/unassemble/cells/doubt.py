@@ -1,0 +1,95 @@
+"""Which parts of a matrix their triangles do not explain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse import csgraph
+
+from ..errors import RecoveryError, SolverError
+from ..matrix import OperatorMatrix
+from ..planar.piece import PieceMesh
+from ..planar.polish import PolishOptions, polish
+from ..topology import Piece, Topology
+from .reading import FITS, even, misfits
+
+_WIDE = 200  # rows of a matrix on which the misfit of a wrong cell stays near it
+_SURE = 1e-3  # misfit that no wrong cell is known to leave
+
+_SHORT = PolishOptions(max_steps=8, max_factorisations=3)
+
+Outcome = PieceMesh | RecoveryError
+"""Positions of a piece, or why there are none."""
+
+Attempt = Callable[[Piece], Outcome]
+"""Solves a piece, each only once."""
+
+Solved = list[tuple[Piece, Outcome]]
+
+
+def in_doubt(matrix: OperatorMatrix, topology: Topology, attempt: Attempt) -> NDArray[np.bool_]:
+    """(n,) rows of components with nonzero entries on no triangle, or entries that do not fit.
+
+    A misfit that is small and spread evenly, at the latest after a short polish, is that of errors in the entries, and
+    raises no doubt. Pieces of components that are in doubt without it are not solved.
+    """
+    doubtful = unexplained(matrix, topology)
+    solved = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
+    rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
+    misfit = misfits_of(matrix, solved)[rest]
+    wrong = misfit > FITS
+    if not wrong.any() or _like_noise(misfit, matrix.n):
+        return doubtful
+    if _like_noise(misfits_of(matrix, _shortly_polished(matrix, solved))[rest], matrix.n):
+        return doubtful
+    return doubtful | _components_of(matrix, rest[wrong])
+
+
+def _like_noise(misfit: NDArray, n: int) -> bool:
+    """Whether a misfit is that of errors in the entries; small meshes spread that of a wrong cell as evenly."""
+    return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < _SURE)
+
+
+def _shortly_polished(matrix: OperatorMatrix, solved: Solved) -> Solved:
+    polished: Solved = []
+    for piece, mesh in solved:
+        if isinstance(mesh, PieceMesh):
+            try:
+                found = polish(piece, -matrix.entries[piece.edge_rows], mesh.z, options=_SHORT)
+            except SolverError as error:
+                polished.append((piece, error))
+                continue
+            polished.append((piece, PieceMesh(found.z, found.scale)))
+        else:
+            polished.append((piece, mesh))
+    return polished
+
+
+def misfits_of(matrix: OperatorMatrix, solved: Solved) -> NDArray[np.float64]:
+    """(e,) as :func:`unassemble.cells.reading.misfits`."""
+    return misfits(
+        matrix.n,
+        matrix.edges,
+        -matrix.entries,
+        [(piece, mesh) for piece, mesh in solved if isinstance(mesh, PieceMesh)],
+    )
+
+
+def unexplained(matrix: OperatorMatrix, topology: Topology) -> NDArray[np.bool_]:
+    """(n,) rows of components with nonzero entries on no triangle."""
+    bare = topology.bare_edges
+    return _components_of(matrix, bare[matrix.entries[bare] != 0])
+
+
+def _components_of(matrix: OperatorMatrix, rows: NDArray) -> NDArray[np.bool_]:
+    """(n,) rows of the connected components that have one of the given edges."""
+    chosen = np.zeros(matrix.n, dtype=bool)
+    if not len(rows):
+        return chosen
+    graph = sp.coo_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
+    label = csgraph.connected_components(graph, directed=False)[1]
+    chosen[label[matrix.edges[rows, 0]]] = True
+    return chosen[label]

@@ -1,0 +1,91 @@
+"""The answer does not depend on the order of the rows, and it is one true sentence: Laplacians of graphs."""
+
+import re
+
+import networkx
+import numpy as np
+import pytest
+
+from exhaustive import all_meshes
+from unassemble import RecoveryError, recover
+from unassemble.topology import settled_numbering
+
+GRAPHS = {
+    "grid": networkx.convert_node_labels_to_integers(networkx.grid_2d_graph(4, 4)),
+    "oblong grid": networkx.convert_node_labels_to_integers(networkx.grid_2d_graph(3, 5)),
+    "path": networkx.path_graph(20),
+    "star": networkx.star_graph(5),
+    "large star": networkx.star_graph(10),
+    "tree": networkx.random_labeled_tree(12, seed=1),
+    "binary tree": networkx.balanced_tree(2, 3),
+    "cycle": networkx.cycle_graph(8),
+    "large cycle": networkx.cycle_graph(30),
+    "wheel": networkx.wheel_graph(8),
+    "triangle and a path": networkx.lollipop_graph(3, 5),
+    "cube": networkx.cubical_graph(),
+    "complete graph": networkx.complete_graph(4),
+    "edge": networkx.path_graph(2),
+}
+
+
+def laplacian(graph, seed):
+    n = len(graph)
+    row = np.random.default_rng(seed).permutation(n)
+    return networkx.laplacian_matrix(graph, nodelist=range(n)).toarray().astype(float)[np.ix_(row, row)]
+
+
+def answer(matrix):
+    """Status and reason, or kind and message of the error, without the numbers."""
+    try:
+        found = recover(matrix)
+    except RecoveryError as error:
+        return type(error).__name__, str(error)
+    return found.status, re.sub(r"\d+(\.\d+)?(e[-+]\d+)?", "#", found.reason)
+
+
+@pytest.mark.parametrize("name", GRAPHS)
+def test_laplacians_of_graphs(name):
+    answers = {answer(laplacian(GRAPHS[name], seed)) for seed in range(5)}
+    assert len(answers) == 1
+    ((kind, _),) = answers
+    if networkx.is_tree(GRAPHS[name]):
+        assert kind != "certified"
+    elif "cycle" in name:  # a regular polygon
+        assert kind == "certified"
+
+
+def test_what_is_said_of_graphs_that_are_no_mesh():
+    with pytest.raises(RecoveryError, match="none has its entries: they may belong to no mesh, as those of a network"):
+        recover(laplacian(GRAPHS["grid"], 0))
+    with pytest.raises(RecoveryError, match="no cells can be put on the graph"):
+        recover(laplacian(GRAPHS["edge"], 0))
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("graph", [networkx.lollipop_graph(3, 4), networkx.path_graph(6)], ids=str)
+def test_pieces_that_may_be_one_are_not_certified(graph, seed):
+    """Equal entries make equal factors c in pieces; yet the whole has readings in one piece."""
+    assert all_meshes(len(graph), dict.fromkeys(map(tuple, graph.edges), 1.0))
+    assert not recover(laplacian(graph, seed)).certified
+
+
+@pytest.mark.parametrize("name", GRAPHS)
+@pytest.mark.parametrize("weights", ["equal", "two", "random"])
+def test_settled_numbering(name, weights):
+    graph = GRAPHS[name]
+    n, rng = len(graph), np.random.default_rng(len(name))
+    edges = np.array(sorted(tuple(sorted(edge)) for edge in graph.edges))
+    w = {"equal": np.ones(len(edges)), "two": rng.choice([1.0, 2.0], len(edges)), "random": rng.random(len(edges))}[
+        weights
+    ]
+    expected = None
+    for _ in range(4):
+        row = rng.permutation(n)
+        ends = np.sort(row[edges], axis=1)
+        order = np.lexsort(ends.T[::-1])
+        found = settled_numbering(n, ends[order], w[order])
+        assert (np.sort(found.vertices[found.edges], axis=1) == ends[order][found.edge_rows]).all()
+        assert (np.sort(found.vertices) == np.arange(n)).all()
+        content = found.edges.tolist(), w[order][found.edge_rows].tolist()
+        assert expected in (None, content)
+        expected = content
