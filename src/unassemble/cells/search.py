@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from ..planar.piece import PieceMesh
 from ..topology.embedding import drawing_with_corners, face_complexes
 from .candidates import Candidates
 from .crosses import Crosses
+from .effort import Effort
 from .evidence import label_changes
 from .proposals import proposals
 from .reading import Reading
@@ -21,49 +21,17 @@ from .relaxation import relaxed
 _log = logging.getLogger(__name__)
 
 _STARTS = 2  # readings to begin with that are worth repairing
-_WORK = 1.2e5  # vertices times solves that repairs may take altogether
 _FEW = 100  # vertices below which all is tried before the entries are blamed
 _SUSPECT = 0.3  # change of the label of a lone triangular hole: it was 0.4 or more in all that were tried
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 _BEGUN = 1000  # vertices up to which all drawings are begun with before one is repaired
-_SOLVES = 180
+_DRAWINGS = 3  # that a graph may have, about
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
 _RELAXED = 20_000  # vertices up to which labels are relaxed
 _WIDE = 20  # vertices of the largest piece below which trying labels one by one is as good
 _RELAXING = 10  # solves that a relaxation is worth
 _AGAIN = 2  # times that a reading is relaxed anew
-_MANY = 20  # pieces that cost as much as another solve
-
-
-@dataclass
-class Effort:
-    """Solves that are left; all drawings and starts share them, so that input without a mesh is soon given up."""
-
-    solves: int
-    known: dict[bytes, PieceMesh | None] = field(default_factory=dict)
-
-    @classmethod
-    def for_graph(cls, n: int) -> Effort:
-        """As much as a graph of n vertices is worth."""
-        return cls(int(np.clip(_WORK / n, 12, _SOLVES)))
-
-    def reading(self, candidates: Candidates, labels: NDArray[np.bool_]) -> Reading:
-        """A reading, counted."""
-        reading = Reading.of(candidates, labels, self.known)
-        self.solves -= 1 + len(reading.pieces) // _MANY
-        return reading
-
-    def share(self, part: float) -> Effort:
-        """A part of what is left."""
-        solves = int(self.solves * part)
-        self.solves -= solves
-        return Effort(solves, self.known)
-
-    @property
-    def spent(self) -> bool:
-        """Whether it is time to give up."""
-        return self.solves <= 0
 
 
 def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = None) -> Reading | None:
@@ -87,11 +55,13 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
     best: Reading | None = None
     effort = Effort.for_graph(n)
     drawings = _drawings(n, edges, weights, scale)
+    together = n <= _BEGUN
+    turning = _TURNING / (_DRAWINGS if together else 1)
     # Repairs take most of the effort: small graphs are begun with in all drawings before.
-    for some in [list(drawings)] if n <= _BEGUN else ([drawing] for drawing in drawings):
+    for some in [drawings] if together else ([drawing] for drawing in drawings):
         begun = []
         for drawing in some:
-            starts, settled = _begun(drawing, effort, int(_TURNING * effort.solves / len(some)))
+            starts, settled = _begun(drawing, effort, int(turning * effort.solves))
             if settled:
                 return starts[0] if starts[0].fits else _better(best, starts[0])
             begun.append(starts)

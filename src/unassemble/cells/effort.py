@@ -1,0 +1,46 @@
+"""How many readings may be solved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..planar.piece import PieceMesh
+from .candidates import Candidates
+from .reading import Reading
+
+_WORK = 1.2e5  # vertices times solves that repairs may take altogether
+_SOLVES = 180
+_MANY = 20  # pieces that cost as much as another solve
+
+
+@dataclass
+class Effort:
+    """Solves that are left; all drawings and starts share them, so that input without a mesh is soon given up."""
+
+    solves: int
+    known: dict[bytes, PieceMesh | None] = field(default_factory=dict)
+
+    @classmethod
+    def for_graph(cls, n: int) -> Effort:
+        """As much as a graph of n vertices is worth."""
+        return cls(int(np.clip(_WORK / n, 12, _SOLVES)))
+
+    def reading(self, candidates: Candidates, labels: NDArray[np.bool_]) -> Reading:
+        """A reading, counted."""
+        reading = Reading.of(candidates, labels, self.known)
+        self.solves -= 1 + len(reading.pieces) // _MANY
+        return reading
+
+    def share(self, part: float) -> Effort:
+        """A part of what is left."""
+        solves = int(self.solves * part)
+        self.solves -= solves
+        return Effort(solves, self.known)
+
+    @property
+    def spent(self) -> bool:
+        """Whether it is time to give up."""
+        return self.solves <= 0
