@@ -11,6 +11,7 @@ from ..linalg import blas_threads
 from ..matrix import check_matrix
 from .cells import Cells, no_cells, recognise_cells
 from .certificate import largest_residual
+from .doubts import with_doubts
 from .halves import joined
 from .material import poisson_ratio
 from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled, without_trace
@@ -85,6 +86,7 @@ def place_nodes(
 ) -> ElasticityRecovery:
     """The recovery once the nodes are known: null space, certificate, cells; see :func:`recover_elasticity`."""
     with clock("null space"), blas_threads(1):
+        nodal = with_doubts(nodal, numbering)
         try:
             solution = solve(nodal, patch)
         except RecoveryError as error:
@@ -107,6 +109,7 @@ def place_nodes(
         better = joined(nodal, numbering, solution.points, solution.component)
         if better is not None:
             nodal, numbering = better
+            nodal = with_doubts(nodal, numbering)
             solution = solve(nodal, patch)
     return _describe(nodal, numbering, solution, clock, cells)
 

@@ -1,0 +1,40 @@
+"""Nodes that may lack a direction, or whose missing row may stand elsewhere: neither pattern nor order can tell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .nodal import NodalMatrix
+from .unknowns import Numbering
+
+
+def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
+    """Mark nodes whose rows may be those of two halves of one: coupled, with no direction in common.
+
+    Where all entries are stored the halves of a node couple to the same nodes; and where unknowns stand in order, it
+    tells them apart.
+    """
+    stored = numbering.common == 1
+    if numbering.kind == "given" or not numbering.incomplete or (stored and numbering.kind != "pattern"):
+        return nodal
+    present = nodal.row_of >= 0
+    some = present.any(axis=1) & ~present.all(axis=1)
+    i, j = nodal.node, nodal.indices
+    halves = some[i] & some[j] & (i != j) & ~(present[i] & present[j]).any(axis=1)
+    if stored:
+        code = _neighbourhoods(nodal)
+        halves &= code[i] == code[j]
+    doubtful = np.zeros(nodal.n, dtype=bool)
+    doubtful[i[halves]] = True
+    return replace(nodal, doubtful=doubtful)
+
+
+def _neighbourhoods(nodal: NodalMatrix) -> NDArray[np.uint64]:
+    """(n,) equal for nodes that couple to the same nodes."""
+    key = np.random.default_rng(0).integers(1, 2**62, nodal.n, dtype=np.uint64)
+    graph = sp.csr_array((np.ones(len(nodal.indices), np.uint64), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2)
+    return np.asarray(graph @ key)  # sums wrap around, which does no harm
