@@ -85,7 +85,8 @@ def chart(
 def _shifted(normal: sp.bsr_array) -> Factorisation:
     """Factorise the normal matrix, made definite by a small multiple of the identity."""
     d = normal.blocksize[0]
-    typical = float(np.median(normal.diagonal()))
+    diagonal = normal.diagonal()
+    typical = float(np.median(diagonal[diagonal > 0])) if (diagonal > 0).any() else 1.0
     for shift in (_SHIFT, 30 * _SHIFT, 1000 * _SHIFT):
         shifted = normal + shift * typical * sp.eye_array(normal.shape[0], format="bsr")  # no diagonal block is missing
         matrix = _upper(sp.bsr_array(shifted.tobsr((d, d))))

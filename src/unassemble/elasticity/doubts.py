@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .nodal import NodalMatrix
+from .nodal import NodalMatrix, without_trace
 from .unknowns import Numbering
 
 
@@ -18,18 +18,19 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     Where all entries are stored the halves of a node couple to the same nodes; and where unknowns stand in order, it
     tells them apart.
     """
-    stored = numbering.common == 1
-    if numbering.kind == "given" or not numbering.incomplete or (stored and numbering.kind != "pattern"):
+    ordered = numbering.kind != "pattern" and numbering.common == 1 and not numbering.odd
+    if numbering.kind == "given" or not numbering.incomplete or ordered:
         return nodal
     present = nodal.row_of >= 0
     some = present.any(axis=1) & ~present.all(axis=1)
     i, j = nodal.node, nodal.indices
     halves = some[i] & some[j] & (i != j) & ~(present[i] & present[j]).any(axis=1)
-    if stored:
-        code = _neighbourhoods(nodal)
-        halves &= code[i] == code[j]
+    code = _neighbourhoods(nodal)
+    alike = halves & (code[i] == code[j])
+    apart = without_trace(nodal).any(axis=1)
+    apart[i[alike]] = False
     doubtful = np.zeros(nodal.n, dtype=bool)
-    doubtful[i[halves]] = True
+    doubtful[i[halves if apart.any() or numbering.common < 1 else alike]] = True
     return replace(nodal, doubtful=doubtful)
 
 

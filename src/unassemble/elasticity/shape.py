@@ -13,6 +13,7 @@ from ..errors import GeometryError
 
 EXACT = 1e-9  # singular values below this are zero; matrices are rounded to 1e-16, gaps are 1e-4 and more
 _FEW = 0.25  # share of nodes that may be loose although rows of their own are valid
+_MOST = 0.75  # share of the nodes that no plane across an axis holds
 _LOOSE = 1e-7  # a field this small at a node leaves it alone
 
 
@@ -118,7 +119,7 @@ def _without_translations(fields: NDArray) -> NDArray:
 def _choose(moving: NDArray, graph: sp.csr_array, *, exact: bool) -> tuple[NDArray, str]:
     """The coordinates, or a representative and the name of what remains free."""
     _, d, k = moving.shape
-    if k == 1 and exact and np.abs(moving).max(axis=(0, 2)).min() <= _LOOSE:
+    if k == 1 and exact and _flat(moving[..., 0]):
         raise GeometryError("the valid rows are satisfied with all nodes in one plane only: some of them are not whole")
     if k == 1:
         return moving[..., 0], ""
@@ -136,6 +137,14 @@ def _choose(moving: NDArray, graph: sp.csr_array, *, exact: bool) -> tuple[NDArr
         f"the valid rows leave a null space of dimension {d + k} where {d + 1} is expected: too many unknowns are "
         "eliminated for the matrix to determine the nodes"
     )
+
+
+def _flat(points: NDArray) -> bool:
+    """Whether most nodes lie in one plane across an axis, as no mesh does, whatever the others do."""
+    most = int(np.ceil(_MOST * len(points)))
+    ordered = np.sort(points, axis=0)
+    spread = (ordered[most - 1 :] - ordered[: len(points) - most + 1]).min(axis=0)
+    return bool((spread <= _LOOSE * np.abs(points).max()).any()) and most > 2 ** points.shape[1]
 
 
 def _of_one_direction(moving: NDArray) -> bool:
