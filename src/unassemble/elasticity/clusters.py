@@ -14,7 +14,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-_MOST = 40  # domains of a cluster
+_MOST = 100  # domains of a cluster
+_PATIENCE = 12  # changes in a row that do not lead below what they started from
 _CLUSTERS = 50
 _TINY = 1e-12  # of a row: no entry
 GAIN = 1e-3  # of one sum that vanishes: what counts as a gain
@@ -123,6 +124,8 @@ def rearranged(
         left.remove(k)
         if total < best:
             best, stage = total, len(names)
+        if len(names) > stage + _PATIENCE:
+            break
     if not stage:
         return None
     direction = direction.copy()
