@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .nodal import NodalMatrix, without_trace
+from .nodal import NodalMatrix, determined, without_trace
 from .unknowns import Numbering
 
 
@@ -32,6 +32,17 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     doubtful = np.zeros(nodal.n, dtype=bool)
     doubtful[i[halves if apart.any() or numbering.common < 1 else alike]] = True
     return replace(nodal, doubtful=doubtful)
+
+
+def unconfirmed(cells: NDArray[np.int64], points: NDArray[np.float64], numbering: Numbering) -> NDArray[np.bool_]:
+    """(n,) nodes with coordinates that are in no certified cell, where it was inferred which rows make up a node.
+
+    Rows that were joined wrongly can be placed all the same; that cells re-assemble shows that theirs are not.
+    """
+    sure = numbering.kind == "given" or not numbering.incomplete or (numbering.common == 1 and not numbering.odd)
+    outside = determined(points) & (not sure)
+    outside[cells.ravel()] = False
+    return outside
 
 
 def _neighbourhoods(nodal: NodalMatrix) -> NDArray[np.uint64]:

@@ -11,7 +11,7 @@ from ..linalg import blas_threads
 from ..matrix import check_matrix
 from .cells import Cells, no_cells, recognise_cells
 from .certificate import largest_residual
-from .doubts import with_doubts
+from .doubts import unconfirmed, with_doubts
 from .halves import joined
 from .material import poisson_ratio
 from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled, without_trace
@@ -128,12 +128,24 @@ def _describe(
             found = recognise_cells(nodal, points, None if ratio is None else 2 * ratio / (1 - 2 * ratio))
     backward = found.backward_error if found.certified else error
     status, reason = _verdict(nodal, solution, error, found, numbering)
+    withheld = np.zeros(nodal.n, dtype=bool)
+    if status == "certified" and found.certified:
+        withheld = unconfirmed(found.cells, points, numbering)
+        points = np.where(withheld[:, None], np.nan, points)
     loose = ~determined(points)
+    component = np.where(loose, -1, solution.component)
     warnings = list(solution.warnings)
     if want_cells:
         warnings += _about_cells(found)
-    if loose.any():
-        warnings.append(f"{loose.sum()} of {nodal.n} nodes are tied to eliminated unknowns only and stay undetermined")
+    if withheld.any():
+        warnings.append(
+            f"{withheld.sum()} nodes belong to no element that re-assembles; since it was inferred which rows make up "
+            "a node, their coordinates are withheld"
+        )
+    if (loose & ~withheld).any():
+        warnings.append(
+            f"{(loose & ~withheld).sum()} of {nodal.n} nodes are tied to eliminated unknowns only and stay undetermined"
+        )
     if solution.planes:
         warnings.append(
             "nodes that lack a direction were taken to lie in planes across it, which fits, to determine others"
@@ -141,7 +153,7 @@ def _describe(
     if solution.ratio is not None:
         warnings.append("Poisson's ratio, read off the nodes that determine it, was used to determine others")
     return ElasticityRecovery(
-        points, numbering.node_of_row, numbering.direction_of_row, np.asarray(loose, dtype=np.int8), solution.component,
+        points, numbering.node_of_row, numbering.direction_of_row, np.asarray(loose, dtype=np.int8), component,
         solution.evidence, ratio, found, backward, status, reason, numbering.kind, tuple(warnings), clock.timings,
     )  # fmt: skip
 
