@@ -34,15 +34,18 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     return replace(nodal, doubtful=doubtful)
 
 
-def unconfirmed(cells: NDArray[np.int64], points: NDArray[np.float64], numbering: Numbering) -> NDArray[np.bool_]:
-    """(n,) nodes with coordinates that are in no certified cell, where it was inferred which rows make up a node.
+def unconfirmed(nodal: NodalMatrix, points: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(n,) nodes with coordinates next to doubtful ones, and in no cell of those that re-assemble.
 
-    Rows that were joined wrongly can be placed all the same; that cells re-assemble shows that theirs are not.
+    Rows that were joined wrongly can be placed all the same; that cells re-assemble shows that theirs were not.
     """
-    sure = numbering.kind == "given" or not numbering.incomplete or (numbering.common == 1 and not numbering.odd)
-    outside = determined(points) & (not sure)
+    if nodal.doubtful is None:
+        return np.zeros(nodal.n, dtype=bool)
+    doubtful = nodal.doubtful | without_trace(nodal).any(axis=1)
+    graph = sp.csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2)
+    outside = determined(points) & (graph @ doubtful.astype(float) > 0)
     outside[cells.ravel()] = False
-    return outside
+    return np.asarray(outside)
 
 
 def _neighbourhoods(nodal: NodalMatrix) -> NDArray[np.uint64]:

@@ -130,7 +130,7 @@ def _describe(
     status, reason = _verdict(nodal, solution, error, found, numbering)
     withheld = np.zeros(nodal.n, dtype=bool)
     if status == "certified" and found.certified:
-        withheld = unconfirmed(found.cells, points, numbering)
+        withheld = unconfirmed(nodal, points, found.cells)
         points = np.where(withheld[:, None], np.nan, points)
     loose = ~determined(points)
     component = np.where(loose, -1, solution.component)
