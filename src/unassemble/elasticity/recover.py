@@ -20,6 +20,7 @@ from .results import ElasticityRecovery, ScalarParts
 from .unknowns import Numbering, find_numbering
 
 CERTIFIED = 1e-9
+_NEARLY = 2e-7  # gap at which entries rounded to 1e-15 still give coordinates to 1e-8
 
 
 def scalar_parts(matrix: sp.csr_array, *, block_size: int | None = None) -> ScalarParts | None:
@@ -189,6 +190,12 @@ def _verdict(
     remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
     if remaining:
         return "uncertified", f"the null space is larger than it should be: {remaining[0]}"
+    nearly = min((one.gap for one in solution.evidence if one.gap > 0), default=1.0)
+    if solution.exact and nearly < _NEARLY:
+        return "uncertified", (
+            f"a field that is no translation or scale satisfies the identities up to {nearly:.1e}: nodes that it moves "
+            "feel the rounding of the entries, magnified by as much, and may be wrong by more than 1e-8"
+        )
     if not solution.exact:
         worst = max(solution.evidence, key=lambda one: one.residual)
         return "uncertified", (
