@@ -22,12 +22,12 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     if numbering.kind == "given" or not numbering.incomplete or ordered:
         return nodal
     present = nodal.row_of >= 0
-    some = present.any(axis=1) & ~present.all(axis=1)
+    some = np.asarray(present.any(axis=1) & ~present.all(axis=1))
     i, j = nodal.node, nodal.indices
     halves = some[i] & some[j] & (i != j) & ~(present[i] & present[j]).any(axis=1)
     code = _neighbourhoods(nodal)
     alike = halves & (code[i] == code[j])
-    apart = without_trace(nodal).any(axis=1)
+    apart = np.asarray(without_trace(nodal).any(axis=1))
     apart[i[alike]] = False
     doubtful = np.zeros(nodal.n, dtype=bool)
     doubtful[i[halves if apart.any() or numbering.common < 1 else alike]] = True
