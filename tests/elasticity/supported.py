@@ -89,6 +89,7 @@ def with_zeros(matrix: sp.csr_array, d: int, zeros: str) -> sp.csr_array:
 class Judgement:
     """What the truth says about coordinates: error relative to the diameter, share of true nodes without any.
 
+    Nodes all of whose rows are those of the identity are not counted, since the matrix does not know about them.
     Where the reason says that an affine map stays free the error is what the best one leaves. A node made up of rows
     of several true ones counts as an error of one; `split` counts true nodes that came out as two.
     """
@@ -105,8 +106,9 @@ def judged(found, truth: Given) -> Judgement:
     live = known[found.node_of_row]
     pairs = np.unique(np.column_stack([found.node_of_row, truth.node]), axis=0)
     mixed = np.bincount(pairs[:, 0], minlength=len(known)) > 1
-    present = np.unique(truth.node)
-    placed = np.unique(truth.node[live])
+    off = abs(truth.matrix).sum(axis=1) - np.abs(truth.matrix.diagonal())
+    present = np.unique(truth.node[off > 0])
+    placed = np.intersect1d(truth.node[live], present)
     split = int((np.bincount(pairs[known[pairs[:, 0]], 1]) > 1).sum())
     missing = 1 - len(placed) / len(present)
     if (mixed & known).any() or found.points.shape[1] != d:

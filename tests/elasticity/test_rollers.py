@@ -56,6 +56,27 @@ def test_quadratic_triangles_lose_nothing_at_a_roller():
     assert any("planes" in one for one in found.warnings)
 
 
+@pytest.mark.parametrize("kind", ["tri-p2", "tet-p2", "hex-s2"])
+def test_quadratic_elements_lose_little_where_symmetry_planes_meet(kind):
+    """Next to the edges some nodes stay loose; they are set aside, and the others are unique."""
+    counts = COUNTS.get(kind, (3, 4, 3))
+    whole = permuted_nodes(stiffness(kind, box(kind, counts), lam=heterogeneous, mu=varying_shear), seed=1)
+    case = given(whole, "identity rollers", "interleaved", "stored")
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert truth.error < 1e-9
+    assert 0 < truth.missing < 0.06
+
+
+def test_no_ratio_is_read_off_points_that_are_not_unique():
+    """A homogeneous body held all around: more than a scale stays free, and Poisson's ratio does not show."""
+    case = given(body("tri-p2", lam=1.5, mu=1.0), "several", "interleaved", "stored")
+    found = recover_elasticity(case.matrix)
+    assert found.status == "uncertified"
+    assert "null space is larger" in found.reason
+
+
 def test_directions_held_elsewhere_than_on_a_plane_across_them_are_not_believed():
     """x is taken out of nodes on y = 0, no plane across x: these stay without coordinates, the others are right."""
     whole = body("tri-p1", perturb=0.2)

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .likeness import doubtful, partners, reach
-from .regions import exchanged
+from .sums import PENALTY, set_right
 
 _STARTS = 8
 _SETTLED = 0.05  # energy, relative to the trace, of directions that need no further start
@@ -60,7 +60,8 @@ def find_directions(
             break
     if best is None:
         return np.zeros(len(group), np.int64)
-    return _named_in_order(exchanged(search, matrix, group, best[1], d), members, d)
+    direction = set_right(matrix, group, members, ~identity, best[1], d)
+    return _named_in_order(direction, members, d)
 
 
 def reconsidered(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> NDArray[np.int64]:
@@ -116,8 +117,10 @@ class _Search:
         entries = (-sign * off.data[between], (off.row[between], off.col[between]))
         self._coupling = sp.csr_array(entries, shape=matrix.shape)
         self._strength = np.asarray(abs(self._coupling).sum(axis=1)).ravel()
-        self._trace = float(np.abs(matrix.diagonal()[~identity]).sum())
-        self._diagonal = float(sign * matrix.diagonal()[~identity].sum())
+        diagonal = np.where(identity, 0, sign * matrix.diagonal())
+        penalised = np.abs(diagonal) > PENALTY * self._strength  # they would hide what all others say
+        self._diagonal = float(diagonal[~penalised].sum())
+        self._trace = float(np.abs(diagonal[~penalised]).sum()) or 1.0
         self._members, self._live, self._d = members, ~identity, d
         self._choices = [np.array(list(permutations(range(d), k))) for k in range(1, d + 1)]
 

@@ -28,6 +28,8 @@ class NodalMatrix:
         Matrix row of each unknown, -1 where there is none.
     size : (n,) float64
         Mean absolute sum of a node's off-diagonal blocks, the unit in which its equations are measured.
+    doubtful : (n,) bool, optional
+        Nodes that may be halves of one; see :mod:`.doubts`.
     """
 
     indptr: NDArray[np.int32]
@@ -35,6 +37,7 @@ class NodalMatrix:
     data: NDArray[np.float64]
     row_of: NDArray[np.int64]
     size: NDArray[np.float64]
+    doubtful: NDArray[np.bool_] | None = None
 
     @classmethod
     def of(cls, indptr: NDArray, indices: NDArray, data: NDArray, row_of: NDArray[np.int64]) -> NodalMatrix:

@@ -80,7 +80,7 @@ def _arranged(
         distance = np.linalg.norm(predicted[part][:, :, None] - y[part][:, None], axis=3)
         order[part] = distance.argmin(axis=2)
         for odd in np.flatnonzero((np.sort(order[part], axis=1) != np.arange(further.shape[1])).any(axis=1)):
-            order[start + odd] = linear_sum_assignment(distance[odd])[1]
+            order[start + odd] = linear_sum_assignment(np.nan_to_num(distance[odd]))[1]  # flat frames have none
         misfit[part] = np.take_along_axis(distance, order[part][:, :, None], axis=2).max(axis=(1, 2))
     cells = np.column_stack([frame, np.take_along_axis(further, order, axis=1)])
     return cells, misfit / np.ptp(points[sets], axis=1).max(axis=1, initial=1e-300)

@@ -43,6 +43,8 @@ def with_planes(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NodalMatr
     graph = sp.csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(n, n))
     count = graph @ gone.astype(float)
     near = (count > 0) & ~penalised(nodal)
+    if nodal.doubtful is not None:  # such a node may be no node of the plane
+        near &= (graph @ nodal.doubtful.astype(float) == 0)[:, None]
     # A direction that nobody near lacks has to be whole, or more is missing than a roller takes.
     other = (present & (count == 0))[:, None, :]
     whole = (valid | ~present[:, :, None] | ~other).all(axis=(1, 2)) & other.any(axis=(1, 2))
@@ -53,6 +55,8 @@ def with_planes(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NodalMatr
     i, j = nodal.node, nodal.indices
     data = nodal.data + np.where(held, missing, 0)[i] * gone[j][:, None, :]
     flat = gone & (count > 1) & (nodal.size > 0)[:, None]
+    if nodal.doubtful is not None:
+        flat &= ~nodal.doubtful[:, None]
     level = np.where(i == j, 1.0, 0.0)[:, None] - gone[j] / np.maximum(count, 1)[i]
     full: NDArray[np.bool_] = np.repeat(valid[..., None], d, axis=3)
     for b in range(d):

@@ -115,7 +115,7 @@ def _with_ratio(
     patch: int | None,
 ) -> Solution:
     """Once more with Poisson's ratio, if it is one number and nodes were left loose."""
-    if found.whole or not found.exact:
+    if found.whole or not found.exact or any(found.freedoms):  # points that are not unique have no ratio to read off
         return found
     nu = poisson_ratio(nodal, found.valid, found.points)
     if nu is None:

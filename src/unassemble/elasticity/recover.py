@@ -12,6 +12,7 @@ from ..matrix import check_matrix
 from ..words import count_of
 from .cells import Cells, no_cells, recognise_cells
 from .certificate import largest_residual
+from .doubts import unconfirmed, with_doubts
 from .halves import joined
 from .material import poisson_ratio
 from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled, without_trace
@@ -23,6 +24,7 @@ from .unknowns import Numbering, find_numbering
 CERTIFIED = 1e-9
 _NEAR = 1e-6  # residual up to which positions are good enough to look for elements
 _SPREADS = 20  # times the rounding of the entries: what an identity may be off by
+_NEARLY = 2e-7  # gap at which entries rounded to 1e-15 still give coordinates to 1e-8
 
 
 def scalar_parts(matrix: sp.csr_array, *, block_size: int | None = None) -> ScalarParts | None:
@@ -98,6 +100,7 @@ def place_nodes(
     `rounding` is that of the entries, where they have few digits.
     """
     with clock("null space"), blas_threads(1):
+        nodal = with_doubts(nodal, numbering)
         try:
             solution = solve(nodal, patch)
         except RecoveryError as error:
@@ -120,6 +123,7 @@ def place_nodes(
         better = joined(nodal, numbering, solution.points, solution.component)
         if better is not None:
             nodal, numbering = better
+            nodal = with_doubts(nodal, numbering)
             solution = solve(nodal, patch)
     return _describe(nodal, numbering, solution, clock, cells, rounding)
 
@@ -141,13 +145,24 @@ def _describe(
     status, reason = _verdict(nodal, solution, error, found, numbering)
     if rounding and near:
         status, reason = "uncertified", _of_few_digits(rounding, error)
+    withheld = np.zeros(nodal.n, dtype=bool)
+    if status == "certified" and found.certified:
+        withheld = unconfirmed(nodal, points, found.cells)
+        points = np.where(withheld[:, None], np.nan, points)
     loose = ~determined(points)
+    component = np.where(loose, -1, solution.component)
     warnings = list(solution.warnings)
     if want_cells:
         warnings += _about_cells(found)
-    if loose.any():
+    if withheld.any():
         warnings.append(
-            f"{count_of(int(loose.sum()), 'node is', 'nodes are')} tied to eliminated unknowns only and not determined"
+            f"{count_of(int(withheld.sum()), 'node belongs', 'nodes belong')} to no element that re-assembles; since "
+            "it was inferred which rows make up a node, no coordinates are given there"
+        )
+    if (loose & ~withheld).any():
+        warnings.append(
+            f"{count_of(int((loose & ~withheld).sum()), 'node is', 'nodes are')} tied to eliminated unknowns only and "
+            "not determined"
         )
     if solution.planes:
         warnings.append(
@@ -156,7 +171,7 @@ def _describe(
     if solution.ratio is not None:
         warnings.append("Poisson's ratio, read off the nodes that determine it, was used to determine others")
     return ElasticityRecovery(
-        points, numbering.node_of_row, numbering.direction_of_row, np.asarray(loose, dtype=np.int8), solution.component,
+        points, numbering.node_of_row, numbering.direction_of_row, np.asarray(loose, dtype=np.int8), component,
         solution.evidence, ratio, found, backward, status, reason, numbering.kind, tuple(warnings), clock.timings,
     )  # fmt: skip
 
@@ -199,6 +214,12 @@ def _verdict(
     remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
     if remaining:
         return "uncertified", f"the null space is larger than it should be: {remaining[0]}"
+    nearly = min((one.gap for one in solution.evidence if one.gap > 0), default=1.0)
+    if solution.exact and nearly < _NEARLY:
+        return "uncertified", (
+            f"a field that is no translation or scale satisfies the identities up to {nearly:.1e}: nodes that it moves "
+            "feel the rounding of the entries, magnified by as much, and may be wrong by more than 1e-8"
+        )
     if not solution.exact:
         worst = max(solution.evidence, key=lambda one: one.residual)
         return "uncertified", (

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from ..errors import GeometryError
 
 EXACT = 1e-9  # singular values below this are zero; matrices are rounded to 1e-16, gaps are 1e-4 and more
+_FEW = 0.25  # share of nodes that may be loose although rows of their own are valid
+_MOST = 0.75  # share of the nodes that no plane across an axis holds
 _LOOSE = 1e-7  # a field this small at a node leaves it alone
 
 
@@ -69,13 +71,14 @@ def shape(
     loose = np.zeros(n, dtype=bool)
     if null.shape[2] > d + 1:
         shared, apart = set_aside(null, d + 1)
-        if 2 * np.count_nonzero(told & apart) <= np.count_nonzero(apart):
+        few = _FEW * n >= np.count_nonzero(apart)  # the others are determined, whatever these do
+        if few or 2 * np.count_nonzero(told & apart) <= np.count_nonzero(apart):
             null, loose = shared, apart
     kept = null[~loose]
     moving = _without_translations(kept)
     dimension = d + moving.shape[2] if exact else d
     points = np.full((n, d), np.nan)
-    points[~loose], freedom = _choose(moving, graph[~loose][:, ~loose])
+    points[~loose], freedom = _choose(moving, graph[~loose][:, ~loose], exact=bool(exact))
     return Shape(points, loose, dimension, freedom, bool(exact))
 
 
@@ -113,9 +116,11 @@ def _without_translations(fields: NDArray) -> NDArray:
     return u[:, s > 1e-6].reshape(n, d, -1)
 
 
-def _choose(moving: NDArray, graph: sp.csr_array) -> tuple[NDArray, str]:
+def _choose(moving: NDArray, graph: sp.csr_array, *, exact: bool) -> tuple[NDArray, str]:
     """The coordinates, or a representative and the name of what remains free."""
     _, d, k = moving.shape
+    if k == 1 and exact and _flat(moving[..., 0]):
+        raise GeometryError("the valid rows are satisfied with all nodes in one plane only: some of them are not whole")
     if k == 1:
         return moving[..., 0], ""
     if k == 0:
@@ -132,6 +137,14 @@ def _choose(moving: NDArray, graph: sp.csr_array) -> tuple[NDArray, str]:
         f"the valid rows leave a null space of dimension {d + k} where {d + 1} is expected: too many unknowns are "
         "eliminated for the matrix to determine the nodes"
     )
+
+
+def _flat(points: NDArray) -> bool:
+    """Whether most nodes lie in one plane across an axis, as no mesh does, whatever the others do."""
+    most = int(np.ceil(_MOST * len(points)))
+    ordered = np.sort(points, axis=0)
+    spread = (ordered[most - 1 :] - ordered[: len(points) - most + 1]).min(axis=0)
+    return bool((spread <= _LOOSE * np.abs(points).max()).any()) and most > 2 ** points.shape[1]
 
 
 def _of_one_direction(moving: NDArray) -> bool:

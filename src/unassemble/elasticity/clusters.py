@@ -1,0 +1,149 @@
+"""Domains of rows whose directions agree among themselves, but not with those of other domains.
+
+A row that adds up to zero, direction by direction, vouches for all the rows that it touches: their directions agree, up
+to the names of the axes. Domains are what such rows tie together. Within one, names can be exchanged only all at once;
+rows that none vouches for are free.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+_MOST = 100  # domains of a cluster
+_PATIENCE = 12  # changes in a row that do not lead below what they started from
+_CLUSTERS = 50
+_TINY = 1e-12  # of a row: no entry
+GAIN = 1e-3  # of one sum that vanishes: what counts as a gain
+
+
+def cost(sums: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What sums of entries, relative to their row, cost: nothing if zero, one at most, and concave in between.
+
+    Rows next to supports never add up to zero, whatever their neighbours' directions, and should have no say; and one
+    large sum is more likely than several small ones.
+    """
+    return np.asarray(np.sqrt(np.minimum(np.abs(sums), 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """A matrix, and what its rows add up to by direction.
+
+    Attributes
+    ----------
+    matrix : (N, N) sparse
+    scale : (N,) float64
+        One over the size of each row.
+    value : (N, d) float64
+        Relative to that size.
+    good : (N,) bool
+        Rows that vouch for what they touch.
+    """
+
+    matrix: sp.csr_array
+    scale: NDArray[np.float64]
+    value: NDArray[np.float64]
+    good: NDArray[np.bool_]
+
+
+def clusters(sums: Sums, group: NDArray[np.int64], live: NDArray[np.bool_]) -> list[list[NDArray[np.int64]]]:
+    """Coupled domains apart from the largest one, as lists of their rows.
+
+    Parameters
+    ----------
+    sums : Sums
+    group : (N,) int64
+        Rows of one group belong to one node.
+    live : (N,) bool
+        Rows that count.
+    """
+    domain = _domains(sums, group)
+    main = int(np.argmax(np.bincount(domain[live])))
+    rest = np.flatnonzero(live & (domain != main))
+    if not len(rest):
+        return []
+    name, inner = np.unique(domain[rest], return_inverse=True)
+    onto = sp.csr_array((np.ones(len(rest)), (inner, np.arange(len(rest)))), shape=(len(name), len(rest)))
+    label = sp.csgraph.connected_components(onto @ abs(sums.matrix[rest][:, rest]) @ onto.T, directed=False)[1]
+    kept = np.flatnonzero(np.bincount(label) <= _MOST)[:_CLUSTERS]
+    return [[rest[inner == k] for k in np.flatnonzero(label == one)] for one in kept]
+
+
+def _domains(sums: Sums, group: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(N,) domain of each row; groups that no good row vouches for are domains by themselves.
+
+    It takes entries in all rows of a node but one, whose direction follows.
+    """
+    n = int(group.max()) + 1
+    touched = sums.matrix.tocoo()
+    live = sums.good[touched.row] & (np.abs(touched.data) * sums.scale[touched.row] > _TINY)
+    ends = (touched.row[live], group[touched.col[live]])
+    count = sp.coo_array((np.ones(len(ends[0]), np.int64), ends), shape=(len(group), n)).tocsr().tocoo()
+    needed = np.maximum(np.bincount(group) - 1, 1)
+    told = count.data >= needed[count.col]
+    link = sp.csr_array(
+        (np.ones(told.sum(), np.int8), (count.row[told] + n, count.col[told])), shape=(n + len(group),) * 2
+    )
+    return np.asarray(sp.csgraph.connected_components(link, directed=False)[1][group], dtype=np.int64)
+
+
+def rearranged(
+    sums: Sums, cluster: list[NDArray[np.int64]], group: NDArray[np.int64], direction: NDArray[np.int64]
+) -> NDArray[np.int64] | None:
+    """Directions with those of a cluster exchanged, if more sums vanish then; see Kernighan and Lin (1970).
+
+    One domain after the other takes the directions that cost least, even if they cost more than the ones before, and
+    keeps them; of all stages the best counts.
+    """
+    d = sums.value.shape[1]
+    rows = np.concatenate(cluster)
+    touched = np.unique(sums.matrix[rows].indices)
+    block = sp.csc_array(sp.diags_array(sums.scale[touched]) @ sums.matrix[touched][:, rows])
+    blocks = [sp.csr_array(block[:, some]) for some in np.split(np.arange(len(rows)), _ends(cluster))]
+    choices = [_choices(one, group, direction, d) for one in cluster]
+    local = sums.value[touched]
+    total = cost(local).sum()
+    best, stage, names = total - GAIN, 0, []
+    left = set(range(len(cluster)))
+    while left:
+        total, k, chosen, local = min(
+            (
+                (float(cost(after).sum()), k, choice, after)
+                for k in left
+                for choice in range(len(choices[k]))
+                for after in [local + blocks[k] @ (np.eye(d)[choices[k][choice]] - np.eye(d)[direction[cluster[k]]])]
+            ),
+            key=lambda one: one[:3],
+        )
+        names.append((k, chosen))
+        left.remove(k)
+        if total < best:
+            best, stage = total, len(names)
+        if len(names) > stage + _PATIENCE:
+            break
+    if not stage:
+        return None
+    direction = direction.copy()
+    for k, chosen in names[:stage]:
+        direction[cluster[k]] = choices[k][chosen]
+    return direction
+
+
+def _ends(cluster: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+    return np.cumsum([len(one) for one in cluster])[:-1]
+
+
+def _choices(
+    rows: NDArray[np.int64], group: NDArray[np.int64], direction: NDArray[np.int64], d: int
+) -> NDArray[np.int64]:
+    """(c, k) other directions that the rows of a domain may have."""
+    if len(np.unique(group[rows])) == 1:
+        every = np.array(list(permutations(range(d), len(rows))))
+    else:
+        every = np.array([np.array(names)[direction[rows]] for names in permutations(range(d))])
+    return every[(every != direction[rows]).any(axis=1)]
