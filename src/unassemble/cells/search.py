@@ -12,9 +12,9 @@ from ..planar.piece import PieceMesh
 from ..topology.embedding import face_complexes
 from .candidates import Candidates
 from .evidence import label_changes
+from .mending import mended
 from .proposals import proposals
 from .reading import Reading
-from .relaxation import relaxed
 
 _log = logging.getLogger(__name__)
 
@@ -25,10 +25,9 @@ _SUSPECT = 0.3  # change of the label of a lone triangular hole: it was 0.4 or m
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 _SOLVES = 180
 _FIRST = 0.7  # part of them for the likeliest reading
-_RELAXED = 20_000  # vertices up to which labels are relaxed
+_MENDED = 20_000  # vertices up to which labels are relaxed and exchanged
 _WIDE = 20  # vertices of the largest piece below which trying labels one by one is as good
-_RELAXING = 10  # solves that a relaxation is worth
-_AGAIN = 2  # times that a reading is relaxed anew
+_MENDING = 20  # solves that this is worth
 _MANY = 20  # pieces that cost as much as another solve
 
 
@@ -91,15 +90,16 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
                 return starts[-1]
         if starts and _entries_are_to_blame(starts[0]):
             return _better(best, starts[0])
+        likeliest = next((start for start in starts if start.pieces), None)
         starts = sorted(starts, key=lambda reading: reading.size)[:_STARTS]
         for k, start in enumerate(starts):
             starts[k] = _turned_over(start, effort)
             if starts[k].fits:
                 return starts[k]
-        if starts and not starts[0].like_noise:
+        if likeliest and not starts[0].like_noise:
             triangles = 2 * (candidates.first & (candidates.size == 3)).sum() > candidates.first.sum()
             place = 0 if n >= _FEW and triangles else len(starts)
-            starts[place:place] = _relaxed(starts[0], effort)
+            starts[place:place] = _mended(likeliest, effort)
         for number, start in enumerate(starts):
             share = effort.share(_FIRST if number == 0 and len(starts) > 1 else 1 / (len(starts) - number))
             best = _better(best, start if start.like_noise else _repaired(start, share))
@@ -136,13 +136,13 @@ def _entries_are_to_blame(reading: Reading) -> bool:
     return float(np.nan_to_num(np.abs(label_changes(reading))).max(initial=0.0)) < _SUSPECT
 
 
-def _relaxed(reading: Reading, effort: Effort) -> list[Reading]:
+def _mended(reading: Reading, effort: Effort) -> list[Reading]:
     """A better reading to begin with, or none."""
     n = reading.candidates.n_vertices
-    if not reading.pieces or n > _RELAXED or max(piece.n_vertices for piece in reading.pieces) < _WIDE:
+    if not reading.pieces or n > _MENDED or max(piece.n_vertices for piece in reading.pieces) < _WIDE:
         return []
-    effort.solves -= _RELAXING
-    labels = relaxed(reading)
+    effort.solves -= _MENDING
+    labels = mended(reading)
     return [] if labels is None else [effort.reading(reading.candidates, labels)]
 
 
@@ -160,13 +160,6 @@ def _turned_over(reading: Reading, effort: Effort) -> Reading:
 def _repaired(reading: Reading, effort: Effort) -> Reading:
     """Turn labels over as the misfit asks for it."""
     best = _leaps(reading, effort)
-    for _ in range(_AGAIN):
-        if best.fits or effort.spent:
-            break
-        again = [_leaps(other, effort) for other in _relaxed(best, effort)]
-        if not again or not again[0].size < best.size:
-            break
-        best = again[0]
     return best if best.fits else _descent(best, effort)
 
 
