@@ -206,6 +206,8 @@ def solved(normal: sp.csr_array, rhs: NDArray) -> NDArray[np.float64]:
     SolverError
         If that breaks down.
     """
+    if not (np.isfinite(normal.data).all() and np.isfinite(rhs).all()):
+        raise SolverError("normal equations are not finite")
     upper = sp.triu(normal, format="csr")
     upper.sort_indices()
     matrix = UpperTriangle(upper.data, upper.indices, upper.indptr)
