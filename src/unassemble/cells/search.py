@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,9 @@ from .candidates import Candidates
 from .crosses import Crosses
 from .effort import Effort
 from .evidence import label_changes
+from .mending import mended
 from .proposals import proposals
 from .reading import Reading
-from .relaxation import relaxed
 
 _log = logging.getLogger(__name__)
 
@@ -28,10 +29,28 @@ _BEGUN = 1000  # vertices up to which all drawings are begun with before one is 
 _DRAWINGS = 3  # that a graph may have, about
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
-_RELAXED = 20_000  # vertices up to which labels are relaxed
+_MENDED = 20_000  # vertices up to which labels are relaxed and exchanged
 _WIDE = 20  # vertices of the largest piece below which trying labels one by one is as good
-_RELAXING = 10  # solves that a relaxation is worth
-_AGAIN = 2  # times that a reading is relaxed anew
+_MENDING = 20  # solves that this is worth
+
+
+@dataclass(frozen=True)
+class Begun:
+    """What one drawing begins with.
+
+    Attributes
+    ----------
+    starts : list of Reading
+        Worth repairing, the best first.
+    likeliest : Reading or None
+        What the angles suggest, where that makes planar surfaces.
+    settled : bool
+        Whether the first start is the answer: it fits, or none will.
+    """
+
+    starts: list[Reading]
+    likeliest: Reading | None = None
+    settled: bool = False
 
 
 def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = None) -> Reading | None:
@@ -61,12 +80,12 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
     for some in [drawings] if together else ([drawing] for drawing in drawings):
         begun = []
         for drawing in some:
-            starts, settled = _begun(drawing, effort, int(turning * effort.solves))
-            if settled:
-                return starts[0] if starts[0].fits else _better(best, starts[0])
-            begun.append(starts)
-        for starts in begun:
-            best = _finished(best, starts, effort)
+            begun.append(_begun(drawing, effort, int(turning * effort.solves)))
+            if begun[-1].settled:
+                first = begun[-1].starts[0]
+                return first if first.fits else _better(best, first)
+        for one in begun:
+            best = _finished(best, one, effort)
             if best is not None and (best.fits or best.like_noise):
                 return best
     return best if best is not None and best.pieces else None
@@ -74,7 +93,7 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
 
 def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Iterator[Candidates]:
     """What may be cells in each drawing; first in one about the vertices that their numbers make crosses."""
-    if n <= _RELAXED:
+    if n <= _MENDED:
         crosses = Crosses.of(n, edges, weights, scale)
         drawing = drawing_with_corners(n, edges, crosses.wedges) if crosses.unique.any() else None
         if drawing is not None:
@@ -83,30 +102,32 @@ def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> 
         yield Candidates.of(drawing, weights, scale)
 
 
-def _begun(candidates: Candidates, effort: Effort, turns: int) -> tuple[list[Reading], bool]:
-    """Starts in one drawing that are worth repairing; and whether the first settles it, since it fits or none will."""
+def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
+    """Starts in one drawing, at no more than so many solves for turning its parts over."""
     starts = []
     for labels in candidates.starts():
         starts.append(effort.reading(candidates, labels))
         if starts[-1].fits:
-            return starts[-1:], True
+            return Begun(starts[-1:], settled=True)
     if starts and _entries_are_to_blame(starts[0]):
-        return starts[:1], True
+        return Begun(starts[:1], settled=True)
+    likeliest = next((start for start in starts if start.pieces), None)
     starts = sorted(starts, key=lambda reading: reading.size)[:_STARTS]
     for k, start in enumerate(starts):
         starts[k] = _turned_over(start, effort, turns // len(starts))
         if starts[k].fits:
-            return [starts[k]], True
-    return starts, False
+            return Begun([starts[k]], settled=True)
+    return Begun(starts, likeliest)
 
 
-def _finished(best: Reading | None, starts: list[Reading], effort: Effort) -> Reading | None:
+def _finished(best: Reading | None, begun: Begun, effort: Effort) -> Reading | None:
     """The best of what repairs make of the starts in one drawing, and of a former one."""
-    if starts and not starts[0].like_noise:
-        candidates = starts[0].candidates
+    starts = list(begun.starts)
+    if begun.likeliest is not None and not starts[0].like_noise:
+        candidates = begun.likeliest.candidates
         triangles = 2 * (candidates.first & (candidates.size == 3)).sum() > candidates.first.sum()
         place = 0 if candidates.n_vertices >= _FEW and triangles else len(starts)
-        starts[place:place] = _relaxed(starts[0], effort)
+        starts[place:place] = _mended(begun.likeliest, effort)
     for number, start in enumerate(starts):
         share = effort.share(_FIRST if number == 0 and len(starts) > 1 else 1 / (len(starts) - number))
         best = _better(best, start if start.like_noise else _repaired(start, share))
@@ -156,13 +177,13 @@ def _entries_are_to_blame(reading: Reading) -> bool:
     return float(np.nan_to_num(np.abs(label_changes(reading))).max(initial=0.0)) < _SUSPECT
 
 
-def _relaxed(reading: Reading, effort: Effort) -> list[Reading]:
+def _mended(reading: Reading, effort: Effort) -> list[Reading]:
     """A better reading to begin with, or none."""
     n = reading.candidates.n_vertices
-    if not reading.pieces or n > _RELAXED or max(piece.n_vertices for piece in reading.pieces) < _WIDE:
+    if not reading.pieces or n > _MENDED or max(piece.n_vertices for piece in reading.pieces) < _WIDE:
         return []
-    effort.solves -= _RELAXING
-    labels = relaxed(reading)
+    effort.solves -= _MENDING
+    labels = mended(reading)
     return [] if labels is None else [effort.reading(reading.candidates, labels)]
 
 
@@ -180,13 +201,6 @@ def _turned_over(reading: Reading, effort: Effort, solves: int) -> Reading:
 def _repaired(reading: Reading, effort: Effort) -> Reading:
     """Turn labels over as the misfit asks for it."""
     best = _leaps(reading, effort)
-    for _ in range(_AGAIN):
-        if best.fits or effort.spent:
-            break
-        again = [_leaps(other, effort) for other in _relaxed(best, effort)]
-        if not again or not again[0].size < best.size:
-            break
-        best = again[0]
     return best if best.fits else _descent(best, effort)
 
 

@@ -11,11 +11,13 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 from scipy.sparse.linalg import lsqr
 
 from ..topology import Topology
+from .images import growing_images
 
 _CLOSED = 1e-6  # distance at shared vertices, relative to the largest piece, below which rings count as closed
 _MOST_IMAGES = 100  # pieces; above, mirror images are left as they are
 _FEW, _SOME = 9, 24  # pieces of which several, or two, are turned over at once
 _MOST_TOGETHER = 4
+_TRIED = 4  # choices of images
 _DENSE = 500  # pieces; above, an iterative least-squares solution
 
 
@@ -80,13 +82,16 @@ def gap(topology: Topology, positions: list[NDArray]) -> float:
 
 
 def _matching_images(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> list[NDArray]:
-    """Mirror images of pieces in rings that let these close, found by turning over one piece after the other.
+    """Mirror images of pieces in rings that let these close.
 
-    Where that ends, two at once are tried, and of few pieces more.
+    Where they are not found piece by piece, one after the other is turned over as long as that lowers the gap, then two
+    at once are tried, and of few pieces more.
     """
     if _rings(topology) <= 0 or len(positions) > _MOST_IMAGES:
         return positions
     best = _joined(topology, positions, held)[1]
+    if best > _CLOSED:
+        positions, best = _grown(topology, positions, held, best)
     free = np.flatnonzero(~held).tolist()
     most = _MOST_TOGETHER if len(free) <= _FEW else 2 if len(free) <= _SOME else 1
     together = 1
@@ -101,6 +106,23 @@ def _matching_images(topology: Topology, positions: list[NDArray], held: NDArray
         else:
             together += 1
     return positions
+
+
+def _grown(
+    topology: Topology, positions: list[NDArray], held: NDArray[np.bool_], gap: float
+) -> tuple[list[NDArray], float]:
+    """Images that close all rings, and what gap they leave; the same positions if there are none."""
+    shared = [np.flatnonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces]
+    vertices = [piece.vertices[s] for piece, s in zip(topology.pieces, shared, strict=True)]
+    for turned in growing_images(vertices, [z[s] for z, s in zip(positions, shared, strict=True)], _CLOSED)[:_TRIED]:
+        # Held pieces stay: what is turned over is the other pieces of their group.
+        group = groups(topology)
+        away = np.isin(group, group[held & turned]) ^ turned
+        trial = [np.conj(z) if over else z for z, over in zip(positions, away, strict=True)]
+        left = _joined(topology, trial, held)[1]
+        if left <= _CLOSED:
+            return trial, left
+    return positions, gap
 
 
 def _rings(topology: Topology) -> int:

@@ -1,0 +1,214 @@
+"""The last wrong labels, cluster by cluster.
+
+Where most labels are right the others lie in small clusters, often a hole and a cell that have changed places, and
+the misfit of :mod:`unassemble.cells.fitting` stays near them. Labels there are turned over, one, two, or up to four at
+a time, and tried in their neighbourhood; where that ends, the labels around the misfit are made fractional again.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecoveryError, SolverError
+from .fitting import Fitted, cost, fitted
+from .neighbourhood import Neighbourhoods, Trial
+from .relaxation import Aim, Path, central_path
+from .sheet import Placed, Sheet
+
+_log = logging.getLogger(__name__)
+
+SETTLED = 1e-5
+"""Cost of labels that explain everything."""
+_SUSPECTS = 60  # cells, or this part of all of them, that are turned over in a round
+_SHARE = 0.05
+_FAINT = 0.1  # misfit about a suspect, relative to the largest, below which it waits for a later round
+_CLEAR, _WORTH = 0.3, 0.02  # gain, relative to the best and to the cost, of what is turned over along with the best
+_PLACES, _BREADTH, _DEPTH = 3, 24, 4
+_PROGRESS, _QUICK = 0.99, 0.9
+_COLD, _SURE = 5.0, 1e-3  # price of a change, and distance from a whole label, of labels far from the misfit
+
+
+@dataclass(frozen=True)
+class _Reopening:
+    """Labels near misfits above a part of the largest, and what they start from on a path."""
+
+    above: float
+    rings: int
+    strength: float
+    path: Path
+
+
+_WARM = Path(first=0.05, last=1e-3, factor=0.7, slack=0.01, mapped_above=np.inf)
+_REOPENINGS = (
+    _Reopening(0.3, 0, 0.7, _WARM),
+    _Reopening(0.1, 0, 0.7, _WARM),
+    _Reopening(0.1, 1, 0.5, Path(first=0.2, last=1e-3, factor=0.7, slack=0.01, mapped_above=np.inf)),
+)
+
+
+class Exchange:
+    """Turns labels over until none are wrong, or no change helps.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    usual : (cells,) bool
+        Labels to which reopened ones are drawn.
+    trials : int
+        How many may be made.
+    """
+
+    def __init__(self, sheet: Sheet, usual: NDArray[np.bool_], trials: int):
+        self._sheet = sheet
+        self._usual = usual[sheet.chosen].astype(np.float64)
+        self._near = Neighbourhoods(sheet)
+        self.left = trials
+
+    def settled(self, fit: Fitted, *, deep: bool = False) -> Fitted:
+        """The labels that explain most; with a beam search, if `deep`, where nothing else helps."""
+        moves: list[Callable[[Fitted], Fitted]] = [
+            *(partial(self._reopened, how=how) for how in _REOPENINGS),
+            self._redrawn,
+        ]
+        if deep:
+            moves.append(self._deep)
+        fit, turn = self._rounds(fit), 0
+        while fit.cost > SETTLED and turn < len(moves) and self.left > 0:
+            other = self._rounds(moves[turn](fit))
+            _log.debug("cost %.3g, then %.3g, %d trials left", fit.cost, other.cost, self.left)
+            fit, turn = (other, 0) if other.cost < _PROGRESS * fit.cost else (fit, turn + 1)
+        return fit
+
+    def _rounds(self, fit: Fitted) -> Fitted:
+        while fit.cost > SETTLED and self.left > 0:
+            other = self._pairs(fit)
+            slow = not other.cost < _QUICK * fit.cost
+            _log.debug("round: cost %.3g, then %.3g, %d trials left", fit.cost, other.cost, self.left)
+            fit = other
+            if slow:
+                break
+        return fit
+
+    def _pairs(self, fit: Fitted) -> Fitted:
+        """Single labels, and pairs of a cell and a hole that touch, in the places of greatest misfit."""
+        suspects = self._suspects(fit)
+        touching = self._near.touching
+        pairs: set[tuple[int, ...]] = {(k,) for k in suspects}
+        for k in suspects:
+            others = touching.indices[touching.indptr[k] : touching.indptr[k + 1]]
+            pairs.update((min(k, j), max(k, j)) for j in others.tolist() if fit.labels[j] != fit.labels[k])
+        return self._taken(fit, self._tried(fit, sorted(pairs)))
+
+    def _suspects(self, fit: Fitted) -> list[int]:
+        sheet = self._sheet
+        at_vertex = np.bincount(sheet.edges.ravel(), np.repeat(cost(fit.misfit), 2), sheet.n_vertices)
+        score = np.bincount(np.repeat(sheet.cell, 3), at_vertex[sheet.triangles].ravel(), sheet.candidates.count)
+        most = max(_SUSPECTS, int(_SHARE * sheet.chosen.sum()))
+        order = np.argsort(-score, kind="stable")[:most]
+        return [int(k) for k in order[sheet.chosen[order] & (score[order] > _FAINT * score.max())]]
+
+    def _tried(self, fit: Fitted, moves: Iterable[tuple[int, ...]], *, wide: bool = False) -> list[Trial]:
+        """All moves, the best first."""
+        trials = []
+        for cells in dict.fromkeys(self._near.with_rivals(fit.labels, cells) for cells in moves):
+            if self.left <= 0:
+                break
+            self.left -= 1
+            trials.append(self._near.trial(fit, cells, rings=2 if wide else 1, redrawn=wide))
+        return sorted(trials, key=lambda trial: -trial.gain)
+
+    def _taken(self, fit: Fitted, trials: list[Trial]) -> Fitted:
+        """The best trials that do not touch each other, all together; or the best one alone."""
+        if not trials or trials[0].gain <= 0:
+            return fit
+        least = max(_CLEAR * trials[0].gain, _WORTH * fit.cost)
+        together: list[Trial] = []
+        used = np.zeros(self._sheet.n_vertices, dtype=bool)
+        for trial in trials:
+            if (trial.gain >= least or not together) and not used[trial.vertices].any():
+                used[trial.vertices] = True
+                together.append(trial)
+        for some in (together, together[:1]):
+            labels, z = fit.labels.copy(), fit.placed.z.copy()
+            for trial in some:
+                labels[list(trial.cells)] ^= True
+                z[trial.vertices] = trial.z
+            other = fitted(self._sheet, labels, Placed(z, fit.placed.c))
+            if other.cost < fit.cost:
+                return other
+        return fit
+
+    def _reopened(self, fit: Fitted, how: _Reopening) -> Fitted:
+        """Labels around the misfit fractional again, the others nearly fixed."""
+        sheet = self._sheet
+        size = np.abs(fit.misfit)
+        at = np.zeros(sheet.n_vertices, dtype=bool)
+        at[sheet.edges[size > how.above * min(float(size.max()), 0.3)]] = True
+        for _ in range(how.rings):
+            at = self._near.next_vertex @ at > 0
+        near = np.zeros(sheet.candidates.count, dtype=bool)
+        near[sheet.cell[at[sheet.triangles].any(axis=1)]] = True
+        opened = near[sheet.chosen]
+        labels = np.where(opened, self._usual, fit.labels[sheet.chosen])
+        distance = np.where(opened, 1 - how.strength, _SURE)
+        strength = np.zeros(sheet.candidates.count)
+        strength[sheet.chosen] = np.abs(labels - distance)
+        aim = Aim(labels, np.where(opened, 1.0, _COLD))
+        try:
+            strength, placed = central_path(sheet, aim, strength, fit.placed, how.path)
+        except SolverError:
+            return fit
+        return fitted(sheet, strength > 0.5, placed)
+
+    def _redrawn(self, fit: Fitted) -> Fitted:
+        """The same labels, fitted from the conformal map: a fit may be caught where a triangle is flat."""
+        try:
+            placed = self._sheet.mapped(fit.labels.astype(np.float64), fit.placed)
+        except RecoveryError:
+            return fit
+        other = fitted(self._sheet, fit.labels, placed)
+        return other if other.cost < fit.cost else fit
+
+    def _deep(self, fit: Fitted) -> Fitted:
+        """Up to four labels at once about the worst edges, by beam search."""
+        best = []
+        for cells in self._places(fit):
+            found: list[Trial] = []
+            level: list[tuple[int, ...]] = [()]
+            for _ in range(_DEPTH):
+                moves = sorted({tuple(sorted((*base, k))) for base in level for k in cells if k not in base})
+                trials = self._tried(fit, moves, wide=True)
+                found += trials[:1]
+                level = [trial.cells for trial in trials[:_BREADTH]]
+            best += sorted(found, key=lambda trial: -trial.gain)[:1]
+        return self._taken(fit, sorted(best, key=lambda trial: -trial.gain))
+
+    def _places(self, fit: Fitted) -> list[list[int]]:
+        """Candidates about the worst edges, each place once."""
+        sheet, near = self._sheet, self._near
+        used = np.zeros(sheet.n_vertices, dtype=bool)
+        places: list[list[int]] = []
+        for e in np.argsort(-np.abs(fit.misfit)).tolist():
+            if len(places) == _PLACES:
+                break
+            if used[sheet.edges[e]].any():
+                continue
+            facing = near.facing_edge.indices[near.facing_edge.indptr[e] : near.facing_edge.indptr[e + 1]]
+            corners = np.unique(sheet.triangles[facing])
+            around = np.unique(
+                np.concatenate(
+                    [
+                        near.around_vertex.indices[near.around_vertex.indptr[v] : near.around_vertex.indptr[v + 1]]
+                        for v in corners.tolist()
+                    ]
+                )
+            )
+            used[sheet.triangles[around]] = True
+            places.append(np.unique(sheet.cell[around]).tolist())
+        return places
