@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from .certificate import largest_force
 from .equations import Equations, equations
 from .members import members_and_cells
 from .nodes import Nodes, nodes_of
+from .pieces import pieces
 from .positions import positions
 from .recognise import StructuralNumbering
 
@@ -68,8 +70,10 @@ def serve_structure(
     nodes = nodes_of(whole, layout, node, direction)
     valid = nodes.whole()
     with clock("solve"), blas_threads(1):
-        found, springs = _best(nodes, valid)
-    points, component, evidence, notes = found
+        found = _best(nodes, valid)
+    points, component, evidence, notes, springs = (
+        found.points, found.component, found.evidence, found.notes, found.springs
+    )  # fmt: skip
     with clock("certify"):
         if springs:
             valid[:, len(layout.displacements) :] = False
@@ -93,7 +97,7 @@ def serve_structure(
         notes.append(f"{loose.sum()} of {count_of(nodes.n, 'node')} cannot be determined: at supports, or tied to "
                      "these only")  # fmt: skip
     points, more = _moved(points, component, known)
-    status, reason = _verdict(error, evidence, layout.dim, rounding)
+    status, reason = _verdict(error, found, layout.dim, rounding)
     return Recovery(
         **fields,
         points=points,
@@ -117,60 +121,83 @@ def serve_structure(
     )
 
 
-_Found = tuple[NDArray[np.float64], NDArray[np.int64], tuple[Evidence, ...], list[str]]
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Positions of the nodes of all pieces.
+
+    Attributes
+    ----------
+    points : (n, d) float64
+        NaN where not determined.
+    component : (n,) int64
+        Piece of each node, -1 where not determined.
+    evidence : tuple of Evidence
+        One per piece.
+    unchecked : int
+        See :class:`.positions.Positions`.
+    notes : list of str
+    springs : bool
+        Whether only equations were used that springs between rotations and the ground leave alone.
+    """
+
+    points: NDArray[np.float64]
+    component: NDArray[np.int64]
+    evidence: tuple[Evidence, ...]
+    unchecked: int
+    notes: list[str]
+    springs: bool
+
+    @property
+    def doubts(self) -> tuple[bool, bool, bool, float]:
+        """What speaks against these positions, the gravest first."""
+        worst = max(one.residual for one in self.evidence)
+        free = any(one.null_dimension > self.points.shape[1] for one in self.evidence)
+        return worst > CERTIFIED, free, self.unchecked > 0, worst
 
 
-def _best(nodes: Nodes, valid: NDArray[np.bool_]) -> tuple[_Found, bool]:
-    """Positions from all rows; where these contradict each other, without what springs to the ground may spoil."""
-    attempts: list[tuple[_Found, bool]] = []
+def _best(nodes: Nodes, valid: NDArray[np.bool_]) -> Placed:
+    """Positions from all rows; where these contradict or do not check each other, from those that no spring spoils."""
+    attempts: list[Placed] = []
     failure: RecoveryError | None = None
     for springs in (False, True):
         try:
-            found = _pieces(nodes, equations(nodes, valid, springs=springs))
+            attempts.append(_placed(nodes, equations(nodes, valid, springs=springs), springs))
         except RecoveryError as error:
             failure = failure or error
             continue
-        attempts.append((found, springs))
-        if all(one.residual <= CERTIFIED for one in found[2]):
+        if not any(attempts[-1].doubts[:3]):
             break
     if not attempts:
         raise failure or GeometryError("no row annihilates translations: no node has a valid equation")
-    return min(attempts, key=lambda one: max(part.residual for part in one[0][2]))
+    return min(attempts, key=lambda one: one.doubts)
 
 
-def _pieces(nodes: Nodes, given: Equations) -> _Found:
+def _placed(nodes: Nodes, given: Equations, springs: bool) -> Placed:
     """Positions piece by piece."""
     d = nodes.layout.dim
-    node = given.operator.indices // d
-    row = np.repeat(np.arange(len(given.right)), np.diff(given.operator.indptr))
-    link = sp.csr_array((np.ones(len(node)), (row, node)), shape=(len(given.right), nodes.n))
-    _, label = sp.csgraph.connected_components(sp.csr_array(link.T @ link), directed=False)
-    touched = np.bincount(node, minlength=nodes.n) > 0
     points, component = np.full((nodes.n, d), np.nan), np.full(nodes.n, -1)
     evidence: list[Evidence] = []
     notes: list[str] = []
+    unchecked = 0
     failure: GeometryError | None = None
-    for piece in np.unique(label[touched]):
-        body = np.flatnonzero((label == piece) & touched)
-        rows = np.flatnonzero(np.diff(link.indptr) > 0)
-        rows = rows[label[link.indices[link.indptr[rows]]] == piece]
-        columns = (body[:, None] * d + np.arange(d)).ravel()
-        part = Equations(sp.csr_array(given.operator[rows][:, columns]), given.right[rows])
-        edges = np.column_stack(sp.triu(nodes.graph[body][:, body], 1).nonzero())
+    edges = np.column_stack(sp.triu(nodes.graph, 1).nonzero())
+    for piece in pieces(given.operator, d, edges):
+        part = Equations(piece.operator, given.right[piece.rows], given.trusting[piece.rows])
         try:
-            one = positions(part, d, edges)
+            one = positions(part, d, piece.edges)
         except GeometryError as error:
             failure = failure or error
-            notes.append(f"the piece with node {body[0]}: {error}")
+            notes.append(f"the piece with node {piece.nodes[0]}: {error}")
             continue
-        points[body] = one.points
-        component[body[determined(one.points)]] = len(evidence)
-        evidence.append(Evidence(one.dimension, one.residual, one.gap, len(rows)))
+        points[piece.nodes] = one.points
+        component[piece.nodes[determined(one.points)]] = len(evidence)
+        unchecked += one.unchecked
+        evidence.append(Evidence(one.dimension, one.residual, one.gap, len(piece.rows)))
     if not evidence:
         raise failure or GeometryError(
             "no row annihilates translations and couples to no support: no node has a valid equation"
         )
-    return points, component, tuple(evidence), notes
+    return Placed(points, component, tuple(evidence), unchecked, notes, springs)
 
 
 def _moved(
@@ -193,7 +220,8 @@ def _moved(
     return points, notes
 
 
-def _verdict(error: float, evidence: tuple[Evidence, ...], d: int, rounding: float) -> tuple[str, str]:
+def _verdict(error: float, found: Placed, d: int, rounding: float) -> tuple[str, str]:
+    evidence = found.evidence
     free = [one.null_dimension for one in evidence if one.null_dimension > d]
     if free:
         return "uncertified", (
@@ -211,9 +239,15 @@ def _verdict(error: float, evidence: tuple[Evidence, ...], d: int, rounding: flo
             f"rigid rotations of the nodes cause forces of {error:.1e} of those that make them up, and another field, "
             f"no translation, only {loosest:.1e}: positions are known to about {error / loosest:.0e} of the size"
         )
-    if error > CERTIFIED:
+    if not error <= CERTIFIED:
         return "uncertified", (
             f"no positions make rigid rotations free of forces: the largest is {error:.1e} of those that make it up; "
             "the points are the best fit"
+        )
+    if found.unchecked:
+        count = count_of(found.unchecked, "equation of moments has", "equations of moments have")
+        return "uncertified", (
+            f"{count} no other to check against, so that springs between rotations and the ground would go unnoticed: "
+            "supports leave too few whole rows"
         )
     return "certified", "rigid rotations of the nodes cause no forces, and only translations change nothing"

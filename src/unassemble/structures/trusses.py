@@ -26,6 +26,7 @@ from ..matrix import OperatorMatrix
 from ..recovery import Recovery
 from ..words import count_of
 from .bars import Bars
+from .pieces import pieces
 from .positions import null_fields
 
 CERTIFIED = 1e-9
@@ -126,21 +127,17 @@ def place_joints(bars: Bars, n: int) -> Truss:
     """
     d = bars.directions.shape[1]
     ends, directions = bars.ends[bars.known], bars.directions[bars.known]
-    graph = sp.csr_array((np.ones(len(ends)), ends.T), shape=(n, n))
-    graph = sp.csr_array(graph + graph.T)
-    _, label = sp.csgraph.connected_components(graph, directed=False)
     points, component = np.full((n, d), np.nan), np.full(n, -1)
     evidence: list[Evidence] = []
     freedoms, warnings = [], []
     failure: GeometryError | None = None
-    for piece in np.flatnonzero(np.bincount(label) > 1):
-        body = np.flatnonzero(label == piece)
-        inside = np.flatnonzero(label[ends[:, 0]] == piece)
-        operator = _across(np.searchsorted(body, ends[inside]), directions[inside], len(body))
-        links = graph[body][:, body]
+    for piece in pieces(_across(ends, directions, n), d, ends):
+        body, order = piece.nodes, len(piece.nodes)
+        links = sp.csr_array((np.ones(len(piece.edges)), piece.edges.T), shape=(order, order))
+        links = sp.csr_array(links + links.T)
         try:
-            fields, values = null_fields(operator, d)
-            one = shape(fields, values, links, np.zeros(len(body), dtype=bool))
+            fields, values = null_fields(piece.operator, d)
+            one = shape(fields, values, links, np.zeros(order, dtype=bool))
         except GeometryError as error:
             failure = failure or error
             warnings.append(f"the piece with node {body[0]}: {error}")
@@ -149,7 +146,7 @@ def place_joints(bars: Bars, n: int) -> Truss:
         component[body[~one.loose]] = len(evidence)
         gap = values[values > EXACT]
         evidence.append(
-            Evidence(one.dimension, float(values[d]), float(gap[0]) if len(gap) else float("inf"), len(inside))
+            Evidence(one.dimension, float(values[d]), float(gap[0]) if len(gap) else float("inf"), len(piece.edges))
         )
         freedoms.append(one.freedom)
     if not evidence:
