@@ -68,13 +68,13 @@ def serve_structure(
     known = checked_anchors(anchors, node, layout.dim)
     whole, rounding = with_exact_sums(matrix.csr())
     nodes = nodes_of(whole, layout, node, direction)
-    valid = nodes.whole()
     with clock("solve"), blas_threads(1):
-        found = _best(nodes, valid)
+        found = _best(nodes)
     points, component, evidence, notes, springs = (
         found.points, found.component, found.evidence, found.notes, found.springs
     )  # fmt: skip
     with clock("certify"):
+        valid = nodes.whole(strict=found.strict)
         if springs:
             valid[:, len(layout.displacements) :] = False
         counted = np.zeros((len(node), len(layout.rotations)), dtype=bool)
@@ -138,6 +138,8 @@ class Placed:
     notes : list of str
     springs : bool
         Whether only equations were used that springs between rotations and the ground leave alone.
+    strict : bool
+        Whether only equations were used that no support can have spoiled; see :meth:`.nodes.Nodes.whole`.
     """
 
     points: NDArray[np.float64]
@@ -146,33 +148,39 @@ class Placed:
     unchecked: int
     notes: list[str]
     springs: bool
+    strict: bool
 
     @property
     def doubts(self) -> tuple[bool, bool, bool, float]:
         """What speaks against these positions, the gravest first."""
         worst = max(one.residual for one in self.evidence)
         free = any(one.null_dimension > self.points.shape[1] for one in self.evidence)
-        return worst > CERTIFIED, free, self.unchecked > 0, worst
+        return worst > CERTIFIED, free, self.unchecked > 0 or not self.strict, worst
 
 
-def _best(nodes: Nodes, valid: NDArray[np.bool_]) -> Placed:
-    """Positions from all rows; where these contradict or do not check each other, from those that no spring spoils."""
+def _best(nodes: Nodes) -> Placed:
+    """Positions from all rows; where these contradict or do not check each other, from those that no spring spoils.
+
+    Where supports leave too few of either, from rows that supports may have spoiled.
+    """
     attempts: list[Placed] = []
     failure: RecoveryError | None = None
-    for springs in (False, True):
-        try:
-            attempts.append(_placed(nodes, equations(nodes, valid, springs=springs), springs))
-        except RecoveryError as error:
-            failure = failure or error
-            continue
-        if not any(attempts[-1].doubts[:3]):
-            break
+    for strict in (True, False):
+        valid = nodes.whole(strict=strict)
+        for springs in (False, True):
+            try:
+                attempts.append(_placed(nodes, equations(nodes, valid, springs=springs), springs, strict))
+            except RecoveryError as error:
+                failure = failure or error
+                continue
+            if not any(attempts[-1].doubts[:3]):
+                return attempts[-1]
     if not attempts:
         raise failure or GeometryError("no row annihilates translations: no node has a valid equation")
     return min(attempts, key=lambda one: one.doubts)
 
 
-def _placed(nodes: Nodes, given: Equations, springs: bool) -> Placed:
+def _placed(nodes: Nodes, given: Equations, springs: bool, strict: bool) -> Placed:
     """Positions piece by piece."""
     d = nodes.layout.dim
     points, component = np.full((nodes.n, d), np.nan), np.full(nodes.n, -1)
@@ -197,7 +205,7 @@ def _placed(nodes: Nodes, given: Equations, springs: bool) -> Placed:
         raise failure or GeometryError(
             "no row annihilates translations and couples to no support: no node has a valid equation"
         )
-    return Placed(points, component, tuple(evidence), unchecked, notes, springs)
+    return Placed(points, component, tuple(evidence), unchecked, notes, springs, strict)
 
 
 def _moved(
@@ -249,5 +257,10 @@ def _verdict(error: float, found: Placed, d: int, rounding: float) -> tuple[str,
         return "uncertified", (
             f"{count} no other to check against, so that springs between rotations and the ground would go unnoticed: "
             "supports leave too few whole rows"
+        )
+    if not found.strict:
+        return "uncertified", (
+            "rigid rotations of the nodes cause no forces, but without moments of nodes next to supports too few rows "
+            "are left, and supports may resist the rotations of these nodes"
         )
     return "certified", "rigid rotations of the nodes cause no forces, and only translations change nothing"

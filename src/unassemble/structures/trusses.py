@@ -30,6 +30,7 @@ from .pieces import pieces
 from .positions import null_fields
 
 CERTIFIED = 1e-9
+_SURE = 1e-6  # of the diameter: how far off the points of a certified truss may be
 
 
 def serve_truss(
@@ -63,12 +64,7 @@ def serve_truss(
                      "leave them room")  # fmt: skip
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: the point reflection of a truss has the same matrix")
-    free = [name for name in found.freedoms if name]
-    status, reason = "certified", "bars along these directions re-assemble to the matrix, and these determine the nodes"
-    if free:
-        status, reason = "uncertified", "the directions of the bars leave more free than translations and size"
-    elif error > CERTIFIED:
-        status, reason = "uncertified", f"a block differs from that of a bar by {error:.1e} of the row's largest entry"
+    status, reason = _verdict(error, found)
     return Recovery(
         points=points,
         triangles=np.empty((0, 3), np.int64),
@@ -91,6 +87,21 @@ def serve_truss(
         choice=choice,
         evidence=found.evidence,
     )
+
+
+def _verdict(error: float, found: Truss) -> tuple[str, str]:
+    if any(found.freedoms):
+        return "uncertified", "the directions of the bars leave more free than translations and size"
+    if not error <= CERTIFIED:
+        return "uncertified", f"a block differs from that of a bar by {error:.1e} of the row's largest entry"
+    worst = max(found.evidence, key=lambda one: one.residual / one.gap)
+    if worst.residual > _SURE * worst.gap:
+        return "uncertified", (
+            f"the directions of the bars contradict each other by {worst.residual:.1e}, and a field that is neither "
+            f"translation nor enlargement does so only by {worst.gap:.1e}: positions are known to about "
+            f"{worst.residual / worst.gap:.0e} of the size"
+        )
+    return "certified", "bars along these directions re-assemble to the matrix, and these determine the nodes"
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,14 +176,18 @@ def _across(ends: NDArray[np.int64], directions: NDArray[np.float64], n: int) ->
 def largest_misfit(nodal: NodalMatrix, points: NDArray[np.float64]) -> float:
     """Largest entry that is left of a block once the bar between the given points is taken away.
 
-    Relative to the largest off-diagonal entry of the node's rows; pairs with undetermined nodes do not count.
+    Relative to the largest off-diagonal entry of the node's rows; pairs with undetermined nodes do not count. Infinite
+    where both ends of a bar lie in one point.
     """
     known = determined(points)
     i, j = nodal.node, nodal.indices
     off = (i != j) & known[i] & known[j]
     blocks, i, j = nodal.data[off], i[off], j[off]
     along = points[i] - points[j]
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    if (length == 0).any():
+        return float("inf")  # a bar without length has no direction
+    along /= length
     present = nodal.row_of >= 0
     bar = along[:, :, None] * along[:, None, :] * (present[i][:, :, None] & present[j][:, None, :])
     weight = (bar * bar).sum(axis=(1, 2))
