@@ -3,32 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..clock import Clock
 from ..elasticity.anchoring import checked_anchors
 from ..elasticity.nodal import determined
-from ..elasticity.results import Evidence
 from ..elasticity.rounded import with_exact_sums
-from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..recovery import Recovery
 from ..words import count_of
 from .certificate import largest_force
-from .equations import Equations, equations
 from .members import members_and_cells
-from .nodes import Nodes, nodes_of
-from .pieces import pieces
-from .positions import positions
+from .nodes import nodes_of
+from .placed import CERTIFIED, Placed, best_positions
 from .recognise import StructuralNumbering
 
-CERTIFIED = 1e-9
 _SPREADS = 20  # times the rounding of the entries: what a sum of forces may be off by
 _SURE = 1e-6  # of the diameter: how far off the points of a certified structure may be
 
@@ -69,7 +62,7 @@ def serve_structure(
     whole, rounding = with_exact_sums(matrix.csr())
     nodes = nodes_of(whole, layout, node, direction)
     with clock("solve"), blas_threads(1):
-        found = _best(nodes)
+        found = best_positions(nodes)
     points, component, evidence, notes, springs = (
         found.points, found.component, found.evidence, found.notes, found.springs
     )  # fmt: skip
@@ -119,93 +112,6 @@ def serve_structure(
         choice=choice,
         evidence=evidence,
     )
-
-
-@dataclass(frozen=True, eq=False)
-class Placed:
-    """Positions of the nodes of all pieces.
-
-    Attributes
-    ----------
-    points : (n, d) float64
-        NaN where not determined.
-    component : (n,) int64
-        Piece of each node, -1 where not determined.
-    evidence : tuple of Evidence
-        One per piece.
-    unchecked : int
-        See :class:`.positions.Positions`.
-    notes : list of str
-    springs : bool
-        Whether only equations were used that springs between rotations and the ground leave alone.
-    strict : bool
-        Whether only equations were used that no support can have spoiled; see :meth:`.nodes.Nodes.whole`.
-    """
-
-    points: NDArray[np.float64]
-    component: NDArray[np.int64]
-    evidence: tuple[Evidence, ...]
-    unchecked: int
-    notes: list[str]
-    springs: bool
-    strict: bool
-
-    @property
-    def doubts(self) -> tuple[bool, bool, bool, float]:
-        """What speaks against these positions, the gravest first."""
-        worst = max(one.residual for one in self.evidence)
-        free = any(one.null_dimension > self.points.shape[1] for one in self.evidence)
-        return worst > CERTIFIED, free, self.unchecked > 0 or not self.strict, worst
-
-
-def _best(nodes: Nodes) -> Placed:
-    """Positions from all rows; where these contradict or do not check each other, from those that no spring spoils.
-
-    Where supports leave too few of either, from rows that supports may have spoiled.
-    """
-    attempts: list[Placed] = []
-    failure: RecoveryError | None = None
-    for strict in (True, False):
-        valid = nodes.whole(strict=strict)
-        for springs in (False, True):
-            try:
-                attempts.append(_placed(nodes, equations(nodes, valid, springs=springs), springs, strict))
-            except RecoveryError as error:
-                failure = failure or error
-                continue
-            if not any(attempts[-1].doubts[:3]):
-                return attempts[-1]
-    if not attempts:
-        raise failure or GeometryError("no row annihilates translations: no node has a valid equation")
-    return min(attempts, key=lambda one: one.doubts)
-
-
-def _placed(nodes: Nodes, given: Equations, springs: bool, strict: bool) -> Placed:
-    """Positions piece by piece."""
-    d = nodes.layout.dim
-    points, component = np.full((nodes.n, d), np.nan), np.full(nodes.n, -1)
-    evidence: list[Evidence] = []
-    notes: list[str] = []
-    unchecked = 0
-    failure: GeometryError | None = None
-    edges = np.column_stack(sp.triu(nodes.graph, 1).nonzero())
-    for piece in pieces(given.operator, d, edges):
-        part = Equations(piece.operator, given.right[piece.rows], given.trusting[piece.rows])
-        try:
-            one = positions(part, d, piece.edges)
-        except GeometryError as error:
-            failure = failure or error
-            notes.append(f"the piece with node {piece.nodes[0]}: {error}")
-            continue
-        points[piece.nodes] = one.points
-        component[piece.nodes[determined(one.points)]] = len(evidence)
-        unchecked += one.unchecked
-        evidence.append(Evidence(one.dimension, one.residual, one.gap, len(piece.rows)))
-    if not evidence:
-        raise failure or GeometryError(
-            "no row annihilates translations and couples to no support: no node has a valid equation"
-        )
-    return Placed(points, component, tuple(evidence), unchecked, notes, springs, strict)
 
 
 def _moved(

@@ -93,13 +93,13 @@ class Nodes:
         return valid
 
     def _untouched(self, zero: NDArray[np.bool_], sound: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """(n, b) forces that do not depend on the translation along them, and moments of nodes that touch no support."""
+        """(n, b) forces that do not depend on the translation along them, and moments of nodes away from supports."""
         moves = len(self.layout.displacements)
         forces = range(moves)
         untouched = np.ones((self.n, self.layout.block_size), dtype=bool)
         untouched[:, :moves] = zero[:, forces, forces]
-        free = sound[:, :moves].all(axis=1) & zero[:, :moves, :moves].all(axis=(1, 2))
-        untouched[:, moves:] = free[:, None]
+        still = zero[:, :moves, :moves].reshape(self.n, -1)
+        untouched[:, moves:] = np.column_stack([still, sound[:, :moves]]).all(axis=1, keepdims=True)
         return untouched
 
     def _penalised(self) -> NDArray[np.bool_]:
