@@ -128,12 +128,15 @@ class Identities:
         return (self._stacked.T @ residual.reshape(-1, d * k)).reshape(-1, d, k)
 
     def normal_matrix(self) -> sp.bsr_array:
-        """(n d, n d) the normal matrix in blocks of d; blocks of zeros are missing."""
+        """(n d, n d) the normal matrix in blocks of d; those of zeros are missing, except on the diagonal."""
         d = self.dim
         gram = self._gram()
         q = self._boundary_part()
         product = q.T.tobsr(blocksize=(d, 2 * d)) @ q
         normal = (gram - product.tobsr(blocksize=(d, d))).tobsr((d, d))
+        if (np.abs(normal.diagonal()).reshape(-1, d).max(axis=1) == 0).any():  # a node in no equation
+            stored = sp.eye_array(normal.shape[0], format="csr") * np.finfo(float).tiny
+            normal = sp.csr_array(normal.tocsr() + stored).tobsr((d, d))
         normal.sort_indices()
         return normal
 

@@ -27,6 +27,7 @@ from .surface import boundary_loops
 from .unknowns import Numbering
 
 _LOST = 1e-11  # rounding errors of coordinates, in edge lengths; entries of flat elements have a hundred times as much
+_THIN = 1e-14  # of the largest variance of the coordinates: rounding
 _SAME = 1e-12  # relative difference up to which the matrices of two directions are one
 
 Scalar = Callable[[OperatorMatrix, Sequence[Any]], Recovery]
@@ -72,6 +73,8 @@ def serve(
     known = checked_anchors(anchors, found.node_of_row, numbering.block_size)
     points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
     status, reason = found.status, found.reason
+    if status == "certified" and _flat(found):
+        status, reason = "uncertified", "the points lie in one line or plane, and no solid body does"
     lost = digits_lost(points, found.points, found.component, factor) if len(known[0]) else 0.0
     if status == "certified" and lost > _LOST:
         status = "uncertified"
@@ -109,6 +112,17 @@ def serve(
         lame=lame,
         evidence=found.evidence,
     )
+
+
+def _flat(found: ElasticityRecovery) -> bool:
+    """Whether the nodes of a piece do not span space, so that no element there has a volume."""
+    d = found.points.shape[1]
+    for piece in range(len(found.evidence)):
+        x = found.points[found.component == piece]
+        spread = np.linalg.eigvalsh(np.cov(x.T, bias=True)) if len(x) > d else np.zeros(d)
+        if spread[0] <= _THIN * spread[-1]:
+            return True
+    return False
 
 
 _FIELD = {"triangle": "triangles", "quad": "quads", "tetra": "tetrahedra", "hexahedron": "hexahedra"}

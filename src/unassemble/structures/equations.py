@@ -30,10 +30,13 @@ class Equations:
     ----------
     operator : (m, n dim) sparse
     right : (m,) float64
+    trusting : (m,) bool
+        Equations of moments, which hold only if no spring ties the rotation to the ground.
     """
 
     operator: sp.csr_array
     right: NDArray[np.float64]
+    trusting: NDArray[np.bool_]
 
 
 def equations(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool) -> Equations:
@@ -53,16 +56,21 @@ def equations(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool) -> Equat
     b, moves = layout.block_size, len(layout.displacements)
     fields = [_rotation(nodes, k) for k in range(len(layout.rotations))]
     direction = np.arange(nodes.n * b) % b
-    parts = []
+    parts, trusting = [], []
     for k, field in enumerate(fields):
-        used = valid[:, :, k].ravel() & ((direction < moves) | (not springs))
-        parts.append(_relative(*_rows(field, used)))
+        for moments in (False,) if springs else (False, True):
+            used = valid[:, :, k].ravel() & ((direction >= moves) == moments)
+            parts.append(_relative(*_rows(field, used)))
+            trusting.append(np.full(len(parts[-1][1]), moments))
     for k, m in combinations(range(len(fields)), 2) if springs else ():
         both = np.flatnonzero(valid[:, moves + m, k] & valid[:, moves + k, m]) * b + moves
         one, other = _rows(fields[k], both + m), _rows(fields[m], both + k)
         parts.append(_relative(one[0] - other[0], one[1] - other[1], _size(one[0]) + _size(other[0])))
+        trusting.append(np.zeros(len(parts[-1][1]), dtype=bool))
     return Equations(
-        sp.vstack([operator for operator, _ in parts], format="csr"), np.concatenate([right for _, right in parts])
+        sp.vstack([operator for operator, _ in parts], format="csr"),
+        np.concatenate([right for _, right in parts]),
+        np.concatenate(trusting),
     )
 
 

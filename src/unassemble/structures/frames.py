@@ -6,27 +6,22 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..clock import Clock
 from ..elasticity.anchoring import checked_anchors
 from ..elasticity.nodal import determined
-from ..elasticity.results import Evidence
 from ..elasticity.rounded import with_exact_sums
-from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..recovery import Recovery
 from ..words import count_of
 from .certificate import largest_force
-from .equations import Equations, equations
 from .members import members_and_cells
-from .nodes import Nodes, nodes_of
-from .positions import positions
+from .nodes import nodes_of
+from .placed import CERTIFIED, Placed, best_positions
 from .recognise import StructuralNumbering
 
-CERTIFIED = 1e-9
 _SPREADS = 20  # times the rounding of the entries: what a sum of forces may be off by
 _SURE = 1e-6  # of the diameter: how far off the points of a certified structure may be
 
@@ -66,11 +61,13 @@ def serve_structure(
     known = checked_anchors(anchors, node, layout.dim)
     whole, rounding = with_exact_sums(matrix.csr())
     nodes = nodes_of(whole, layout, node, direction)
-    valid = nodes.whole()
     with clock("solve"), blas_threads(1):
-        found, springs = _best(nodes, valid)
-    points, component, evidence, notes = found
+        found = best_positions(nodes)
+    points, component, evidence, notes, springs = (
+        found.points, found.component, found.evidence, found.notes, found.springs
+    )  # fmt: skip
     with clock("certify"):
+        valid = nodes.whole(strict=found.strict)
         if springs:
             valid[:, len(layout.displacements) :] = False
         counted = np.zeros((len(node), len(layout.rotations)), dtype=bool)
@@ -93,7 +90,7 @@ def serve_structure(
         notes.append(f"{loose.sum()} of {count_of(nodes.n, 'node')} cannot be determined: at supports, or tied to "
                      "these only")  # fmt: skip
     points, more = _moved(points, component, known)
-    status, reason = _verdict(error, evidence, layout.dim, rounding)
+    status, reason = _verdict(error, found, layout.dim, rounding)
     return Recovery(
         **fields,
         points=points,
@@ -117,62 +114,6 @@ def serve_structure(
     )
 
 
-_Found = tuple[NDArray[np.float64], NDArray[np.int64], tuple[Evidence, ...], list[str]]
-
-
-def _best(nodes: Nodes, valid: NDArray[np.bool_]) -> tuple[_Found, bool]:
-    """Positions from all rows; where these contradict each other, without what springs to the ground may spoil."""
-    attempts: list[tuple[_Found, bool]] = []
-    failure: RecoveryError | None = None
-    for springs in (False, True):
-        try:
-            found = _pieces(nodes, equations(nodes, valid, springs=springs))
-        except RecoveryError as error:
-            failure = failure or error
-            continue
-        attempts.append((found, springs))
-        if all(one.residual <= CERTIFIED for one in found[2]):
-            break
-    if not attempts:
-        raise failure or GeometryError("no row annihilates translations: no node has a valid equation")
-    return min(attempts, key=lambda one: max(part.residual for part in one[0][2]))
-
-
-def _pieces(nodes: Nodes, given: Equations) -> _Found:
-    """Positions piece by piece."""
-    d = nodes.layout.dim
-    node = given.operator.indices // d
-    row = np.repeat(np.arange(len(given.right)), np.diff(given.operator.indptr))
-    link = sp.csr_array((np.ones(len(node)), (row, node)), shape=(len(given.right), nodes.n))
-    _, label = sp.csgraph.connected_components(sp.csr_array(link.T @ link), directed=False)
-    touched = np.bincount(node, minlength=nodes.n) > 0
-    points, component = np.full((nodes.n, d), np.nan), np.full(nodes.n, -1)
-    evidence: list[Evidence] = []
-    notes: list[str] = []
-    failure: GeometryError | None = None
-    for piece in np.unique(label[touched]):
-        body = np.flatnonzero((label == piece) & touched)
-        rows = np.flatnonzero(np.diff(link.indptr) > 0)
-        rows = rows[label[link.indices[link.indptr[rows]]] == piece]
-        columns = (body[:, None] * d + np.arange(d)).ravel()
-        part = Equations(sp.csr_array(given.operator[rows][:, columns]), given.right[rows])
-        edges = np.column_stack(sp.triu(nodes.graph[body][:, body], 1).nonzero())
-        try:
-            one = positions(part, d, edges)
-        except GeometryError as error:
-            failure = failure or error
-            notes.append(f"the piece with node {body[0]}: {error}")
-            continue
-        points[body] = one.points
-        component[body[determined(one.points)]] = len(evidence)
-        evidence.append(Evidence(one.dimension, one.residual, one.gap, len(rows)))
-    if not evidence:
-        raise failure or GeometryError(
-            "no row annihilates translations and couples to no support: no node has a valid equation"
-        )
-    return points, component, tuple(evidence), notes
-
-
 def _moved(
     points: NDArray[np.float64], component: NDArray[np.int64], anchors: tuple[NDArray, NDArray]
 ) -> tuple[NDArray[np.float64], list[str]]:
@@ -193,7 +134,8 @@ def _moved(
     return points, notes
 
 
-def _verdict(error: float, evidence: tuple[Evidence, ...], d: int, rounding: float) -> tuple[str, str]:
+def _verdict(error: float, found: Placed, d: int, rounding: float) -> tuple[str, str]:
+    evidence = found.evidence
     free = [one.null_dimension for one in evidence if one.null_dimension > d]
     if free:
         return "uncertified", (
@@ -211,9 +153,20 @@ def _verdict(error: float, evidence: tuple[Evidence, ...], d: int, rounding: flo
             f"rigid rotations of the nodes cause forces of {error:.1e} of those that make them up, and another field, "
             f"no translation, only {loosest:.1e}: positions are known to about {error / loosest:.0e} of the size"
         )
-    if error > CERTIFIED:
+    if not error <= CERTIFIED:
         return "uncertified", (
             f"no positions make rigid rotations free of forces: the largest is {error:.1e} of those that make it up; "
             "the points are the best fit"
+        )
+    if found.unchecked:
+        count = count_of(found.unchecked, "equation of moments has", "equations of moments have")
+        return "uncertified", (
+            f"{count} no other to check against, so that springs between rotations and the ground would go unnoticed: "
+            "supports leave too few whole rows"
+        )
+    if not found.strict:
+        return "uncertified", (
+            "rigid rotations of the nodes cause no forces, but without moments of nodes next to supports too few rows "
+            "are left, and supports may resist the rotations of these nodes"
         )
     return "certified", "rigid rotations of the nodes cause no forces, and only translations change nothing"

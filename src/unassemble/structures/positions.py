@@ -20,6 +20,8 @@ _STEPS = 3
 _REFINEMENTS = 30
 _SPARE = 6  # fields to look at beyond translations; doubled while all of them are null
 _MOST = 200
+_PROBES = 3
+_CHECKED = 1e-4  # how much of a disturbance of an equation has to be left in its residual for it to be noticed
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +38,16 @@ class Positions:
         Singular value of the best field that is no null field.
     residual : float
         Largest residual of an equation, relative to the largest coordinate difference along an edge.
+    unchecked : int
+        Equations of moments that no other equation contradicts, whatever their right-hand side: a spring between the
+        rotation and the ground would move the points unnoticed.
     """
 
     points: NDArray[np.float64]
     dimension: int
     gap: float
     residual: float
+    unchecked: int
 
 
 def positions(given: Equations, d: int, edges: NDArray[np.int64]) -> Positions:
@@ -66,13 +72,8 @@ def positions(given: Equations, d: int, edges: NDArray[np.int64]) -> Positions:
         raise GeometryError(f"{operator.shape[0]} equations are too few for {n} nodes: too much lies next to supports")
     with _normal_solver(operator) as solver:
         fields, values = _least_fields(operator, solver, d)
-        x = np.zeros(n * d)
-        for _ in range(_REFINEMENTS):
-            step = solver.solve(operator.T @ (right - operator @ x))
-            step -= np.tile(step.reshape(n, d).mean(axis=0), n)
-            x += step
-            if np.abs(step).max() <= 1e-15 * np.abs(x).max():
-                break
+        x = _least_squares(operator, solver, right[:, None], d)[:, 0]
+        unchecked = _unchecked(given, solver, d)
     null, gap = fields[..., values <= EXACT], values[values > EXACT]
     loose = np.zeros(n, dtype=bool)
     if null.shape[2] > d:
@@ -81,7 +82,34 @@ def positions(given: Equations, d: int, edges: NDArray[np.int64]) -> Positions:
     span = np.linalg.norm(x[edges[:, 0]] - x[edges[:, 1]], axis=1).max(initial=0)
     residual = float(np.abs(operator @ x.ravel() - right).max()) / (span or 1.0)
     points = np.where(loose[:, None], np.nan, x - x[~loose].mean(axis=0))
-    return Positions(points, null.shape[2], float(gap[0]) if len(gap) else float("inf"), residual)
+    return Positions(points, null.shape[2], float(gap[0]) if len(gap) else float("inf"), residual, unchecked)
+
+
+def _least_squares(operator: sp.csr_array, solver: Factorisation, right: NDArray, d: int) -> NDArray:
+    """(n d, k) centred solutions for right-hand sides (m, k)."""
+    x = np.zeros((operator.shape[1], right.shape[1]))
+    for _ in range(_REFINEMENTS):
+        step = solver.solve(operator.T @ (right - operator @ x))
+        step -= np.tile(step.reshape(-1, d, step.shape[1]).mean(axis=0), (len(step) // d, 1))
+        x += step
+        if np.abs(step).max() <= 1e-15 * np.abs(x).max():
+            break
+    return x
+
+
+def _unchecked(given: Equations, solver: Factorisation, d: int) -> int:
+    """Equations of moments whose disturbances do not show in any residual.
+
+    Residuals of random right-hand sides are random combinations of the rows of a projector, and a row of it is zero
+    if and only if its diagonal entry is: where residuals vanish, the equation can be met whatever it says.
+    """
+    trusting = np.flatnonzero(given.trusting)
+    if not len(trusting):
+        return 0
+    right = np.zeros((len(given.right), _PROBES))
+    right[trusting] = np.random.default_rng(0).standard_normal((len(trusting), _PROBES))
+    left = right - given.operator @ _least_squares(given.operator, solver, right, d)
+    return int((np.abs(left[trusting]).max(axis=1) < _CHECKED).sum())
 
 
 def null_fields(operator: sp.csr_array, d: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

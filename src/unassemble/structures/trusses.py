@@ -26,9 +26,11 @@ from ..matrix import OperatorMatrix
 from ..recovery import Recovery
 from ..words import count_of
 from .bars import Bars
+from .pieces import pieces
 from .positions import null_fields
 
 CERTIFIED = 1e-9
+_SURE = 1e-6  # of the diameter: how far off the points of a certified truss may be
 
 
 def serve_truss(
@@ -62,12 +64,7 @@ def serve_truss(
                      "leave them room")  # fmt: skip
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: the point reflection of a truss has the same matrix")
-    free = [name for name in found.freedoms if name]
-    status, reason = "certified", "bars along these directions re-assemble to the matrix, and these determine the nodes"
-    if free:
-        status, reason = "uncertified", "the directions of the bars leave more free than translations and size"
-    elif error > CERTIFIED:
-        status, reason = "uncertified", f"a block differs from that of a bar by {error:.1e} of the row's largest entry"
+    status, reason = _verdict(error, found)
     return Recovery(
         points=points,
         triangles=np.empty((0, 3), np.int64),
@@ -90,6 +87,21 @@ def serve_truss(
         choice=choice,
         evidence=found.evidence,
     )
+
+
+def _verdict(error: float, found: Truss) -> tuple[str, str]:
+    if any(found.freedoms):
+        return "uncertified", "the directions of the bars leave more free than translations and size"
+    if not error <= CERTIFIED:
+        return "uncertified", f"a block differs from that of a bar by {error:.1e} of the row's largest entry"
+    worst = max(found.evidence, key=lambda one: one.residual / one.gap)
+    if worst.residual > _SURE * worst.gap:
+        return "uncertified", (
+            f"the directions of the bars contradict each other by {worst.residual:.1e}, and a field that is neither "
+            f"translation nor enlargement does so only by {worst.gap:.1e}: positions are known to about "
+            f"{worst.residual / worst.gap:.0e} of the size"
+        )
+    return "certified", "bars along these directions re-assemble to the matrix, and these determine the nodes"
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,21 +138,17 @@ def place_joints(bars: Bars, n: int) -> Truss:
     """
     d = bars.directions.shape[1]
     ends, directions = bars.ends[bars.known], bars.directions[bars.known]
-    graph = sp.csr_array((np.ones(len(ends)), ends.T), shape=(n, n))
-    graph = sp.csr_array(graph + graph.T)
-    _, label = sp.csgraph.connected_components(graph, directed=False)
     points, component = np.full((n, d), np.nan), np.full(n, -1)
     evidence: list[Evidence] = []
     freedoms, warnings = [], []
     failure: GeometryError | None = None
-    for piece in np.flatnonzero(np.bincount(label) > 1):
-        body = np.flatnonzero(label == piece)
-        inside = np.flatnonzero(label[ends[:, 0]] == piece)
-        operator = _across(np.searchsorted(body, ends[inside]), directions[inside], len(body))
-        links = graph[body][:, body]
+    for piece in pieces(_across(ends, directions, n), d, ends):
+        body, order = piece.nodes, len(piece.nodes)
+        links = sp.csr_array((np.ones(len(piece.edges)), piece.edges.T), shape=(order, order))
+        links = sp.csr_array(links + links.T)
         try:
-            fields, values = null_fields(operator, d)
-            one = shape(fields, values, links, np.zeros(len(body), dtype=bool))
+            fields, values = null_fields(piece.operator, d)
+            one = shape(fields, values, links, np.zeros(order, dtype=bool))
         except GeometryError as error:
             failure = failure or error
             warnings.append(f"the piece with node {body[0]}: {error}")
@@ -149,7 +157,7 @@ def place_joints(bars: Bars, n: int) -> Truss:
         component[body[~one.loose]] = len(evidence)
         gap = values[values > EXACT]
         evidence.append(
-            Evidence(one.dimension, float(values[d]), float(gap[0]) if len(gap) else float("inf"), len(inside))
+            Evidence(one.dimension, float(values[d]), float(gap[0]) if len(gap) else float("inf"), len(piece.edges))
         )
         freedoms.append(one.freedom)
     if not evidence:
@@ -168,14 +176,18 @@ def _across(ends: NDArray[np.int64], directions: NDArray[np.float64], n: int) ->
 def largest_misfit(nodal: NodalMatrix, points: NDArray[np.float64]) -> float:
     """Largest entry that is left of a block once the bar between the given points is taken away.
 
-    Relative to the largest off-diagonal entry of the node's rows; pairs with undetermined nodes do not count.
+    Relative to the largest off-diagonal entry of the node's rows; pairs with undetermined nodes do not count. Infinite
+    where both ends of a bar lie in one point.
     """
     known = determined(points)
     i, j = nodal.node, nodal.indices
     off = (i != j) & known[i] & known[j]
     blocks, i, j = nodal.data[off], i[off], j[off]
     along = points[i] - points[j]
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    if (length == 0).any():
+        return float("inf")  # a bar without length has no direction
+    along /= length
     present = nodal.row_of >= 0
     bar = along[:, :, None] * along[:, None, :] * (present[i][:, :, None] & present[j][:, None, :])
     weight = (bar * bar).sum(axis=(1, 2))

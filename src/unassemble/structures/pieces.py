@@ -1,0 +1,71 @@
+"""Equations of several pieces, taken apart in one pass over them all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Equations that share no node with others.
+
+    Attributes
+    ----------
+    nodes : (k,) int64
+        Increasing.
+    rows : (m,) int64
+        Of the equations of all pieces.
+    operator : (m, k d) sparse
+    edges : (e, 2) int64
+        Coupled nodes, by their place in `nodes`.
+    """
+
+    nodes: NDArray[np.int64]
+    rows: NDArray[np.int64]
+    operator: sp.csr_array
+    edges: NDArray[np.int64]
+
+
+def pieces(operator: sp.csr_array, d: int, edges: NDArray[np.int64]) -> Iterator[Piece]:
+    """Connected pieces, in the order of their first nodes; nodes in no equation are in none.
+
+    The work is that of one pass over the equations, however many pieces there are.
+
+    Parameters
+    ----------
+    operator : (m, n d) sparse
+    d : int
+        Coordinates of a node.
+    edges : (e, 2) int64
+        Coupled nodes; those of different pieces are left out.
+    """
+    m, n = operator.shape[0], operator.shape[1] // d
+    node = operator.indices // d
+    row = np.repeat(np.arange(m), np.diff(operator.indptr))
+    incidence = sp.csr_array((np.ones(len(node), np.int8), (row, m + node)), shape=(m + n, m + n))
+    count, label = sp.csgraph.connected_components(incidence, directed=False)
+    of_row, of_node = label[:m], label[m:]
+    bodies, equations = _groups(of_node, count), _groups(of_row, count)
+    inside = edges[of_node[edges[:, 0]] == of_node[edges[:, 1]]]
+    links = _groups(of_node[inside[:, 0]], count)
+    place = np.empty(n, np.int64)
+    for body in bodies:
+        place[body] = np.arange(len(body))
+    used = [k for k in range(count) if len(bodies[k]) and len(equations[k])]
+    for k in sorted(used, key=lambda k: bodies[k][0]):
+        part = sp.csr_array(operator[equations[k]])
+        columns = place[part.indices // d] * d + part.indices % d
+        shape = (len(equations[k]), len(bodies[k]) * d)
+        local = sp.csr_array((part.data, columns, part.indptr), shape=shape)
+        yield Piece(bodies[k], equations[k], local, place[inside[links[k]]])
+
+
+def _groups(label: NDArray, count: int) -> list[NDArray[np.int64]]:
+    """Indices of each label, increasing."""
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(label, minlength=count))[:-1])
