@@ -183,6 +183,17 @@ def test_anchors_move_and_do_not_stretch():
         recover(given.matrix, anchors=[(0, 1.0, 2.0)])
 
 
+@pytest.mark.parametrize("make", [frame, lambda: truss(3, 40)])
+def test_anchors_far_away_cost_digits(make):
+    given = make()
+    d = given.points.shape[1]
+    for shift, status in ((1e3, "certified"), (1e10, "uncertified")):
+        found = recover(given.matrix, anchors=[(given.block * k, *(given.points[k] + shift)) for k in (0, 5)])
+        assert found.status == status, found.reason
+        assert found.dim == d
+        assert ("too few digits" in found.reason) == (status == "uncertified")
+
+
 def test_rigid_modes_cost_nothing():
     for make in (frame, plane_frame):
         given = make().permuted(5)

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 
+_LOST = 1e-11  # rounding errors of coordinates, in edge lengths; entries of flat elements have a hundred times as much
+
 Anchors = tuple[NDArray[np.int64], NDArray[np.float64]]
 
 
@@ -100,3 +102,16 @@ def digits_lost(
         shift = np.median(points[body] - shape, axis=0)  # these differences round to the shift: they hide the errors
         worst = max(worst, float(np.abs((points[body] - shift) - shape).max() / abs(size)))
     return worst
+
+
+def near_enough(status: str, reason: str, lost: float) -> tuple[str, str]:
+    """Status and reason; what was certified is not if its coordinates lost more digits than entries would bear.
+
+    `lost` is that of :func:`digits_lost`.
+    """
+    if status != "certified" or lost <= _LOST:
+        return status, reason
+    return "uncertified", (
+        f"{reason}, but the anchors lie so far from the origin that coordinates have too few digits left: as "
+        f"written they are off by {lost:.1e} edge lengths; subtract a point near the anchors from all of `anchors`"
+    )

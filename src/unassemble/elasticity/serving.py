@@ -16,7 +16,7 @@ from ..matrix import OperatorMatrix, check_matrix
 from ..recovery import Recovery
 from ..structures.bars import bars_of
 from ..structures.trusses import serve_truss
-from .anchoring import anchored, checked_anchors, digits_lost
+from .anchoring import anchored, checked_anchors, digits_lost, near_enough
 from .cells import Cells
 from .kinds import KINDS
 from .nodal import nodal_matrix, uncoupled
@@ -26,7 +26,6 @@ from .rounded import with_exact_sums
 from .surface import boundary_loops
 from .unknowns import Numbering
 
-_LOST = 1e-11  # rounding errors of coordinates, in edge lengths; entries of flat elements have a hundred times as much
 _THIN = 1e-14  # of the largest variance of the coordinates: rounding
 _SAME = 1e-12  # relative difference up to which the matrices of two directions are one
 
@@ -75,13 +74,7 @@ def serve(
     status, reason = found.status, found.reason
     if status == "certified" and _flat(found):
         status, reason = "uncertified", "the points lie in one line or plane, and no solid body does"
-    lost = digits_lost(points, found.points, found.component, factor) if len(known[0]) else 0.0
-    if status == "certified" and lost > _LOST:
-        status = "uncertified"
-        reason = (
-            f"{reason}, but the anchors lie so far from the origin that coordinates have too few digits left: as "
-            f"written they are off by {lost:.1e} edge lengths; subtract a point near the anchors from all of `anchors`"
-        )
+    status, reason = near_enough(status, reason, digits_lost(points, found.points, found.component, factor))
     lame, scale = _in_units(found, factor)
     fields: dict[str, Any] = {"triangles": np.empty((0, 3), np.int64), **_cell_fields(found.cells)}
     boundary, offsets = np.empty((0, 2), np.int64), np.zeros(1, np.int64)

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..clock import Clock
-from ..elasticity.anchoring import checked_anchors
+from ..elasticity.anchoring import checked_anchors, digits_lost, near_enough
 from ..elasticity.nodal import determined
 from ..elasticity.rounded import with_exact_sums
 from ..linalg import blas_threads
@@ -18,7 +19,7 @@ from ..recovery import Recovery
 from ..words import count_of
 from .certificate import largest_force
 from .members import members_and_cells
-from .nodes import nodes_of
+from .nodes import Nodes, nodes_of
 from .placed import CERTIFIED, Placed, best_positions
 from .recognise import StructuralNumbering
 
@@ -90,7 +91,8 @@ def serve_structure(
         notes.append(f"{loose.sum()} of {count_of(nodes.n, 'node')} cannot be determined: at supports, or tied to "
                      "these only")  # fmt: skip
     points, more = _moved(points, component, known)
-    status, reason = _verdict(error, found, layout.dim, rounding)
+    lost = digits_lost(points, found.points, component, np.ones(len(evidence))) / _edge_length(nodes, found.points)
+    status, reason = near_enough(*_verdict(error, found, layout.dim, rounding), lost)
     return Recovery(
         **fields,
         points=points,
@@ -112,6 +114,13 @@ def serve_structure(
         choice=choice,
         evidence=evidence,
     )
+
+
+def _edge_length(nodes: Nodes, points: NDArray[np.float64]) -> float:
+    """Mean distance of coupled nodes."""
+    i, j = sp.triu(nodes.graph, 1).nonzero()
+    length = np.linalg.norm(points[i] - points[j], axis=1)
+    return float(np.nanmean(length)) if np.isfinite(length).any() else 1.0
 
 
 def _moved(

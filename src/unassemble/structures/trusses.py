@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..clock import Clock
-from ..elasticity.anchoring import anchored, checked_anchors
+from ..elasticity.anchoring import anchored, checked_anchors, digits_lost, near_enough
 from ..elasticity.nodal import NodalMatrix, determined
 from ..elasticity.results import Evidence
 from ..elasticity.shape import EXACT, in_gauge, shape
@@ -64,7 +64,8 @@ def serve_truss(
                      "leave them room")  # fmt: skip
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: the point reflection of a truss has the same matrix")
-    status, reason = _verdict(error, found)
+    lost = digits_lost(points, found.points, found.component, factor)
+    status, reason = near_enough(*_verdict(error, found), lost)
     return Recovery(
         points=points,
         triangles=np.empty((0, 3), np.int64),
