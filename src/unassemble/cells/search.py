@@ -123,17 +123,24 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
 def _finished(best: Reading | None, begun: Begun, effort: Effort) -> Reading | None:
     """The best of what repairs make of the starts in one drawing, and of a former one."""
     starts = list(begun.starts)
-    if begun.likeliest is not None and not starts[0].like_noise:
-        candidates = begun.likeliest.candidates
+    likeliest = begun.likeliest
+    if likeliest is not None and starts[0].like_noise:
+        likeliest = None
+    if likeliest is not None and likeliest.candidates.n_vertices <= _BEGUN:
+        candidates = likeliest.candidates
         triangles = 2 * (candidates.first & (candidates.size == 3)).sum() > candidates.first.sum()
         place = 0 if candidates.n_vertices >= _FEW and triangles else len(starts)
-        starts[place:place] = _mended(begun.likeliest, effort)
+        starts[place:place] = _mended(likeliest, effort)
+        likeliest = None
     for number, start in enumerate(starts):
         share = effort.share(_FIRST if number == 0 and len(starts) > 1 else 1 / (len(starts) - number))
         best = _better(best, start if start.like_noise else _repaired(start, share))
         if best.fits or best.like_noise:
-            break
+            return best
         effort.solves += max(share.solves, 0)
+    if likeliest is not None:  # on large graphs this costs more than all repairs
+        for start in _mended(likeliest, effort):
+            best = _better(best, _repaired(start, effort))
     return best
 
 
