@@ -156,11 +156,12 @@ def _verdict(error: float, found: Placed, d: int, rounding: float) -> tuple[str,
             f"the entries are rounded to {rounding:.0e} of themselves, and rigid rotations cause forces of {error:.1e} "
             "of those that make them up, which is what that leaves"
         )
-    loosest = min((one.gap for one in evidence), default=np.inf)
-    if error > _SURE * loosest:
+    loosest = min(evidence, key=lambda one: one.gap / np.sqrt(one.rows))
+    doubt = error * np.sqrt(loosest.rows) / loosest.gap  # each equation may be off by as much
+    if doubt > _SURE:
         return "uncertified", (
             f"rigid rotations of the nodes cause forces of {error:.1e} of those that make them up, and another field, "
-            f"no translation, only {loosest:.1e}: positions are known to about {error / loosest:.0e} of the size"
+            f"no translation, only {loosest.gap:.1e}: positions may be off by {doubt:.0e} of the size"
         )
     if not error <= CERTIFIED:
         return "uncertified", (
