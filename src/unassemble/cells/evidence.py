@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import SolverError
-from ..linalg import UpperTriangle, factorisation
+from ..linalg import solved
 from ..planar.cotangent import edge_weights
 from ..planar.normal import WeightJacobian, distant_pair
 from ..planar.piece import PieceMesh
@@ -103,17 +103,8 @@ def _response(reading: Reading, piece: Piece, z: NDArray, local: NDArray, chosen
 
 
 def solved_normal(normal: sp.csr_array, rhs: NDArray) -> NDArray | None:
-    """Positive definite solve; None where the factorisation breaks down."""
-    if not np.isfinite(normal.data).all():  # flat triangles
-        return None
-    upper = sp.triu(normal, format="csr")
-    upper.sort_indices()
-    matrix = UpperTriangle(upper.data, upper.indices, upper.indptr)
+    """Positive definite solve; None where the factorisation breaks down, as on flat triangles."""
     try:
-        factor = factorisation(matrix)
-        factor.factorise(matrix)
-        solution = factor.solve(rhs)
-        factor.release()
+        return solved(normal, rhs)
     except SolverError:
         return None
-    return solution if np.isfinite(solution).all() else None

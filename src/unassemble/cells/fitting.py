@@ -13,7 +13,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import SolverError
-from .sheet import Placed, Sheet, solved, unpinned
+from ..linalg import solved
+from .sheet import Placed, Sheet, unpinned
 
 SMOOTH = 0.02
 """h: misfits below count by their squares."""

@@ -18,7 +18,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .sheet import Placed, Sheet, solved, unpinned
+from ..linalg import solved
+from .sheet import Placed, Sheet, unpinned
 
 _HELD = 1e-9  # keeps the problem definite where labels of zero leave vertices free
 _NEAREST = 0.1  # of the way to 0 or 1 that one step leaves

@@ -13,8 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..errors import SolverError
-from ..linalg import UpperTriangle, factorisation
+from ..linalg import factorisation
 from ..planar.cotangent import corner_gradients
 from ..planar.krylov import ShiftedSearch
 from ..planar.normal import distant_pair
@@ -196,25 +195,3 @@ def unpinned(z: NDArray) -> NDArray[np.bool_]:
     pins = distant_pair(z)
     free[np.r_[2 * pins, 2 * pins + 1]] = False
     return free
-
-
-def solved(normal: sp.csr_array, rhs: NDArray) -> NDArray[np.float64]:
-    """Solve a definite system.
-
-    Raises
-    ------
-    SolverError
-        If that breaks down.
-    """
-    if not (np.isfinite(normal.data).all() and np.isfinite(rhs).all()):
-        raise SolverError("normal equations are not finite")
-    upper = sp.triu(normal, format="csr")
-    upper.sort_indices()
-    matrix = UpperTriangle(upper.data, upper.indices, upper.indptr)
-    factor = factorisation(matrix)
-    factor.factorise(matrix)
-    solution = factor.solve(rhs)
-    factor.release()
-    if not np.isfinite(solution).all():
-        raise SolverError("normal equations are singular")
-    return np.asarray(solution)

@@ -8,10 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .sums import PENALTY
 from .unknowns import Numbering
 
 _ROUNDING = 1e-9  # a row that annihilates constants does so to rounding; supports leave 1e-3 and more
-_PENALTY = 1e3  # a diagonal entry this many times the rest of its row is a penalty
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +151,7 @@ def penalised(nodal: NodalMatrix) -> NDArray[np.bool_]:
     """(n, d) unknowns with a penalty on the diagonal."""
     own = nodal.data[nodal.node == nodal.indices]
     diagonal = np.abs(np.diagonal(own, axis1=1, axis2=2))
-    return (diagonal > _PENALTY * nodal.size[:, None]) & (nodal.size > 0)[:, None]
+    return (diagonal > PENALTY * nodal.size[:, None]) & (nodal.size > 0)[:, None]
 
 
 def uncoupled(nodal: NodalMatrix) -> bool:

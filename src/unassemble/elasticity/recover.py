@@ -18,12 +18,11 @@ from .material import poisson_ratio
 from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled
 from .positions import Solution, solve
 from .results import ElasticityRecovery, ScalarParts
-from .rounded import with_exact_sums
+from .rounded import SPREADS, with_exact_sums
 from .unknowns import Numbering, find_numbering
 from .verdict import about_cells, of_few_digits, verdict
 
 _NEAR = 1e-6  # residual up to which positions are good enough to look for elements
-_SPREADS = 20  # times the rounding of the entries: what an identity may be off by
 
 
 def scalar_parts(matrix: sp.csr_array, *, block_size: int | None = None) -> ScalarParts | None:
@@ -134,7 +133,7 @@ def _describe(
     points = solution.points
     with clock("certify"):
         error = largest_residual(nodal, solution.valid, points, solution.ratio)
-        near = error < max(_NEAR, _SPREADS * rounding)
+        near = error < max(_NEAR, SPREADS * rounding)
         ratio = poisson_ratio(nodal, solution.valid, points) if near else None
     found = no_cells(nodal.dim)
     if want_cells and near:

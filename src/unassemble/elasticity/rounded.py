@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from .orders import ORDERS, regular
 
 _LAYOUTS = {3: (3, 2, 1), 2: (2,), 6: (3,)}  # unknowns of a node, and how many of these may be displacements
+SPREADS = 20  # times the rounding of the entries: what an identity, or a sum of forces, may be off by
 _FULL = 1e-10  # rounding below which nothing needs to be set right
 _FEW = range(3, 10)  # numbers of decimal digits to look for
 _LEAST = 0.05  # of the rows that have to annihilate all translations

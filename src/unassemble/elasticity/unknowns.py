@@ -16,12 +16,12 @@ from ..errors import InputError, RecoveryError
 from .directions import find_directions, nodes_by_neighbours
 from .grouping import by_first_row, coupled_in_common, possible_nodes, same_pattern
 from .orderly import by_component, node_by_node
+from .orders import ORDERS, regular
 from .sampling import promising
 
 _ROUNDING = 1e-9
 _ROUNDS = 4
 _FEW = 4  # places to start from where a glance is all that a matrix gets
-_KINDS = ("interleaved", "by component")
 _ANNIHILATED = 0.02  # share of rows and directions below which an orderly numbering calls for a search
 _LARGE = 20_000  # rows beyond which a few places are looked at before every row is asked
 _LIKELY = 0.6  # quality of nodes apart from that share; made-up ones have half or less
@@ -94,8 +94,8 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
         If no numbering makes rows annihilate constants.
     """
     sizes = _sizes(block_size)
-    identity = _uncoupled_rows(matrix)
-    best = max((_regular(matrix, identity, d, kind) for d in sizes for kind in _KINDS), key=_quality)
+    identity = uncoupled_rows(matrix)
+    best = max((_regular(matrix, identity, d, kind) for d in sizes for kind in ORDERS), key=_quality)
     if best is None or _quality(best) <= 0 or best.share < 0.5 or (best.kind == "by component" and best.common < 0.9):
         hopeful = matrix.shape[0] <= _LARGE or promising(matrix, sizes)
         best = max([best, *_orderly(matrix, identity, sizes, hopeful)], key=_quality)
@@ -111,8 +111,8 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
 
 def numbering_at_sight(matrix: sp.csr_array) -> Numbering | None:
     """The same where it shows at once: unknowns in order, or rows of the same pattern. None if neither is so."""
-    identity = _uncoupled_rows(matrix)
-    best = max((_regular(matrix, identity, d, kind) for d in (3, 2) for kind in _KINDS), key=_quality)
+    identity = uncoupled_rows(matrix)
+    best = max((_regular(matrix, identity, d, kind) for d in (3, 2) for kind in ORDERS), key=_quality)
     if best is not None and best.share > 0 and best.common > _ORDERLY:
         return best
     group = same_pattern(matrix, identity)
@@ -145,7 +145,7 @@ def regular_numbering(matrix: sp.csr_array, kind: str, block_size: int | None = 
     sizes = [d for d in _sizes(block_size) if order % d == 0]
     if not sizes:
         raise InputError(f"a matrix with {order} rows has no numbering {kind!r} with {block_size or '2 or 3'} unknowns")
-    identity = _uncoupled_rows(matrix)
+    identity = uncoupled_rows(matrix)
     best = max((_regular(matrix, identity, d, kind, checked=False) for d in sizes), key=_quality)
     if best is None or _quality(best) <= 0:
         raise RecoveryError(f"with unknowns {kind} no row annihilates translations: this is no elasticity matrix, or "
@@ -181,7 +181,7 @@ def _orderly(matrix: sp.csr_array, identity: NDArray, sizes: tuple[int, ...], ho
     inner.sort_indices()
     found = []
     for d in sizes:
-        for kind, read in zip(_KINDS, (node_by_node, by_component), strict=True):
+        for kind, read in zip(ORDERS, (node_by_node, by_component), strict=True):
             if read is node_by_node and not hopeful:
                 continue
             for reading in read(inner, d):
@@ -232,7 +232,8 @@ def _odd(matrix: sp.csr_array, identity: NDArray, node: NDArray, direction: NDAr
     return int((~present & (missed == 0) & present.any(axis=1)[:, None]).any(axis=1).sum())
 
 
-def _uncoupled_rows(matrix: sp.csr_array) -> NDArray[np.bool_]:
+def uncoupled_rows(matrix: sp.csr_array) -> NDArray[np.bool_]:
+    """(N,) rows without an entry off the diagonal, as those of the identity."""
     off = matrix.copy()
     off.setdiag(0)
     return np.asarray(abs(off).sum(axis=1)).ravel() == 0
@@ -243,8 +244,7 @@ def _regular(matrix: sp.csr_array, identity: NDArray, d: int, kind: str, *, chec
     order = matrix.shape[0]
     if order % d:
         return None
-    row = np.arange(order)
-    node, direction = (row // d, row % d) if kind == "interleaved" else (row % (order // d), row // (order // d))
+    node, direction = regular(order, d, kind)
     common = coupled_in_common(matrix, node, direction)
     if checked and common < 0.6:
         return None
@@ -292,6 +292,6 @@ def given_numbering(matrix: sp.csr_array, node_of_row: NDArray, direction_of_row
     node = by_first_row(node)
     if len(np.unique(node * d + direction)) < order:
         raise InputError("two rows have the same node and direction")
-    identity = _uncoupled_rows(matrix)
+    identity = uncoupled_rows(matrix)
     share, common = _share(matrix, identity, direction, d, searched=True), coupled_in_common(matrix, node, direction)
     return Numbering(d, node, direction, identity, "given", share, common)

@@ -1,7 +1,7 @@
 """Sparse linear algebra behind one small interface."""
 
 from .ahead import AnalysisAhead
-from .definite import nearly_singular
+from .definite import nearly_singular, solved
 from .factorisation import Factorisation, backend, factorisation
 from .threads import blas_threads, threads
 from .upper import UpperTriangle, upper_from_edges
@@ -14,6 +14,7 @@ __all__ = [
     "blas_threads",
     "factorisation",
     "nearly_singular",
+    "solved",
     "threads",
     "upper_from_edges",
 ]

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from ..errors import GeometryError, SolverError
 from .factorisation import Factorisation, factorisation
@@ -49,3 +51,23 @@ def nearly_singular(matrix: UpperTriangle, shifts: Sequence[float]) -> Iterator[
             solver.release()
         return
     raise GeometryError("the normal matrix of the equations is not positive; the entries may differ too much in size")
+
+
+def solved(normal: sp.csr_array, rhs: NDArray) -> NDArray[np.float64]:
+    """Solve normal equations once.
+
+    Raises
+    ------
+    SolverError
+        If they are not finite, or singular.
+    """
+    if not (np.isfinite(normal.data).all() and np.isfinite(rhs).all()):
+        raise SolverError("normal equations are not finite")
+    matrix = UpperTriangle.of(normal)
+    factor = factorisation(matrix)
+    factor.factorise(matrix)
+    solution = factor.solve(rhs)
+    factor.release()
+    if not np.isfinite(solution).all():
+        raise SolverError("normal equations are singular")
+    return np.asarray(solution)

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ..elasticity.nodal import NodalMatrix, nodal_matrix
 from ..elasticity.orders import ORDERS, regular
-from ..elasticity.unknowns import Numbering
+from ..elasticity.unknowns import Numbering, uncoupled_rows
 
 _RANK_ONE = 1e-9  # how much of a bar's block may be left, relative to the bar
-_SAMPLE = 64  # nodes to look at before all are
+_SAMPLE = 64  # nodes, or blocks, to look at before all are
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +45,9 @@ def bars_of(nodal: NodalMatrix) -> Bars | None:
     upper = (nodal.node < nodal.indices) & (np.abs(nodal.data).max(axis=(1, 2)) > 0)
     blocks = nodal.data[upper]
     if not len(blocks):
+        return None
+    some = np.linalg.svd(blocks[:_SAMPLE], compute_uv=False)
+    if (some[:, 1] > _RANK_ONE * some[:, 0]).any():  # mostly a solid: not worth looking at all of it
         return None
     i, j = nodal.node[upper].astype(np.int64), nodal.indices[upper].astype(np.int64)
     left, size, right = np.linalg.svd(blocks)
@@ -82,8 +85,7 @@ def truss_numbering(matrix: sp.csr_array, block_size: int | None = None, kind: s
             node, direction = regular(order, d, name)
             if not _like_bars(matrix, node, direction, d):
                 continue
-            lone = np.asarray(abs(matrix).sum(axis=1)).ravel() == np.abs(matrix.diagonal())
-            numbering = Numbering(d, node, direction, lone, name, 0.0, 1.0)
+            numbering = Numbering(d, node, direction, uncoupled_rows(matrix), name, 0.0, 1.0)
             if bars_of(nodal_matrix(matrix, numbering)) is not None:
                 return numbering
     return None

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..clock import Clock
 from ..elasticity.anchoring import checked_anchors, digits_lost, near_enough
 from ..elasticity.nodal import determined
-from ..elasticity.rounded import with_exact_sums
+from ..elasticity.rounded import SPREADS, with_exact_sums
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..recovery import Recovery
@@ -23,7 +23,6 @@ from .nodes import Nodes, nodes_of
 from .placed import CERTIFIED, Placed, best_positions
 from .recognise import StructuralNumbering
 
-_SPREADS = 20  # times the rounding of the entries: what a sum of forces may be off by
 _SURE = 1e-6  # of the diameter: how far off the points of a certified structure may be
 
 
@@ -151,7 +150,7 @@ def _verdict(error: float, found: Placed, d: int, rounding: float) -> tuple[str,
             f"the null space has dimension {free[0]} where {d} translations are expected: supports leave too few whole "
             "rows"
         )
-    if error < _SPREADS * rounding:
+    if error < SPREADS * rounding:
         return "uncertified", (
             f"the entries are rounded to {rounding:.0e} of themselves, and rigid rotations cause forces of {error:.1e} "
             "of those that make them up, which is what that leaves"

@@ -9,11 +9,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..elasticity.sums import PENALTY
 from .layouts import Layout
 
 _ROUNDING = 1e-9  # a row that annihilates a translation does so to rounding; supports leave 1e-3 and more
 _NOTHING = 1e-14  # of sqrt(A_ii A_jj), which bounds an entry of a definite matrix: rounding
-_PENALTY = 1e3  # a diagonal entry this many times the rest of its row is a penalty
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ class Nodes:
         """(n, b) unknowns with a penalty on the diagonal."""
         diagonal = np.abs(self.matrix.diagonal())
         rest = np.asarray(abs(self.matrix).sum(axis=1)).ravel() - diagonal
-        return np.asarray((diagonal > _PENALTY * rest).reshape(self.n, -1))
+        return np.asarray((diagonal > PENALTY * rest).reshape(self.n, -1))
 
 
 def nodes_of(matrix: sp.csr_array, layout: Layout, node: NDArray[np.int64], direction: NDArray[np.int64]) -> Nodes:

@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..elasticity.grouping import by_first_row
 from ..elasticity.orders import ORDERS, regular
 from ..errors import InputError
 from .gaps import with_gaps
@@ -113,10 +114,7 @@ def given_structure(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> 
     size = int(direction.max()) + 1
     if size in (4, 5):
         raise InputError(f"nodes with {size} unknowns are not known: frames and shells have 6, solids 2 or 3")
-    _, node = np.unique(node, return_inverse=True)
-    first = np.full(node.max() + 1, len(node))
-    np.minimum.at(first, node, np.arange(len(node)))
-    node = np.argsort(np.argsort(first))[node]
+    node = by_first_row(node)
     if len(np.unique(node * size + direction)) < len(node):
         return None
     fitting = [layout for layout in LAYOUTS if layout.block_size == size]
