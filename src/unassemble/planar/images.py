@@ -6,6 +6,7 @@ the pieces so far only those remain with which these close; where the matrix doe
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Sequence
 
 import numpy as np
@@ -68,14 +69,26 @@ def _image(z: NDArray, turned: np.bool_) -> NDArray[np.complex128]:
 
 def _order(vertices: Sequence[NDArray[np.int64]]) -> list[int]:
     """Pieces, each sharing as many vertices as possible with those before."""
-    left = set(range(len(vertices)))
+    every = np.concatenate(vertices) if len(vertices) else np.empty(0, np.int64)
+    piece = np.repeat(np.arange(len(vertices)), [len(v) for v in vertices])
+    at: dict[int, list[int]] = {int(vertex): [] for vertex in every}
+    for vertex, p in zip(every.tolist(), piece.tolist(), strict=True):
+        at[vertex].append(p)
+    shared = [0] * len(vertices)
+    waiting = [(0, -len(v), p) for p, v in enumerate(vertices)]
+    heapq.heapify(waiting)
     order: list[int] = []
-    reached = np.empty(0, dtype=np.int64)
-    while left:
-        piece = max(left, key=lambda p: (int(np.isin(vertices[p], reached).sum()), len(vertices[p]), -p))
-        left.remove(piece)
-        order.append(piece)
-        reached = np.union1d(reached, vertices[piece])
+    taken = np.zeros(len(vertices), dtype=bool)
+    while waiting:
+        count, _, p = heapq.heappop(waiting)
+        if taken[p] or -count != shared[p]:  # it was entered again since, sharing more
+            continue
+        taken[p] = True
+        order.append(p)
+        for vertex in vertices[p].tolist():
+            for other in at.pop(vertex, ()):
+                shared[other] += 1
+                heapq.heappush(waiting, (-shared[other], -len(vertices[other]), other))
     return order
 
 
