@@ -80,6 +80,15 @@ def random_mesh(n: int, seed: int = 0, *, holes: bool = True) -> tuple[NDArray, 
     return delaunay(points, longest=2.6 / k)
 
 
+def strip(n: int, height: float, jitter: float, *, seed: int = 0) -> tuple[NDArray, NDArray]:
+    """Triangles between two rows of points in zigzag, moved at random; no vertex is inside."""
+    rng = np.random.default_rng(seed)
+    k = np.arange(n)
+    points = np.column_stack([k / 2, k % 2 * height]) + jitter * rng.uniform(-1, 1, (n, 2)) * [1, min(height, 1)]
+    even = (k[:-2] % 2 == 0)[:, None]
+    return points, np.where(even, np.column_stack([k[:-2], k[2:], k[1:-1]]), np.column_stack([k[:-2], k[1:-1], k[2:]]))
+
+
 def edge_list(triangles: NDArray) -> NDArray[np.int64]:
     """Pairs i < j in lexicographic order."""
     pairs = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -20,11 +20,12 @@ if TYPE_CHECKING:
     from .elasticity.results import Evidence
 
 
-def _no_cells(corners: int) -> NDArray[np.int64]:
-    return np.empty((0, corners), np.int64)
+def _none(*columns: int) -> Callable[[], NDArray[np.int64]]:
+    """Default of a field of indices: none, each of so many columns."""
+    return lambda: np.empty((0, *columns), np.int64)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Recovery:
     """A mesh recovered from a matrix, scalar or vector-valued.
 
@@ -109,12 +110,12 @@ class Recovery:
     """
 
     points: NDArray[np.float64]
-    triangles: NDArray[np.int64]
+    triangles: NDArray[np.int64] = field(default_factory=_none(3))
     component: NDArray[np.int64]
-    hinges: NDArray[np.int64]
+    hinges: NDArray[np.int64] = field(default_factory=_none())
     scale: NDArray[np.float64]
-    boundary: NDArray[np.int64]
-    boundary_offsets: NDArray[np.int64]
+    boundary: NDArray[np.int64] = field(default_factory=_none(2))
+    boundary_offsets: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
     node_status: NDArray[np.int8]
     status: str
     reason: str
@@ -123,15 +124,15 @@ class Recovery:
     n_holes: int | None = None
     timings: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
-    worst_entries: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    worst_entries: NDArray[np.int64] = field(default_factory=_none(2))
     worst_misfits: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     standard_deviations: NDArray[np.float64] | None = None
     chi_square: Mapping[str, float] | None = None
-    quads: NDArray[np.int64] = field(default_factory=lambda: _no_cells(4))
-    tetrahedra: NDArray[np.int64] = field(default_factory=lambda: _no_cells(4))
-    hexahedra: NDArray[np.int64] = field(default_factory=lambda: _no_cells(8))
-    lines: NDArray[np.int64] = field(default_factory=lambda: _no_cells(2))
-    mid_nodes: NDArray[np.int64] = field(default_factory=lambda: _no_cells(0))
+    quads: NDArray[np.int64] = field(default_factory=_none(4))
+    tetrahedra: NDArray[np.int64] = field(default_factory=_none(4))
+    hexahedra: NDArray[np.int64] = field(default_factory=_none(8))
+    lines: NDArray[np.int64] = field(default_factory=_none(2))
+    mid_nodes: NDArray[np.int64] = field(default_factory=_none(0))
     node_of_row: NDArray[np.int64] | None = None
     direction_of_row: NDArray[np.int64] | None = None
     numbering: str = ""
@@ -140,9 +141,9 @@ class Recovery:
     lame: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     evidence: tuple[Evidence, ...] = ()
     polygons_offsets: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
-    polygons_data: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    polygons_data: NDArray[np.int64] = field(default_factory=_none())
     estimated_noise: float | None = None
-    suspects: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    suspects: NDArray[np.int64] = field(default_factory=_none(2))
     alternatives: tuple[Alternative, ...] = ()
 
     @property

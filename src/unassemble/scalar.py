@@ -95,7 +95,8 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
             sigma = noise or pooled_noise(topology, matrix, meshes, freedom)
             deviations = _deviations(topology, placement, placed, meshes, sigma, scale is None)
     trouble = [note for m in meshes for note in m.notes]
-    status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble)
+    doubt = max(m.doubt for m in meshes)
+    status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble, doubt)
     others: list[Alternative] = []
     if status == "certified" and topology.method == "the numbers":
         with clock("ambiguity"):

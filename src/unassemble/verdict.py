@@ -16,6 +16,7 @@ from .topology import Topology
 from .words import count_of
 
 _SAME_SCALE = 1e-6
+_SURE = 1e-8  # of a piece's size: how far off certified positions may be
 _SCALE_ERROR = 1e5  # relative error of c in small pieces, over that of the entries, at most
 
 
@@ -37,6 +38,7 @@ def verdict(
     evidence: Evidence,
     scale: NDArray,
     notes: Sequence[str] = (),
+    doubt: float = 0.0,
 ) -> tuple[str, str]:
     """``"certified"`` or ``"uncertified"``, and why.
 
@@ -47,6 +49,8 @@ def verdict(
         c of each piece, the factor of the Laplacian.
     notes : sequence of str
         Stages that did not converge.
+    doubt : float
+        About the error of the positions, relative to the size of their piece, as far as a solver knows of one.
     """
     good = passes(certificate, chi_square, scale)
     apart = _discord(topology, certificate, scale) if good else None
@@ -57,6 +61,11 @@ def verdict(
             chi_square, certificate, topology, evidence, scale, notes
         )
     error = certificate.backward_error
+    if good and not evidence.certain and not doubt <= _SURE:
+        return "uncertified", (
+            f"the operator re-assembled on this mesh gives the matrix back to {error:.1e}, but so may others: in "
+            f"double precision the entries determine the positions to about {doubt:.0e} of the size only"
+        )
     if good and not evidence.certain:
         return "certified", f"the operator re-assembled on this mesh gives the matrix back to {error:.1e}"
     return "uncertified", _misfit(topology, certificate, matrix, evidence, notes)

@@ -1,6 +1,7 @@
 """Sparse linear algebra behind one small interface."""
 
 from .ahead import AnalysisAhead
+from .augmented import AugmentedSystem
 from .definite import nearly_singular, solved
 from .factorisation import Factorisation, backend, factorisation
 from .threads import blas_threads, threads
@@ -8,6 +9,7 @@ from .upper import UpperTriangle, upper_from_edges
 
 __all__ = [
     "AnalysisAhead",
+    "AugmentedSystem",
     "Factorisation",
     "UpperTriangle",
     "backend",

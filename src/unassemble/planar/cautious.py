@@ -8,6 +8,7 @@ steps are cut short before that.
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..topology import Piece
 from .normal import NormalEquations, WeightJacobian, distant_pair
-from .polish import GaussNewton, PolishedMesh, Problem, downhill
+from .polish import Equations, GaussNewton, PolishedMesh, Problem, downhill
 
 _log = logging.getLogger(__name__)
 
@@ -46,9 +47,10 @@ def cautious_polish(
     *,
     scale: float | None = None,
     spread: NDArray | None = None,
+    equations: Callable[[WeightJacobian, NDArray], Equations] = NormalEquations,
     options: CautiousOptions | None = None,
 ) -> PolishedMesh:
-    """Maximum-likelihood mesh from a distant start.
+    """Maximum-likelihood mesh from a distant start, or with equations that serve one Jacobian.
 
     Parameters
     ----------
@@ -58,6 +60,8 @@ def cautious_polish(
     scale : float, optional
     spread : (e,) float64, optional
         As for the polish.
+    equations : callable
+        Makes the linearised problem from its Jacobian and two vertices to be held.
     options : CautiousOptions, optional
     """
     options = options or CautiousOptions()
@@ -66,14 +70,15 @@ def cautious_polish(
     z = (z - z.mean()) / extent
     pins = distant_pair(z)
     problem = Problem(piece, weights, spread, scale)
-    fit, steps, converged = problem.at(z), 0, False
+    fit, steps, length, converged = problem.at(z), 0, np.inf, False
     history: list[tuple[float, float]] = []
     while steps < options.max_steps and not converged:
         jacobian = WeightJacobian(piece, fit.z, spread)
-        system = GaussNewton(jacobian, NormalEquations(jacobian, pins), fit.weights if scale is None else None)
+        system = GaussNewton(jacobian, equations(jacobian, pins), fit.weights if scale is None else None)
         move = system(jacobian, fit.misfit)
         system.release()
         steps += 1
+        length = float(np.abs(move).max())
         change = float(np.linalg.norm(jacobian.forward(move)))
         converged = change <= options.settled * fit.noise
         history.append((fit.norm, change))
@@ -83,7 +88,7 @@ def cautious_polish(
         if better is None or (not converged and _stalled(history)):
             break
         fit = better
-    return PolishedMesh(fit.z * extent, fit.scale, fit.norm, steps, steps, converged)
+    return PolishedMesh(fit.z * extent, fit.scale, fit.norm, steps, steps, converged, length)
 
 
 def _stalled(history: list[tuple[float, float]], steps: int = 6) -> bool:

@@ -132,11 +132,15 @@ def _rings(topology: Topology) -> int:
 
 
 def _joined(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> tuple[list[NDArray], float]:
-    """Least-squares similarities, and the largest distance that they leave at a shared vertex."""
+    """Least-squares similarities, and the largest distance that they leave at a shared vertex.
+
+    Pieces that shrink to points meet in any image: they leave as much as there is.
+    """
     n = len(positions)
     rows, columns, values, rhs = _equations(topology, positions)
     # Unknowns are t - 1 and s; the least-norm solution keeps turns near 1. Shifts are scaled to matter little.
-    extent = max(float(np.abs(z).max()) for z in positions)
+    size = np.array([np.abs(z).max() for z in positions])
+    extent = float(size.max())
     weight = np.r_[np.where(held, 0.0, 1.0), np.where(held, 0.0, 1e3 * extent)]
     system = coo_array((values * weight[columns], (rows, columns)), shape=(len(rhs), 2 * n)).tocsr()
     if n <= _DENSE:
@@ -144,8 +148,10 @@ def _joined(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_
     else:
         solution = lsqr(system, rhs, atol=1e-15, btol=1e-15, iter_lim=20 * n + 1000)[0]
     turn, shift = 1 + (weight * solution)[:n], (weight * solution)[n:]
-    left = np.abs(system @ solution - rhs).max(initial=0.0) / extent
-    return [turn[p] * z + shift[p] for p, z in enumerate(positions)], float(left)
+    left = float(np.abs(system @ solution - rhs).max(initial=0.0) / extent)
+    if (np.abs(turn) * size <= _CLOSED * extent).any():
+        left = max(left, 1.0)
+    return [turn[p] * z + shift[p] for p, z in enumerate(positions)], left
 
 
 def _held(group: NDArray, known: NDArray) -> NDArray[np.bool_]:

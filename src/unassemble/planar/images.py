@@ -57,7 +57,7 @@ def growing_images(
             taken = order[first : last + 1]
             around = [vertices[p] for p in taken]
             grown = [
-                turned for turned in grown if _gap(around, [_image(positions[p], turned[p]) for p in taken]) <= closed
+                turned for turned in grown if _meet(around, [_image(positions[p], turned[p]) for p in taken], closed)
             ]
         chosen = grown[:_WIDTH]
     return chosen
@@ -92,8 +92,8 @@ def _order(vertices: Sequence[NDArray[np.int64]]) -> list[int]:
     return order
 
 
-def _gap(vertices: Sequence[NDArray[np.int64]], positions: Sequence[NDArray[np.complex128]]) -> float:
-    """How far apart pieces stay at shared vertices, the first of them being held."""
+def _meet(vertices: Sequence[NDArray[np.int64]], positions: Sequence[NDArray[np.complex128]], closed: float) -> bool:
+    """Whether pieces meet at shared vertices, the first of them being held, without shrinking to points."""
     n = len(vertices)
     piece = np.repeat(np.arange(n), [len(v) for v in vertices])
     vertex, z = np.concatenate(vertices), np.concatenate(positions)
@@ -107,4 +107,7 @@ def _gap(vertices: Sequence[NDArray[np.int64]], positions: Sequence[NDArray[np.c
     rhs = z[q] - z[p]
     system = np.delete(system, [0, n], axis=1)
     solution = np.linalg.lstsq(system, rhs, rcond=1e-12)[0]
-    return float(np.abs(system @ solution - rhs).max(initial=0.0) / np.abs(z).max())
+    extent = np.abs(z).max()
+    size = np.array([np.abs(at).max() for at in positions[1:]])
+    small = np.abs(1 + solution[: n - 1]) * size <= closed * extent
+    return not small.any() and bool(np.abs(system @ solution - rhs).max(initial=0.0) <= closed * extent)

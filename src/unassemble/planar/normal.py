@@ -74,6 +74,10 @@ class NormalEquations:
         result[self._free] = np.ascontiguousarray(solution.T).view(np.complex128).T
         return result
 
+    def fitted(self, jacobian: WeightJacobian, change: NDArray) -> NDArray:
+        """Displacement d (n,) complex that explains a change (e,) of the weights best: least |J d - r|."""
+        return self.solve(jacobian.transpose(change))
+
     def release(self) -> None:
         """Give the memory of the factor back."""
         self._factor.release()

@@ -14,6 +14,7 @@ from ..topology import Piece
 from .cautious import cautious_polish, count_flipped
 from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
+from .pivoted import PivotedEquations, affordable
 from .polish import PolishedMesh, polish
 
 _ROUNDING = 1e-12
@@ -37,12 +38,15 @@ class PieceMesh:
     spread : (e,) float64 or None
         Standard deviations of the entries' errors, up to a common factor, for which z is the least-squares solution;
         all equal by default.
+    doubt : float
+        About the error of z relative to its extent, where a polish came to no end for reasons of conditioning.
     """
 
     z: NDArray[np.complex128]
     scale: float
     notes: tuple[str, ...] = ()
     spread: NDArray[np.float64] | None = None
+    doubt: float = 0.0
 
 
 def positions(
@@ -89,18 +93,27 @@ def refined(
         return PieceMesh(mesh.z, mesh.scale, (*mesh.notes, f"no polish: {error}"))
     if not (np.isfinite(found.z).all() and np.isfinite(found.scale)):
         return PieceMesh(mesh.z, mesh.scale, (*mesh.notes, "the polish did not stay finite and was left out"))
-    notes = () if found.converged else ("the polish did not converge",)
-    return PieceMesh(found.z, found.scale, (*mesh.notes, *notes), spread)
+    if found.converged:
+        return PieceMesh(found.z, found.scale, mesh.notes, spread)
+    note = f"the polish did not converge: its last step moved points by {found.last_step:.0e} of the size"
+    return PieceMesh(found.z, found.scale, (*mesh.notes, note), spread, found.last_step)
 
 
 def _polished(
     piece: Piece, weights: NDArray, start: NDArray, scale: float | None, spread: NDArray | None
 ) -> PolishedMesh:
-    """By the chord iteration; where it fails, by small steps from the better of start and result."""
+    """By the chord iteration; where it fails, by small steps from the better of start and result.
+
+    Rounding in the normal equations of long thin pieces is one reason to fail.
+    """
     found = polish(piece, weights, start, scale=scale, spread=spread)
     finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
     flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
-    if (found.converged and not flipped) or piece.n_vertices > _CAUTIOUS_LIMIT:
+    if found.converged and not flipped:
+        return found
+    if not flipped and affordable(piece.edges, found.z):
+        return cautious_polish(piece, weights, found.z, scale=scale, spread=spread, equations=PivotedEquations)
+    if piece.n_vertices > _CAUTIOUS_LIMIT:
         return found
     nearest = found.z if flipped <= count_flipped(piece, start) else start
     again = cautious_polish(piece, weights, nearest, scale=scale, spread=spread)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,9 @@ from .iterative import IterativeNormalEquations
 from .normal import NormalEquations, WeightJacobian, distant_pair
 
 _log = logging.getLogger(__name__)
+
+_CONFOUNDED = 1e-14
+"""Square of the part of the weights that displacements leave, below which rounding has made it up."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,8 @@ class PolishedMesh:
     steps, factorisations : int
     converged : bool
         Whether steps fell to rounding level.
+    last_step : float
+        Length of the last step that was computed, relative to the mesh's extent: about the error that remains.
     """
 
     z: NDArray[np.complex128]
@@ -72,6 +78,7 @@ class PolishedMesh:
     steps: int
     factorisations: int
     converged: bool
+    last_step: float
 
 
 def polish(
@@ -140,7 +147,7 @@ def polish(
         fit = better or fit
     if system is not None:
         system.release()
-    return PolishedMesh(fit.z * extent, fit.scale, fit.norm, steps, factorisations, converged)
+    return PolishedMesh(fit.z * extent, fit.scale, fit.norm, steps, factorisations, converged, length)
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,24 +197,34 @@ def downhill(problem: Problem, fit: Fit, move: NDArray) -> Fit | None:
     return None
 
 
+class Equations(Protocol):
+    """The linearised problem without the scale."""
+
+    def fitted(self, jacobian: WeightJacobian, change: NDArray) -> NDArray:
+        """Displacement d (n,) complex that explains a change (e,) of the weights best: least |J d - r|."""
+
+    def release(self) -> None:
+        """Give the memory of the factor back."""
+
+
 class GaussNewton:
     """Steps of the linearised problem min |J d + g w - r| over displacements d and log-scale g."""
 
-    def __init__(self, jacobian: WeightJacobian, equations: NormalEquations, weights: NDArray | None):
+    def __init__(self, jacobian: WeightJacobian, equations: Equations, weights: NDArray | None):
         self._equations = equations
         self._weights = weights  # None where the scale is known
         if weights is not None:
-            self._slope = jacobian.transpose(weights)
-            self._response = self._equations.solve(self._slope)
-            # What J cannot explain of w; zero would mean that c and the shape are confounded.
-            self._complement = float(weights @ weights) - _dot(self._slope, self._response)
+            self._response = equations.fitted(jacobian, weights)
+            # What J cannot explain of w; nothing but rounding means that c and the shape are confounded.
+            left = float(weights @ (weights - jacobian.forward(self._response)))
+            self._complement = left if left > _CONFOUNDED * float(weights @ weights) else 0.0
 
     def __call__(self, jacobian: WeightJacobian, misfit: NDArray) -> NDArray:
         """Displacement d (n,) complex; the scale follows from it by least squares."""
-        move = self._equations.solve(jacobian.transpose(misfit))
-        if self._weights is None or self._complement <= 0:
+        move = self._equations.fitted(jacobian, misfit)
+        if self._weights is None or not self._complement:
             return move
-        log_scale = (float(self._weights @ misfit) - _dot(self._slope, move)) / self._complement
+        log_scale = float(self._weights @ (misfit - jacobian.forward(move))) / self._complement
         return move - log_scale * self._response
 
     def release(self) -> None:
@@ -228,8 +245,3 @@ class IterativeGaussNewton:
     def release(self) -> None:
         """Give the memory of the factor back."""
         self._equations.release()
-
-
-def _dot(a: NDArray, b: NDArray) -> float:
-    """Inner product of displacements as real vectors."""
-    return float(np.vdot(a, b).real)

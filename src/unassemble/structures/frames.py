@@ -67,14 +67,14 @@ def serve_structure(
         found.points, found.component, found.evidence, found.notes, found.springs
     )  # fmt: skip
     with clock("certify"):
-        valid = nodes.whole(strict=found.strict)
+        valid = found.valid.copy()
         if springs:
             valid[:, len(layout.displacements) :] = False
         counted = np.zeros((len(node), len(layout.rotations)), dtype=bool)
         present = nodes.present
         counted[nodes.row_of[present]] = valid[present]
         error = largest_force(whole, layout, node, direction, points, counted)
-    fields: dict[str, Any] = {"triangles": np.empty((0, 3), np.int64)}
+    fields: dict[str, Any] = {}
     if cells and error < 1e-6:
         with clock("members"):
             fields = members_and_cells(nodes, points)
@@ -96,10 +96,7 @@ def serve_structure(
         **fields,
         points=points,
         component=component,
-        hinges=np.empty(0, np.int64),
         scale=np.full(len(evidence), np.nan),
-        boundary=np.empty((0, 2), np.int64),
-        boundary_offsets=np.zeros(1, np.int64),
         node_status=np.asarray(loose, dtype=np.int8),
         status=status,
         reason=reason,

@@ -38,6 +38,8 @@ class Placed:
         Whether only equations were used that springs between rotations and the ground leave alone.
     strict : bool
         Whether only equations were used that no support can have spoiled; see :meth:`.nodes.Nodes.whole`.
+    valid : (n, b, rotations) bool
+        The equations that hold all that assembly gave them, by that rule.
     """
 
     points: NDArray[np.float64]
@@ -47,6 +49,7 @@ class Placed:
     notes: list[str]
     springs: bool
     strict: bool
+    valid: NDArray[np.bool_]
 
     @property
     def doubts(self) -> tuple[bool, bool, bool, float]:
@@ -72,7 +75,7 @@ def best_positions(nodes: Nodes) -> Placed:
         valid = nodes.whole(strict=strict)
         for springs in (False, True):
             try:
-                attempts.append(_placed(nodes, equations(nodes, valid, springs=springs), springs, strict))
+                attempts.append(_placed(nodes, valid, springs=springs, strict=strict))
             except RecoveryError as error:
                 failure = failure or error
                 continue
@@ -83,9 +86,10 @@ def best_positions(nodes: Nodes) -> Placed:
     return min(attempts, key=lambda one: one.doubts)
 
 
-def _placed(nodes: Nodes, given: Equations, springs: bool, strict: bool) -> Placed:
+def _placed(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool, strict: bool) -> Placed:
     """Positions piece by piece."""
     d = nodes.layout.dim
+    given = equations(nodes, valid, springs=springs)
     points, component = np.full((nodes.n, d), np.nan), np.full(nodes.n, -1)
     evidence: list[Evidence] = []
     notes: list[str] = []
@@ -108,4 +112,4 @@ def _placed(nodes: Nodes, given: Equations, springs: bool, strict: bool) -> Plac
         raise failure or GeometryError(
             "no row annihilates translations and couples to no support: no node has a valid equation"
         )
-    return Placed(points, component, tuple(evidence), unchecked, notes, springs, strict)
+    return Placed(points, component, tuple(evidence), unchecked, notes, springs, strict, valid)

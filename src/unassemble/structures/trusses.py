@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from ..clock import Clock
 from ..elasticity.anchoring import anchored, checked_anchors, digits_lost, near_enough
 from ..elasticity.nodal import NodalMatrix, determined
+from ..elasticity.numbering import Numbering
 from ..elasticity.results import Evidence
 from ..elasticity.shape import EXACT, in_gauge, shape
-from ..elasticity.unknowns import Numbering
 from ..errors import GeometryError
 from ..matrix import OperatorMatrix
 from ..recovery import Recovery
@@ -68,13 +68,9 @@ def serve_truss(
     status, reason = near_enough(*_verdict(error, found), lost)
     return Recovery(
         points=points,
-        triangles=np.empty((0, 3), np.int64),
         lines=bars.ends[~loose[bars.ends].any(axis=1)],
         component=found.component,
-        hinges=np.empty(0, np.int64),
         scale=np.full(len(found.evidence), np.nan),
-        boundary=np.empty((0, 2), np.int64),
-        boundary_offsets=np.zeros(1, np.int64),
         node_status=np.asarray(loose, dtype=np.int8),
         status=status,
         reason=reason,
