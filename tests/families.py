@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from dense_mesh import signed_areas
 from meshes import delaunay, random_mesh
 from vanishing import Mesh, refined, squares, triangular_holes, used
 
@@ -65,10 +66,12 @@ def ring(rng: np.random.Generator) -> Mesh:
     inner = np.column_stack([np.cos(angle), np.sin(angle)])
     angle += rng.uniform(0, 0.6) * 2 * np.pi / n
     outer = rng.uniform(1.3, 2, (n, 1)) * np.column_stack([np.cos(angle), np.sin(angle)])
-    points = np.concatenate([inner, outer])
     i = np.arange(n)
     j = (i + 1) % n
-    return points, np.concatenate([np.column_stack([i, n + i, j]), np.column_stack([n + i, n + j, j])])
+    triangles = np.concatenate([np.column_stack([i, n + i, j]), np.column_stack([n + i, n + j, j])])
+    while not (signed_areas(np.concatenate([inner, outer]) @ [1, 1j], triangles) > 0).all():  # some fold over
+        outer *= 1.2
+    return np.concatenate([inner, outer]), triangles
 
 
 def grid(rng: np.random.Generator) -> Mesh:

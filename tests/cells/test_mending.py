@@ -90,7 +90,8 @@ def test_a_new_cell_takes_the_place_of_its_rivals(solution):
         assert set(near.with_rivals(labels, [k])) == {k, *rivals.tolist()}
 
 
-@pytest.mark.parametrize("seed", [33, 34])
+# In the last one an ear hangs on an edge of a hole, and is drawn inside of a cell at first.
+@pytest.mark.parametrize("seed", [33, 34, 54])
 def test_one_triangle_in_eight_is_missing(seed):
     rng = np.random.default_rng(seed)
     c = float(rng.choice([1.0, -2.5, 1e-3]))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..topology import Polygons
-from ..topology.faces import FaceComplex
+from ..topology.faces import FaceComplex, joined
 from .angles import face_sums, facing_angles, likeliest_scale, vertex_excess
 from .crosses import Crosses
 from .open_corners import OpenCorners
@@ -29,8 +29,8 @@ class Candidates:
 
     Attributes
     ----------
-    n_vertices : int
-    edges : (e, 2) int64
+    drawing : FaceComplex
+        Of the graph.
     weights : (e,) float64
         -A_ij of each edge.
     scale : float or None
@@ -55,8 +55,7 @@ class Candidates:
         Parts that can be turned over; its corners are numbered after the faces.
     """
 
-    n_vertices: int
-    edges: NDArray[np.int64]
+    drawing: FaceComplex
     weights: NDArray[np.float64]
     scale: float | None
     relative: NDArray[np.float64]
@@ -93,8 +92,7 @@ class Candidates:
         if crosses is not None:
             belief[np.isin(corners.vertices[:, 1], crosses.hub) & ~corners.turned] = 1.0
         return cls(
-            n_vertices=drawing.n_vertices,
-            edges=drawing.edges,
+            drawing=drawing,
             weights=weights,
             scale=scale,
             relative=relative,
@@ -116,6 +114,16 @@ class Candidates:
         )
 
     @property
+    def n_vertices(self) -> int:
+        """Number of vertices."""
+        return self.drawing.n_vertices
+
+    @property
+    def edges(self) -> NDArray[np.int64]:
+        """(e, 2) pairs i < j."""
+        return self.drawing.edges
+
+    @property
     def count(self) -> int:
         """Number of candidates."""
         return len(self.belief)
@@ -124,6 +132,15 @@ class Candidates:
     def size(self) -> NDArray[np.int64]:
         """(cells,) number of vertices."""
         return self.cells.size
+
+    @cached_property
+    def chorded(self) -> NDArray[np.bool_]:
+        """(cells,) faces of four edges with an edge between opposite vertices: parts of two cells, if any of one."""
+        chorded = np.zeros(self.count, dtype=bool)
+        quads = np.flatnonzero(self.size == 4)
+        a, b, c, d = (self.cells.vertices[self.cells.offsets[quads] + k] for k in range(4))
+        chorded[quads] = joined(self.n_vertices, self.edges, a, c) | joined(self.n_vertices, self.edges, b, d)
+        return chorded
 
     @cached_property
     def conflicts(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..topology.adjacency import adjacency
-from ..topology.keys import distinct
+from .agreement import common_values
 
 _AGREE = 1e-7
-_LEAST = 2  # crosses that must agree in c where it is not known
 _OPPOSITE = np.array([[0, 1, 2, 3], [0, 1, 3, 2], [0, 2, 1, 3]])
 """Cyclic orders of four neighbours: first opposite third, second opposite fourth."""
 
@@ -70,9 +69,10 @@ class Crosses:
         u = (1 / w)[:, _OPPOSITE]
         factors = 2 * sign / np.sqrt((u[..., 0] + u[..., 2]) * (u[..., 1] + u[..., 3]))
         if scale is None:
-            scale = _most_frequent(factors)
-        if scale is None:
-            return cls(None, np.empty(0, np.int64), np.empty((0, 4), np.int64), np.empty(0, bool))
+            common = common_values(factors.ravel(), np.repeat(np.arange(len(factors)), 3), _AGREE)
+            if not len(common):
+                return cls(None, np.empty(0, np.int64), np.empty((0, 4), np.int64), np.empty(0, bool))
+            scale = float(common[0])
         fits = np.abs(factors / scale - 1) < _AGREE
         kept = fits.any(axis=1)
         order = np.take_along_axis(near[kept], _OPPOSITE[fits[kept].argmax(axis=1)], axis=1)
@@ -85,18 +85,3 @@ class Crosses:
         return np.concatenate(
             [np.column_stack([order[:, k], hub, order[:, (k + 1) % 4]]) for k in range(4)], dtype=np.int64
         )
-
-
-def _most_frequent(factors: NDArray) -> float | None:
-    """The value that most rows (k, 3) have; None where no two have the same."""
-    row = np.repeat(np.arange(len(factors)), 3)
-    value = factors.ravel()
-    order = np.argsort(value)
-    row, value = row[order], value[order]
-    # Runs of values that follow each other closely, each row counted once.
-    run = np.cumsum(np.append(0, np.abs(np.diff(value)) > _AGREE * np.abs(value[1:]))) if len(value) else value
-    count = np.bincount(distinct(run.astype(np.int64) * len(factors) + row) // max(len(factors), 1))
-    if not len(count):
-        return None
-    best = int(count.argmax())
-    return float(np.median(value[run == best])) if count[best] >= _LEAST else None

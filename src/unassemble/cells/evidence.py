@@ -23,6 +23,9 @@ from ..planar.piece import PieceMesh
 from ..topology import Piece
 from .reading import FITS, Reading, fans_of
 
+FEW = 100
+"""Vertices below which all is tried before the entries are blamed."""
+_SUSPECT = 0.3  # change of the label of a lone triangular hole: it was 0.4 or more in all that were tried
 _RIDGE = 0.1
 _FAR = 1e8
 LONGEST = 40  # edges of a face that may be a cell
@@ -37,6 +40,18 @@ def label_changes(reading: Reading) -> NDArray[np.float64]:
         if mesh and overdetermined and (reading.misfit[piece.edge_rows] > FITS).any():
             _explain(reading, piece, mesh, changes)
     return changes
+
+
+def entries_are_to_blame(reading: Reading) -> bool:
+    """Whether triangles alone do not fit, and none of them is suspected of being a hole: no choice of cells helps."""
+    candidates, labels = reading.candidates, reading.labels
+    if (
+        not reading.pieces
+        or candidates.n_vertices < FEW
+        or (labels & ((candidates.size > 3) | candidates.corner)).any()
+    ):
+        return False
+    return float(np.nan_to_num(np.abs(label_changes(reading))).max(initial=0.0)) < _SUSPECT
 
 
 def _explain(reading: Reading, piece: Piece, mesh: PieceMesh, changes: NDArray) -> None:

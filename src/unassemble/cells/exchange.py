@@ -25,6 +25,8 @@ _log = logging.getLogger(__name__)
 
 SETTLED = 1e-5
 """Cost of labels that explain everything."""
+NEARLY = 0.005
+"""Mean cost of an edge where few labels are wrong."""
 _SUSPECTS = 60  # cells, or this part of all of them, that are turned over in a round
 _SHARE = 0.05
 _FAINT = 0.1  # misfit about a suspect, relative to the largest, below which it waits for a later round
@@ -65,8 +67,8 @@ class Exchange:
     """
 
     def __init__(self, sheet: Sheet, usual: NDArray[np.bool_], trials: int):
-        self._sheet = sheet
-        self._usual = usual[sheet.chosen].astype(np.float64)
+        self.sheet = sheet
+        self.usual = usual
         self._near = Neighbourhoods(sheet)
         self.left = trials
 
@@ -78,12 +80,22 @@ class Exchange:
         ]
         if deep:
             moves.append(self._deep)
+        begun = fit.cost, self.left
         fit, turn = self._rounds(fit), 0
-        while fit.cost > SETTLED and turn < len(moves) and self.left > 0:
+        while fit.cost > SETTLED and turn < len(moves) and self._suffices(fit, *begun):
             other = self._rounds(moves[turn](fit))
             _log.debug("cost %.3g, then %.3g, %d trials left", fit.cost, other.cost, self.left)
             fit, turn = (other, 0) if other.cost < _PROGRESS * fit.cost else (fit, turn + 1)
         return fit
+
+    def _suffices(self, fit: Fitted, cost_then: float, left_then: int) -> bool:
+        """Whether the trials that are left would do if the cost went on falling as it has since `then`.
+
+        Where little is left to do a single label may make the difference.
+        """
+        if fit.cost <= NEARLY * len(self.sheet.edges):
+            return self.left > 0
+        return (cost_then - fit.cost) * self.left > fit.cost * (left_then - self.left)
 
     def _rounds(self, fit: Fitted) -> Fitted:
         while fit.cost > SETTLED and self.left > 0:
@@ -106,7 +118,7 @@ class Exchange:
         return self._taken(fit, self._tried(fit, sorted(pairs)))
 
     def _suspects(self, fit: Fitted) -> list[int]:
-        sheet = self._sheet
+        sheet = self.sheet
         at_vertex = np.bincount(sheet.edges.ravel(), np.repeat(cost(fit.misfit), 2), sheet.n_vertices)
         score = np.bincount(np.repeat(sheet.cell, 3), at_vertex[sheet.triangles].ravel(), sheet.candidates.count)
         most = max(_SUSPECTS, int(_SHARE * sheet.chosen.sum()))
@@ -129,7 +141,7 @@ class Exchange:
             return fit
         least = max(_CLEAR * trials[0].gain, _WORTH * fit.cost)
         together: list[Trial] = []
-        used = np.zeros(self._sheet.n_vertices, dtype=bool)
+        used = np.zeros(self.sheet.n_vertices, dtype=bool)
         for trial in trials:
             if (trial.gain >= least or not together) and not used[trial.vertices].any():
                 used[trial.vertices] = True
@@ -139,14 +151,14 @@ class Exchange:
             for trial in some:
                 labels[list(trial.cells)] ^= True
                 z[trial.vertices] = trial.z
-            other = fitted(self._sheet, labels, Placed(z, fit.placed.c))
+            other = fitted(self.sheet, labels, Placed(z, fit.placed.c))
             if other.cost < fit.cost:
                 return other
         return fit
 
     def _reopened(self, fit: Fitted, how: _Reopening) -> Fitted:
         """Labels around the misfit fractional again, the others nearly fixed."""
-        sheet = self._sheet
+        sheet = self.sheet
         size = np.abs(fit.misfit)
         at = np.zeros(sheet.n_vertices, dtype=bool)
         at[sheet.edges[size > how.above * min(float(size.max()), 0.3)]] = True
@@ -155,7 +167,7 @@ class Exchange:
         near = np.zeros(sheet.candidates.count, dtype=bool)
         near[sheet.cell[at[sheet.triangles].any(axis=1)]] = True
         opened = near[sheet.chosen]
-        labels = np.where(opened, self._usual, fit.labels[sheet.chosen])
+        labels = np.where(opened, self.usual[sheet.chosen], fit.labels[sheet.chosen])
         distance = np.where(opened, 1 - how.strength, _SURE)
         strength = np.zeros(sheet.candidates.count)
         strength[sheet.chosen] = np.abs(labels - distance)
@@ -169,10 +181,10 @@ class Exchange:
     def _redrawn(self, fit: Fitted) -> Fitted:
         """The same labels, fitted from the conformal map: a fit may be caught where a triangle is flat."""
         try:
-            placed = self._sheet.mapped(fit.labels.astype(np.float64), fit.placed)
+            placed = self.sheet.mapped(fit.labels.astype(np.float64), fit.placed)
         except RecoveryError:
             return fit
-        other = fitted(self._sheet, fit.labels, placed)
+        other = fitted(self.sheet, fit.labels, placed)
         return other if other.cost < fit.cost else fit
 
     def _deep(self, fit: Fitted) -> Fitted:
@@ -191,7 +203,7 @@ class Exchange:
 
     def _places(self, fit: Fitted) -> list[list[int]]:
         """Candidates about the worst edges, each place once."""
-        sheet, near = self._sheet, self._near
+        sheet, near = self.sheet, self._near
         used = np.zeros(sheet.n_vertices, dtype=bool)
         places: list[list[int]] = []
         for e in np.argsort(-np.abs(fit.misfit)).tolist():

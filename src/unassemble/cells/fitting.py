@@ -44,6 +44,11 @@ class Fitted:
     placed: Placed
     misfit: NDArray[np.float64]
 
+    @classmethod
+    def of(cls, sheet: Sheet, labels: NDArray[np.bool_], placed: Placed) -> Fitted:
+        """Positions as they are."""
+        return cls(labels, placed, sheet.misfit(placed, labels.astype(np.float64)))
+
     @property
     def cost(self) -> float:
         """Sum of phi over the edges."""
@@ -53,7 +58,7 @@ class Fitted:
 def fitted(sheet: Sheet, labels: NDArray[np.bool_], placed: Placed, steps: int = 10) -> Fitted:
     """Improve positions for given labels by reweighted, damped Gauss-Newton steps."""
     strength = labels.astype(np.float64)
-    best = Fitted(labels, placed, sheet.misfit(placed, strength))
+    best = Fitted.of(sheet, labels, placed)
     damping = _DAMPING
     for _ in range(steps):
         trial = _lowered(sheet, best, strength, damping)

@@ -13,25 +13,20 @@ from ..planar.piece import PieceMesh
 from ..topology.embedding import drawing_with_corners, face_complexes
 from .candidates import Candidates
 from .crosses import Crosses
-from .effort import Effort
-from .evidence import label_changes
-from .mending import mended
+from .effort import SMALL_GRAPH, Effort
+from .evidence import FEW, entries_are_to_blame, label_changes
+from .mending import MOST_VERTICES, mended
 from .proposals import proposals
 from .reading import Reading
+from .triangles_only import read_triangles
 
 _log = logging.getLogger(__name__)
 
 _STARTS = 2  # readings to begin with that are worth repairing
-_FEW = 100  # vertices below which all is tried before the entries are blamed
-_SUSPECT = 0.3  # change of the label of a lone triangular hole: it was 0.4 or more in all that were tried
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
-_BEGUN = 1000  # vertices up to which all drawings are begun with before one is repaired
 _DRAWINGS = 3  # that a graph may have, about
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
-_MENDED = 20_000  # vertices up to which labels are relaxed and exchanged
-_WIDE = 20  # vertices of the largest piece below which trying labels one by one is as good
-_MENDING = 20  # solves that this is worth
 
 
 @dataclass(frozen=True)
@@ -73,8 +68,11 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
     """
     best: Reading | None = None
     effort = Effort.for_graph(n)
+    triangles = read_triangles(n, edges, weights, scale, effort)
+    if triangles is not None:
+        return triangles
     drawings = _drawings(n, edges, weights, scale)
-    together = n <= _BEGUN
+    together = n <= SMALL_GRAPH
     turning = _TURNING / (_DRAWINGS if together else 1)
     # Repairs take most of the effort: small graphs are begun with in all drawings before.
     for some in [drawings] if together else ([drawing] for drawing in drawings):
@@ -93,7 +91,7 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
 
 def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Iterator[Candidates]:
     """What may be cells in each drawing; first in one about the vertices that their numbers make crosses."""
-    if n <= _MENDED:
+    if n <= MOST_VERTICES:
         crosses = Crosses.of(n, edges, weights, scale)
         drawing = drawing_with_corners(n, edges, crosses.wedges) if crosses.unique.any() else None
         if drawing is not None:
@@ -109,7 +107,7 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
         starts.append(effort.reading(candidates, labels))
         if starts[-1].fits:
             return Begun(starts[-1:], settled=True)
-    if starts and _entries_are_to_blame(starts[0]):
+    if starts and entries_are_to_blame(starts[0]):
         return Begun(starts[:1], settled=True)
     likeliest = next((start for start in starts if start.pieces), None)
     starts = sorted(starts, key=lambda reading: reading.size)[:_STARTS]
@@ -126,10 +124,10 @@ def _finished(best: Reading | None, begun: Begun, effort: Effort) -> Reading | N
     likeliest = begun.likeliest
     if likeliest is not None and starts[0].like_noise:
         likeliest = None
-    if likeliest is not None and likeliest.candidates.n_vertices <= _BEGUN:
+    if likeliest is not None and likeliest.candidates.n_vertices <= SMALL_GRAPH:
         candidates = likeliest.candidates
         triangles = 2 * (candidates.first & (candidates.size == 3)).sum() > candidates.first.sum()
-        place = 0 if candidates.n_vertices >= _FEW and triangles else len(starts)
+        place = 0 if candidates.n_vertices >= FEW and triangles else len(starts)
         starts[place:place] = _mended(likeliest, effort)
         likeliest = None
     for number, start in enumerate(starts):
@@ -172,26 +170,10 @@ def _better(one: Reading | None, other: Reading) -> Reading:
     return other if one is None or other.size < one.size else one
 
 
-def _entries_are_to_blame(reading: Reading) -> bool:
-    """Whether triangles alone do not fit, and none of them is suspected of being a hole: no choice of cells helps."""
-    candidates, labels = reading.candidates, reading.labels
-    if (
-        not reading.pieces
-        or candidates.n_vertices < _FEW
-        or (labels & ((candidates.size > 3) | candidates.corner)).any()
-    ):
-        return False
-    return float(np.nan_to_num(np.abs(label_changes(reading))).max(initial=0.0)) < _SUSPECT
-
-
 def _mended(reading: Reading, effort: Effort) -> list[Reading]:
     """A better reading to begin with, or none."""
-    n = reading.candidates.n_vertices
-    if not reading.pieces or n > _MENDED or max(piece.n_vertices for piece in reading.pieces) < _WIDE:
-        return []
-    effort.solves -= _MENDING
-    labels = mended(reading)
-    return [] if labels is None else [effort.reading(reading.candidates, labels)]
+    better = mended(reading, effort)
+    return [] if better is None else [better]
 
 
 def _turned_over(reading: Reading, effort: Effort, solves: int) -> Reading:

@@ -83,6 +83,7 @@ class Sheet:
 
     def __init__(self, candidates: Candidates, unit: float):
         self.candidates = candidates
+        self.unit = unit
         self.n_vertices = n = candidates.n_vertices
         self.chosen = (candidates.size <= LONGEST) & ~candidates.outer
         self.triangles, self.cell = fans_of(candidates, self.chosen)

@@ -42,7 +42,8 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
     """Drawings of a planar graph on the sphere, the likeliest first.
 
     Where the graph is not tri-connected it has many. A mesh has nearly all of its short cycles as faces: first the
-    surface that they make by themselves, then an embedding in which all of them are faces, last any.
+    surface that they make by themselves, then an embedding in which all of them are faces, or all but those on edges
+    with more than two 3-cycles, last any.
 
     Parameters
     ----------
@@ -64,12 +65,27 @@ def _drawings(n: int, edges: NDArray, cycles: list[NDArray]) -> Iterator[FaceCom
     surface = from_cycles(n, edges, cycles)
     if surface is not None:
         yield surface
-    rotation = _with_faces(n, edges, cycles) if sum(map(len, cycles)) else None
-    if rotation is not None:
-        yield from_rotation(n, edges, *rotation)
+    drawing = drawing_with_faces(n, edges, cycles)
+    if drawing is None:
+        triangles, quads = cycles
+        drawing = drawing_with_faces(n, edges, [triangles[~crowded(n, edges, triangles).any(axis=1)], quads])
+    if drawing is not None:
+        yield drawing
     rotation = planarity.rotation_system(n, edges)
     if rotation is not None:
         yield from_rotation(n, edges, *rotation)
+
+
+def drawing_with_faces(n: int, edges: NDArray, cycles: list[NDArray]) -> FaceComplex | None:
+    """A drawing in which given cycles, (m_k, k) each, are faces; None if there is none, or no cycle is given."""
+    rotation = _with_faces(n, edges, cycles) if sum(map(len, cycles)) else None
+    return None if rotation is None else from_rotation(n, edges, *rotation)
+
+
+def crowded(n: int, edges: NDArray, triangles: NDArray) -> NDArray[np.bool_]:
+    """(m, 3) whether the sides of 3-cycles, each from a vertex to the next, lie on more than two of them."""
+    sides = around(n, edges, triangles) >> 1
+    return np.asarray((np.bincount(sides.ravel(), minlength=len(edges)) > 2)[sides])
 
 
 def drawing_with_corners(n: int, edges: NDArray, corners: NDArray) -> FaceComplex | None:

@@ -1,0 +1,59 @@
+"""Graphs all of whose edges lie on 3-cycles: nothing need have vanished, and only holes are to be found.
+
+Corners and undivided cells are not supposed where triangles can do without them. Where triangles are cut off from the
+others by holes, or hang on them by vertices, their numbers tell c, and by that many cells and holes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..topology.cycles import three_cycles
+from ..topology.embedding import face_complexes
+from .candidates import Candidates
+from .effort import Effort
+from .evidence import entries_are_to_blame
+from .mending import MOST_VERTICES, mended
+from .peeling import ContradictionError, peeled, scales_of_lone_triangles
+from .reading import Reading
+
+
+def read_triangles(n: int, edges: NDArray, weights: NDArray, scale: float | None, effort: Effort) -> Reading | None:
+    """Triangles that fit; None where none are found, or some edge lies on no triangle.
+
+    Parameters are those of :func:`unassemble.cells.search.read_cells`.
+    """
+    if n > MOST_VERTICES:
+        return None
+    _, opposite = three_cycles(n, edges)
+    scales = scales_of_lone_triangles(opposite, weights) if scale is None else [scale]
+    possible = _covered(opposite, weights) and scales
+    drawing = next(face_complexes(n, edges), None) if possible else None
+    if drawing is None:
+        return None
+    candidates = Candidates.of(drawing, weights, scale)
+    labels = candidates.first & (candidates.size == 3)
+    cell, half = candidates.sides.T
+    sides = half[labels[cell]].reshape(-1, 3) >> 1
+    if not _covered(sides, weights):
+        return None
+    for c in scales:
+        try:
+            state = peeled(sides, 2 * weights / c)
+        except ContradictionError:
+            continue
+        candidates = Candidates.of(drawing, weights, c)
+        labels[labels] = state >= 0
+        break
+    else:
+        return None
+    reading = effort.reading(candidates, labels)
+    if not (reading.fits or reading.like_noise or entries_are_to_blame(reading)):
+        reading = mended(reading, effort) or reading
+    return reading if reading.fits else None
+
+
+def _covered(sides: NDArray[np.int64], weights: NDArray[np.float64]) -> bool:
+    """Whether each nonzero weight is that of a side of some triangle."""
+    return not weights[np.bincount(sides.ravel(), minlength=len(weights)) == 0].any()
