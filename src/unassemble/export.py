@@ -156,8 +156,9 @@ def _boundary_flag(recovery: Recovery) -> NDArray[np.int64]:
     if recovery.dim == 3:
         from .elasticity.surface import outer_nodes
 
-        for kind, cells in recovery.cells.items():
-            flag[cells if kind == "line" else outer_nodes(kind, cells)] = 1
+        flag[recovery.lines] = 1
+        solid = {kind: cells for kind, cells in recovery.cells.items() if kind != "line"}
+        flag[outer_nodes(solid) if solid else []] = 1
     return flag
 
 

@@ -6,7 +6,7 @@ import skfem
 from assembled import box, eliminated, error, on_plane, permuted_nodes, stiffness
 from skfem.helpers import ddot, sym_grad, trace
 
-from unassemble.elasticity import positions, recover_elasticity
+from unassemble.elasticity import placing, recover_elasticity
 
 GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3)
 RULES = {  # one point fewer in each direction than the element needs
@@ -54,7 +54,7 @@ def test_evidence_tells_a_poor_fit():
 
 
 def test_bodies_too_large_for_one_factorisation_say_so(monkeypatch):
-    monkeypatch.setitem(positions._WHOLE, 3, 500)
+    monkeypatch.setitem(placing._WHOLE, 3, 500)
     given = stiffness("hex-q1", box("hex-q1", (8, 8, 9), perturb=0.2), form=layers(0.3))
     found = recover_elasticity(given.matrix, patch=200, cells=False)
     assert found.status == "uncertified"

@@ -8,7 +8,7 @@ from assembled import box, heterogeneous, permuted_nodes, stiffness
 from supported import given, judged
 
 from unassemble.elasticity import recover_elasticity
-from unassemble.elasticity.sums import set_right
+from unassemble.elasticity.sums import names_of, set_right
 from unassemble.elasticity.unknowns import find_numbering
 
 COUNTS = {"tri-p1": (8, 9), "tri-p2": (6, 7), "tet-p1": (4, 5, 5)}
@@ -30,7 +30,7 @@ def wrong(case, group, live, direction):
     order = np.argsort(group, kind="stable")
     start = np.concatenate([[0], np.cumsum(size)[:-1]])
     members = [order[start[size == k][:, None] + np.arange(k)] for k in range(1, d + 1)]
-    after = set_right(case.matrix, group, members, live, direction, d)
+    after = set_right(case.matrix, group, members, live, direction, names_of(d))
     return min(np.count_nonzero(np.array(names)[after] != case.direction) for names in permutations(range(d)))
 
 

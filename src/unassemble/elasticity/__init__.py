@@ -1,9 +1,10 @@
 """Vector-valued matrices: node positions from the linear identities of isotropic elasticity."""
 
 from .modes import rigid_body_modes, save_amgcl_coordinates, save_petsc_vec
+from .numbering import Numbering
 from .recover import recover_elasticity, scalar_parts
 from .results import ElasticityRecovery, Evidence, ScalarParts
-from .unknowns import Numbering, given_numbering
+from .unknowns import given_numbering
 
 __all__ = [
     "ElasticityRecovery",

@@ -62,7 +62,7 @@ def null_fields(
     body: NDArray[np.int64],
     *,
     patch: int | None = None,
-    ratio: float | None = None,
+    terms: NDArray[np.float64] | None = None,
 ) -> NullFields:
     """Least singular fields of all valid identities of a body.
 
@@ -74,11 +74,11 @@ def null_fields(
         Nodes of the body, whose identities to use.
     patch : int, optional
         Most rows in one chart.
-    ratio : float, optional
-        lambda / mu, where it is known.
+    terms : (d, d, d, t) float64, optional
+        Unknown boundary terms; see :func:`.identities.identities`.
     """
     parts = _patches(nodal, body, patch or _PATCH[nodal.dim])
-    made = [chart(nodal, valid, rows, whole=len(parts) == 1, ratio=ratio) for rows in parts]
+    made = [chart(nodal, valid, rows, whole=len(parts) == 1, terms=terms) for rows in parts]
     made = [one for one in made if len(one.nodes)]
     _log.debug("%d charts of %s fields", len(made), [len(one.values) for one in made])
     if not made:
@@ -87,13 +87,13 @@ def null_fields(
         one = made[0]
         return NullFields(one.nodes, one.fields, one.values, one.rows, 1)
     nodes, fields = _join(made, nodal.n)
-    return _measured(nodal, valid, parts, nodes, fields, made, ratio)
+    return _measured(nodal, valid, parts, nodes, fields, made, terms)
 
 
 def _patches(nodal: NodalMatrix, body: NDArray[np.int64], size: int) -> list[NDArray[np.int64]]:
     if len(body) <= 1.5 * size:
         return [body]
-    graph = sp.csr_array((np.ones(len(nodal.indices), np.int8), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2)
+    graph = nodal.graph
     return [body[part] for part in patches(graph[body][:, body], size)]
 
 
@@ -160,7 +160,7 @@ def _measured(
     nodes: NDArray[np.int64],
     fields: NDArray[np.float64],
     made: list[Chart],
-    ratio: float | None,
+    terms: NDArray[np.float64] | None,
 ) -> NullFields:
     """Rayleigh-Ritz on the whole body, through the identities part by part."""
     d, k = fields.shape[1:]
@@ -168,7 +168,7 @@ def _measured(
     place[nodes] = np.arange(len(nodes))
     triangle = np.zeros((0, k))
     for part in parts:
-        local = identities(nodal, valid, part, ratio)
+        local = identities(nodal, valid, part, terms)
         residual = local.residual(fields[place[local.columns]]).reshape(-1, k)
         triangle = np.asarray(np.linalg.qr(np.vstack([triangle, np.linalg.qr(residual, mode="r")]), mode="r"))
     _, values, v = scipy.linalg.svd(triangle)

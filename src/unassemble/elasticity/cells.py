@@ -6,26 +6,21 @@ of each; the residual of the fit is the certificate. Material may differ from ce
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .cliques import Graph, shared_cliques, simplices, straight_simplices
+from .candidates import Block, candidates, coupled
+from .cliques import Graph
 from .entries import Entries, Pairs
-from .kinds import KINDS, Kind
 from .materials import fits
-from .moduli import FITS, Fit, Model
-from .nodal import NodalMatrix, determined
-from .ordering import ordered
-from .piercing import unpierced
-from .surface import contested, tiles
+from .model import FITS, Fit, Model
+from .nodal import NodalMatrix, determined, surrounded, valid_pairs
+from .surface import tiles
 
 _EMPTY = 1e-7  # of the largest coefficient; candidates below carry no material
-_COVERED = 0.5  # of the nodes: what cells have to touch before they are tried
-_LINEAR = {2: 8, 3: 20}  # blocks per row, at most, in meshes of linear simplices; others have too many cliques to try
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,128 +29,143 @@ class Cells:
 
     Attributes
     ----------
-    kind : str
-        meshio's name; empty where no element was recognised.
-    cells : (m, k) int64
-        Nodes, in meshio's order, positively oriented.
-    lame : (m, 2) float64
-        lambda and mu of each cell, up to one common factor (the unknown size of the body); empty where they are not
-        known.
+    blocks : mapping of str to (m, k) int64
+        By kind, meshio's names: nodes in meshio's order, positively oriented. Empty where no element was recognised.
+    lame : (n_cells, 2) float64
+        lambda and mu of each cell, up to one common factor (the unknown size of the body), in the order of the blocks;
+        empty where they are not known.
     backward_error : float
         Largest difference between an entry and the re-assembled one, relative to the largest off-diagonal entry of
         its row; NaN where the cells were read off the graph only.
     varying : bool
         Whether material differs within cells, at the points of the quadrature; `lame` then has the means.
+    shown : (n, d) bool, optional
+        Unknowns of nodes whose row has an entry that re-assembles and is not zero.
     """
 
-    kind: str
-    cells: NDArray[np.int64]
+    blocks: Mapping[str, NDArray[np.int64]]
     lame: NDArray[np.float64]
     backward_error: float
     varying: bool = False
+    shown: NDArray[np.bool_] | None = None
+
+    @property
+    def kind(self) -> str:
+        """The kind of all cells; several are joined by a plus sign."""
+        return "+".join(self.blocks)
+
+    @property
+    def cells(self) -> NDArray[np.int64]:
+        """(m, k) the cells, where they are of one kind."""
+        (cells,) = self.blocks.values()
+        return cells
+
+    @property
+    def first_nodes(self) -> NDArray[np.int64]:
+        """(n_cells,) a node of each cell, in the order of `lame`."""
+        return np.concatenate([cells[:, 0] for cells in self.blocks.values()])
 
     @property
     def recognised(self) -> bool:
         """Whether there are cells."""
-        return bool(self.kind)
+        return bool(self.blocks)
 
     @property
     def certified(self) -> bool:
         """Whether the cells re-assemble to the given matrix."""
         return self.recognised and bool(np.isfinite(self.backward_error))
 
+    def among(self, nodes: NDArray[np.bool_]) -> Cells:
+        """The cells all of whose nodes are among some, (n,) bool."""
+        kept = [nodes[cells].all(axis=1) for cells in self.blocks.values()]
+        if all(some.all() for some in kept):
+            return self
+        parts = zip(self.blocks.items(), kept, strict=True)
+        blocks = {kind: cells[some] for (kind, cells), some in parts if some.any()}
+        lame = self.lame[np.concatenate(kept)] if len(self.lame) else self.lame
+        return replace(self, blocks=blocks, lame=lame)
+
     @property
     def n_cells(self) -> int:
         """Number of cells."""
-        return len(self.cells)
+        return sum(map(len, self.blocks.values()))
 
 
-def no_cells(d: int) -> Cells:
+def no_cells() -> Cells:
     """Nothing recognised."""
-    return Cells("", np.empty((0, d + 1), np.int64), np.empty((0, 2)), float("nan"))
+    return Cells({}, np.empty((0, 2)), float("nan"))
 
 
 def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: float | None = None) -> Cells:
-    """Find cells of one kind that re-assemble to the matrix: simplices or boxes, linear or quadratic.
+    """Find cells that re-assemble to the matrix: simplices or boxes, linear or quadratic; or linear ones of both.
 
     With lambda / mu known to be one number, `ratio`, linear simplices of one material are tried first, which is quick.
     Where no material fits, boxes and quadratic cells that lie side by side and of which each entry belongs to one at
     least are returned all the same, without certificate.
 
     Entries between two nodes that both miss a neighbour are left out, since cells that lost a node to a support
-    contribute to them. Cells all of whose entries are left out cannot be seen and are not reported.
+    contribute to them. Cells all of whose entries are left out cannot be seen and are not reported. First neighbours
+    that lack some of their directions only, as on rollers, and those of nodes with a penalty count as being there,
+    which fewer rows can tell.
     """
-    d = nodal.dim
-    graph = _graph(nodal, points)
-    entries = Entries.of(nodal)
-    plain = no_cells(d)
-    if not len(entries.key):
-        return plain
-    for kind, sets in _candidates(graph, points, d):
-        cells = ordered(sets, points, kind)
-        if kind.linear_simplex:
-            cells = _without_pierced(kind, cells, points, graph)
-        told = entries.explained_by(Pairs.of(cells, entries), FITS)
-        if told is None or not len(told.key):
+    graph, known = coupled(nodal, points), determined(points)
+    likely = Entries.of(nodal, known, surrounded(nodal, valid_pairs(nodal, inferred=True)))
+    found = no_cells()
+    for entries in [likely, Entries.of(nodal, known)] if (likely.complete != likely.sure).any() else [likely]:
+        other = _recognised(points, graph, entries, ratio)
+        if other.certified:
+            return other
+        found = found if found.recognised else other
+    return found
+
+
+def _recognised(points: NDArray[np.float64], graph: Graph, entries: Entries, ratio: float | None) -> Cells:
+    """Cells that explain most entries.
+
+    Cells that hide next to supports are excused, and those of another kind must not pass for such.
+    """
+    best, most = no_cells(), 0
+    for blocks in candidates(graph, points, entries.complete) if len(entries.key) else ():
+        told = entries.explained_by([Pairs.of(one.cells, entries) for one in blocks], graph, FITS)
+        if told is None or len(told.key) <= most:
             continue
-        cells = cells[Pairs.of(cells, told).seen]
-        for model, fit in fits(points, cells, kind, told, ratio):
-            found = _accepted(model, fit)
-            if found is not None:
-                return found
-        if not plain.recognised:
-            plain = _by_graph(kind, cells)
-    return plain
-
-
-def _graph(nodal: NodalMatrix, points: NDArray) -> Graph:
-    """Pairs of determined nodes with an entry."""
-    known = determined(points)
-    live = (np.abs(nodal.data).max(axis=(1, 2)) > 1e-13 * nodal.size[nodal.node]) & known[nodal.node]
-    live &= known[nodal.indices]
-    return Graph(sp.csr_array((np.ones(live.sum()), (nodal.node[live], nodal.indices[live])), shape=(nodal.n,) * 2))
-
-
-def _candidates(graph: Graph, points: NDArray, d: int) -> Iterator[tuple[Kind, NDArray[np.int64]]]:
-    """Sets of nodes that could be the cells of a kind, those of most nodes first."""
-    known = int(determined(points).sum())
-    for kind in sorted((kind for kind in KINDS.values() if kind.dim == d), key=lambda kind: -kind.nodes):
-        if kind.linear_simplex:
-            pattern = len(graph.row) + graph.n
-            if pattern <= graph.n * _LINEAR[d]:
-                yield kind, simplices(graph, d)
+        seen = [replace(one, cells=one.cells[Pairs.of(one.cells, told).seen]) for one in blocks]
+        if not all(len(one.cells) for one in seen):
             continue
-        sets = shared_cliques(graph, kind.nodes)
-        if kind.name == "triangle6":
-            sets = np.unique(np.vstack([sets, straight_simplices(graph, points, d)]), axis=0)
-        if len(np.unique(sets)) > _COVERED * known:
-            yield kind, sets
+        found = next((cells for fit in fits(points, seen, told, ratio) if (cells := _accepted(*fit))), None)
+        if found is not None:
+            best, most = replace(found, shown=told.shown(FITS)), len(told.key)
+        elif not best.recognised:
+            best = _by_graph(seen)
+        if most == len(entries.key):
+            break
+    return best
 
 
-def _without_pierced(kind: Kind, cells: NDArray[np.int64], points: NDArray, graph: Graph) -> NDArray[np.int64]:
-    """Cliques that may be cells; only those that overlap others need a look."""
-    doubtful = np.flatnonzero(contested(kind.base, cells))
-    return np.delete(cells, doubtful[~unpierced(cells[doubtful], points, graph)], axis=0)
-
-
-def _by_graph(kind: Kind, cells: NDArray[np.int64]) -> Cells:
+def _by_graph(blocks: Sequence[Block]) -> Cells:
     """Cells without certificate, if they lie side by side; cliques of linear simplices are no evidence."""
-    if kind.linear_simplex or not len(cells) or not tiles(kind.base, cells[:, : kind.corners]):
-        return no_cells(kind.dim)
-    return Cells(kind.name, cells, np.empty((0, 2)), float("nan"))
+    if any(one.kind.linear_simplex for one in blocks) or not tiles(_linear(blocks)):
+        return no_cells()
+    return Cells({one.kind.name: one.cells for one in blocks}, np.empty((0, 2)), float("nan"))
 
 
-def _accepted(model: Model, fit: Fit) -> Cells | None:
+def _linear(blocks: Sequence[Block]) -> dict[str, NDArray[np.int64]]:
+    """The linear cells on the same corners."""
+    return {one.kind.base: one.cells[:, : one.kind.corners] for one in blocks}
+
+
+def _accepted(models: Sequence[Model], fit: Fit) -> Cells | None:
     """Cells that carry material, if they fit, have shear moduli of one sign and do not overlap; made-up ones do.
 
     A quadratic triangle, for one, is a combination of small linear ones and a large one with a negative modulus.
     """
-    kind, lame = model.kind, fit.lame
+    lame = fit.lame
     if not fit.misfit <= FITS or not lame.any():
         return None
     carries = np.abs(lame).max(axis=1) > _EMPTY * np.abs(lame).max()
-    cells, lame = model.cells[carries], lame[carries]
-    mu = lame[:, 1]
-    if not ((mu > 0).all() or (mu < 0).all()) or not tiles(kind.base, cells[:, : kind.corners]):
+    parts = np.split(carries, np.cumsum([len(model.cells) for model in models])[:-1])
+    blocks = [Block(model.kind, model.cells[part]) for model, part in zip(models, parts, strict=True) if part.any()]
+    mu = lame[carries, 1]
+    if not ((mu > 0).all() or (mu < 0).all()) or not tiles(_linear(blocks)):
         return None
-    return Cells(kind.name, cells, lame, fit.misfit, model.varying)
+    return Cells({one.kind.name: one.cells for one in blocks}, lame[carries], fit.misfit, models[0].varying)

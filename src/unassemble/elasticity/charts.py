@@ -47,7 +47,12 @@ class Chart:
 
 
 def chart(
-    nodal: NodalMatrix, valid: NDArray[np.bool_], rows: NDArray[np.int64], *, whole: bool, ratio: float | None = None
+    nodal: NodalMatrix,
+    valid: NDArray[np.bool_],
+    rows: NDArray[np.int64],
+    *,
+    whole: bool,
+    terms: NDArray[np.float64] | None = None,
 ) -> Chart:
     """Compute the least singular fields of the identities of some rows.
 
@@ -59,10 +64,10 @@ def chart(
     whole : bool
         Whether these are all rows of the body. Otherwise fields are added until the rest is stiff, so that the
         charts together hold every field of the body that fits.
-    ratio : float, optional
-        lambda / mu, where it is known.
+    terms : (d, d, d, t) float64, optional
+        Unknown boundary terms; see :func:`.identities.identities`.
     """
-    local = identities(nodal, valid, rows, ratio)
+    local = identities(nodal, valid, rows, terms)
     n, d = len(local.columns), local.dim
     if not n:
         return Chart(local.columns, np.empty((0, d, 0)), np.empty(0), 0)

@@ -45,6 +45,11 @@ class Graph:
         offset = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
         return place, self.col[self.start[nodes[place]] + offset]
 
+    def only(self, pairs: NDArray[np.bool_]) -> Graph:
+        """The graph of some of the pairs `row`, `col`, both ways."""
+        entries = (np.ones(int(pairs.sum()), np.int8), (self.row[pairs], self.col[pairs]))
+        return Graph(sp.csr_array(entries, shape=(self.n, self.n)))
+
     def closed(self) -> sp.csr_array:
         """Pattern of ones, with the diagonal."""
         own = np.arange(self.n)

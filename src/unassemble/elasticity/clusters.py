@@ -93,7 +93,11 @@ def _domains(sums: Sums, group: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def rearranged(
-    sums: Sums, cluster: list[NDArray[np.int64]], group: NDArray[np.int64], direction: NDArray[np.int64]
+    sums: Sums,
+    cluster: list[NDArray[np.int64]],
+    group: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    names: list[NDArray[np.int64]],
 ) -> NDArray[np.int64] | None:
     """Directions with those of a cluster exchanged, if more sums vanish then; see Kernighan and Lin (1970).
 
@@ -105,11 +109,11 @@ def rearranged(
     touched = np.unique(sums.matrix[rows].indices)
     block = sp.csc_array(sp.diags_array(sums.scale[touched]) @ sums.matrix[touched][:, rows])
     blocks = [sp.csr_array(block[:, some]) for some in np.split(np.arange(len(rows)), _ends(cluster))]
-    choices = [_choices(one, group, direction, d) for one in cluster]
+    choices = [_choices(one, group, direction, names) for one in cluster]
     local = sums.value[touched]
     total = cost(local).sum()
-    best, stage, names = total - GAIN, 0, []
-    left = set(range(len(cluster)))
+    best, stage, taken = total - GAIN, 0, []
+    left = {k for k in range(len(cluster)) if len(choices[k])}
     while left:
         total, k, chosen, local = min(
             (
@@ -120,16 +124,16 @@ def rearranged(
             ),
             key=lambda one: one[:3],
         )
-        names.append((k, chosen))
+        taken.append((k, chosen))
         left.remove(k)
         if total < best:
-            best, stage = total, len(names)
-        if len(names) > stage + _PATIENCE:
+            best, stage = total, len(taken)
+        if len(taken) > stage + _PATIENCE:
             break
     if not stage:
         return None
     direction = direction.copy()
-    for k, chosen in names[:stage]:
+    for k, chosen in taken[:stage]:
         direction[cluster[k]] = choices[k][chosen]
     return direction
 
@@ -139,11 +143,14 @@ def _ends(cluster: list[NDArray[np.int64]]) -> NDArray[np.int64]:
 
 
 def _choices(
-    rows: NDArray[np.int64], group: NDArray[np.int64], direction: NDArray[np.int64], d: int
+    rows: NDArray[np.int64], group: NDArray[np.int64], direction: NDArray[np.int64], names: list[NDArray[np.int64]]
 ) -> NDArray[np.int64]:
     """(c, k) other directions that the rows of a domain may have."""
     if len(np.unique(group[rows])) == 1:
-        every = np.array(list(permutations(range(d), len(rows))))
+        every = names[len(rows) - 1]
     else:
-        every = np.array([np.array(names)[direction[rows]] for names in permutations(range(d))])
+        every = np.array([np.array(one)[direction[rows]] for one in permutations(range(len(names)))])
+        if len(names[-1]) == 1:  # directions increase within a node
+            same = group[rows[1:]] == group[rows[:-1]]
+            every = every[(~same | (np.diff(every, axis=1) > 0)).all(axis=1)]
     return every[(every != direction[rows]).any(axis=1)]

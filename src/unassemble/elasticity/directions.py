@@ -13,8 +13,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .constants import PENALTY
 from .likeness import doubtful, partners, reach
-from .sums import PENALTY, set_right
+from .sums import names_of, set_right
 
 _STARTS = 8
 _SETTLED = 0.05  # energy, relative to the trace, of directions that need no further start
@@ -27,6 +28,7 @@ def find_directions(
     d: int,
     *,
     starts: int | None = None,
+    ordered: bool = False,
 ) -> NDArray[np.int64]:
     """Direction of each row.
 
@@ -39,6 +41,8 @@ def find_directions(
     d : int
     starts : int, optional
         Places to start from, at most.
+    ordered : bool
+        Whether directions increase within each group.
 
     Returns
     -------
@@ -49,8 +53,11 @@ def find_directions(
     size = np.bincount(group)
     start = np.concatenate([[0], np.cumsum(size)[:-1]])
     members = [order[start[size == k][:, None] + np.arange(k)] for k in range(1, d + 1)]
-    search = _Search(matrix, group, members, identity, d)
+    names = names_of(d, ordered=ordered)
+    search = _Search(matrix, group, members, identity, names)
     best: tuple[float, NDArray] | None = None
+    if ordered and len(members[-1]):  # whole nodes leave no choice
+        starts = 1
     for known in _starts(members, len(group), d)[:starts]:
         direction = search.complete(known)
         energy = search.energy(direction)
@@ -60,7 +67,9 @@ def find_directions(
             break
     if best is None:
         return np.zeros(len(group), np.int64)
-    direction = set_right(matrix, group, members, ~identity, best[1], d)
+    direction = set_right(matrix, group, members, ~identity, best[1], names)
+    if ordered:
+        return direction
     return _named_in_order(direction, members, d)
 
 
@@ -69,7 +78,7 @@ def reconsidered(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> 
     order = len(direction)
     row = np.arange(order)
     return _Search(matrix, row, [row[:, None], *[np.empty((0, k), np.int64) for k in range(2, d + 1)]],
-                   np.zeros(order, dtype=bool), d).reconsider(direction)  # fmt: skip
+                   np.zeros(order, dtype=bool), names_of(d)).reconsider(direction)  # fmt: skip
 
 
 def _named_in_order(direction: NDArray, members: list[NDArray], d: int) -> NDArray[np.int64]:
@@ -109,7 +118,7 @@ class _Search:
         group: NDArray,
         members: list[NDArray],
         identity: NDArray,
-        d: int,
+        names: list[NDArray[np.int64]],
     ):
         off = matrix.tocoo()
         between = group[off.row] != group[off.col]
@@ -121,8 +130,8 @@ class _Search:
         penalised = np.abs(diagonal) > PENALTY * self._strength  # they would hide what all others say
         self._diagonal = float(diagonal[~penalised].sum())
         self._trace = float(np.abs(diagonal[~penalised]).sum()) or 1.0
-        self._members, self._live, self._d = members, ~identity, d
-        self._choices = [np.array(list(permutations(range(d), k))) for k in range(1, d + 1)]
+        self._members, self._live, self._d = members, ~identity, len(names)
+        self._choices = names
 
     def energy(self, direction: NDArray) -> float:
         """Sum of the entries between rows of the same direction, relative to the trace."""
@@ -181,7 +190,7 @@ class _Search:
             if len(rows):
                 choices = self._choices[rows.shape[1] - 1]
                 fit = score[rows[:, None, :], choices[None]].sum(axis=2)
-                two = np.partition(fit, -2, axis=1)[:, -2:]
+                two = np.partition(np.column_stack([fit, np.full(len(fit), -np.inf)]), -2, axis=1)[:, -2:]
                 best[rows] = choices[np.argmax(fit, axis=1)]
                 size = self._strength[rows].sum(axis=1) / self._d
                 margin[rows] = ((two[:, 1] - two[:, 0]) / np.where(size > 0, size, 1))[:, None]
@@ -195,7 +204,7 @@ def nodes_by_neighbours(matrix: sp.csr_array, direction: NDArray, d: int) -> NDA
     """
     order = matrix.shape[0]
     pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
-    reached = reach(matrix, 2)
+    reached = reach(matrix)
     rows = [np.flatnonzero(direction == a) for a in range(d)]
     first, second = [], []
     for c, b in combinations(range(d), 2):

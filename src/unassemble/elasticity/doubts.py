@@ -5,19 +5,26 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .nodal import NodalMatrix, determined, without_trace
-from .unknowns import Numbering
+from .numbering import Numbering
 
 
 def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     """Mark nodes whose rows may be those of two halves of one: coupled, with no direction in common.
 
     Where all entries are stored the halves of a node couple to the same nodes; and where unknowns stand in order, it
-    tells them apart.
+    tells which of them are in doubt.
     """
+    if numbering.open_row is not None:
+        unsure = numbering.open_row
+        if nodal.blurred is not None and numbering.unnamed is not None:  # rows without a name were left out
+            unsure = unsure | numbering.unnamed
+        doubtful = np.zeros(nodal.n, dtype=bool)
+        doubtful[numbering.node_of_row[unsure]] = True
+        doubtful &= (nodal.row_of < 0).any(axis=1)
+        return replace(nodal, doubtful=doubtful) if doubtful.any() else nodal
     ordered = numbering.kind != "pattern" and numbering.common == 1 and not numbering.odd
     if numbering.kind == "given" or not numbering.incomplete or ordered:
         return nodal
@@ -34,22 +41,26 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     return replace(nodal, doubtful=doubtful)
 
 
-def unconfirmed(nodal: NodalMatrix, points: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(n,) nodes with coordinates next to doubtful ones, and in no cell of those that re-assemble.
+def unconfirmed(
+    nodal: NodalMatrix, numbering: Numbering, points: NDArray[np.float64], shown: NDArray[np.bool_] | None
+) -> NDArray[np.bool_]:
+    """(n,) nodes with coordinates next to doubtful ones that cells do not confirm.
 
-    Rows that were joined wrongly can be placed all the same; that cells re-assemble shows that theirs were not.
+    Rows that were joined wrongly can be placed all the same; that entries re-assemble which are not zero, some of each
+    row, shows that these were not. They are `shown`, (n, d).
     """
     if nodal.doubtful is None:
         return np.zeros(nodal.n, dtype=bool)
+    if numbering.open_row is not None:  # nothing was joined that order does not join
+        return nodal.doubtful
     doubtful = nodal.doubtful | without_trace(nodal).any(axis=1)
-    graph = sp.csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2)
-    outside = determined(points) & (graph @ doubtful.astype(float) > 0)
-    outside[cells.ravel()] = False
+    outside = determined(points) & (nodal.graph @ doubtful.astype(float) > 0)
+    if shown is not None:
+        outside &= ~(shown | (nodal.row_of < 0)).all(axis=1)
     return np.asarray(outside)
 
 
 def _neighbourhoods(nodal: NodalMatrix) -> NDArray[np.uint64]:
     """(n,) equal for nodes that couple to the same nodes."""
     key = np.random.default_rng(0).integers(1, 2**62, nodal.n, dtype=np.uint64)
-    graph = sp.csr_array((np.ones(len(nodal.indices), np.uint64), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2)
-    return np.asarray(graph @ key)  # sums wrap around, which does no harm
+    return np.asarray(nodal.graph.astype(np.uint64) @ key)  # sums wrap around, which does no harm

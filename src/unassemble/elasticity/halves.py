@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from .grouping import by_first_row
 from .nodal import NodalMatrix, determined, without_trace
-from .unknowns import Numbering
+from .numbering import Numbering
 
 _APART = 1e-7  # of the mean edge length, up to which two positions are one
 
@@ -62,4 +62,6 @@ def _merged(nodal: NodalMatrix, label: NDArray[np.int64]) -> NodalMatrix:
     blocks.sort_indices()
     row_of = np.full((n, d), -1, dtype=np.int64)
     np.maximum.at(row_of, label, nodal.row_of)
-    return NodalMatrix.of(blocks.indptr, blocks.indices, blocks.data, row_of)
+    penalised = np.zeros((n, d), dtype=bool)
+    np.logical_or.at(penalised, label, nodal.penalised)
+    return replace(NodalMatrix.of(blocks.indptr, blocks.indices, blocks.data, row_of), penalised=penalised)

@@ -5,7 +5,8 @@ to the coordinate x_a, is
 
     (A^{cb} x_a)_i = delta_ab p_c + delta_ac q_b + delta_cb q_a.
 
-At each node these d^3 numbers lie in a space of dimension 2 d, known beforehand. What sticks out of it is
+At each node these d^3 numbers lie in a space of dimension 2 d, known beforehand; of dimension d, where lambda / mu is
+known; and where homogeneous material surrounds the node, they vanish. What sticks out of that space is
 linear in the coordinates and vanishes for the true ones. p and q never appear as unknowns.
 """
 
@@ -35,23 +36,28 @@ def boundary_terms(d: int, ratio: float | None = None) -> NDArray[np.float64]:
     return terms if ratio is None else ratio * terms[..., :d] + terms[..., d:]
 
 
-def seen_terms(valid: NDArray[np.bool_], ratio: float | None = None) -> NDArray[np.float64]:
+def no_terms(d: int) -> NDArray[np.float64]:
+    """(d, d, d, 0) boundary terms inside homogeneous material: none."""
+    return np.empty((d, d, d, 0))
+
+
+def seen_terms(valid: NDArray[np.bool_], terms: NDArray[np.float64]) -> NDArray[np.float64]:
     """(d, d, d, k) boundary terms in the valid places (d, d, d) of one node.
 
     A node without a row of direction b may use its place (b, b, b) for an equation without boundary terms.
     """
     d = len(valid)
-    seen = boundary_terms(d, ratio) * valid[..., None]
+    seen = terms * valid[..., None]
     for b in range(d):
         if valid[b].sum() == 1 and valid[b, b, b]:
             seen[b, b, b] = 0
     return seen
 
 
-def boundary_basis(valid: NDArray[np.bool_], ratio: float | None = None) -> NDArray[np.float64]:
+def boundary_basis(valid: NDArray[np.bool_], terms: NDArray[np.float64]) -> NDArray[np.float64]:
     """Orthonormal basis of the boundary terms seen by the valid places (d, d, d) of one node: (d, d, d, k)."""
     d = len(valid)
-    u, s, _ = np.linalg.svd(seen_terms(valid, ratio).reshape(d**3, -1), full_matrices=False)
+    u, s, _ = np.linalg.svd(seen_terms(valid, terms).reshape(d**3, terms.shape[3]), full_matrices=False)
     return u[:, s > 1e-10].reshape(d, d, d, -1)
 
 
@@ -71,8 +77,8 @@ class Identities:
         Blocks relative to the size of their row, zero where not valid.
     valid : (m, d, d, d) bool
         Places (c, b, a) that count.
-    ratio : float or None
-        lambda / mu, where it is known.
+    terms : (d, d, d, t) float64
+        What unknown boundary terms may put into the places c, b, a; see :func:`boundary_terms` and :func:`no_terms`.
     """
 
     rows: NDArray[np.int64]
@@ -81,7 +87,7 @@ class Identities:
     indices: NDArray[np.int32]
     data: NDArray[np.float64]
     valid: NDArray[np.bool_]
-    ratio: float | None = None
+    terms: NDArray[np.float64]
 
     @property
     def dim(self) -> int:
@@ -94,7 +100,7 @@ class Identities:
         d = self.dim
         code = self.valid.reshape(len(self.rows), -1) @ (1 << np.arange(d**3))
         kinds = [np.flatnonzero(code == value) for value in np.unique(code)]
-        return [(rows, boundary_basis(self.valid[rows[0]], self.ratio)) for rows in kinds]
+        return [(rows, boundary_basis(self.valid[rows[0]], self.terms)) for rows in kinds]
 
     @cached_property
     def _stacked(self) -> sp.csr_array:
@@ -171,19 +177,20 @@ class Identities:
     def boundary_values(self, x: NDArray) -> tuple[NDArray, NDArray]:
         """Vectors p and q of each row, (m, d) each, that fit coordinates x of shape (n, d) best.
 
-        NaN where the valid pairs do not determine them. In units of the size of the row.
+        NaN where the valid pairs do not determine them. In units of the size of the row. Both have to be among the
+        terms.
         """
         d = self.dim
         value = self.apply(x[:, :, None])[..., 0]
         found = np.full((len(self.rows), 2 * d), np.nan)
         for rows, basis in self._kinds:
             if basis.shape[3] == 2 * d:
-                seen = seen_terms(self.valid[rows[0]]).reshape(d**3, 2 * d)
+                seen = seen_terms(self.valid[rows[0]], self.terms).reshape(d**3, 2 * d)
                 found[rows] = value[rows].reshape(len(rows), -1) @ np.linalg.pinv(seen).T
         return found[:, :d], found[:, d:]
 
 
-def _telling(valid: NDArray[np.bool_], ratio: float | None) -> NDArray[np.bool_]:
+def _telling(valid: NDArray[np.bool_], terms: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(m,) rows with an equation left once p and q are eliminated."""
     d = valid.shape[1]
     code = valid.reshape(len(valid), -1) @ (1 << np.arange(d**3))
@@ -191,12 +198,12 @@ def _telling(valid: NDArray[np.bool_], ratio: float | None) -> NDArray[np.bool_]
     for value in np.unique(code):
         here = np.flatnonzero(code == value)
         one = valid[here[0]]
-        telling[here] = one.sum() > boundary_basis(one, ratio).shape[3]
+        telling[here] = one.sum() > boundary_basis(one, terms).shape[3]
     return telling
 
 
 def identities(
-    nodal: NodalMatrix, valid: NDArray[np.bool_], rows: NDArray[np.int64], ratio: float | None = None
+    nodal: NodalMatrix, valid: NDArray[np.bool_], rows: NDArray[np.int64], terms: NDArray[np.float64] | None = None
 ) -> Identities:
     """Collect the valid identities of some nodes.
 
@@ -207,11 +214,12 @@ def identities(
         See :func:`~unassemble.elasticity.nodal.valid_pairs` and :func:`~unassemble.elasticity.planes.with_planes`.
     rows : (m,) int64
         Nodes whose rows to use; those that say nothing once p and q are eliminated are dropped.
-    ratio : float, optional
-        lambda / mu, where it is known to be one number: half as many unknowns p and q, and more equations left.
+    terms : (d, d, d, t) float64, optional
+        Unknown boundary terms: the fewer there are, the more equations are left. Any p and q, where not given.
     """
+    terms = boundary_terms(nodal.dim) if terms is None else terms
     valid = valid if valid.ndim == 4 else np.repeat(valid[..., None], nodal.dim, axis=3)
-    rows = rows[_telling(valid[rows], ratio)]
+    rows = rows[_telling(valid[rows], terms)]
     count = np.diff(nodal.indptr)[rows]
     start = np.repeat(nodal.indptr[rows] - (np.cumsum(count) - count), count)
     entry = (np.arange(count.sum()) + start).astype(np.int64)
@@ -224,4 +232,4 @@ def identities(
     columns = np.flatnonzero(touched)
     local = np.cumsum(touched) - 1
     indptr = np.concatenate([[0], np.cumsum(np.bincount(row[live], minlength=len(rows)))]).astype(np.int32)
-    return Identities(rows, columns, indptr, local[neighbour].astype(np.int32), data[live], valid[rows], ratio)
+    return Identities(rows, columns, indptr, local[neighbour].astype(np.int32), data[live], valid[rows], terms)

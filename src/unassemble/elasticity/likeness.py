@@ -10,14 +10,15 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+_STEPS = 2
 _AT_ONCE = 1 << 22  # entries of the reach to multiply at a time
 _SAME = 1e-6  # single precision
 _FEW = 0.08  # share of pairs of rows whose likeness may be an exception
 _MOST = 60_000_000  # entries of a reach beyond which it is not taken a step further
 
 
-def reach(matrix: sp.csr_array, steps: int) -> sp.csr_array:
-    """(N, N) where the rows lead to over some steps, rows of norm one.
+def reach(matrix: sp.csr_array) -> sp.csr_array:
+    """(N, N) where the rows lead to over some steps of the graph, rows of norm one.
 
     Each step divides by the number of rows coupled to, half before and half after it.
     """
@@ -25,7 +26,7 @@ def reach(matrix: sp.csr_array, steps: int) -> sp.csr_array:
     weight = sp.diags_array(1 / np.sqrt(np.maximum(np.diff(matrix.indptr), 1)).astype(np.float32))
     step = sp.csr_array(weight @ pattern @ weight)
     reached = step
-    for _ in range(steps - 1):
+    for _ in range(_STEPS - 1):
         if reached.nnz * (step.nnz / max(step.shape[0], 1)) > _MOST * 8:
             break
         reached = sp.csr_array(reached @ step)
@@ -59,6 +60,25 @@ def partners(
     np.maximum.at(best_s, s, value)
     chosen = (value >= best_r[r] - _SAME) & (value >= best_s[s] - _SAME)
     return r[chosen], s[chosen], value[chosen]
+
+
+def likest(
+    pattern: sp.csr_array, reached: sp.csr_array, rows: NDArray, others: NDArray, direction: NDArray
+) -> NDArray[np.bool_]:
+    """(k,) whether of all rows of its direction at most two steps from row r, row s is the likest, or equal to it.
+
+    Parameters
+    ----------
+    rows, others : (k,) int64
+        Rows r and s.
+    direction : (N,) int64
+    """
+    near = sp.coo_array(pattern[rows] @ pattern)
+    fits = direction[near.col] == direction[others][near.row]
+    which, other = near.row[fits].astype(np.int64), near.col[fits].astype(np.int64)
+    best = np.zeros(len(rows))
+    np.maximum.at(best, which, alike(reached, rows[which], other))
+    return alike(reached, rows, others) >= best - _SAME
 
 
 def doubtful(likeness: NDArray[np.float64]) -> float:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .entries import Entries, Pairs
-from .kinds import Kind
-from .moduli import FITS, Fit, Model, all_at_once, cell_by_cell, one_material
+from .candidates import Block
+from .entries import Entries, Pairs, claims
+from .model import FITS, Fit, Model
+from .moduli import all_at_once, one_material
+from .peeling import cell_by_cell
 from .reference import Rule, rules
 
 _SAMPLE = 60  # cells on which quadrature rules are tried
@@ -18,43 +21,61 @@ _LARGEST = {True: 10_000_000, False: 50_000_000}  # numbers in the joint problem
 
 
 def fits(
-    points: NDArray, cells: NDArray, kind: Kind, entries: Entries, ratio: float | None
-) -> Iterator[tuple[Model, Fit]]:
-    """Lame coefficients of the candidates, in the ways that suit the kind, the simplest first.
+    points: NDArray, blocks: Sequence[Block], entries: Entries, ratio: float | None
+) -> Iterator[tuple[tuple[Model, ...], Fit]]:
+    """Lame coefficients of the candidates, in the ways that suit their kinds, the simplest first.
 
-    One material where lambda / mu is one number, `ratio`; a material for each cell; a material for each point of the
-    quadrature.
+    Cells with entries of their own, boxes and quadratic ones, are one block at most; linear simplices lie beside them.
+    One material where lambda / mu is one number, `ratio`, and there are simplices; a material for each cell; a material
+    for each point of the quadrature, where there are no simplices.
     """
-    if not len(cells):
+    simple = [Model(points, one.cells, one.kind, next(rules(one.kind))) for one in blocks if one.kind.linear_simplex]
+    rich = [one for one in blocks if not one.kind.linear_simplex]
+    if not rich:
+        yield from _of_simplices(simple, entries, ratio)
         return
-    if kind.linear_simplex:
-        (rule,) = rules(kind)
-        model = Model(points, cells, kind, rule)
-        if ratio is not None:
-            yield model, one_material(model, entries, ratio)
-        if model.coefficients <= _LARGEST[False]:
-            yield model, all_at_once(model, entries)
-        return
-    for varying in (False, True):
-        likely, open_rules = _likely_rules(points, cells, kind, entries, varying)
-        if likely is not None:
-            model = Model(points, cells, kind, likely, varying)
-            yield model, cell_by_cell(model, entries)
-    for rule in open_rules:
-        model = Model(points, cells, kind, rule, varying=True)
+    beside = [Pairs.of(one.cells, entries) for one in simple]
+    for varying in (False,) if simple else (False, True):
+        likely, open_rules = _likely_rules(points, rich[0], entries, varying, beside)
+        if likely is None:
+            continue
+        model = Model(points, rich[0].cells, rich[0].kind, likely, varying)
+        if simple and ratio is not None:
+            yield (*simple, model), one_material((*simple, model), entries, ratio)
+        peeled = cell_by_cell(model, entries, beside)
+        if not simple:
+            yield (model,), Fit(peeled.lame, peeled.misfit)
+            continue
+        if np.isfinite(peeled.misfit):
+            for models, fit in _of_simplices(simple, replace(entries, value=peeled.rest), None):
+                yield (*models, model), Fit(np.vstack([fit.lame, peeled.lame]), fit.misfit)
+    for rule in () if simple else open_rules:
+        model = Model(points, rich[0].cells, rich[0].kind, rule, varying=True)
         if model.coefficients <= _LARGEST[True] and _patch_fits(model, entries):
-            yield model, all_at_once(model, entries)
+            yield (model,), all_at_once(model, entries)
+
+
+def _of_simplices(
+    simple: Sequence[Model], entries: Entries, ratio: float | None
+) -> Iterator[tuple[tuple[Model, ...], Fit]]:
+    """Linear simplices, of which candidates may be none: one material, then one for each."""
+    (model,) = simple
+    if ratio is not None:
+        yield (model,), one_material((model,), entries, ratio)
+    if model.coefficients <= _LARGEST[False]:
+        yield (model,), all_at_once(model, entries)
 
 
 def _likely_rules(
-    points: NDArray, cells: NDArray, kind: Kind, entries: Entries, varying: bool
+    points: NDArray, block: Block, entries: Entries, varying: bool, beside: Sequence[Pairs]
 ) -> tuple[Rule | None, list[Rule]]:
     """The quadrature rule that fits a few cells best by the entries that are theirs alone, None if none does.
 
-    And the rules with more coefficients than such entries determine.
+    And the rules with more coefficients than such entries determine. Cells `beside` claim entries too.
     """
+    kind, cells = block.kind, block.cells
     pairs = Pairs.of(cells, entries)
-    alone = np.bincount(pairs.place[pairs.there], minlength=len(entries.key)) == 1
+    alone = claims((pairs, *beside), entries) == 1
     own = pairs.there & alone[pairs.place]
     rich = np.flatnonzero(own.sum(axis=1) >= own.sum(axis=1).max())
     some = rich[:: max(len(rich) // _SAMPLE, 1)]
@@ -78,6 +99,6 @@ def _patch_fits(model: Model, entries: Entries) -> bool:
     centre = model.points[model.cells].mean(axis=1)
     some = np.argsort(np.linalg.norm(centre - centre[len(centre) // 2], axis=1))[:_SAMPLE]
     pairs, own = Pairs.of(model.cells, entries), Pairs.of(model.cells[some], entries)
-    count, inside = (np.bincount(one.place[one.there], minlength=len(entries.key)) for one in (pairs, own))
+    count, inside = claims((pairs,), entries), claims((own,), entries)
     patch = Model(model.points, model.cells[some], model.kind, model.rule, model.varying)
     return all_at_once(patch, entries.at(np.flatnonzero((inside > 0) & (inside == count)))).misfit <= FITS

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .sums import PENALTY
-from .unknowns import Numbering
+from .constants import PENALTY
+from .numbering import Numbering
 
 _ROUNDING = 1e-9  # a row that annihilates constants does so to rounding; supports leave 1e-3 and more
 
@@ -23,13 +23,18 @@ class NodalMatrix:
     indptr, indices : int32
         Graph of the nodes, columns increasing, every node coupled to itself.
     data : (nnz, d, d) float64
-        ``data[k, c, b]`` is A^{cb}_ij; unknowns that the matrix lacks have zeros.
+        ``data[k, c, b]`` is A^{cb}_ij; unknowns that the matrix lacks have zeros. A diagonal entry with a penalty is
+        replaced by what makes its row annihilate constants, which is what assembly put there if the row is whole.
     row_of : (n, d) int64
         Matrix row of each unknown, -1 where there is none.
     size : (n,) float64
         Mean absolute sum of a node's off-diagonal blocks, the unit in which its equations are measured.
+    penalised : (n, d) bool
+        Unknowns with a penalty on the diagonal.
     doubtful : (n,) bool, optional
-        Nodes that may be halves of one; see :mod:`.doubts`.
+        Nodes whose rows, or directions, may be others; see :mod:`.doubts`.
+    blurred : (n,) bool, optional
+        Nodes coupled to rows that were left out.
     """
 
     indptr: NDArray[np.int32]
@@ -37,17 +42,27 @@ class NodalMatrix:
     data: NDArray[np.float64]
     row_of: NDArray[np.int64]
     size: NDArray[np.float64]
+    penalised: NDArray[np.bool_]
     doubtful: NDArray[np.bool_] | None = None
+    blurred: NDArray[np.bool_] | None = None
 
     @classmethod
     def of(cls, indptr: NDArray, indices: NDArray, data: NDArray, row_of: NDArray[np.int64]) -> NodalMatrix:
         """From blocks in BSR form, every node coupled to itself."""
         n, d = row_of.shape
         indptr = indptr.astype(np.int32)
-        indices, data = indices[: indptr[-1]].astype(np.int32), data[: indptr[-1]]
+        indices, data = indices[: indptr[-1]].astype(np.int32), data[: indptr[-1]].copy()
+        own = np.repeat(np.arange(n), np.diff(indptr)) == indices
         off = np.abs(data).sum(axis=(1, 2)) / d**2
-        off[np.repeat(np.arange(n), np.diff(indptr)) == indices] = 0
-        return cls(indptr, indices, data, row_of, np.add.reduceat(off, indptr[:-1]))
+        off[own] = 0
+        size = np.add.reduceat(off, indptr[:-1])
+        diagonal = np.diagonal(data, axis1=1, axis2=2)[own]
+        penalised = (np.abs(diagonal) > PENALTY * size[:, None]) & (size > 0)[:, None]
+        node, direction = np.nonzero(penalised)
+        place = np.flatnonzero(own)[node]
+        data[place, direction, direction] = 0  # before the rest is added up: it would be lost beside the penalty
+        data[place, direction, direction] = -np.add.reduceat(data, indptr[:-1])[node, direction, direction]
+        return cls(indptr, indices, data, row_of, size, penalised)
 
     @property
     def n(self) -> int:
@@ -64,21 +79,29 @@ class NodalMatrix:
         """(nnz,) the node to whose rows each block belongs."""
         return np.repeat(np.arange(self.n, dtype=np.int32), np.diff(self.indptr))
 
+    @property
+    def graph(self) -> sp.csr_array:
+        """(n, n) ones where there are blocks."""
+        return sp.csr_array((np.ones(len(self.indices)), self.indices, self.indptr), shape=(self.n, self.n))
+
     def row_sums(self, entries: NDArray | None = None) -> NDArray:
         """(n, ...) sums over each node's blocks."""
         entries = self.data if entries is None else entries
         return np.add.reduceat(entries, self.indptr[:-1], axis=0)  # no node is empty
 
 
-def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
+def nodal_matrix(
+    matrix: sp.csr_array, numbering: Numbering, *, left_out: NDArray[np.bool_] | None = None
+) -> NodalMatrix:
     """Gather the unknowns of each node into blocks.
 
-    Unknowns whose row and column are those of the identity are left out, as if they had been eliminated.
+    Unknowns whose row and column are those of the identity are left out, as if they had been eliminated; so are those
+    that the caller names.
     """
     n, d = numbering.n_nodes, numbering.block_size
     place = numbering.node_of_row * d + numbering.direction_of_row
     row_of = np.full(n * d, -1, dtype=np.int64)
-    live = ~numbering.identity_row
+    live = ~numbering.identity_row if left_out is None else ~(numbering.identity_row | left_out)
     row_of[place[live]] = np.flatnonzero(live)
     coo = matrix.tocoo()
     keep = live[coo.row] & live[coo.col]
@@ -92,32 +115,65 @@ def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
     )
     blocks = entries.tocsr().tobsr(blocksize=(d, d))
     blocks.sort_indices()
-    return NodalMatrix.of(blocks.indptr, blocks.indices, blocks.data, row_of.reshape(n, d))
+    found = NodalMatrix.of(blocks.indptr, blocks.indices, blocks.data, row_of.reshape(n, d))
+    if left_out is None:
+        return found
+    blurred = np.zeros(n, dtype=bool)
+    blurred[numbering.node_of_row[coo.row[left_out[coo.col]]]] = True
+    return replace(found, blurred=blurred)
 
 
-def valid_pairs(nodal: NodalMatrix, *, strict: bool = True) -> NDArray[np.bool_]:
+def valid_pairs(nodal: NodalMatrix, *, strict: bool = True, inferred: bool = False) -> NDArray[np.bool_]:
     """Which rows of which blocks hold every coefficient that assembly gave them.
 
     Row i of A^{cb} annihilates constants, unless a coupled unknown of component b was taken away or the
     diagonal was changed. The converse fails on regular meshes, where what is missing can add up to zero (two
     eliminated nodes opposite each other). So the strict rule asks it of all rows of a node at once: they couple to
-    the same
-    unknowns, and a neighbour that is known to lack the direction spoils it. A penalty on the diagonal explains
+    the same unknowns, and a neighbour that is known to lack the direction spoils it. A penalty on the diagonal explains
     itself and spoils its own row only.
+
+    Not even that if diagonals may be `inferred`: what makes the row annihilate constants is what assembly put there,
+    if the row is whole. Only the others of the node can tell whether it is, which is less than is asked elsewhere.
 
     Returns
     -------
     (n, d, d) bool
         Component c of the row, component b of the columns.
     """
-    present = nodal.row_of >= 0
-    zero = _annihilating(nodal)
-    valid = zero & present[:, :, None] & present[:, None, :] & (nodal.size > 0)[:, None, None]
+    present: NDArray[np.bool_] = nodal.row_of >= 0
+    zero, penalty = _annihilating(nodal), _with_penalty(nodal)
+    valid = np.asarray(zero & ~penalty & present[:, :, None] & present[:, None, :] & (nodal.size > 0)[:, None, None])
     if not strict:
         return valid
-    whole = (zero | _excused(nodal)).all(axis=1)
-    lacking = _graph(nodal) @ (~present & ~without_trace(nodal))
-    return valid & (whole & (lacking == 0))[:, None, :]
+    whole = (zero | ~present[:, :, None]).all(axis=1)
+    lacking = nodal.graph @ (~present & ~without_trace(nodal))
+    if inferred:
+        valid |= penalty & valid.any(axis=1, keepdims=True)
+    sure: NDArray[np.bool_] = whole & (lacking == 0)
+    return np.asarray(valid & sure[:, None, :])
+
+
+def eliminated(nodal: NodalMatrix) -> NDArray[np.bool_]:
+    """(n, d) unknowns that were taken out of nodes of which others are left."""
+    present = nodal.row_of >= 0
+    return ~present & ~without_trace(nodal) & np.asarray(present.any(axis=1))[:, None]
+
+
+def surrounded(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(n,) nodes whose neighbours are all there, though some may lack a direction.
+
+    The rows show it in those directions that none of them lacks; there has to be one.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    valid : (n, d, d) bool
+        By the strict rule.
+    """
+    present = nodal.row_of >= 0
+    lacking = nodal.graph @ eliminated(nodal).astype(float) > 0
+    whole = (valid | ~present[:, :, None]).all(axis=1)
+    return np.asarray((whole | lacking | ~present).all(axis=1) & (whole & present & ~lacking).any(axis=1))
 
 
 def without_trace(nodal: NodalMatrix) -> NDArray[np.bool_]:
@@ -126,10 +182,10 @@ def without_trace(nodal: NodalMatrix) -> NDArray[np.bool_]:
     What was eliminated leaves a trace in the rows next to it. Where there is none, the unknown stands
     somewhere else: the node's rows were not recognised as those of one node.
     """
-    missing = (~(_annihilating(nodal) | _excused(nodal))).any(axis=1)
     present = nodal.row_of >= 0
+    missing = (~_annihilating(nodal) & present[:, :, None]).any(axis=1)
     some = np.asarray(present.any(axis=1))
-    return ~present & (_graph(nodal) @ missing.astype(float) == 0) & some[:, None]
+    return ~present & (nodal.graph @ missing.astype(float) == 0) & some[:, None]
 
 
 def _annihilating(nodal: NodalMatrix) -> NDArray[np.bool_]:
@@ -138,20 +194,9 @@ def _annihilating(nodal: NodalMatrix) -> NDArray[np.bool_]:
     return np.asarray(np.abs(nodal.row_sums()) <= _ROUNDING * size)
 
 
-def _excused(nodal: NodalMatrix) -> NDArray[np.bool_]:
-    """(n, d, d) rows that are not there, and rows that do not annihilate constants because of a penalty."""
-    return penalised(nodal)[:, None, :] & np.eye(nodal.dim, dtype=bool) | ~(nodal.row_of >= 0)[:, :, None]
-
-
-def _graph(nodal: NodalMatrix) -> sp.csr_array:
-    return sp.csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2)
-
-
-def penalised(nodal: NodalMatrix) -> NDArray[np.bool_]:
-    """(n, d) unknowns with a penalty on the diagonal."""
-    own = nodal.data[nodal.node == nodal.indices]
-    diagonal = np.abs(np.diagonal(own, axis1=1, axis2=2))
-    return (diagonal > PENALTY * nodal.size[:, None]) & (nodal.size > 0)[:, None]
+def _with_penalty(nodal: NodalMatrix) -> NDArray[np.bool_]:
+    """(n, d, d) rows of blocks whose diagonal entry is inferred."""
+    return nodal.penalised[:, None, :] & np.eye(nodal.dim, dtype=bool)
 
 
 def uncoupled(nodal: NodalMatrix) -> bool:

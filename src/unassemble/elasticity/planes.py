@@ -14,10 +14,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .nodal import NodalMatrix, penalised, without_trace
+from .nodal import NodalMatrix, eliminated, surrounded
 
 
 def with_planes(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NodalMatrix, NDArray[np.bool_]] | None:
@@ -37,18 +36,19 @@ def with_planes(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NodalMatr
     valid : (n, d, d, d) bool
         By component c of the row, b of the columns, and a of the coordinate.
     """
-    n, d = nodal.n, nodal.dim
+    d = nodal.dim
     present = nodal.row_of >= 0
-    gone: NDArray[np.bool_] = ~present & ~without_trace(nodal) & np.asarray(present.any(axis=1))[:, None]
-    graph = sp.csr_array((np.ones(len(nodal.indices)), nodal.indices, nodal.indptr), shape=(n, n))
+    gone = eliminated(nodal)
+    graph = nodal.graph
     count = graph @ gone.astype(float)
-    near = (count > 0) & ~penalised(nodal)
+    near = count > 0
     if nodal.doubtful is not None:  # such a node may be no node of the plane
         near &= (graph @ nodal.doubtful.astype(float) == 0)[:, None]
-    # A direction that nobody near lacks has to be whole, or more is missing than a roller takes.
-    other = (present & (count == 0))[:, None, :]
-    whole = (valid | ~present[:, :, None] | ~other).all(axis=(1, 2)) & other.any(axis=(1, 2))
+    if nodal.blurred is not None:  # what such rows miss is not in the plane alone
+        near &= ~nodal.blurred[:, None]
+    whole = surrounded(nodal, valid)  # or more is missing than a roller takes
     held = (near & whole[:, None])[:, None, :] & present[:, :, None] & (nodal.size > 0)[:, None, None]
+    held &= ~(nodal.penalised[:, None, :] & np.eye(d, dtype=bool))  # beside a penalty the sum does not show
     if not held.any():
         return None
     missing = -nodal.row_sums() / np.maximum(count, 1)[:, None, :]

@@ -4,24 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from ..clock import Clock
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..matrix import check_matrix
-from ..words import count_of
 from .cells import no_cells, recognise_cells
 from .certificate import largest_residual
 from .doubts import unconfirmed, with_doubts
 from .halves import joined
 from .material import poisson_ratio
 from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled
-from .positions import Solution, solve
+from .numbering import Numbering
+from .positions import solve
 from .results import ElasticityRecovery, ScalarParts
 from .rounded import SPREADS, with_exact_sums
-from .unknowns import Numbering, find_numbering
-from .verdict import about_cells, of_few_digits, verdict
+from .solution import Solution
+from .unknowns import find_numbering
+from .verdict import about_cells, about_nodes, of_few_digits, verdict
 
+_SAME = 1e-6  # difference up to which Poisson's ratios of pieces are one
 _NEAR = 1e-6  # residual up to which positions are good enough to look for elements
 
 
@@ -76,12 +79,13 @@ def recover_elasticity(
     with clock("numbering"):
         numbering = numbering or find_numbering(whole, block_size)
         nodal = nodal_matrix(whole, numbering)
+    unproven = whole if numbering.unnamed is not None and numbering.unnamed.any() else None
     del whole
     if uncoupled(nodal):
         raise GeometryError(
             "the directions are not coupled: these are scalar matrices side by side; recover one of them by itself"
         )
-    return place_nodes(nodal, numbering, clock, cells=cells, patch=patch, rounding=rounding)
+    return place_nodes(nodal, numbering, clock, cells=cells, patch=patch, rounding=rounding, whole=unproven)
 
 
 def place_nodes(
@@ -92,15 +96,17 @@ def place_nodes(
     cells: bool = True,
     patch: int | None = None,
     rounding: float = 0.0,
+    whole: sp.csr_array | None = None,
 ) -> ElasticityRecovery:
     """The recovery once the nodes are known: null space, certificate, cells; see :func:`recover_elasticity`.
 
-    `rounding` is that of the entries, where they have few digits.
+    `rounding` is that of the entries, where they have few digits; `whole` is the matrix, where the direction of some
+    rows is not proven.
     """
     with clock("null space"), blas_threads(1):
         nodal = with_doubts(nodal, numbering)
         try:
-            solution = solve(nodal, patch)
+            nodal, solution = _solved(nodal, numbering, whole, patch)
         except RecoveryError as error:
             if numbering.kind == "given" or (numbering.common == 1 and not numbering.incomplete):
                 raise
@@ -126,6 +132,22 @@ def place_nodes(
     return _describe(nodal, numbering, solution, clock, cells, rounding)
 
 
+def _solved(
+    nodal: NodalMatrix, numbering: Numbering, whole: sp.csr_array | None, patch: int | None
+) -> tuple[NodalMatrix, Solution]:
+    """Positions; where none fit exactly, once more without the rows whose direction nothing proves."""
+    try:
+        solution = solve(nodal, patch)
+    except RecoveryError:
+        if whole is None:
+            raise
+    else:
+        if whole is None or (solution.exact and not any(solution.freedoms)):
+            return nodal, solution
+    nodal = with_doubts(nodal_matrix(whole, numbering, left_out=numbering.unnamed), numbering)
+    return nodal, solve(nodal, patch)
+
+
 def _describe(
     nodal: NodalMatrix, numbering: Numbering, solution: Solution, clock: Clock, want_cells: bool, rounding: float
 ) -> ElasticityRecovery:
@@ -134,9 +156,9 @@ def _describe(
     with clock("certify"):
         error = largest_residual(nodal, solution.valid, points, solution.ratio)
         near = error < max(_NEAR, SPREADS * rounding)
-        ratio = poisson_ratio(nodal, solution.valid, points) if near else None
-    found = no_cells(nodal.dim)
-    if want_cells and near:
+        ratio = _poisson_ratio(nodal, solution, points) if near else None
+    found = no_cells()
+    if (want_cells or solution.straight) and near:
         with clock("cells"):
             found = recognise_cells(nodal, points, None if ratio is None else 2 * ratio / (1 - 2 * ratio))
     backward = found.backward_error if found.certified else error
@@ -144,27 +166,24 @@ def _describe(
     if rounding and near:
         status, reason = "uncertified", of_few_digits(rounding, error)
     withheld = np.zeros(nodal.n, dtype=bool)
-    if status == "certified" and found.certified:
-        withheld = unconfirmed(nodal, points, found.cells)
+    if status == "certified" and (found.certified or numbering.open_row is not None):
+        withheld = unconfirmed(nodal, numbering, points, found.shown)
         points = np.where(withheld[:, None], np.nan, points)
+        found = found.among(~withheld)
     loose = ~determined(points)
     component = np.where(loose, -1, solution.component)
     warnings = list(solution.warnings)
     if want_cells:
         warnings += about_cells(found)
-    if withheld.any():
-        warnings.append(
-            f"{count_of(int(withheld.sum()), 'node belongs', 'nodes belong')} to no element that re-assembles; since "
-            "it was inferred which rows make up a node, no coordinates are given there"
-        )
-    if (loose & ~withheld).any():
-        warnings.append(
-            f"{count_of(int((loose & ~withheld).sum()), 'node is', 'nodes are')} tied to eliminated unknowns only and "
-            "not determined"
-        )
+    warnings += about_nodes(nodal, loose, withheld)
     if solution.planes:
         warnings.append(
             "nodes that lack a direction were taken to lie in planes across it, which fits, to determine others"
+        )
+    if solution.straight:
+        warnings.append(
+            "the body is homogeneous and held all around, where the identities leave an affine map free; the elements "
+            "determined it"
         )
     if solution.ratio is not None:
         warnings.append("Poisson's ratio, read off the nodes that determine it, was used to determine others")
@@ -172,3 +191,19 @@ def _describe(
         points, numbering.node_of_row, numbering.direction_of_row, np.asarray(loose, dtype=np.int8), component,
         solution.evidence, ratio, found, backward, status, reason, numbering.kind, tuple(warnings), clock.timings,
     )  # fmt: skip
+
+
+def _poisson_ratio(nodal: NodalMatrix, solution: Solution, points: NDArray[np.float64]) -> float | None:
+    """Poisson's ratio as the boundary terms have it, and as the elements that told axes have it; None if they differ.
+
+    None too where more than translation and scale is free, since boundary terms go with the points.
+    """
+    if any(solution.freedoms):
+        return None
+    told = [ratio / (2 * (1 + ratio)) for ratio in solution.straight]
+    if len(solution.straight) < len(solution.evidence):
+        nu = poisson_ratio(nodal, solution.valid, points)
+        if nu is None:
+            return None
+        told.append(nu)
+    return told[0] if np.ptp(told) < _SAME else None

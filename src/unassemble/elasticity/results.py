@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .cells import Cells
 from .modes import rigid_body_modes
-from .unknowns import Numbering
+from .numbering import Numbering
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from .directions import find_directions
 from .grouping import by_first_row, possible_nodes, same_pattern
-from .orderly import stretches
+from .likeness import reach
+from .runs import stretches
 
 _PLACES = (0.5, 0.2, 0.8)  # where to look, as parts of the rows
 _MOST = 3000  # rows of a sample beyond which it is no quick look
@@ -42,7 +43,7 @@ def _directions_show(matrix: sp.csr_array, group: NDArray[np.int64], seed: int, 
     whole = np.searchsorted(rows, inner)
     nobody = np.zeros(len(rows), dtype=bool)
     for d in sizes:
-        for node in [*possible_nodes(by_first_row(group[rows]), d), stretches(sample, d)[0]]:
+        for node in [*possible_nodes(by_first_row(group[rows]), d), stretches(reach(sample), d)[0]]:
             direction = find_directions(sample, node, nobody, d, starts=_STARTS)
             ones = np.zeros((len(rows), d))
             ones[np.arange(len(rows)), direction] = 1

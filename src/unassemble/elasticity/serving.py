@@ -20,11 +20,11 @@ from .anchoring import anchored, checked_anchors, digits_lost, near_enough
 from .cells import Cells
 from .kinds import KINDS
 from .nodal import nodal_matrix, uncoupled
+from .numbering import Numbering
 from .recover import parts_of, place_nodes
 from .results import ElasticityRecovery, ScalarParts
 from .rounded import with_exact_sums
 from .surface import boundary_loops
-from .unknowns import Numbering
 
 _THIN = 1e-14  # of the largest variance of the coordinates: rounding
 _SAME = 1e-12  # relative difference up to which the matrices of two directions are one
@@ -66,9 +66,10 @@ def serve(
     bars = bars_of(nodal)
     if bars is not None:
         return serve_truss(matrix, nodal, numbering, bars, clock, anchors=anchors, choice=choice)
+    unproven = whole if numbering.unnamed is not None and numbering.unnamed.any() else None
     del whole
     checked_anchors(anchors, numbering.node_of_row, numbering.block_size)  # before the long work
-    found = place_nodes(nodal, numbering, clock, cells=cells, rounding=rounding)
+    found = place_nodes(nodal, numbering, clock, cells=cells, rounding=rounding, whole=unproven)
     known = checked_anchors(anchors, found.node_of_row, numbering.block_size)
     points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
     status, reason = found.status, found.reason
@@ -76,20 +77,13 @@ def serve(
         status, reason = "uncertified", "the points lie in one line or plane, and no solid body does"
     status, reason = near_enough(status, reason, digits_lost(points, found.points, found.component, factor))
     lame, scale = _in_units(found, factor)
-    fields: dict[str, Any] = {"triangles": np.empty((0, 3), np.int64), **_cell_fields(found.cells)}
-    boundary, offsets = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
-    if found.cells.recognised and nodal.dim == 2:
-        boundary, offsets = boundary_loops(found.cells.kind, found.cells.cells)
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: with a mesh its point reflection fits the matrix as well")
     return Recovery(
-        **fields,
+        **_cell_fields(found.cells),
         points=points,
         component=found.component,
-        hinges=np.empty(0, np.int64),
         scale=scale,
-        boundary=boundary,
-        boundary_offsets=offsets,
         node_status=found.node_status,
         status=status,
         reason=reason,
@@ -121,13 +115,17 @@ def _flat(found: ElasticityRecovery) -> bool:
 _FIELD = {"triangle": "triangles", "quad": "quads", "tetra": "tetrahedra", "hexahedron": "hexahedra"}
 
 
-def _cell_fields(found: Cells) -> dict[str, NDArray[np.int64]]:
-    """Corners of the cells by their name in a Recovery, and their further nodes."""
-    if not found.recognised:
-        return {}
-    kind = KINDS[found.kind]
-    fields = {_FIELD[kind.base]: np.ascontiguousarray(found.cells[:, : kind.corners])}
-    return fields | ({"mid_nodes": np.ascontiguousarray(found.cells[:, kind.corners :])} if kind.quadratic else {})
+def _cell_fields(found: Cells) -> dict[str, Any]:
+    """Corners of the cells by their name in a Recovery, their further nodes, and in the plane their boundary."""
+    fields = {}
+    for name, cells in found.blocks.items():
+        kind = KINDS[name]
+        fields[_FIELD[kind.base]] = np.ascontiguousarray(cells[:, : kind.corners])
+        if kind.quadratic:
+            fields["mid_nodes"] = np.ascontiguousarray(cells[:, kind.corners :])
+    if any(KINDS[name].dim == 2 for name in found.blocks):
+        fields["boundary"], fields["boundary_offsets"] = boundary_loops(found.blocks)
+    return fields
 
 
 def _in_units(found: ElasticityRecovery, factor: NDArray) -> tuple[NDArray, NDArray]:
@@ -140,7 +138,7 @@ def _in_units(found: ElasticityRecovery, factor: NDArray) -> tuple[NDArray, NDAr
     scale = np.full(pieces, np.nan)
     if not found.cells.certified:
         return np.empty((0, 2)), scale
-    piece = found.component[found.cells.cells[:, 0]]
+    piece = found.component[found.cells.first_nodes]
     lame = found.cells.lame / np.where(np.isnan(factor), 1.0, np.abs(factor))[piece, None] ** (d - 2)
     count = np.bincount(piece, minlength=pieces)
     some = count > 0

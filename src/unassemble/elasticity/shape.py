@@ -43,7 +43,11 @@ class Shape:
 
 
 def shape(
-    fields: NDArray[np.float64], values: NDArray[np.float64], graph: sp.csr_array, told: NDArray[np.bool_]
+    fields: NDArray[np.float64],
+    values: NDArray[np.float64],
+    graph: sp.csr_array,
+    told: NDArray[np.bool_],
+    common: int | None = None,
 ) -> Shape:
     """Find the coordinates among the least singular fields.
 
@@ -57,6 +61,8 @@ def shape(
         Which nodes are coupled.
     told : (n,) bool
         Nodes with a valid row of their own; supports do not leave these loose.
+    common : int, optional
+        Fields that the nodes share which are not loose: d + 1, translations and scale, where not given.
 
     Raises
     ------
@@ -66,11 +72,12 @@ def shape(
     n, d, k = fields.shape
     if k <= d:
         raise GeometryError(f"{n} nodes with valid rows are too few to tell their positions")
+    common = d + 1 if common is None else common
     exact = values[d] <= EXACT
     null = fields[..., values <= EXACT] if exact else fields[..., : d + 1]
     loose = np.zeros(n, dtype=bool)
-    if null.shape[2] > d + 1:
-        shared, apart = set_aside(null, d + 1)
+    if null.shape[2] > common:
+        shared, apart = set_aside(null, common)
         few = _FEW * n >= np.count_nonzero(apart)  # the others are determined, whatever these do
         if few or 2 * np.count_nonzero(told & apart) <= np.count_nonzero(apart):
             null, loose = shared, apart

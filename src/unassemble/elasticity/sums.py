@@ -6,18 +6,24 @@ the sums vanish, however the entries are spread, so that nodes whose other direc
 
 from __future__ import annotations
 
-from itertools import permutations
+from itertools import combinations, permutations
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .clusters import GAIN, Sums, clusters, cost, rearranged
+from .constants import PENALTY
 
 _ROUNDS = 200
 _HOPEFUL = 0.1  # share of rows that add up to zero below which nothing is to be set right
 _ROUNDING = 1e-9
-PENALTY = 1e3  # a diagonal entry this many times the rest of its row is a penalty
+
+
+def names_of(d: int, *, ordered: bool = False) -> list[NDArray[np.int64]]:
+    """(c, k) directions that k = 1 .. d rows of one node may have: all different, or increasing."""
+    choose = combinations if ordered else permutations
+    return [np.array(list(choose(range(d), k))) for k in range(1, d + 1)]
 
 
 def set_right(
@@ -26,7 +32,7 @@ def set_right(
     members: list[NDArray[np.int64]],
     live: NDArray[np.bool_],
     direction: NDArray[np.int64],
-    d: int,
+    names: list[NDArray[np.int64]],
 ) -> NDArray[np.int64]:
     """Exchange directions, first of single nodes, then of clusters of them, as long as more sums vanish.
 
@@ -41,8 +47,10 @@ def set_right(
     live : (N,) bool
         Rows that count.
     direction : (N,) int64
-    d : int
+    names : list of (c, k) int64
+        Directions that the rows of a group of k = 1 .. d rows may have; see :func:`names_of`.
     """
+    d = len(names)
     size = np.asarray(abs(matrix).sum(axis=1)).ravel() - np.abs(matrix.diagonal())  # there may be a penalty on it
     scale = np.asarray(1 / np.where(size > 0, size, 1))
     telling = live & (np.abs(matrix.diagonal()) <= PENALTY * size)
@@ -53,11 +61,11 @@ def set_right(
             break
         near = abs(matrix) @ failing.astype(float) > 0
         better = _each(matrix, [rows[near[rows].any(axis=1) & live[rows].all(axis=1)] for rows in members if len(rows)],
-                       direction, sums, scale, d)  # fmt: skip
+                       direction, sums, scale, names)  # fmt: skip
         if better is None:
             spoiled = np.bincount(group, telling & failing)[group] > 0  # single rows can add up to zero by symmetry
             whole = Sums(matrix, scale, sums, telling & ~spoiled)
-            trials = (rearranged(whole, one, group, direction) for one in clusters(whole, group, live))
+            trials = (rearranged(whole, one, group, direction, names) for one in clusters(whole, group, live))
             better = next((one for one in trials if one is not None), None)
         if better is None:
             break
@@ -66,13 +74,18 @@ def set_right(
 
 
 def _each(
-    matrix: sp.csr_array, members: list[NDArray], direction: NDArray, sums: NDArray, scale: NDArray, d: int
+    matrix: sp.csr_array,
+    members: list[NDArray],
+    direction: NDArray,
+    sums: NDArray,
+    scale: NDArray,
+    names: list[NDArray[np.int64]],
 ) -> NDArray[np.int64] | None:
     """Directions after those nodes have changed theirs that gain by it, and most among all near them."""
     changed = direction.copy()
     for rows in members:
         if len(rows) and (changed == direction).all():  # what one kind of nodes did changes the sums for the next
-            _moved(matrix, rows, changed, sums, scale, d)
+            _moved(matrix, rows, changed, sums, scale, names)
     return None if np.array_equal(changed, direction) else changed
 
 
@@ -82,15 +95,22 @@ def _sums(matrix: sp.csr_array, direction: NDArray, live: NDArray, d: int) -> ND
     return np.asarray(matrix @ labels)
 
 
-def _moved(matrix: sp.csr_array, rows: NDArray, direction: NDArray, sums: NDArray, scale: NDArray, d: int) -> None:
+def _moved(
+    matrix: sp.csr_array,
+    rows: NDArray,
+    direction: NDArray,
+    sums: NDArray,
+    scale: NDArray,
+    names: list[NDArray[np.int64]],
+) -> None:
     """Change directions, in place, of nodes that gain most among all that share a row with them."""
     parts = [sp.csr_array(matrix[rows[:, j]]) for j in range(rows.shape[1])]
     best, choice = np.full(len(rows), GAIN), np.full(len(rows), -1)
-    choices = np.array(list(permutations(range(d), rows.shape[1])))
-    for k, names in enumerate(choices):
+    choices = names[rows.shape[1] - 1]
+    for k, choice_k in enumerate(choices):
         gain = np.zeros(len(rows))
-        for a in range(d):
-            step = (names == a).astype(float) - (direction[rows] == a)
+        for a in range(len(names)):
+            step = (choice_k == a).astype(float) - (direction[rows] == a)
             change = _combined(parts, step)
             if change is None:
                 continue

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from ..words import count_of
 from .cells import Cells
 from .nodal import NodalMatrix, without_trace
-from .positions import Solution
-from .unknowns import Numbering
+from .numbering import Numbering
+from .solution import Solution
 
 CERTIFIED = 1e-9
 _NEARLY = 2e-7  # gap at which entries rounded to 1e-15 still give coordinates to 1e-8
+_MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
 
 
 def about_cells(found: Cells) -> list[str]:
     """What there is to say of the elements."""
     if not found.recognised:
         return [
-            "no elements were recognised: looked for are linear and quadratic triangles, quadrilaterals, tetrahedra "
-            "and hexahedra, of one kind throughout"
+            "no elements were recognised: looked for are triangles and quadrilaterals, tetrahedra and hexahedra, "
+            "linear, or quadratic and of one kind throughout"
         ]
     if not found.certified:
         return [
@@ -30,6 +32,40 @@ def about_cells(found: Cells) -> list[str]:
     if found.varying:
         return ["the material differs within elements: their Lame coefficients are means"]
     return []
+
+
+def about_nodes(nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[np.bool_]) -> list[str]:
+    """Why nodes have no coordinates.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    loose : (n,) bool
+        Nodes without coordinates.
+    withheld : (n,) bool
+        Those that no cell confirms.
+    """
+    apart: NDArray[np.bool_] = np.asarray(without_trace(nodal).any(axis=1))
+    beside = np.zeros(nodal.n, dtype=bool)
+    beside[nodal.node[apart[nodal.indices]]] = True
+    unread, told = loose & ~withheld & beside, []
+    if withheld.any():
+        told.append(
+            f"{count_of(int(withheld.sum()), 'node has', 'nodes have')} rows that no element shows to be theirs; "
+            "since it was inferred which rows make up a node, no coordinates are given there"
+        )
+    if unread.any():
+        told.append(
+            f"{count_of(int(unread.sum()), 'node is', 'nodes are')} not determined, since rows there, or next to it, "
+            "belong to nodes that were not recognised; give the numbering if it is known"
+        )
+    rest = int((loose & ~withheld & ~unread).sum())
+    if rest:
+        told.append(
+            f"{count_of(rest, 'node is', 'nodes are')} not determined: the rows coupled to it lack entries, as next to "
+            "eliminated unknowns, and no equation that holds for every element and material is left of them"
+        )
+    return told
 
 
 def of_few_digits(rounding: float, error: float) -> str:
@@ -91,7 +127,15 @@ def verdict(
         )
     if found.certified and found.backward_error <= CERTIFIED:
         return "certified", f"the matrix re-assembled on the {count_of(found.n_cells, 'element')} is the given one"
-    odd = int(without_trace(nodal).any(axis=1).sum())
+    if solution.straight:
+        return "uncertified", (
+            "the identities leave an affine map free, since the material around every valid row is homogeneous; "
+            "elements determined it, but the matrix re-assembled on them is not the given one"
+        )
+    apart = np.asarray(without_trace(nodal).any(axis=1))
+    if numbering.open_row is not None and nodal.doubtful is not None:
+        apart &= ~nodal.doubtful  # these get no coordinates
+    odd = int(apart.sum())
     if odd:
         return "uncertified", (
             f"{count_of(odd, 'node lacks', 'nodes lack')} directions although no row next to it misses anything: its "
@@ -103,6 +147,11 @@ def verdict(
             "which rows belong to one node was inferred, where some nodes lack rows and others do not store entries "
             "that vanished; only elements that re-assemble to the matrix would show that the inference is right"
         )
+    if error <= CERTIFIED and error > _MAGNIFIED * nearly:
+        return "uncertified", (
+            f"the valid identities hold to {error:.1e}, but a field that is no translation or scale satisfies them up "
+            f"to {nearly:.1e}: nodes that it moves may be wrong by more than 1e-8"
+        )
     if error <= CERTIFIED:
         return "certified", "the valid identities hold to rounding, and only translations and scale satisfy them"
     return "uncertified", f"the largest residual of a valid identity is {error:.1e}"
@@ -110,8 +159,7 @@ def verdict(
 
 def _torn(nodal: NodalMatrix, solution: Solution) -> bool:
     """Whether nodes of different pieces are connected through the matrix."""
-    graph = sp.csr_array((np.ones(len(nodal.indices), np.int8), nodal.indices, nodal.indptr), shape=(nodal.n,) * 2)
-    label = sp.csgraph.connected_components(graph, directed=False)[1]
+    label = sp.csgraph.connected_components(nodal.graph, directed=False)[1]
     known = solution.component >= 0
     pairs = np.unique(np.column_stack([label, solution.component])[known], axis=0)
     return len(np.unique(pairs[:, 0])) < len(pairs)

@@ -86,28 +86,30 @@ def _draw_surface(ax: Axes, recovery: Recovery, flat: NDArray, depth: NDArray) -
 
     from ..elasticity.surface import outer_facets
 
-    for kind, cells in recovery.cells.items():
-        facets = outer_facets(kind, cells)
+    polygons: list[NDArray] = []
+    normals, away = [np.empty((0, 3))], [np.empty(0)]
+    for facets in outer_facets(recovery.cells):
         x = recovery.points[facets]
         normal = np.cross(x[:, 1] - x[:, 0], x[:, -1] - x[:, 0])
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         normal = normal / np.where(length > 0, length, 1)
         facing = normal @ _TOWARDS > 0
-        order = np.argsort(depth[facets[facing]].mean(axis=1), kind="stable")
-        facets, normal = facets[facing][order], normal[facing][order]
-        shade = 0.3 + 0.7 * np.clip(normal @ _LIGHT, 0, 1)[:, None]
-        colours = shade * np.array(to_rgb(style.FILL)) + (1 - shade) * np.array(to_rgb(style.EDGE))
-        outlined = len(facets) <= _MOST_OUTLINED
-        ax.add_collection(
-            PolyCollection(
-                flat[facets],
-                facecolors=colours,
-                edgecolors=style.OUTER if outlined else "face",
-                linewidths=float(np.clip(30 / np.sqrt(max(len(facets), 1)), 0.1, 0.6)),
-                rasterized=len(facets) > _MOST_VECTOR,
-            ),
-            autolim=False,
-        )
+        polygons += list(flat[facets[facing]])
+        normals.append(normal[facing])
+        away.append(depth[facets[facing]].mean(axis=1))
+    order = np.argsort(np.concatenate(away), kind="stable")
+    shade = 0.3 + 0.7 * np.clip(np.concatenate(normals)[order] @ _LIGHT, 0, 1)[:, None]
+    colours = shade * np.array(to_rgb(style.FILL)) + (1 - shade) * np.array(to_rgb(style.EDGE))
+    ax.add_collection(
+        PolyCollection(
+            [polygons[k] for k in order],
+            facecolors=colours,
+            edgecolors=style.OUTER if len(polygons) <= _MOST_OUTLINED else "face",
+            linewidths=float(np.clip(30 / np.sqrt(max(len(polygons), 1)), 0.1, 0.6)),
+            rasterized=len(polygons) > _MOST_VECTOR,
+        ),
+        autolim=False,
+    )
 
 
 def _draw_cells(ax: Axes, recovery: Recovery, flat: NDArray) -> None:

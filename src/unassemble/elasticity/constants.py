@@ -1,0 +1,73 @@
+"""Constants, the first evidence of directions: in rows that lack nothing, entries of each direction add up to zero."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+_ROUNDING = 1e-9
+PENALTY = 1e3  # a diagonal entry this many times the rest of its row is a penalty
+
+
+def uncoupled_rows(matrix: sp.csr_array) -> NDArray[np.bool_]:
+    """(N,) rows without an entry off the diagonal, as those of the identity."""
+    off = matrix.copy()
+    off.setdiag(0)
+    return np.asarray(abs(off).sum(axis=1)).ravel() == 0
+
+
+def annihilated_share(
+    matrix: sp.csr_array, identity: NDArray, direction: NDArray, d: int, *, searched: bool = False
+) -> float:
+    """Share of pairs (row, direction) that annihilate constants.
+
+    Only rows count that annihilate their own direction and another one to which they do couple: sums of nothing are
+    no evidence. Where no row couples to another direction, as in vector Laplacians, none needs to, unless the
+    directions are the result of a search, which would find any halves of any mesh.
+    """
+    live = ~identity
+    if not live.any():
+        return 0.0
+    ones = np.zeros((len(direction), d))
+    ones[np.flatnonzero(live), direction[live]] = 1
+    off = abs(matrix).sum(axis=1) - np.abs(matrix.diagonal())
+    size = np.asarray(off).ravel()[live]
+    zero = np.abs(matrix @ ones)[live] <= _ROUNDING * size[:, None]
+    own = zero[np.arange(len(size)), direction[live]]
+    other = np.arange(d) != direction[live][:, None]
+    coupled = other & ((abs(matrix) @ ones)[live] > _ROUNDING * size[:, None])
+    if searched or coupled.any():
+        own &= (zero & coupled).any(axis=1)
+    return float((zero & own[:, None]).mean())
+
+
+def proven_directions(
+    matrix: sp.csr_array, direction: NDArray[np.int64], group: NDArray[np.int64], d: int
+) -> NDArray[np.bool_]:
+    """(N,) rows whose direction sums that vanish prove: that of their own entries, or those of all other directions.
+
+    Sums over one direction count in rows whose whole group makes them vanish, rows that couple to the same unknowns. In
+    them a row of that direction cannot be missed, and one of another direction would not be borne. Where planes with
+    one direction taken out meet, no sum of two directions vanishes; that of the third does not tell which of the two
+    a row is.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+        Symmetric.
+    direction, group : (N,) int64
+    d : int
+    """
+    own = np.eye(d, dtype=bool)[direction]
+    size = np.asarray(abs(matrix).sum(axis=1)).ravel() - np.abs(matrix.diagonal())
+    least = _ROUNDING * np.where(size > 0, size, np.inf)
+    excused = own & (np.abs(matrix.diagonal()) > PENALTY * size)[:, None]
+    failing = np.zeros((int(group.max()) + 1, d))
+    np.add.at(failing, group, (np.abs(matrix @ own.astype(float)) > least[:, None]) & ~excused)
+    entry = matrix.tocoo()
+    strong = np.abs(entry.data) > least[entry.row]
+    pattern = sp.csr_array((strong.astype(float), (entry.row, entry.col)), shape=matrix.shape)
+    vanishing = (failing == 0)[group] & ~excused & (pattern @ own.astype(float) > 0)
+    seen = pattern.T @ vanishing.astype(float) > 0
+    return np.asarray((seen & own).any(axis=1) | (seen | own).all(axis=1))

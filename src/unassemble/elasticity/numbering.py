@@ -1,0 +1,101 @@
+"""Which rows of a matrix belong to one node and to which direction each of them, and how much speaks for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .constants import annihilated_share, uncoupled_rows
+from .grouping import coupled_in_common
+from .traces import unaccounted
+
+_LIKELY = 0.6  # quality of nodes apart from the share of sums that vanish; made-up ones have half or less
+ANNIHILATED = 0.02  # share of rows and directions below which an orderly numbering calls for a search
+
+
+@dataclass(frozen=True, eq=False)
+class Numbering:
+    """Nodes and directions of the rows of a vector-valued matrix.
+
+    Attributes
+    ----------
+    block_size : int
+        Unknowns per node, 2 or 3.
+    node_of_row : (N,) int64
+        Nodes are numbered by their first row.
+    direction_of_row : (N,) int64
+    identity_row : (N,) bool
+        Rows that couple to nothing: unknowns replaced by the identity.
+    kind : {"interleaved", "by component", "pattern", "given"}
+    share : float
+        Share of the pairs (row, direction) whose entries add up to zero, among rows that couple.
+    common : float
+        How far the rows of a node couple to the same nodes: 1 if all do.
+    odd : int
+        Nodes that lack a direction without a trace, no row near them missing it: their rows belong together, and it
+        did not show.
+    open_row : (N,) bool, optional
+        Where the unknowns stand in order: rows that may belong to one node with others of them, which neither pattern
+        nor order decides.
+    unnamed : (N,) bool, optional
+        Rows whose direction nothing proves.
+    """
+
+    block_size: int
+    node_of_row: NDArray[np.int64]
+    direction_of_row: NDArray[np.int64]
+    identity_row: NDArray[np.bool_]
+    kind: str
+    share: float
+    common: float
+    odd: int = 0
+    open_row: NDArray[np.bool_] | None = None
+    unnamed: NDArray[np.bool_] | None = None
+
+    @property
+    def incomplete(self) -> bool:
+        """Whether some node lacks rows."""
+        return len(self.node_of_row) != self.block_size * self.n_nodes
+
+    @property
+    def has_whole_node(self) -> bool:
+        """Whether some node has a row for every direction."""
+        return int(np.bincount(self.node_of_row).max()) == self.block_size
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return int(self.node_of_row.max()) + 1
+
+    @property
+    def quality(self) -> float:
+        """Rows add up to zero, those of a node couple to the same nodes, and most nodes have all their directions."""
+        if not self.has_whole_node:
+            return 0.0
+        filled = len(self.node_of_row) / (self.n_nodes * self.block_size)
+        return self.share * self.common * filled * (1 - self.odd / self.n_nodes)
+
+    @property
+    def sound(self) -> bool:
+        """Whether its nodes look like nodes, however few of their rows annihilate constants."""
+        return self.share > ANNIHILATED and self.quality > _LIKELY * self.share
+
+
+def measured(
+    matrix: sp.csr_array,
+    node: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    d: int,
+    kind: str = "pattern",
+    open_row: NDArray[np.bool_] | None = None,
+    unnamed: NDArray[np.bool_] | None = None,
+) -> Numbering:
+    """A numbering that was searched for, and what speaks for it."""
+    identity = uncoupled_rows(matrix)
+    share = annihilated_share(matrix, identity, direction, d, searched=True)
+    common = coupled_in_common(matrix, node, direction)
+    odd = int(unaccounted(matrix, ~identity, node, direction, d).any(axis=1).sum())
+    return Numbering(d, node, direction, identity, kind, share, common, odd, open_row, unnamed)

@@ -1,0 +1,106 @@
+"""Positions piece by piece: the least singular fields of the identities, and the coordinates among them."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..errors import GeometryError
+from .atlas import NullFields, null_fields
+from .nodal import NodalMatrix, determined
+from .results import Evidence
+from .shape import EXACT, Shape, in_gauge, shape
+from .solution import Solution
+
+# Nodes of a body whose best fit, where none is exact, one factorisation finds. Charts are no help there: each fits in
+# its own way, and where two of them meet the joined field has a kink that costs far more than the misfit itself.
+_WHOLE = {2: 250_000, 3: 30_000}
+
+
+def placed(
+    nodal: NodalMatrix,
+    valid: NDArray[np.bool_],
+    patch: int | None,
+    terms: NDArray[np.float64] | None = None,
+    *,
+    common: int | None = None,
+) -> Solution:
+    """Positions piece by piece.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    valid : (n, d, d) or (n, d, d, d) bool
+    patch : int, optional
+        Most nodes per chart.
+    terms : (d, d, d, t) float64, optional
+        Unknown boundary terms; see :func:`.identities.identities`.
+    common : int, optional
+        Fields that all nodes of a piece share; see :func:`.shape.shape`.
+
+    Raises
+    ------
+    GeometryError
+        If no piece has positions.
+    """
+    component, n_pieces = _pieces(nodal, valid)
+    graph = nodal.graph
+    points = np.full((nodal.n, nodal.dim), np.nan)
+    evidence, freedoms, exact, warnings = [], [], [], []
+    failure: GeometryError | None = None
+    for piece in range(n_pieces):
+        body = np.flatnonzero(component == piece)
+        found = null_fields(nodal, valid, body, patch=patch, terms=terms)
+        if found.charts > 1 and not _settled(found):
+            if len(body) <= _WHOLE[nodal.dim]:
+                found = null_fields(nodal, valid, body, patch=len(body), terms=terms)
+            else:
+                warnings.append(
+                    f"piece {piece} with node {body[0]} is too large for the best fit by one factorisation; the "
+                    "points are those of smaller parts, joined, whose distances may be far from right"
+                )
+        try:
+            told = np.asarray(valid.reshape(nodal.n, -1)[found.nodes].any(axis=1))
+            one = shape(found.fields, found.values, graph[found.nodes][:, found.nodes], told, common)
+        except GeometryError as error:
+            failure = failure or error
+            warnings.append(f"piece {piece} with node {body[0]}: {error}")
+            evidence.append(Evidence(int((found.values < EXACT).sum()), float("nan"), float("nan"), found.rows))
+            freedoms.append("")
+            continue
+        points[found.nodes] = one.points
+        points[body] = in_gauge(points[body], graph[body][:, body])
+        evidence.append(_evidence(found, one))
+        freedoms.append(one.freedom)
+        exact.append(one.exact)
+    if not exact:
+        raise failure or GeometryError("no row annihilates constants: no node has a valid equation")
+    component = np.where(determined(points), component, -1)
+    return Solution(valid, component, points, tuple(evidence), tuple(freedoms), all(exact), tuple(warnings))
+
+
+def _settled(found: NullFields) -> bool:
+    """Whether more than translations satisfies the identities exactly, and not all fields that were looked for."""
+    d = found.fields.shape[1]
+    return len(found.values) > d and bool(found.values[d] <= EXACT < found.values[-1])
+
+
+def _pieces(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
+    """Pieces held together by valid identities; -1 for nodes that none of them touches."""
+    pairs = valid if valid.ndim == 3 else np.asarray(valid.any(axis=3))
+    live = (np.abs(nodal.data) * pairs[nodal.node]).max(axis=(1, 2)) > 0
+    link = sp.csr_array((np.ones(live.sum()), (nodal.node[live], nodal.indices[live])), shape=(nodal.n, nodal.n))
+    _, label = sp.csgraph.connected_components(link, directed=False)
+    size = np.bincount(label)
+    kept = np.flatnonzero(size > 1)
+    order = np.full(len(size), -1)
+    order[kept] = np.arange(len(kept))
+    return order[label].astype(np.int64), len(kept)
+
+
+def _evidence(found: NullFields, one: Shape) -> Evidence:
+    d = found.fields.shape[1]
+    null = max(int((found.values <= EXACT).sum()), d + 1)
+    gap = float(found.values[null]) if null < len(found.values) else float("inf")
+    return Evidence(one.dimension, float(found.values[d]), gap, found.rows)

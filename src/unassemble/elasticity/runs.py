@@ -1,0 +1,147 @@
+"""Unknowns that stand node by node, but some of which were taken out.
+
+Rollers and symmetry planes eliminate single directions of nodes. No stride fits the rest; but directions increase
+within each node.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .constants import proven_directions
+from .directions import find_directions, reconsidered
+from .grouping import by_first_row, same_pattern
+from .likeness import alike, doubtful, likest, reach
+from .orders import Reading
+from .sums import names_of, set_right
+from .traces import shows_all, unaccounted
+
+_ROUNDS = 3
+
+
+def node_by_node(matrix: sp.csr_array, d: int) -> list[Reading]:
+    """Nodes and directions of rows that stand node by node, each with at most d rows: one or two readings."""
+    order = matrix.shape[0]
+    if order < 2 * d:
+        return []
+    group = same_pattern(matrix, np.zeros(order, dtype=bool))
+    run = np.concatenate([[0], np.cumsum(group[1:] != group[:-1])])
+    if 2 * np.count_nonzero(np.bincount(run)[run] == d) > order:
+        found = _by_pattern(matrix, group, run, d)
+        if shows_all(matrix, found, d):
+            return [found]
+    return _by_likeness(matrix, d)
+
+
+def _by_pattern(matrix: sp.csr_array, group: NDArray[np.int64], run: NDArray[np.int64], d: int) -> Reading:
+    """Nodes among runs of rows of the same pattern. Those of d rows are nodes, and tell directions of the others.
+
+    Rows of longer runs, which hold several nodes, are taken one by one until directions tell where nodes end. In the
+    end every row may choose for itself, as shorter runs may hold several nodes, too.
+    """
+    order = len(run)
+    row = np.arange(order)
+    nobody = np.zeros(order, dtype=bool)
+    length = np.bincount(run)[run]
+    node = by_first_row(np.where(length <= d, run, order + row))
+    for _ in range(_ROUNDS):
+        direction = find_directions(matrix, node, nobody, d, ordered=True)
+        again = _cut_where(run, direction)
+        if np.array_equal(again, node):
+            break
+        node = again
+    single = [row[:, None], *[np.empty((0, k), np.int64) for k in range(2, d + 1)]]
+    direction = set_right(matrix, row, single, ~nobody, direction, names_of(d))
+    unnamed = ~proven_directions(matrix, direction, group, d)
+    return Reading(_cut_where(run, direction), direction, np.zeros(order, dtype=bool), unnamed)
+
+
+def _cut_where(run: NDArray[np.int64], direction: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(N,) nodes that end with a run, or where directions stop increasing."""
+    return np.concatenate([[0], np.cumsum((np.diff(run) > 0) | (np.diff(direction) <= 0))])
+
+
+def _by_likeness(matrix: sp.csr_array, d: int) -> list[Reading]:
+    """Two readings where entries that vanished are not stored.
+
+    Neighbouring rows that reach the same rows are taken for one node to find directions by; then a node ends where
+    directions stop increasing. In the second reading each row has chosen its direction for itself in the end, since
+    rows of two nodes taken for one would keep different ones for ever.
+    """
+    nobody = np.zeros(matrix.shape[0], dtype=bool)
+    reached = reach(matrix)
+    node, link = stretches(reached, d)
+    for _ in range(_ROUNDS):
+        directions = find_directions(matrix, node, nobody, d)
+        again = _increasing(matrix, reached, directions, link)
+        if np.array_equal(again, node):
+            break
+        node = again
+    freely = reconsidered(matrix, directions, d)
+    other = _increasing(matrix, reached, freely, link)
+    return [Reading(_mended(matrix, *one, d), one[1]) for one in ((node, directions), (other, freely))]
+
+
+def _mended(matrix: sp.csr_array, node: NDArray[np.int64], direction: NDArray[np.int64], d: int) -> NDArray[np.int64]:
+    """Join neighbouring runs where one lacks, without a trace, the direction of the row with which the other meets it.
+
+    Its row has to stand next to it, in the order of directions, so that this is no guess: the two look little alike for
+    other reasons.
+    """
+    everywhere = np.ones(len(node), dtype=bool)
+    while True:
+        lost = unaccounted(matrix, everywhere, node, direction, d)
+        cut = np.diff(node) > 0
+        joins = cut & (np.diff(direction) > 0)
+        joins &= lost[node[:-1], direction[1:]] | lost[node[1:], direction[:-1]]
+        if not joins.any():
+            return node
+        node = np.concatenate([[0], np.cumsum(cut & ~joins)])
+
+
+def stretches(reached: sp.csr_array, d: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Runs of at most d rows, cut where neighbouring rows are least alike, and how alike each is to the next.
+
+    Complete nodes have one cut in d places; that many weakest links are cut at least.
+
+    Parameters
+    ----------
+    reached : (N, N) sparse
+        See :func:`.likeness.reach`.
+    d : int
+
+    Returns
+    -------
+    node : (N,) int64
+    link : (N - 1,) float64
+    """
+    row = np.arange(reached.shape[0] - 1)
+    link = alike(reached, row, row + 1)
+    cut = link < min(np.quantile(link, 1 / d) + 1e-9, doubtful(np.sort(link)[len(link) // d :]))
+    while True:
+        node = np.concatenate([[0], np.cumsum(cut)])
+        size = np.bincount(node)
+        if size.max() <= d:
+            return node, link
+        inner = ~cut & (size[node[:-1]] > d)
+        weakest = np.full(len(size), np.inf)
+        np.minimum.at(weakest, node[:-1][inner], link[inner])
+        cut = cut | (inner & (link <= weakest[node[:-1]]))
+
+
+def _increasing(
+    matrix: sp.csr_array, reached: sp.csr_array, direction: NDArray[np.int64], link: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """(N,) runs of rows with increasing directions.
+
+    Two rows that are less alike than nearly all others of these are cut apart unless each is the other's likest.
+    """
+    cut = np.diff(direction) <= 0
+    weak = np.flatnonzero(~cut & (link < doubtful(link[~cut])))
+    if len(weak):
+        pattern = sp.csr_array((np.ones(matrix.nnz, np.float32), matrix.indices, matrix.indptr), shape=matrix.shape)
+        both = likest(pattern, reached, weak, weak + 1, direction) & likest(pattern, reached, weak + 1, weak, direction)
+        cut[weak[~both]] = True
+    return np.concatenate([[0], np.cumsum(cut)])

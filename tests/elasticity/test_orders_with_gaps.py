@@ -1,0 +1,81 @@
+"""Unknowns in one of the usual orders of which supports took some: which rows belong together, and what stays open."""
+
+import numpy as np
+import pytest
+from assembled import box, heterogeneous, permuted_nodes, stiffness
+from supported import given, judged
+
+from unassemble.elasticity import recover_elasticity
+from unassemble.elasticity.constants import proven_directions, uncoupled_rows
+from unassemble.elasticity.grouping import same_pattern
+from unassemble.elasticity.matching import matched_by_pattern
+from unassemble.elasticity.unknowns import find_numbering
+
+
+def groups(*directions: str) -> tuple[np.ndarray, np.ndarray]:
+    names = sorted(set("".join(directions)))
+    group = np.array([names.index(one) for some in directions for one in some])
+    return group, np.repeat(np.arange(len(directions)), [len(some) for some in directions])
+
+
+def quadratic(kind: str, support: str, order: str, seed: int, perturb: float = 0.2):
+    mesh = box(kind, (4, 5, 4), perturb=perturb)
+    body = permuted_nodes(stiffness(kind, mesh, lam=heterogeneous, mu=lambda x: 1 + x[1] + x[0] * x[1]), seed=seed)
+    return given(body, support, order, "stored")
+
+
+def test_order_tells_which_node_of_a_group_lacks_a_direction():
+    group, direction = groups("abcbd", "acbd")
+    node, open_row = matched_by_pattern(group, direction, 2)
+    assert node.tolist() == [0, 1, 2, 3, 4, 0, 2, 3, 4]
+    assert not open_row.any()
+
+
+def test_neighbours_of_one_group_of_which_one_lacks_a_direction_stay_open():
+    group, direction = groups("abbc", "abc")
+    node, open_row = matched_by_pattern(group, direction, 2)
+    assert node.tolist() == [0, 1, 2, 3, 0, 4, 3]
+    assert np.flatnonzero(open_row).tolist() == [1, 2, 5]
+
+
+def test_as_many_rows_of_different_nodes_are_not_taken_for_one():
+    group, direction = groups("abcdef", "acdefb")  # one node of group b lacks the second direction, another the first
+    node, open_row = matched_by_pattern(group, direction, 2)
+    assert np.flatnonzero(open_row).tolist() == [1, 11]
+    assert node[1] != node[11]
+
+
+@pytest.mark.parametrize("kind", ["tet-p2", "hex-s2"])
+def test_by_component_on_a_roller_every_node_is_found(kind):
+    case = quadratic(kind, "roller", "by component", 4)
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert truth.error < 1e-8
+    assert truth.missing == truth.split == 0
+
+
+@pytest.mark.parametrize("order", ["interleaved", "by component"])
+def test_where_symmetry_planes_meet_nothing_wrong_is_certified(order):
+    case = quadratic("hex-s2", "symmetry", order, 1)
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert truth.error < 1e-8
+    assert truth.missing < 0.2
+
+
+def test_no_direction_that_sums_prove_is_wrong():
+    case = quadratic("hex-s2", "symmetry", "interleaved", 1)
+    found = find_numbering(case.matrix)
+    assert found.unnamed is not None
+    wrong = found.direction_of_row != case.direction
+    assert wrong.any()
+    assert not (wrong & ~found.unnamed).any()
+    group = same_pattern(case.matrix, uncoupled_rows(case.matrix))
+    proven = proven_directions(case.matrix, case.direction, group, 3)
+    assert proven.mean() > 0.95
+    exchanged = case.direction.copy()
+    row = np.flatnonzero(proven)[0]
+    exchanged[row] = (exchanged[row] + 1) % 3
+    assert not proven_directions(case.matrix, exchanged, group, 3)[row]
