@@ -44,10 +44,12 @@ $(DOCS_INSTALLED): $(INSTALLED)
 demo: $(INSTALLED)
 	$(BIN)/unassemble demo
 
-# The short second pass repeats what depends on the sparse solver with the one that every machine has.
+# The short first pass repeats what depends on the sparse solver with the one that every machine has. The tests run side
+# by side on all cores, each process with one thread: threads of several processes would wait for each other.
+test: export OMP_NUM_THREADS := 1
 test: $(INSTALLED)
 	UNASSEMBLE_SOLVER=superlu $(BIN)/python -m pytest -q -m fallback
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .

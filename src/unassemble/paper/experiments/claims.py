@@ -15,7 +15,7 @@ from ..substitution import substitution
 from .cases import Case, case
 from .convergence import Histories
 from .embeddings import Embedded
-from .ranks import ranks
+from .ranks import Ranks
 
 Verdict = Literal["holds", "holds in part", "fails"]
 
@@ -113,8 +113,8 @@ def _reached(runs: dict[str, Histories]) -> Claim:
 
 
 def _ranks(runs: dict[str, Histories]) -> Claim:
-    at = [ranks(r.case.system(), r.case.system().pack(r.case.angles)) for r in runs.values()]
-    mended = [ranks(s, s.pack(c.angles)) for c in (r.case for r in runs.values()) for s in (c.system(sines=True),)]
+    at = [Ranks(r.case.system(), r.case.system().pack(r.case.angles)) for r in runs.values()]
+    mended = [Ranks(s, s.pack(c.angles)) for c in (r.case for r in runs.values()) for s in (c.system(sines=True),)]
     predicted = [deficiency(c.piece, c.corners, c.truth) for c in (r.case for r in runs.values())]
     linear = [r.case.corners.counts.m + r.case.corners.w - a.linear for r, a in zip(runs.values(), at, strict=True)]
     return Claim(
@@ -128,7 +128,7 @@ def _ranks(runs: dict[str, Histories]) -> Claim:
 
 
 def _ranks_away(runs: dict[str, Histories]) -> Claim:
-    start = [ranks(s, np.append(np.full(r.case.angles.size, 1 / np.sqrt(3)), 1.0)).deficiency
+    start = [Ranks(s, np.append(np.full(r.case.angles.size, 1 / np.sqrt(3)), 1.0)).deficiency
              for r in runs.values() for s in (r.case.system(),)]  # fmt: skip
     return Claim(
         "rank-start", "3.2", "Away from the solution the Jacobian has full rank",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,42 +10,49 @@ from numpy.typing import NDArray
 from ..equations import AngleSystem
 
 
-@dataclass(frozen=True)
 class Ranks:
-    """Ranks at one point.
+    """Ranks at one point; singular values below `threshold` times the greatest are zero.
 
-    Attributes
+    Each is computed when it is asked for, and once.
+
+    Parameters
     ----------
-    edges, linear, whole : int
-        Of the rows (1)-(2), of (3)-(4), of all rows.
-    deficiency : int
-        Unknowns less the rank of all rows.
-    least : float
-        The least singular value that counts.
+    system : AngleSystem
+        Equations.
+    x : (n_unknowns,) ndarray
+        Where the Jacobian is taken.
+    threshold : float
+        Relative to the greatest singular value of the same rows.
     """
 
-    edges: int
-    linear: int
-    whole: int
-    deficiency: int
-    least: float
+    def __init__(self, system: AngleSystem, x: NDArray, *, threshold: float = 1e-9):
+        self._system, self._threshold = system, threshold
+        self._matrix = system.jacobian(x).sparse().toarray()
 
+    @cached_property
+    def edges(self) -> int:
+        """Rank of the rows (1)-(2)."""
+        return len(self._kept(self._matrix[self._system.row_of_edges : self._system.row_of_loops]))
 
-def ranks(system: AngleSystem, x: NDArray, *, threshold: float = 1e-9) -> Ranks:
-    """Ranks of J(x); singular values below `threshold` times the greatest are zero."""
-    matrix = system.jacobian(x).sparse().toarray()
-    edges = matrix[system.row_of_edges : system.row_of_loops]
-    whole, least = _rank(matrix, threshold)
-    return Ranks(
-        _rank(edges, threshold)[0],
-        _rank(matrix[: system.row_of_edges], threshold)[0],
-        whole,
-        system.n_unknowns - whole,
-        least,
-    )
+    @cached_property
+    def linear(self) -> int:
+        """Rank of the rows (3)-(4)."""
+        return len(self._kept(self._matrix[: self._system.row_of_edges]))
 
+    @cached_property
+    def _whole(self) -> NDArray[np.float64]:
+        return self._kept(self._matrix)
 
-def _rank(matrix: NDArray, threshold: float) -> tuple[int, float]:
-    values = np.linalg.svd(matrix, compute_uv=False)
-    kept = values[values > threshold * values[0]]
-    return len(kept), float(kept[-1])
+    @property
+    def deficiency(self) -> int:
+        """Unknowns less the rank of all rows."""
+        return self._system.n_unknowns - len(self._whole)
+
+    @property
+    def least(self) -> float:
+        """The least singular value of all rows that counts."""
+        return float(self._whole[-1])
+
+    def _kept(self, rows: NDArray) -> NDArray[np.float64]:
+        values = np.linalg.svd(rows, compute_uv=False)
+        return values[values > self._threshold * values[0]]
