@@ -111,9 +111,33 @@ def scattered(rng: np.random.Generator) -> Mesh:
     return delaunay(rng.random((int(rng.integers(4, 200)), 2)), longest=rng.uniform(0.15, 2))
 
 
+def integer(rng: np.random.Generator) -> Mesh:
+    """Delaunay triangles of points of an integer grid: cells of up to eight corners, right angles at the boundary."""
+    side = int(rng.integers(4, 20))
+    points = np.unique(rng.integers(0, side, (side * side // 2, 2)), axis=0).astype(np.float64)
+    points, triangles = delaunay(points)
+    middle = points[triangles].mean(axis=1)
+    for hole in rng.uniform(0, side, (int(rng.integers(4)), 2)):
+        keep = np.linalg.norm(middle - hole, axis=1) > side / 10
+        middle, triangles = middle[keep], triangles[keep]
+    return used(points, triangles)
+
+
 FAMILIES: dict[str, Callable[[np.random.Generator], Mesh]] = {
     family.__name__: family
-    for family in (pierced, crossed, kites, lattice, ring, grid, adaptive, separate_holes, polygon, scattered)
+    for family in (
+        pierced,
+        crossed,
+        kites,
+        lattice,
+        ring,
+        grid,
+        adaptive,
+        separate_holes,
+        polygon,
+        scattered,
+        integer,
+    )
 }
 
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from meshes import random_mesh, specimen, triangle_set
+from meshes import largest_error, random_mesh, specimen, triangle_set
 from unassemble import recover
-from vanishing import forgotten, holes, refined, squares, without_zeros
+from vanishing import forgotten, holes, polar, refined, squares, without_zeros
 
 
 def cells_of(found):
@@ -177,3 +177,19 @@ def test_symmetric_graphs_whose_cells_and_holes_may_change_places(graph, seed):
 def test_long_paths_are_not_certified(seed):
     found = recover(permuted_laplacian(networkx.path_graph(150), seed))
     assert found.status == "uncertified"
+
+
+def test_right_angle_where_every_row_has_three_neighbours():
+    """An annulus whose outer side a-c faces a right angle at b: there are no rows that could be twins."""
+    points, triangles = polar(3, 12, 0.5)
+    points = points * (1 + 0.05 * np.random.default_rng(0).random((len(points), 1)))
+    outer = np.hypot(*points.T) > 1.9
+    a, b, c = next(np.roll(t, 1 - k) for t in triangles for k in range(3) if outer[np.delete(t, k)].all())
+    middle = (points[a] + points[c]) / 2
+    inwards = (points[c] - points[a])[::-1] * [1, -1]
+    points[b] = middle - 0.5 * inwards * np.sign(inwards @ middle)
+    known = forgotten(specimen(points, triangles, c=-2.0, seed=3))
+    assert np.diff(known.matrix.indptr).min() == 4
+    found = recover(known.matrix)
+    assert found.certified, found.reason
+    assert largest_error(found.points, known.points) <= 1e-12

@@ -7,6 +7,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from families import integer
 from meshes import SHARED, largest_error, needs_shared, random_mesh, specimen, triangle_set
 from unassemble import recover
 from vanishing import (
@@ -64,6 +65,15 @@ def test_grid(name):
     assert len(found.triangles) + (size - 2).sum() == len(triangles)
     kept = {frozenset(t) for t in found.triangles.tolist()}
     assert kept <= {frozenset(t) for t in known.triangles.tolist()}
+
+
+def test_points_of_an_integer_grid():
+    """Cells of many sizes, and no row with one or two neighbours."""
+    known = forgotten(specimen(*integer(np.random.default_rng(5)), seed=5))
+    found = recover(known.matrix)
+    assert found.certified, found.reason
+    assert set(np.diff(found.polygons_offsets)) >= {4, 5}
+    assert largest_error(found.points, known.points) <= 1e-12
 
 
 def test_polygons_are_counter_clockwise_cells():

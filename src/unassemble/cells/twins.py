@@ -21,7 +21,7 @@ def twins(stored: OperatorMatrix, mesh: OrientedMesh, agree: float) -> list[Alte
     order = np.flatnonzero(few)[np.lexsort((ends[few, 1], ends[few, 0]))]
     row, neighbour, entry = ends[order, 0], ends[order, 1], entries[order]
     start = np.flatnonzero(np.diff(row, prepend=-1))
-    last = np.append(start[1:], len(row)) - 1
+    last = np.append(start[1:], len(row))[: len(start)] - 1
     alike = np.lexsort((entry[last], entry[start], neighbour[last], neighbour[start]))
     start, last = start[alike], last[alike]
     same = (neighbour[start[1:]] == neighbour[start[:-1]]) & (neighbour[last[1:]] == neighbour[last[:-1]])
