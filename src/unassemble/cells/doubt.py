@@ -41,14 +41,14 @@ def in_doubt(matrix: OperatorMatrix, topology: Topology, attempt: Attempt) -> ND
     rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
     misfit = misfits_of(matrix, solved)[rest]
     wrong = misfit > FITS
-    if not wrong.any() or _like_noise(misfit, matrix.n):
+    if not wrong.any() or like_noise(misfit, matrix.n):
         return doubtful
-    if _like_noise(misfits_of(matrix, _shortly_polished(matrix, solved))[rest], matrix.n):
+    if like_noise(misfits_of(matrix, _shortly_polished(matrix, solved))[rest], matrix.n):
         return doubtful
     return doubtful | _components_of(matrix, rest[wrong])
 
 
-def _like_noise(misfit: NDArray, n: int) -> bool:
+def like_noise(misfit: NDArray, n: int) -> bool:
     """Whether a misfit is that of errors in the entries; small meshes spread that of a wrong cell as evenly."""
     return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < _SURE)
 
@@ -89,7 +89,12 @@ def _components_of(matrix: OperatorMatrix, rows: NDArray) -> NDArray[np.bool_]:
     chosen = np.zeros(matrix.n, dtype=bool)
     if not len(rows):
         return chosen
-    graph = sp.coo_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
-    label = csgraph.connected_components(graph, directed=False)[1]
+    label = components_of(matrix)
     chosen[label[matrix.edges[rows, 0]]] = True
     return chosen[label]
+
+
+def components_of(matrix: OperatorMatrix) -> NDArray[np.int32]:
+    """(n,) number of the connected component of each row."""
+    graph = sp.coo_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
+    return np.asarray(csgraph.connected_components(graph, directed=False)[1])

@@ -19,6 +19,7 @@ from .mending import MOST_VERTICES, mended
 from .proposals import proposals
 from .reading import Reading
 from .triangles_only import read_triangles
+from .wrong_entries import without_wrong_entries
 
 _log = logging.getLogger(__name__)
 
@@ -81,7 +82,7 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
             begun.append(_begun(drawing, effort, int(turning * effort.solves)))
             if begun[-1].settled:
                 first = begun[-1].starts[0]
-                return first if first.fits else _better(best, first)
+                return first if first.fits or first.fits_but_for_few else _better(best, first)
         for one in begun:
             best = _finished(best, one, effort)
             if best is not None and (best.fits or best.like_noise):
@@ -107,6 +108,9 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
         starts.append(effort.reading(candidates, labels))
         if starts[-1].fits:
             return Begun(starts[-1:], settled=True)
+    for start in starts[:_STARTS]:
+        if (spoilt := without_wrong_entries(start)) is not None:
+            return Begun([spoilt], settled=True)
     if starts and entries_are_to_blame(starts[0]):
         return Begun(starts[:1], settled=True)
     likeliest = next((start for start in starts if start.pieces), None)
