@@ -8,7 +8,7 @@ from .completion import completed, guessed
 from .corners import Alternative, OrientedMesh
 from .doubt import Attempt, Outcome, in_doubt
 from .search import read_cells
-from .wrong_entries import wrong_entries
+from .spoilt import wrong_entries
 
 __all__ = [
     "AGREE",

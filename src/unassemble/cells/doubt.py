@@ -17,7 +17,8 @@ from ..topology import Piece, Topology
 from .reading import FITS, even, misfits
 
 _WIDE = 200  # rows of a matrix on which the misfit of a wrong cell stays near it
-_SURE = 1e-3  # misfit that no wrong cell is known to leave
+SURE = 1e-3
+"""Misfit, even if spread evenly, that no wrong cell is known to leave."""
 
 _SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 
@@ -41,16 +42,16 @@ def in_doubt(matrix: OperatorMatrix, topology: Topology, attempt: Attempt) -> ND
     rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
     misfit = misfits_of(matrix, solved)[rest]
     wrong = misfit > FITS
-    if not wrong.any() or like_noise(misfit, matrix.n):
+    if not wrong.any() or _like_noise(misfit, matrix.n):
         return doubtful
-    if like_noise(misfits_of(matrix, _shortly_polished(matrix, solved))[rest], matrix.n):
+    if _like_noise(misfits_of(matrix, _shortly_polished(matrix, solved))[rest], matrix.n):
         return doubtful
     return doubtful | _components_of(matrix, rest[wrong])
 
 
-def like_noise(misfit: NDArray, n: int) -> bool:
+def _like_noise(misfit: NDArray, n: int) -> bool:
     """Whether a misfit is that of errors in the entries; small meshes spread that of a wrong cell as evenly."""
-    return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < _SURE)
+    return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < SURE)
 
 
 def _shortly_polished(matrix: OperatorMatrix, solved: Solved) -> Solved:

@@ -19,7 +19,7 @@ from .mending import MOST_VERTICES, mended
 from .proposals import proposals
 from .reading import Reading
 from .triangles_only import read_triangles
-from .wrong_entries import without_wrong_entries
+from .spoilt import without_wrong_entries
 
 _log = logging.getLogger(__name__)
 

@@ -15,8 +15,8 @@ from ..planar.piece import PieceMesh
 from ..planar.robust import robust_fit
 from ..topology import Piece, Topology
 from ..topology.keys import contains, pair_keys
-from .doubt import Attempt, components_of, like_noise, misfits_of, unexplained
-from .reading import FITS, Reading
+from .doubt import SURE, Attempt, components_of, misfits_of, unexplained
+from .reading import FITS, Reading, even
 
 _MOST_VERTICES = 200_000
 _CHANCE = np.log(1e-6)  # that the entries which fit do so by coincidence
@@ -113,13 +113,15 @@ def _without_few(piece: Piece, weights: NDArray, z: NDArray | None, scale: float
     if piece.n_vertices > _MOST_VERTICES or not _provable(piece, 1, scale):
         return None
 
-    def settled(misfit: NDArray) -> bool:
-        return bool((misfit <= FITS).all()) or like_noise(misfit, piece.n_vertices)
-
-    fit = robust_fit(piece, weights, z, settled, scale=scale)
+    fit = robust_fit(piece, weights, z, _settled, scale=scale)
     if fit is None or not _provable(piece, len(fit.aside), scale):
         return None
     return PieceMesh(fit.z, fit.scale, aside=fit.aside if len(fit.aside) else None)
+
+
+def _settled(misfit: NDArray) -> bool:
+    """Whether a misfit is that of rounding, or of noise."""
+    return bool((misfit <= FITS).all()) or (even(misfit) and float(np.sqrt(np.mean(misfit**2))) < SURE)
 
 
 def _provable(piece: Piece, aside: int, scale: float | None) -> bool:
