@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..errors import RecoveryError, SolverError
 from .fitting import Fitted, cost, fitted
 from .neighbourhood import Neighbourhoods, Trial
-from .relaxation import Aim, Path, central_path
+from .relaxation import Aim, HopelessError, Path, central_path
 from .sheet import Placed, Sheet
 
 _log = logging.getLogger(__name__)
@@ -81,29 +81,30 @@ class Exchange:
         if deep:
             moves.append(self._deep)
         begun = fit.cost, self.left
-        fit, turn = self._rounds(fit), 0
-        while fit.cost > SETTLED and turn < len(moves) and self._suffices(fit, *begun):
-            other = self._rounds(moves[turn](fit))
+        fit, turn = self._rounds(fit, begun), 0
+        while fit.cost > SETTLED and turn < len(moves) and self._suffices(fit, begun):
+            other = self._rounds(moves[turn](fit), begun)
             _log.debug("cost %.3g, then %.3g, %d trials left", fit.cost, other.cost, self.left)
             fit, turn = (other, 0) if other.cost < _PROGRESS * fit.cost else (fit, turn + 1)
         return fit
 
-    def _suffices(self, fit: Fitted, cost_then: float, left_then: int) -> bool:
-        """Whether the trials that are left would do if the cost went on falling as it has since `then`.
+    def _suffices(self, fit: Fitted, begun: tuple[float, int]) -> bool:
+        """Whether the trials that are left would do if the cost went on falling as it has since it was `begun` with.
 
         Where little is left to do a single label may make the difference.
         """
+        cost_then, left_then = begun
         if fit.cost <= NEARLY * len(self.sheet.edges):
             return self.left > 0
         return (cost_then - fit.cost) * self.left > fit.cost * (left_then - self.left)
 
-    def _rounds(self, fit: Fitted) -> Fitted:
+    def _rounds(self, fit: Fitted, begun: tuple[float, int]) -> Fitted:
         while fit.cost > SETTLED and self.left > 0:
             other = self._pairs(fit)
             slow = not other.cost < _QUICK * fit.cost
             _log.debug("round: cost %.3g, then %.3g, %d trials left", fit.cost, other.cost, self.left)
             fit = other
-            if slow:
+            if slow or not self._suffices(fit, begun):
                 break
         return fit
 
@@ -174,7 +175,7 @@ class Exchange:
         aim = Aim(labels, np.where(opened, 1.0, _COLD))
         try:
             strength, placed = central_path(sheet, aim, strength, fit.placed, how.path)
-        except SolverError:
+        except (SolverError, HopelessError):
             return fit
         return fitted(sheet, strength > 0.5, placed)
 

@@ -14,7 +14,7 @@ from .exchange import NEARLY, SETTLED, Exchange
 from .fitting import Fitted, cost, fitted
 from .reading import Reading
 from .redrawing import redrawings
-from .relaxation import Aim, Path, central_path
+from .relaxation import HOPELESS, Aim, HopelessError, Path, central_path
 from .sheet import Placed, Sheet
 
 MOST_VERTICES = 20_000
@@ -23,8 +23,6 @@ _WIDE = 20  # vertices of the largest piece for which it is worth its while
 _SOLVES = 20  # that this is worth
 _NEAR = 0.95  # strength of the first labels
 _SHORT = Path(first=0.1, slack=0.01)
-_HOPELESS = 0.05  # mean cost of an edge after a relaxation with which there is nothing to begin with
-_NO_MESH = 2 * _HOPELESS  # the same after the first one with which others are not tried: 0.03 at most on seven meshes
 _TRIALS, _TRIALS_PER_VERTEX = 6000, 10  # the lesser number is made
 _DEAREST, _STEEP, _CHEAPEST = 1.5, 4.0, 0.3  # price of a change: with angles that add up to pi, its fall, and the least
 
@@ -33,6 +31,11 @@ def mended(start: Reading, effort: Effort) -> Reading | None:
     """A reading with fewer wrong labels than one with many, maybe in another drawing.
 
     None where none is found, the graph is too large, or so small that trying labels one by one is as good.
+
+    Raises
+    ------
+    HopelessError
+        If not even labels between 0 and 1 come near the weights.
     """
     widest = max((piece.n_vertices for piece in start.pieces), default=0)
     if widest < _WIDE or start.candidates.n_vertices > MOST_VERTICES:
@@ -55,7 +58,7 @@ def _mended_labels(start: Reading) -> tuple[Candidates, NDArray[np.bool_]] | Non
     trials = min(_TRIALS, _TRIALS_PER_VERTEX * sheet.n_vertices)
     exchange = Exchange(sheet, start.labels, trials)
     for fit in relaxed:
-        if best.cost > SETTLED and fit.cost <= _HOPELESS * len(sheet.edges):
+        if best.cost > SETTLED and fit.cost <= HOPELESS * len(sheet.edges):
             best = min(best, exchange.settled(fit), key=lambda either: either.cost)
     if best.cost <= NEARLY * len(sheet.edges):
         again, best = _redrawn(exchange, best)
@@ -78,9 +81,16 @@ def _relaxations(sheet: Sheet, labels: NDArray[np.bool_]) -> list[Fitted]:
     believed = Aim(first, _prices(sheet, labels))
     found: list[Fitted] = []
     for aim, path in ((believed, Path()), (Aim(first, even), Path()), (Aim(first, even), _SHORT)):
-        fit = _relaxed(sheet, aim, path)
-        if fit is None or (fit.cost > _NO_MESH * len(sheet.edges) and not found):
+        try:
+            fit = _relaxed(sheet, aim, path)
+        except HopelessError:
+            if not found:
+                raise
             break
+        if fit is None:
+            break
+        if fit.cost > HOPELESS * len(sheet.edges) and not found:
+            raise HopelessError
         found.append(fit)
         if fit.cost <= NEARLY * len(sheet.edges):
             break
