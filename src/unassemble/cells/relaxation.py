@@ -24,7 +24,6 @@ from .sheet import Placed, Sheet, unpinned
 
 HOPELESS = 0.05
 """Mean cost of an edge at the end of a path with which there is nothing to begin with: 0.03 at most on meshes."""
-_BAD = 2  # steps in succession; single ones go wrong on meshes too
 _HELD = 1e-9  # keeps the problem definite where labels of zero leave vertices free
 _NEAREST = 0.1  # of the way to 0 or 1 that one step leaves
 
@@ -82,16 +81,19 @@ def central_path(
     RecoveryError
         If there is no conformal map on the way, or an equation is singular.
     HopelessError
-        If the misfit stays above that of no cells at all, or is large and rises although it counts more and more.
+        If no map on the way leaves less of the weights than no cells at all.
     """
     strength = strength.copy()
     drawn_to = aim.price * np.where(aim.labels > 0.5, -1.0, 1.0)
     t = path.first
-    watch = _Watch(float(cost(sheet.weights / sheet.spread(1.0)).mean()))
+    nothing = float(cost(sheet.weights / sheet.spread(1.0)).sum())  # is what no cells explain
+    least = 0.0 if t <= path.mapped_above else np.inf
     while t > path.last:
         if placed is None or t > path.mapped_above:
             placed = sheet.mapped(strength, placed)
-        watch.look(float(cost(sheet.misfit(placed, strength)).mean()), moving=t <= path.mapped_above)
+            least = min(least, float(cost(sheet.misfit(placed, strength)).sum()))
+        elif least > nothing:
+            raise HopelessError
         slack = path.slack * t / path.first
         new, d, log_scale = _step(sheet, placed, strength, drawn_to, t, slack)
         if t <= path.mapped_above:
@@ -101,29 +103,6 @@ def central_path(
         t *= path.factor
     assert placed is not None
     return strength, placed
-
-
-@dataclass
-class _Watch:
-    """Gives a path up that leads nowhere.
-
-    Attributes
-    ----------
-    most : float
-        What no cells at all leave.
-    """
-
-    most: float
-    before: float = np.inf
-    bad: int = 0
-
-    def look(self, left: float, *, moving: bool) -> None:
-        """At the mean cost of an edge; positions that move with the labels should lower it."""
-        worse = left > self.most or (moving and left > max(HOPELESS, self.before))
-        self.bad = self.bad + 1 if worse else 0
-        if self.bad == _BAD:
-            raise HopelessError
-        self.before = left
 
 
 def _step(
