@@ -1,8 +1,8 @@
 """Meshes that fit but for a few entries, which no other choice of cells explains.
 
-A cell too many or too few changes the weights of all of its sides that the graph has: of three sides of a triangle, of
-two edges that follow each other on the boundary at least. Where the entries that do not fit
-(:mod:`unassemble.planar.robust`) include no such set, it is the entries that are wrong.
+A cell too many or too few changes the weights of two of its sides at least, which are near each other. Near the
+boundary others may do instead, as few entries hold a vertex there; but where each of the entries that do not fit
+(:mod:`unassemble.planar.robust`) lies by itself, it is the entries that are wrong.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def _in_component(
         start = meshes[piece]
         z = start.z if isinstance(start, PieceMesh) else None
         mesh = _without_few(piece, -matrix.entries[piece.edge_rows], z, scale)
-        if mesh is None or (mesh.aside is not None and _sides_of_cells(piece, mesh.aside)):
+        if mesh is None or (mesh.aside is not None and not _apart(len(mesh.z), piece.edges, piece.edges[mesh.aside])):
             return None
         found[piece] = mesh
     scales = np.array([mesh.scale for mesh in (meshes | found).values() if isinstance(mesh, PieceMesh)])
@@ -102,8 +102,7 @@ def without_wrong_entries(reading: Reading) -> Reading | None:
         if not contains(given, aside).all():  # what has vanished is exact
             return None
         wrong[np.searchsorted(given, aside)] = True
-    cell, half = candidates.sides.T
-    if not wrong.any() or (np.bincount(cell, ~wrong[half >> 1], candidates.count) == 0).any():
+    if not wrong.any() or not _apart(n, reading.edges, candidates.edges[wrong]):
         return None
     return reading.placed(tuple(meshes))
 
@@ -130,9 +129,10 @@ def _provable(piece: Piece, aside: int, scale: float | None) -> bool:
     return bool(left * np.log(FITS) + aside * np.log(len(piece.edges)) < _CHANCE)
 
 
-def _sides_of_cells(piece: Piece, edges: NDArray[np.int64]) -> bool:
-    """Whether some edges include all sides of a triangle, or two that follow each other on the boundary."""
-    chosen = np.zeros(len(piece.edges), dtype=bool)
-    chosen[edges] = True
-    on_boundary = piece.edges[chosen & ~piece.inner]
-    return bool(chosen[piece.opposite].all(axis=1).any()) or len(np.unique(on_boundary)) < on_boundary.size
+def _apart(n: int, edges: NDArray[np.int64], some: NDArray[np.int64]) -> bool:
+    """Whether no two of some edges (k, 2) share a vertex or are joined by one of all `edges`."""
+    owner = np.full(n, -1)
+    owner[some] = np.arange(len(some))[:, None]
+    one, two = owner[edges.T]
+    joined = (one >= 0) & (two >= 0) & (one != two)
+    return len(np.unique(some)) == some.size and not joined.any()
