@@ -130,7 +130,7 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
 def _finished(best: Reading | None, begun: Begun, effort: Effort) -> Reading | None:
     """The best of what repairs make of the starts in one drawing, and of a former one."""
     starts = list(begun.starts)
-    likeliest = begun.likeliest if not starts[0].like_noise else None
+    likeliest = begun.likeliest if starts and not starts[0].like_noise else None
     if likeliest is not None and likeliest.candidates.n_vertices <= SMALL_GRAPH:
         candidates = likeliest.candidates
         triangles = 2 * (candidates.first & (candidates.size == 3)).sum() > candidates.first.sum()
