@@ -8,6 +8,7 @@ from .completion import completed, guessed
 from .corners import Alternative, OrientedMesh
 from .doubt import Attempt, Outcome, in_doubt
 from .search import read_cells
+from .spoilt import wrong_entries
 
 __all__ = [
     "AGREE",
@@ -20,4 +21,5 @@ __all__ = [
     "guessed",
     "in_doubt",
     "read_cells",
+    "wrong_entries",
 ]

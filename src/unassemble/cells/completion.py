@@ -124,7 +124,7 @@ def _read_again(
     """One component: the reading that fits, or the triangles that there were, or the best reading."""
     weights = -matrix.entries[numbering.edge_rows]
     reading = read_cells(len(numbering.vertices), numbering.edges, weights, scale)
-    if reading is not None and reading.fits:
+    if reading is not None and (reading.fits or reading.fits_but_for_few):
         return _part(matrix, numbering, reading)
     before = float(np.sqrt(np.mean(misfit_of_triangles()[numbering.edge_rows] ** 2)))
     if reading is not None and reading.size < _BETTER * before and reading.misfit.max() < 1:

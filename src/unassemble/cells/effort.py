@@ -46,3 +46,38 @@ class Effort:
     def spent(self) -> bool:
         """Whether it is time to give up."""
         return self.solves <= 0
+
+    def progress(self, reading: Reading, patience: int) -> Progress:
+        """Of repairs that begin with a reading and may go on for some solves in any case."""
+        return Progress(self, reading.size, self.solves, patience)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Whether repairs are worth going on with.
+
+    The squared misfit is about proportional to the number of wrong cells. Had it to go on falling as it has since the
+    beginning, the solves that are left must do.
+
+    Attributes
+    ----------
+    effort : Effort
+    size : float
+        Of the misfit at the beginning.
+    solves : int
+        That were left then.
+    patience : int
+        Solves after which progress is asked for.
+    """
+
+    effort: Effort
+    size: float
+    solves: int
+    patience: int
+
+    def suffices(self, size: float) -> bool:
+        """Whether the misfit, now `size`, would be gone in time."""
+        used = self.solves - self.effort.solves
+        if self.effort.spent or used <= self.patience:
+            return not self.effort.spent
+        return (self.size**2 - size**2) * self.effort.solves > size**2 * used

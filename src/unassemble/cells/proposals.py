@@ -17,6 +17,8 @@ from .reading import Reading
 _CLEAR = 0.35  # a label that is to change by so much is turned over
 _HOPELESS = -0.3  # belief in a corner at a vertex that does not look like an inner one
 _SINGLES = 8
+LIKELY = 1 + 2 * _SINGLES
+"""Proposals, at most, before exchanges are among them."""
 _EXCHANGES = 24
 _LIKELY = 100  # cells that take part in exchanges
 

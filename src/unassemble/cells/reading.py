@@ -74,7 +74,7 @@ class Reading:
     ) -> Reading:
         """Triangulate the cells and solve every piece, but for those `known`, to which new ones are added."""
         bare = cls.unsolved(candidates, labels)
-        n, edges, weights = candidates.n_vertices, bare.edges, bare.weights
+        weights = bare.weights
         known = {} if known is None else known
         meshes: dict[Piece, PieceMesh | None] = {**lone_triangles(bare.pieces, weights)}
         for piece in bare.pieces:
@@ -83,16 +83,26 @@ class Reading:
                 if name not in known:
                     known[name] = _solved(piece, weights[piece.edge_rows])
                 meshes[piece] = known[name]
-        solved = [(piece, mesh) for piece in bare.pieces if (mesh := meshes[piece])]
-        misfit = misfits(n, edges, weights, solved)
+        return bare.placed(tuple(meshes[piece] for piece in bare.pieces))
+
+    def placed(self, meshes: tuple[PieceMesh | None, ...]) -> Reading:
+        """With positions of each piece, or None."""
+        candidates, n, edges = self.candidates, self.candidates.n_vertices, self.edges
+        solved = [(piece, mesh) for piece, mesh in zip(self.pieces, meshes, strict=True) if mesh]
+        misfit = misfits(n, edges, self.weights, solved)
         _add_discord(n, edges, solved, misfit, candidates.scale)
-        misfit[np.isin(edges, _crowded(candidates, labels)).any(axis=1)] = 1.0
-        return replace(bare, meshes=tuple(meshes[piece] for piece in bare.pieces), misfit=misfit)
+        misfit[np.isin(edges, _crowded(candidates, self.labels)).any(axis=1)] = 1.0
+        return replace(self, meshes=meshes, misfit=misfit)
 
     @property
     def fits(self) -> bool:
         """Whether every entry is reproduced."""
         return bool(len(self.pieces) and (self.misfit <= FITS).all())
+
+    @property
+    def fits_but_for_few(self) -> bool:
+        """Whether entries have been set aside as wrong."""
+        return any(mesh is not None and mesh.aside is not None for mesh in self.meshes)
 
     @cached_property
     def size(self) -> float:

@@ -16,8 +16,10 @@ from .crosses import Crosses
 from .effort import SMALL_GRAPH, Effort
 from .evidence import FEW, entries_are_to_blame, label_changes
 from .mending import MOST_VERTICES, mended
-from .proposals import proposals
+from .proposals import LIKELY, proposals
 from .reading import Reading
+from .relaxation import HopelessError
+from .spoilt import without_wrong_entries
 from .triangles_only import read_triangles
 
 _log = logging.getLogger(__name__)
@@ -81,9 +83,13 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
             begun.append(_begun(drawing, effort, int(turning * effort.solves)))
             if begun[-1].settled:
                 first = begun[-1].starts[0]
-                return first if first.fits else _better(best, first)
+                return first if first.fits or first.fits_but_for_few else _better(best, first)
         for one in begun:
-            best = _finished(best, one, effort)
+            try:
+                best = _finished(best, one, effort)
+            except HopelessError:  # drawings differ little
+                best = _better(best, one.starts[0])
+                return best if best.pieces else None
             if best is not None and (best.fits or best.like_noise):
                 return best
     return best if best is not None and best.pieces else None
@@ -107,6 +113,9 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
         starts.append(effort.reading(candidates, labels))
         if starts[-1].fits:
             return Begun(starts[-1:], settled=True)
+    for start in starts[:_STARTS]:
+        if (spoilt := without_wrong_entries(start)) is not None:
+            return Begun([spoilt], settled=True)
     if starts and entries_are_to_blame(starts[0]):
         return Begun(starts[:1], settled=True)
     likeliest = next((start for start in starts if start.pieces), None)
@@ -121,25 +130,32 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
 def _finished(best: Reading | None, begun: Begun, effort: Effort) -> Reading | None:
     """The best of what repairs make of the starts in one drawing, and of a former one."""
     starts = list(begun.starts)
-    likeliest = begun.likeliest
-    if likeliest is not None and starts[0].like_noise:
-        likeliest = None
+    likeliest = begun.likeliest if starts and not starts[0].like_noise else None
     if likeliest is not None and likeliest.candidates.n_vertices <= SMALL_GRAPH:
         candidates = likeliest.candidates
         triangles = 2 * (candidates.first & (candidates.size == 3)).sum() > candidates.first.sum()
-        place = 0 if candidates.n_vertices >= FEW and triangles else len(starts)
-        starts[place:place] = _mended(likeliest, effort)
-        likeliest = None
-    for number, start in enumerate(starts):
-        share = effort.share(_FIRST if number == 0 and len(starts) > 1 else 1 / (len(starts) - number))
+        first = candidates.n_vertices >= FEW and triangles
+        starts, likeliest = _with_mended(starts, likeliest, effort, 0 if first else len(starts)), None
+    number = 0
+    while starts:
+        start = starts.pop(0)
+        share = effort.share(_FIRST if number == 0 and starts else 1 / (len(starts) + 1))
         best = _better(best, start if start.like_noise else _repaired(start, share))
         if best.fits or best.like_noise:
             return best
         effort.solves += max(share.solves, 0)
-    if likeliest is not None:  # on large graphs this costs more than all repairs
-        for start in _mended(likeliest, effort):
-            best = _better(best, _repaired(start, effort))
+        number += 1
+        if likeliest is not None:  # on large graphs this costs more than repairs
+            starts, likeliest = _with_mended(starts, likeliest, effort, 0), None
     return best
+
+
+def _with_mended(starts: list[Reading], likeliest: Reading, effort: Effort, place: int) -> list[Reading]:
+    """Starts with a mended one among them, or this alone if it fits."""
+    found = mended(likeliest, effort)
+    if found is None:
+        return starts
+    return [found] if found.fits else [*starts[:place], found, *starts[place:]]
 
 
 def fitting_starts(n: int, edges: NDArray, weights: NDArray, scale: float | None = None) -> Iterator[Reading]:
@@ -170,12 +186,6 @@ def _better(one: Reading | None, other: Reading) -> Reading:
     return other if one is None or other.size < one.size else one
 
 
-def _mended(reading: Reading, effort: Effort) -> list[Reading]:
-    """A better reading to begin with, or none."""
-    better = mended(reading, effort)
-    return [] if better is None else [better]
-
-
 def _turned_over(reading: Reading, effort: Effort, solves: int) -> Reading:
     """Parts of the drawing turned over, each because that lowers the misfit; at no more than so many solves."""
     least = effort.solves - solves
@@ -195,10 +205,10 @@ def _repaired(reading: Reading, effort: Effort) -> Reading:
 
 def _leaps(reading: Reading, effort: Effort) -> Reading:
     """All clear changes at once, uphill too: with many wrong cells the misfit of the way is no guide."""
-    best, since_best = reading, 0
+    best, since_best, progress = reading, 0, effort.progress(reading, _PATIENCE)
     patience = np.clip(3e4 / reading.candidates.n_vertices, 2, _PATIENCE)
     seen = {reading.labels.tobytes()}
-    while reading.pieces and not reading.fits and since_best < patience and not effort.spent:
+    while reading.pieces and not reading.fits and since_best < patience and progress.suffices(best.size):
         changes = np.nan_to_num(label_changes(reading))
         labels = next((x for x in proposals(reading, changes) if x.tobytes() not in seen), None)
         if labels is None:
@@ -213,11 +223,12 @@ def _leaps(reading: Reading, effort: Effort) -> Reading:
 
 def _descent(reading: Reading, effort: Effort) -> Reading:
     """Small changes, each of which lowers the misfit."""
-    while reading.pieces and not reading.fits and not effort.spent:
+    progress = effort.progress(reading, LIKELY)
+    while reading.pieces and not reading.fits and progress.suffices(reading.size):
         changes = np.nan_to_num(label_changes(reading))
         for labels in proposals(reading, changes):
             trial = effort.reading(reading.candidates, labels)
-            if trial.size < reading.size or effort.spent:
+            if trial.size < reading.size or not progress.suffices(reading.size):
                 break
         else:
             return reading
