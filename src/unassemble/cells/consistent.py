@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,6 +12,7 @@ from scipy.sparse import csgraph
 
 from ..planar.cotangent import edge_weights
 from ..planar.hinges import gap
+from ..planar.images import growing_images
 from ..topology import Piece, Topology
 from ..topology.keys import with_sides
 from ..topology.pieces import planar_pieces
@@ -18,6 +20,13 @@ from .numbered import Numbered
 
 _FITS = 1e-6
 _NO_EDGES = np.empty((0, 2), np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    edges: NDArray[np.int64]
+    pieces: tuple[Piece, ...]
+    positions: list[NDArray]
 
 
 class Assembly:
@@ -40,9 +49,11 @@ class Assembly:
             return _least(wrong, lambda some: not self._maps(some))
         if self._closes(chosen):
             return None
-        # Pieces first: there are fewer of them than of cells.
-        numbers = _least(np.arange(len(parts)), lambda some: not self._closes(np.concatenate([parts[k] for k in some])))
-        return np.concatenate([parts[k] for k in numbers])
+        # Pieces, of which there are fewer than cells, and a quicker test, which may miss how rings close.
+        numbers = np.arange(len(parts))
+        if not self._seem_open(parts, numbers):
+            return chosen
+        return np.concatenate([parts[k] for k in _least(numbers, lambda some: self._seem_open(parts, some))])
 
     def _parts(self, chosen: NDArray) -> list[NDArray]:
         """Cells that hang together by edges, neighbours next to each other."""
@@ -65,11 +76,20 @@ class Assembly:
         solved = self._positions(chosen)
         if solved is None:
             return False
-        edges, pieces, positions = solved
-        return gap(Topology(self._cells.shapes.n_vertices, edges, pieces, ""), positions) <= _FITS
+        return gap(Topology(self._cells.shapes.n_vertices, solved.edges, solved.pieces, ""), solved.positions) <= _FITS
 
-    def _positions(self, chosen: NDArray) -> tuple[NDArray, tuple[Piece, ...], list[NDArray]] | None:
-        """Edges, pieces and positions; None if the cells do not make planar surfaces with these cotangents."""
+    def _seem_open(self, parts: list[NDArray], numbers: NDArray) -> bool:
+        """Whether no mirror images were found with which rings of some parts close."""
+        solved = self._positions(np.concatenate([parts[k] for k in numbers]))
+        if solved is None:
+            return True
+        count = np.bincount(np.concatenate([piece.vertices for piece in solved.pieces]))
+        shared = [count[piece.vertices] > 1 for piece in solved.pieces]
+        vertices = [piece.vertices[own] for piece, own in zip(solved.pieces, shared, strict=True)]
+        return not growing_images(vertices, [z[own] for z, own in zip(solved.positions, shared, strict=True)], _FITS)
+
+    def _positions(self, chosen: NDArray) -> _Solved | None:
+        """Pieces and positions; None if the cells do not make planar surfaces with these cotangents."""
         shapes, cells = self._cells.shapes, self._cells
         n = shapes.n_vertices
         triangles = shapes.triangles(cells.cell[chosen])
@@ -91,7 +111,7 @@ class Assembly:
             if z is None:
                 return None
             positions.append(z)
-        return edges, pieces, positions
+        return _Solved(edges, pieces, positions)
 
 
 def _least(items: NDArray, bad: Callable[[NDArray], bool]) -> NDArray:
