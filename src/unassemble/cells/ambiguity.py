@@ -16,7 +16,7 @@ from .flips import turned_over
 from .hinged import as_one_piece
 from .hubs import Hub, hubs, rearranged
 from .loose import is_loose, other_reading
-from .regrouped import regrouped
+from .regrouped import fitting, regrouped
 from .rereading import other_readings
 from .twins import twins
 
@@ -68,7 +68,9 @@ def _by_rules(
     corners = Corners.of(stored.n, stored.edges, mesh)
     around = list(hubs(corners, mesh.z))
     found = twins(stored, mesh, agree)
-    found += [other for hub in around if (other := rearranged(hub, agree)) is not None]
+    orders = [other for hub in around if (other := rearranged(hub, agree)) is not None]
+    # Parts that hang together at a hub only may yet be joined by other pieces.
+    found += fitting(stored, mesh, factors, orders) if len(topology.hinges) else orders
     found += turned_over(corners, mesh.z, agree)
     if not scale_known:
         found += _loose_pieces(stored, topology, corners, around)

@@ -8,7 +8,7 @@ they have. Whether that makes another mesh depends on how the rest hangs togethe
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations, islice
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,26 +34,39 @@ def regrouped(
     corners : Corners
         All right angles of the mesh that was found.
     """
-    pairs = list(_regroupings(corners, mesh.z, agree))
-    if not pairs:
+    return fitting(stored, mesh, factors, list(_regroupings(corners, mesh.z, agree)), first=True)
+
+
+def fitting(
+    stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, others: list[Alternative], *, first: bool = False
+) -> list[Alternative]:
+    """Those about one vertex that fit, as their solution shows; in large graphs none is solved, and all are kept.
+
+    Parameters are those of :func:`unassemble.cells.ambiguity.alternatives`, and
+
+    others : list of Alternative
+    first : bool
+        Only the first for each component; in large graphs none.
+    """
+    if not others:
         return []
     found = []
     for part in components(stored.n, stored.edges):
-        if len(part.vertices) > _MOST_VERTICES:
-            continue
         rows = np.zeros(stored.n, dtype=bool)
         rows[part.vertices] = True
-        own = (other for other in pairs if rows[other.around[0]])
+        own = [other for other in others if rows[other.around[0]]]
+        if len(part.vertices) > _MOST_VERTICES:
+            found += [] if first else own
+            continue
         known: dict[bytes, PieceMesh | None] = {}
         weights, scale = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
-        for other in islice(own, _MOST_TRIALS):
+        for other in own[:_MOST_TRIALS]:
             cells = _cells(stored.n, mesh, part, other)
-            reading = Reading.of(
-                CellSet(len(part.vertices), part.edges, weights, scale, *cells), np.ones(len(cells[1]), bool), known
-            )
-            if reading.fits:
+            some = CellSet(len(part.vertices), part.edges, weights, scale, *cells)
+            if Reading.of(some, np.ones(some.count, dtype=bool), known).fits:
                 found.append(other)
-                break
+                if first:
+                    break
     return found
 
 
@@ -79,10 +92,12 @@ def _cells(n: int, mesh: OrientedMesh, part: Numbering, other: Alternative) -> t
     triangles = mesh.triangles[number[mesh.triangles[:, 0]] >= 0]
     gone = (np.sort(triangles, axis=1)[:, None, :] == np.array(other.cells)).all(axis=2).any(axis=1)
     # The vertex of the right angle stands in the middle.
-    added = np.array([[*new[:1], *other.around, *new[1:]] for new in (other.other[:2], other.other[2:])])
+    (h,) = other.around
+    ends = [[v for v in new if v != h] for new in other.other_cells]
+    added = np.array([[a, h, b] for a, b in ends])
     three = np.concatenate([triangles[~gone], added])
     first = mesh.polygons.vertices[mesh.polygons.offsets[:-1]]
     own = mesh.polygons.chosen(number[first] >= 0, number)
     whole = Polygons.joined([Polygons(3 * np.arange(len(three) + 1), number[three].ravel()), own])
     place = np.arange(whole.count)
-    return whole, (place >= len(three) - 2) & (place < len(three))
+    return whole, (place >= len(three) - len(added)) & (place < len(three))
