@@ -42,6 +42,7 @@ def test_other_meshes_of_a_lattice(seed):
     assert found.alternatives
     for other in found.alternatives:
         gone = {tuple(sorted(cell)) for cell in other.cells}
+        assert not gone & {tuple(sorted(cell)) for cell in other.other_cells}
         kept = [cell for cell in cells if tuple(sorted(cell)) not in gone]
         assert len(kept) == len(cells) - len(gone)
         assert explains(known.matrix, [*kept, *other.other_cells], c)

@@ -31,7 +31,7 @@ _MOST_SHAPES = 3000
 _MOST_CELLS = 2500  # with their numbers
 _NUMBERS = 4  # that are tried at most
 _SCALES = 3  # of each kind that are tried
-_WORK = 25_000  # cells of all programs that are solved, together
+_WORK = 12_000  # cells of all programs that are solved, together
 _AGREE = 1e-7
 
 

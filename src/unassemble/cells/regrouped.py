@@ -77,7 +77,8 @@ def _regroupings(corners: Corners, z: NDArray, agree: float) -> Iterator[Alterna
     for group in np.split(order, np.flatnonzero(np.diff(h[order])) + 1):
         for i, j in combinations(group.tolist(), 2):
             for d, f, other in ((a[j], b[j], gets[j]), (b[j], a[j], -gets[j])):
-                if abs(gets[i] + other) <= agree:  # h-d has the inverse of h-a
+                apart = not {a[i], b[i]} & {d, f}  # with an edge in common they would come out as they are
+                if apart and abs(gets[i] + other) <= agree:  # h-d has the inverse of h-a
                     old = (int(a[i]), int(b[i])), (int(a[j]), int(b[j]))
                     new = (int(a[i]), int(d)), (int(b[i]), int(f))
                     top = int(h[i])
