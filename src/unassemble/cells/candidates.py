@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..topology import Polygons
 from ..topology.faces import FaceComplex, joined
 from .angles import face_sums, facing_angles, likeliest_scale, vertex_excess
+from .cell_set import CellSet
 from .crosses import Crosses
 from .open_corners import OpenCorners
 from .turning import Turns
@@ -24,20 +25,17 @@ _INNER = (-0.35 * np.pi, -0.55 * np.pi)  # angle excess above which a vertex may
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
+class Candidates(CellSet):
     """Cells that a graph may have; any set of them that shares no half-edge is a reading of the graph.
+
+    Corners are two consecutive edges of an empty face.
 
     Attributes
     ----------
     drawing : FaceComplex
         Of the graph.
-    weights : (e,) float64
-        -A_ij of each edge.
-    scale : float or None
-        c, where it is known.
     relative : (e,) float64
         The weights over c, or over the likeliest c, from the angles.
-    cells : Polygons
     sides : (s, 2) int64
         Pairs (cell, half-edge) of what each cell takes up.
     belief : (cells,) float64
@@ -46,9 +44,6 @@ class Candidates:
         The faces that make the likeliest reading without vanished boundary edges.
     outer : (cells,) bool
         The face of each block that bounds it from outside.
-    corner : (cells,) bool
-        Triangles a-b-c of two edges a-b, b-c of an empty face; the third has vanished from the boundary, which it
-        does if the angle at b is a right one.
     strip : (cells,) bool
         Corners inside paths, all of them right angles if the path is a strip, none if pieces hang together there.
     turns : Turns
@@ -56,15 +51,11 @@ class Candidates:
     """
 
     drawing: FaceComplex
-    weights: NDArray[np.float64]
-    scale: float | None
     relative: NDArray[np.float64]
-    cells: Polygons
     sides: NDArray[np.int64]
     belief: NDArray[np.float64]
     first: NDArray[np.bool_]
     outer: NDArray[np.bool_]
-    corner: NDArray[np.bool_]
     strip: NDArray[np.bool_]
     turns: Turns
 
@@ -92,6 +83,8 @@ class Candidates:
         if crosses is not None:
             belief[np.isin(corners.vertices[:, 1], crosses.hub) & ~corners.turned] = 1.0
         return cls(
+            n_vertices=drawing.n_vertices,
+            edges=drawing.edges,
             drawing=drawing,
             weights=weights,
             scale=scale,
@@ -112,26 +105,6 @@ class Candidates:
             strip=np.r_[np.zeros(len(faces), bool), corners.in_strip],
             turns=corners.turns,
         )
-
-    @property
-    def n_vertices(self) -> int:
-        """Number of vertices."""
-        return self.drawing.n_vertices
-
-    @property
-    def edges(self) -> NDArray[np.int64]:
-        """(e, 2) pairs i < j."""
-        return self.drawing.edges
-
-    @property
-    def count(self) -> int:
-        """Number of candidates."""
-        return len(self.belief)
-
-    @property
-    def size(self) -> NDArray[np.int64]:
-        """(cells,) number of vertices."""
-        return self.cells.size
 
     @cached_property
     def chorded(self) -> NDArray[np.bool_]:

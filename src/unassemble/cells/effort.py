@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..planar.piece import PieceMesh
-from .candidates import Candidates
-from .reading import Reading
+from .reading import C, Reading
 
 SMALL_GRAPH = 1000
 """Vertices up to which all drawings are begun with before one is repaired, and labels relaxed first."""
@@ -30,7 +29,7 @@ class Effort:
         """As much as a graph of n vertices is worth."""
         return cls(int(np.clip(_WORK / n, 12, _SOLVES)))
 
-    def reading(self, candidates: Candidates, labels: NDArray[np.bool_]) -> Reading:
+    def reading(self, candidates: C, labels: NDArray[np.bool_]) -> Reading[C]:
         """A reading, counted."""
         reading = Reading.of(candidates, labels, self.known)
         self.solves -= 1 + len(reading.pieces) // _MANY

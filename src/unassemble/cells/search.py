@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..planar.piece import PieceMesh
 from ..topology.embedding import drawing_with_corners, face_complexes
 from .candidates import Candidates
+from .covering import read_by_cover
 from .crosses import Crosses
 from .effort import SMALL_GRAPH, Effort
 from .evidence import FEW, entries_are_to_blame, label_changes
@@ -76,6 +77,7 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
     drawings = _drawings(n, edges, weights, scale)
     together = n <= SMALL_GRAPH
     turning = _TURNING / (_DRAWINGS if together else 1)
+    covered = False
     # Repairs take most of the effort: small graphs are begun with in all drawings before.
     for some in [drawings] if together else ([drawing] for drawing in drawings):
         begun = []
@@ -84,6 +86,11 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
             if begun[-1].settled:
                 first = begun[-1].starts[0]
                 return first if first.fits or first.fits_but_for_few else _better(best, first)
+        if not covered:  # in no drawing, so only once
+            covered = True
+            cover = read_by_cover(n, edges, weights, scale)
+            if cover is not None:
+                return cover
         for one in begun:
             try:
                 best = _finished(best, one, effort)
