@@ -151,9 +151,10 @@ class Candidates:
 
     def turned(self, labels: NDArray[np.bool_]) -> Iterator[NDArray[np.bool_]]:
         """Labels with one part of the drawing turned over, where that changes any."""
-        faces = self.count - int(self.corner.sum())
-        for corners in self.turns.turned(labels[faces:]):
-            yield np.r_[labels[:faces], corners]
+        for corners in self.turns.turned(labels[self.corner]):
+            turned = labels.copy()
+            turned[self.corner] = corners
+            yield turned
 
     def starts(self) -> Iterator[NDArray[np.bool_]]:
         """Readings to begin with, the likeliest first."""
