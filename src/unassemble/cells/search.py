@@ -15,7 +15,6 @@ from .candidates import Candidates
 from .crosses import Crosses
 from .effort import SMALL_GRAPH, Effort
 from .evidence import FEW, entries_are_to_blame, label_changes
-from .half_circles import with_half_circles
 from .mending import MOST_VERTICES, mended
 from .proposals import proposals
 from .reading import Reading
@@ -26,7 +25,7 @@ _log = logging.getLogger(__name__)
 _STARTS = 2  # readings to begin with that are worth repairing
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 _DRAWINGS = 3  # that a graph may have, about
-_HALF_CIRCLES = 60
+_LAST = 60  # solves for small changes of the best reading, when all others are spent
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
 
@@ -90,17 +89,7 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
                 return best
     if best is None or not best.pieces:
         return None
-    best = _descent(best, Effort(_HALF_CIRCLES))
-    return best if best.fits else _on_half_circles(best)
-
-
-def _on_half_circles(best: Reading) -> Reading:
-    """A better reading with cells on half circles."""
-    start = with_half_circles(best)
-    if start is None:
-        return best
-    found = _descent(start, Effort(_HALF_CIRCLES))
-    return found if found.fits else best
+    return _descent(best, Effort(_LAST))
 
 
 def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Iterator[Candidates]:
