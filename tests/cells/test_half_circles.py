@@ -26,3 +26,17 @@ def test_half_hexagons_on_the_boundary(count, seed):
     assert found.certified, found.reason
     assert np.diff(found.polygons_offsets).tolist() == [4] * count
     assert largest_error(found.points, known.points) <= 1e-11
+
+
+def test_a_half_circle_and_a_right_angle_on_its_diameter_are_one_cell():
+    """Five corners on a circle, two of them opposite: however the cell is put together, it is written as one."""
+    rng = np.random.default_rng(4)
+    angle = np.pi * np.array([0, 0.3, 0.65, 1, 1.4])
+    inner = np.column_stack([np.cos(angle), np.sin(angle)])
+    around = 2 * np.pi * (np.arange(9) + rng.uniform(-0.2, 0.2, 9)) / 9
+    rings = [r * np.column_stack([np.cos(around + s), np.sin(around + s)]) for r, s in ((1.7, 0), (2.6, 0.3))]
+    known = forgotten(specimen(*delaunay(np.concatenate([inner, *rings])), c=3.0, seed=1))
+    found = recover(known.matrix)
+    assert found.certified, found.reason
+    assert np.diff(found.polygons_offsets).tolist() == [5]
+    assert largest_error(found.points, known.points) <= 1e-11
