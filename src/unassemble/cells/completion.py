@@ -16,6 +16,7 @@ from ..topology.keys import contains, distinct, pair_keys
 from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained
 from .reading import Reading
 from .search import first_reading, read_cells
+from .undivided import undivided
 
 _BETTER = 0.1  # a reading that does not fit replaces the triangles only if its misfit is below this times theirs
 
@@ -153,8 +154,7 @@ def _part(matrix: OperatorMatrix, numbering: Numbering, reading: Reading) -> _Pa
     ]
     pairs = np.sort(vertices[reading.edges], axis=1)
     added = ~contains(pair_keys(matrix.n, *matrix.edges.T), pair_keys(matrix.n, *pairs.T))
-    cells = reading.candidates.cells
-    return _Part(pieces, pairs[added], cells.chosen(reading.labels & (cells.size > 3), vertices))
+    return _Part(pieces, pairs[added], undivided([piece for piece, _ in pieces], added)[1])
 
 
 def _merged(

@@ -28,6 +28,7 @@ _log = logging.getLogger(__name__)
 _STARTS = 2  # readings to begin with that are worth repairing
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 _DRAWINGS = 3  # that a graph may have, about
+_LAST = 60  # solves for small changes of the best reading, when all others are spent
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
 
@@ -99,7 +100,9 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
                 return best if best.pieces else None
             if best is not None and (best.fits or best.like_noise):
                 return best
-    return best if best is not None and best.pieces else None
+    if best is None or not best.pieces:
+        return None
+    return _descent(best, Effort(_LAST))
 
 
 def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Iterator[Candidates]:
