@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, milp
 
+from ..linalg import quiet
 from .numbered import Numbered
 
 _ROUNDING = 1e-6  # of angle sums
@@ -57,13 +58,14 @@ class Program:
     def solution(self, cost: NDArray[np.float64]) -> NDArray[np.int64] | None:
         """Rows of the cells (m,) of least cost that fulfil all conditions; None if none are found."""
         size = self._matrix.shape[1]
-        found = milp(
-            np.append(cost, np.zeros(size - len(cost))),
-            constraints=LinearConstraint(self._matrix, self._low, self._high),
-            integrality=np.ones(size),
-            bounds=Bounds(0, 1),
-            options={"node_limit": _NODES},
-        )
+        with quiet():  # HiGHS has a line or two that no option turns off
+            found = milp(
+                np.append(cost, np.zeros(size - len(cost))),
+                constraints=LinearConstraint(self._matrix, self._low, self._high),
+                integrality=np.ones(size),
+                bounds=Bounds(0, 1),
+                options={"node_limit": _NODES},
+            )
         return None if found.x is None else np.flatnonzero(found.x[: len(cost)] > 0.5)
 
     def _add(self, row: NDArray, low: float, high: float) -> None:
