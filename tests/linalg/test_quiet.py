@@ -11,10 +11,10 @@ from unassemble.linalg import quiet
 @pytest.mark.skipif(sys.platform == "win32", reason="the C library goes by another name")
 def test_only_what_compiled_code_prints_is_lost(capfd):
     library = ctypes.CDLL(None)
-    print("before")
+    sys.stdout.write("before\n")
     with quiet():
         library.printf(b"noise\n")
-    print("after")
+    sys.stdout.write("after\n")
     library.printf(b"wanted\n")
     library.fflush(None)
     assert capfd.readouterr().out.split() == ["before", "after", "wanted"]

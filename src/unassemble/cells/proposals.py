@@ -1,7 +1,8 @@
 """Which labels to turn over next.
 
-Two things speak for a change: the linear explanation of the misfit (see :mod:`unassemble.cells.evidence`), which is
-right from afar, and the misfit itself, which gathers around the last wrong cells.
+Three things speak for a change: the linear explanation of the misfit (see :mod:`unassemble.cells.evidence`), which is
+right from afar; what the entries of a cell's sides say by themselves (:mod:`unassemble.cells.left_out`); and the
+misfit itself, which gathers around the last wrong cells.
 """
 
 from __future__ import annotations
@@ -13,14 +14,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .pursuit import left_out
+from .left_out import left_out
 from .reading import Reading
 
 _CLEAR = 0.35  # a label that is to change by so much is turned over
 _HOPELESS = -0.3  # belief in a corner at a vertex that does not look like an inner one
 _SINGLES = 8
-LIKELY = 1 + 2 * _SINGLES
-"""Proposals, at most, before exchanges are among them."""
 _EXCHANGES = 24
 _LIKELY = 100  # cells that take part in exchanges
 

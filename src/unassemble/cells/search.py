@@ -17,7 +17,7 @@ from .crosses import Crosses
 from .effort import SMALL_GRAPH, Effort
 from .evidence import FEW, entries_are_to_blame, label_changes
 from .mending import MOST_VERTICES, mended
-from .proposals import LIKELY, proposals
+from .proposals import proposals
 from .reading import Reading
 from .relaxation import HopelessError
 from .spoilt import without_wrong_entries
@@ -246,12 +246,11 @@ def _leaps(reading: Reading, effort: Effort) -> Reading:
 
 def _descent(reading: Reading, effort: Effort) -> Reading:
     """Small changes, each of which lowers the misfit."""
-    progress = effort.progress(reading, LIKELY)
-    while reading.pieces and not reading.fits and progress.suffices(reading.size):
+    while reading.pieces and not reading.fits and not effort.spent:
         changes = np.nan_to_num(label_changes(reading))
         for labels in proposals(reading, changes):
             trial = effort.reading(reading.candidates, labels)
-            if trial.size < reading.size or not progress.suffices(reading.size):
+            if trial.size < reading.size or effort.spent:
                 break
         else:
             return reading
