@@ -4,6 +4,7 @@ Where entries vanish the graph alone does not tell: see the page on theory in th
 """
 
 from .ambiguity import AGREE, alternatives
+from .coincidence import coincident
 from .completion import completed, guessed
 from .corners import Alternative, OrientedMesh
 from .doubt import Attempt, Outcome, in_doubt
@@ -17,6 +18,7 @@ __all__ = [
     "OrientedMesh",
     "Outcome",
     "alternatives",
+    "coincident",
     "completed",
     "guessed",
     "in_doubt",

@@ -30,7 +30,7 @@ _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 _DRAWINGS = 3  # that a graph may have, about
 _LAST = 60  # solves for small changes of the best reading, when all others are spent
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
-_EASY = 0.2  # part of them for leaps before shapes are counted
+_EASY = 0.1  # as many again for leaps in each drawing, before shapes are counted
 _FIRST = 0.7  # part of them for the likeliest reading
 
 
@@ -107,14 +107,12 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
 
 
 def _easily(begun: list[Begun], effort: Effort) -> Reading | None:
-    """A reading that a few leaps lead to, or none."""
-    starts = [one.starts[0] for one in begun if one.starts and not one.starts[0].like_noise]
-    for number, start in enumerate(starts):
-        share = effort.share(_EASY / (len(starts) - number))
-        found = _leaps(start, share)
-        if found.fits:
-            return found
-        effort.solves += max(share.solves, 0)
+    """A reading that a few leaps lead to, or none; what they cost is not taken from repairs."""
+    for one in begun:
+        if one.starts and not one.starts[0].like_noise:
+            found = _leaps(one.starts[0], Effort(int(_EASY * effort.solves)))
+            if found.fits:
+                return found
     return None
 
 
