@@ -45,17 +45,21 @@ def alike(reached: sp.csr_array, r: NDArray, s: NDArray) -> NDArray[np.float64]:
     return np.concatenate([np.empty(0), *parts])
 
 
-def partners(
+def compared(
     pattern: sp.csr_array, reached: sp.csr_array, rows_c: NDArray, rows_b: NDArray
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Pairs (r, s) of places in two lists of rows that are each other's likest, or equal to it, and how alike they are.
-
-    Only rows at most two steps apart are compared.
-    """
+    """Pairs (r, s) of places in two lists of rows at most two steps apart, and how alike they are."""
     cross = pattern[rows_c][:, rows_b]
     near = sp.coo_array(cross @ pattern[rows_b][:, rows_b] + pattern[rows_c][:, rows_c] @ cross)
     r, s = near.row.astype(np.int64), near.col.astype(np.int64)
-    value = alike(reached, rows_c[r], rows_b[s])
+    return r, s, alike(reached, rows_c[r], rows_b[s])
+
+
+def partners(
+    pattern: sp.csr_array, reached: sp.csr_array, rows_c: NDArray, rows_b: NDArray
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Those of the pairs compared that are each other's likest, or equal to it."""
+    r, s, value = compared(pattern, reached, rows_c, rows_b)
     best_r, best_s = np.zeros(len(rows_c)), np.zeros(len(rows_b))
     np.maximum.at(best_r, r, value)
     np.maximum.at(best_s, s, value)
