@@ -116,7 +116,7 @@ def anisotropic(d, seed, share):
 def test_other_homogeneous_materials_are_not_certified(kind, share):
     """Linear fields satisfy the identities inside any homogeneous material; no isotropic one explains the entries."""
     d = 3 if kind.startswith(("tet", "hex")) else 2
-    for seed in range(2):
+    for seed in range(2 if d == 2 else 1):
         matrix, _ = held(kind, 0.2, seed=seed, tensor=anisotropic(d, seed, share))
         found = found_with_numbering(matrix, d)
         assert not found.certified
@@ -141,7 +141,8 @@ def test_checkerboards_are_not_certified(which):
 @pytest.mark.parametrize("kind", ["tri-p1", "quad-q1", "tri-p2", "quad-s2"])
 @pytest.mark.parametrize("perturb", [0.0, 0.2])
 def test_several_supports_on_all_sides(kind, perturb):
-    truth = given(stiffness(kind, box(kind, (9, 8), perturb=perturb), lam=1.5), "several", "interleaved", "stored")
+    counts = (9, 8) if kind in ("tri-p1", "quad-q1") else (7, 7)
+    truth = given(stiffness(kind, box(kind, counts, perturb=perturb), lam=1.5), "several", "interleaved", "stored")
     found = recover_elasticity(truth.matrix)
     verdict = judged(found, truth)
     assert found.certified
