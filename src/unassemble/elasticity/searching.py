@@ -32,31 +32,41 @@ def searched(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[Numbering]:
     identity = uncoupled_rows(matrix)
     whole = _RIGHT * whole_share(matrix, identity)
     found: list[Numbering] = []
-    for d, node in _starts(matrix, identity, [d for d in sizes if d <= matrix.shape[0]]):
+    right: list[Numbering] = []
+    for d, node, first in _starts(matrix, identity, [d for d in sizes if d <= matrix.shape[0]]):
+        if right and not first:
+            break
         for one in _rounds(matrix, identity, node, d):
             found.append(_freed(matrix, one) if one.sound else one)
             if found[-1].sound and found[-1].share >= whole:
-                direction = found[-1].direction_of_row
-                paired = _paired(matrix, identity, direction, d)
-                return found[-1:] if paired is None else [found[-1], measured(matrix, paired, direction, d)]
-    return found
+                right += _both_ways(matrix, found[-1])
+                break
+        if any(not one.odd for one in right):
+            break
+    return right or found
 
 
-def _starts(matrix: sp.csr_array, identity: NDArray, sizes: list[int]) -> Iterator[tuple[int, NDArray[np.int64]]]:
-    """What may be nodes, the likeliest first.
+def _both_ways(matrix: sp.csr_array, one: Numbering) -> list[Numbering]:
+    """Right directions with the nodes that helped to find them, and with those that they tell apart."""
+    d, direction = one.block_size, one.direction_of_row
+    paired = _paired(matrix, one.identity_row, direction, d)
+    return [one] if paired is None else [one, measured(matrix, paired, direction, d)]
+
+
+def _starts(matrix: sp.csr_array, identity: NDArray, sizes: list[int]) -> Iterator[tuple[int, NDArray[np.int64], bool]]:
+    """What may be nodes, the likeliest first, and whether to look on though directions are right.
 
     Rows of one pattern, if most have a fellow; rows that are likest each other; rows of one pattern all the same; and
     single rows.
     """
     group = same_pattern(matrix, identity)
-    single = np.arange(len(group))
     patterns = [(d, node) for d in sizes for node in possible_nodes(group, d)[:-1]]
     clear = [2 * np.count_nonzero(np.bincount(node)[node] > 1) > len(node) for _, node in patterns]
-    yield from (one for one, first in zip(patterns, clear, strict=True) if first)
+    yield from ((*one, True) for one, first in zip(patterns, clear, strict=True) if first)
     for d in sizes:
-        yield d, bunched(matrix, d)
-    yield from (one for one, first in zip(patterns, clear, strict=True) if not first)
-    yield from ((d, single) for d in sizes)
+        yield d, bunched(matrix, d), True
+    yield from ((*one, False) for one, first in zip(patterns, clear, strict=True) if not first)
+    yield from ((d, np.arange(len(group)), False) for d in sizes)
 
 
 def _rounds(matrix: sp.csr_array, identity: NDArray, node: NDArray[np.int64], d: int) -> Iterator[Numbering]:
