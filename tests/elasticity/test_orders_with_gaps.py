@@ -6,6 +6,7 @@ from assembled import box, heterogeneous, permuted_nodes, stiffness
 from supported import given, judged
 
 from unassemble.elasticity import recover_elasticity
+from unassemble.elasticity.alignment import aligned
 from unassemble.elasticity.constants import proven_directions, uncoupled_rows
 from unassemble.elasticity.grouping import same_pattern
 from unassemble.elasticity.matching import matched_by_pattern
@@ -89,3 +90,16 @@ def test_nodes_that_may_be_halves_say_nothing_of_planes():
     found = recover_elasticity(case.matrix)
     assert found.certified
     assert judged(found, case).error < 1e-9
+
+
+def test_the_heaviest_alignment_wins_over_the_likest_pairs():
+    """Row 1 is likest row 2 of the other list, but then row 2 and row 3 would have no partners."""
+    r, s = np.array([0, 1, 1, 2, 3]), np.array([0, 1, 2, 2, 3])
+    likeness = np.array([1.0, 0.9, 0.95, 0.9, 1.0])
+    assert aligned(r, s, likeness).tolist() == [0, 1, 3, 4]
+
+
+def test_pairs_that_another_alignment_would_replace_are_left_out():
+    """One of two rows as alike has no partner, and order does not tell which."""
+    r, s = np.array([0, 1, 2, 3]), np.array([0, 1, 1, 2])
+    assert aligned(r, s, np.array([1.0, 0.9, 0.9, 1.0])).tolist() == [0, 3]
