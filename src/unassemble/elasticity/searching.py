@@ -90,19 +90,42 @@ def _paired(matrix: sp.csr_array, identity: NDArray, direction: NDArray[np.int64
 
 
 def _freed(matrix: sp.csr_array, one: Numbering) -> Numbering:
-    """The same after every row has chosen its direction for itself, if more sums vanish then.
+    """The same after rows have chosen directions for themselves: all of them, if more sums vanish then.
 
-    Nodes in which two rows have chosen the same come apart.
+    And those of nodes that lack a direction, if no fewer do: rows of the same direction may have been taken for such a
+    node, next to supports, where no sums tell.
     """
     d, order = one.block_size, matrix.shape[0]
     row = np.arange(order)
     single = [row[:, None], *[np.empty((0, k), np.int64) for k in range(2, d + 1)]]
     direction = set_right(matrix, row, single, ~one.identity_row, one.direction_of_row, names_of(d))
+    other = _with_directions(matrix, one, direction)
+    best = other if other.share > one.share else one
+    other = _with_directions(matrix, best, _of_least_energy(matrix, best))
+    return other if other.share >= best.share else best
+
+
+def _of_least_energy(matrix: sp.csr_array, one: Numbering) -> NDArray[np.int64]:
+    """(N,) directions after rows of nodes that lack some have taken those of least energy, all others left alone."""
+    d, order = one.block_size, matrix.shape[0]
+    count = np.bincount(one.node_of_row)[one.node_of_row]
+    rows = np.flatnonzero((count > 1) & (count < d))
+    label = np.zeros((order, d))
+    label[np.arange(order), one.direction_of_row] = ~one.identity_row
+    energy = matrix[rows] @ label
+    energy[np.arange(len(rows)), one.direction_of_row[rows]] -= matrix.diagonal()[rows]
+    direction = one.direction_of_row.copy()
+    direction[rows] = np.argmin(energy * np.sign(matrix.diagonal().sum()), axis=1)
+    return direction
+
+
+def _with_directions(matrix: sp.csr_array, one: Numbering, direction: NDArray[np.int64]) -> Numbering:
+    """The same with other directions; nodes in which two rows have the same come apart."""
     if np.array_equal(direction, one.direction_of_row):
         return one
+    d = one.block_size
     key = one.node_of_row * d + direction
     twice = np.bincount(one.node_of_row, np.bincount(key)[key] > 1)[one.node_of_row] > 0
-    node = by_first_row(np.where(twice, order + row, one.node_of_row))
+    node = by_first_row(np.where(twice, len(key) + np.arange(len(key)), one.node_of_row))
     node = leftover_joined(matrix, ~one.identity_row, node, direction, d)
-    other = measured(matrix, node, direction, d)
-    return other if other.share > one.share else one
+    return measured(matrix, node, direction, d)
