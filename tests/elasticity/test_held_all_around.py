@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-import skfem
 from assembled import ELEMENTS, Assembled, box, eliminated, error, permuted_nodes, stiffness
-from skfem.helpers import grad
 from supported import given, judged
 
 from unassemble import recover
@@ -110,13 +108,7 @@ def anisotropic(d, seed, share):
                 for k, m in {(c, e), (e, c)}:
                     other[i, j, k, m] = (factor @ factor.T)[p, q]
     stiff = np.einsum("ab,ce->abce", unit, unit) + np.einsum("ac,be->abce", unit, unit)
-    stiff = stiff + np.einsum("ae,bc->abce", unit, unit) + share * other
-
-    @skfem.BilinearForm
-    def form(u, v, w):
-        return np.einsum("iakl,ia...,kl...->...", stiff, grad(v), grad(u))
-
-    return form
+    return stiff + np.einsum("ae,bc->abce", unit, unit) + share * other
 
 
 @pytest.mark.parametrize("kind", ["tri-p1", "quad-q1", "tri-p2", "tet-p1", "hex-q1"])
@@ -124,8 +116,8 @@ def anisotropic(d, seed, share):
 def test_other_homogeneous_materials_are_not_certified(kind, share):
     """Linear fields satisfy the identities inside any homogeneous material; no isotropic one explains the entries."""
     d = 3 if kind.startswith(("tet", "hex")) else 2
-    for seed in range(2):
-        matrix, _ = held(kind, 0.2, seed=seed, form=anisotropic(d, seed, share))
+    for seed in range(2 if d == 2 else 1):
+        matrix, _ = held(kind, 0.2, seed=seed, tensor=anisotropic(d, seed, share))
         found = found_with_numbering(matrix, d)
         assert not found.certified
         assert found.poisson_ratio is None
@@ -149,7 +141,8 @@ def test_checkerboards_are_not_certified(which):
 @pytest.mark.parametrize("kind", ["tri-p1", "quad-q1", "tri-p2", "quad-s2"])
 @pytest.mark.parametrize("perturb", [0.0, 0.2])
 def test_several_supports_on_all_sides(kind, perturb):
-    truth = given(stiffness(kind, box(kind, (9, 8), perturb=perturb), lam=1.5), "several", "interleaved", "stored")
+    counts = (9, 8) if kind in ("tri-p1", "quad-q1") else (7, 7)
+    truth = given(stiffness(kind, box(kind, counts, perturb=perturb), lam=1.5), "several", "interleaved", "stored")
     found = recover_elasticity(truth.matrix)
     verdict = judged(found, truth)
     assert found.certified

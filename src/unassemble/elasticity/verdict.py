@@ -101,7 +101,7 @@ def verdict(
     """
     remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
     if remaining:
-        return "uncertified", f"the null space is larger than it should be: {remaining[0]}"
+        return "uncertified", f"the null space is larger than it should be: {remaining[0]}{_unless(nodal, numbering)}"
     nearly = min((one.gap for one in solution.evidence if one.gap > 0), default=1.0)
     if solution.exact and nearly < _NEARLY:
         return "uncertified", (
@@ -155,6 +155,17 @@ def verdict(
     if error <= CERTIFIED:
         return "certified", "the valid identities hold to rounding, and only translations and scale satisfy them"
     return "uncertified", f"the largest residual of a valid identity is {error:.1e}"
+
+
+def _unless(nodal: NodalMatrix, numbering: Numbering) -> str:
+    """What may be to blame instead, where it was inferred which rows make up a node."""
+    odd = int(np.asarray(without_trace(nodal).any(axis=1)).sum())
+    if numbering.kind == "given" or not (odd or (numbering.kind == "pattern" and numbering.common < 1)):
+        return ""
+    lacking = f" {count_of(odd, 'node lacks', 'nodes lack')} directions without a trace, and" if odd else ""
+    return (
+        f". Or rows were not joined to nodes as they should be:{lacking} it was inferred which rows belong to one node"
+    )
 
 
 def _torn(nodal: NodalMatrix, solution: Solution) -> bool:
