@@ -6,6 +6,8 @@ unknowns nothing else tells which of their rows belong together.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -26,7 +28,7 @@ _ROUNDS = 4
 def single_nodes(group: NDArray[np.int64], direction: NDArray[np.int64], d: int) -> NDArray[np.int64]:
     """(N,) nodes of rows of the same pattern with one row of each direction at most; all other rows by themselves."""
     count = _by_direction(group, direction, d)
-    lone = (count <= 1).all(axis=1)[group]
+    lone = np.asarray((count <= 1).all(axis=1))[group]
     return by_first_row(np.where(lone, group, len(group) + np.arange(len(group))))
 
 
@@ -117,16 +119,16 @@ def _joined(
 ) -> NDArray[np.int64]:
     """(N,) nodes after those in doubt were joined that have the same pattern and lie in one place."""
     n, d = nodal.n, nodal.dim
-    valid = np.where((nodal.row_of >= 0)[:, :, None], whole[nodal.row_of], False)
+    valid: NDArray[np.bool_] = whole[nodal.row_of] & (nodal.row_of >= 0)[:, :, None]
     try:
-        solution = placed(nodal, valid, None)
+        solution = placed(*_with_sums(nodal, valid, group, node, direction), None)
     except GeometryError:
         return node
     if not solution.exact or "hourglass" in solution.freedoms:
         return node
     kind = np.full(n, -1)
     kind[node[open_row]] = group[open_row]
-    some = np.flatnonzero(determined(solution.points) & (kind >= 0))
+    some = np.flatnonzero(determined(solution.points[:n]) & (kind >= 0))
     if len(some) < 2:
         return node
     pairs = some[cKDTree(solution.points[some]).query_pairs(_APART, output_type="ndarray")]
@@ -138,11 +140,62 @@ def _joined(
     return by_first_row(np.where(twice, n + node, label))
 
 
+def _with_sums(
+    nodal: NodalMatrix,
+    valid: NDArray[np.bool_],
+    group: NDArray[np.int64],
+    node: NDArray[np.int64],
+    direction: NDArray[np.int64],
+) -> tuple[NodalMatrix, NDArray[np.bool_]]:
+    """One more equation for each pattern that lacks no direction, where each of its nodes takes part in some equation.
+
+    Whichever rows belong together, those of any direction have the same positions, and so the same sum of positions.
+    They stand in nodes of their own, which have no positions, in places without boundary terms.
+
+    Returns
+    -------
+    nodal : NodalMatrix
+    valid : (n, d, d, d) bool
+    """
+    n, d = nodal.n, nodal.dim
+    touched = np.zeros(n, dtype=bool)
+    touched[nodal.indices[(np.abs(nodal.data) * valid[nodal.node]).max(axis=(1, 2)) > 0]] = True
+    count = _by_direction(group, direction, d)
+    several = (count == count[:, :1]).all(axis=1) & (count[:, 0] > 1)
+    several[group[~touched[node]]] = False
+    number = np.cumsum(several) - 1
+    m = int(several.sum())
+    rows = np.flatnonzero(several[group])
+    weight = 1 / count[group[rows], 0]
+    parts = []
+    for c in range(1, d):
+        sign = np.where(direction[rows] == 0, 1.0, np.where(direction[rows] == c, -1.0, 0.0))
+        parts.append(sp.coo_array((sign * weight, (number[group[rows]], node[rows])), shape=(m, n)))
+    sums = sp.csr_array(sp.hstack([sp.vstack(parts), sp.eye_array((d - 1) * m)]))
+    sums.sort_indices()
+    own = sums.indices >= n
+    blocks = np.where(own, 0, sums.data)[:, None, None] * np.eye(d)
+    full = np.repeat(valid[..., None], d, axis=3)
+    alone = np.zeros((d, d, d), dtype=bool)
+    alone[np.arange(d), np.arange(d), np.arange(d)] = True
+    more = (d - 1) * m
+    extended = replace(
+        nodal,
+        indptr=np.concatenate([nodal.indptr, nodal.indptr[-1] + sums.indptr[1:]]).astype(np.int32),
+        indices=np.concatenate([nodal.indices, sums.indices]).astype(np.int32),
+        data=np.concatenate([nodal.data, blocks]),
+        row_of=np.vstack([nodal.row_of, np.full((more, d), -1)]),
+        size=np.concatenate([nodal.size, np.ones(more)]),
+        penalised=np.vstack([nodal.penalised, np.zeros((more, d), dtype=bool)]),
+    )
+    return extended, np.concatenate([full, np.broadcast_to(alone, (more, d, d, d))])
+
+
 def _remaining(
     group: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[np.int64], d: int, live: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
     """(N,) nodes after all that is left of a pattern was joined where that is one row of each direction."""
     left = (_by_direction(node, direction, d) == 0).any(axis=1)[node] & live
     rest = _by_direction(group[left], direction[left], d, int(group.max()) + 1)
-    last = left & (rest == 1).all(axis=1)[group]
+    last = left & np.asarray((rest == 1).all(axis=1))[group]
     return by_first_row(np.where(last, len(node) + group, node))
