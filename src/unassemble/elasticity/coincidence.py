@@ -39,6 +39,7 @@ def placed_together(
     node: NDArray[np.int64],
     direction: NDArray[np.int64],
     d: int,
+    open_row: NDArray[np.bool_] | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Nodes after rows of the same pattern were joined whose positions coincide, and rows that are left in doubt.
 
@@ -53,6 +54,8 @@ def placed_together(
     node, direction : (N,) int64
         Rows of one node belong together; those of others may, too.
     d : int
+    open_row : (N,) bool, optional
+        Rows that may belong to one node with others; all where it is not given.
 
     Returns
     -------
@@ -60,18 +63,19 @@ def placed_together(
     open_row : (N,) bool
     """
     identity = ~live
+    may = live if open_row is None else live & open_row
     whole = _whole_rows(matrix, live, group, direction, d)
     for _ in range(_ROUNDS):
-        open_row = _open(group, node, direction, d) & live
+        open_row = _open(group, node, direction, d) & may
         if not open_row.any():
             break
         nodal = nodal_matrix(matrix, Numbering(d, node, direction, identity, "pattern", 1.0, 1.0))
         again = _joined(nodal, whole, group, node, direction, open_row)
-        again = _remaining(group, again, direction, d, live)
+        again = _remaining(group, again, direction, d, may)
         if again.max() == node.max():
             break
         node = again
-    return node, _open(group, node, direction, d) & live
+    return node, _open(group, node, direction, d) & may
 
 
 def _by_direction(label: NDArray[np.int64], direction: NDArray[np.int64], d: int, n: int = 0) -> NDArray[np.int64]:
@@ -136,7 +140,7 @@ def _joined(
     first, second = pairs[alike].T
     link = sp.csr_array((np.ones(len(first), np.int8), (first, second)), shape=(n, n))
     label = sp.csgraph.connected_components(link, directed=False)[1].astype(np.int64)[node]
-    twice = (_by_direction(label, direction, d) > 1).any(axis=1)[label]
+    twice = np.asarray((_by_direction(label, direction, d) > 1).any(axis=1))[label]
     return by_first_row(np.where(twice, n + node, label))
 
 
@@ -161,7 +165,7 @@ def _with_sums(
     touched = np.zeros(n, dtype=bool)
     touched[nodal.indices[(np.abs(nodal.data) * valid[nodal.node]).max(axis=(1, 2)) > 0]] = True
     count = _by_direction(group, direction, d)
-    several = (count == count[:, :1]).all(axis=1) & (count[:, 0] > 1)
+    several: NDArray[np.bool_] = np.asarray((count == count[:, :1]).all(axis=1) & (count[:, 0] > 1))
     several[group[~touched[node]]] = False
     number = np.cumsum(several) - 1
     m = int(several.sum())
@@ -192,10 +196,10 @@ def _with_sums(
 
 
 def _remaining(
-    group: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[np.int64], d: int, live: NDArray[np.bool_]
+    group: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[np.int64], d: int, may: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
     """(N,) nodes after all that is left of a pattern was joined where that is one row of each direction."""
-    left = (_by_direction(node, direction, d) == 0).any(axis=1)[node] & live
+    left = (_by_direction(node, direction, d) == 0).any(axis=1)[node] & may
     rest = _by_direction(group[left], direction[left], d, int(group.max()) + 1)
     last = left & np.asarray((rest == 1).all(axis=1))[group]
     return by_first_row(np.where(last, len(node) + group, node))
