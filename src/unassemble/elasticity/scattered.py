@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from .coincidence import placed_together, single_nodes
 from .constants import proven_directions, uncoupled_rows
 from .extension import extended_directions
-from .grouping import same_pattern
+from .grouping import possible_nodes, same_pattern
 from .numbering import Numbering, measured
+from .sums import names_of, set_right
 
 _ORDERED = 0.3  # share of neighbouring rows with the same pattern: 2/3 node by node, some more where nodes share one
 _SETTLED = 0.9  # share of whole rows that have to annihilate translations
@@ -45,7 +46,19 @@ def scattered(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
 def _with_nodes(
     matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], identity: NDArray[np.bool_], d: int
 ) -> Numbering:
+    direction = _set_right(matrix, group, direction, ~identity, d)
     node = single_nodes(group, direction, d)
     node, open_row = placed_together(matrix, ~identity, group, node, direction, d)
     unnamed = ~proven_directions(matrix, direction, group, d) & ~identity
     return replace(measured(matrix, node, direction, d), open_row=open_row, unnamed=unnamed)
+
+
+def _set_right(
+    matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], live: NDArray[np.bool_], d: int
+) -> NDArray[np.int64]:
+    """Directions next to supports, where translations are in equilibrium no more, set right by the rows around."""
+    node = possible_nodes(group, d)[0]
+    order, size = np.argsort(node, kind="stable"), np.bincount(node)
+    many = size[node[order]]
+    members = [order[many == k].reshape(-1, k) for k in range(1, d + 1)]
+    return set_right(matrix, node, members, live, direction, names_of(d))
