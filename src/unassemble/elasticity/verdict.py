@@ -68,6 +68,17 @@ def about_nodes(nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[
     return told
 
 
+def about_open_rows(numbering: Numbering) -> str:
+    """What is not known of rows that may belong to one node with others; empty where there are none."""
+    rows = 0 if numbering.open_row is None else int(numbering.open_row.sum())
+    if not rows:
+        return ""
+    return (
+        f"{count_of(rows, 'row couples', 'rows couple')} to the same unknowns as rows of other nodes, and neither "
+        "order nor positions tell which of them belong together; give the numbering if it is known"
+    )
+
+
 def of_few_digits(rounding: float, error: float) -> str:
     """Why a matrix whose entries are rounded is not certified though all is well."""
     return (
@@ -101,7 +112,10 @@ def verdict(
     """
     remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
     if remaining:
-        return "uncertified", f"the null space is larger than it should be: {remaining[0]}"
+        doubt = about_open_rows(numbering)
+        return "uncertified", (
+            f"the null space is larger than it should be: {remaining[0]}" + (f"; {doubt}" if doubt else "")
+        )
     nearly = min((one.gap for one in solution.evidence if one.gap > 0), default=1.0)
     if solution.exact and nearly < _NEARLY:
         return "uncertified", (
