@@ -22,7 +22,7 @@ from .results import ElasticityRecovery, ScalarParts
 from .rounded import SPREADS, with_exact_sums
 from .solution import Solution
 from .unknowns import find_numbering
-from .verdict import about_cells, about_nodes, of_few_digits, verdict
+from .verdict import about_cells, about_nodes, about_open_rows, of_few_digits, verdict
 
 _SAME = 1e-6  # difference up to which Poisson's ratios of pieces are one
 _NEAR = 1e-6  # residual up to which positions are good enough to look for elements
@@ -110,6 +110,8 @@ def place_nodes(
         except RecoveryError as error:
             if numbering.kind == "given" or (numbering.common == 1 and not numbering.incomplete):
                 raise
+            if about_open_rows(numbering):
+                raise GeometryError(f"no positions were found: {about_open_rows(numbering)}") from error
             raise GeometryError(
                 f"{error}; but which rows belong to one node, and to which direction, was inferred and may be wrong: "
                 "give the numbering if it is known"

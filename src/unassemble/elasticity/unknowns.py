@@ -21,6 +21,7 @@ from .grouping import by_first_row, coupled_in_common, same_pattern
 from .numbering import WHOLE, Numbering, measured
 from .orders import ORDERS, regular
 from .sampling import promising
+from .scattered import scattered
 from .searching import searched
 
 __all__ = [
@@ -60,6 +61,9 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
     if best is None or best.share < WHOLE or (best.kind == "by component" and best.common < _ALIKE):
         best = _best([best, *by_component_with_gaps(matrix, sizes)])
         clear = best is not None and best.sound and best.common == 1
+        apart = None if clear else scattered(matrix, sizes)
+        if apart is not None:
+            best, clear = apart, True
         if not clear and (matrix.shape[0] <= _LARGE or promising(matrix, sizes)):
             best = _best([best, *interleaved_with_gaps(matrix, sizes)])
             if best is None or not best.sound:

@@ -68,6 +68,17 @@ def about_nodes(nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[
     return told
 
 
+def about_open_rows(numbering: Numbering) -> str:
+    """What is not known of rows that may belong to one node with others; empty where there are none."""
+    rows = 0 if numbering.open_row is None else int(numbering.open_row.sum())
+    if not rows:
+        return ""
+    return (
+        f"{count_of(rows, 'row couples', 'rows couple')} to the same unknowns as rows of other nodes, and neither "
+        "order nor positions tell which of them belong together; give the numbering if it is known"
+    )
+
+
 def of_few_digits(rounding: float, error: float) -> str:
     """Why a matrix whose entries are rounded is not certified though all is well."""
     return (
@@ -159,6 +170,8 @@ def verdict(
 
 def _unless(nodal: NodalMatrix, numbering: Numbering) -> str:
     """What may be to blame instead, where it was inferred which rows make up a node."""
+    if numbering.open_row is not None and numbering.open_row.any():
+        return f"; {about_open_rows(numbering)}"
     odd = int(np.asarray(without_trace(nodal).any(axis=1)).sum())
     if numbering.kind == "given" or not (odd or (numbering.kind == "pattern" and numbering.common < 1)):
         return ""
