@@ -44,7 +44,7 @@ def placed(
     GeometryError
         If no piece has positions.
     """
-    component, n_pieces = _pieces(nodal, valid)
+    component, n_pieces = pieces_of(nodal, valid)
     graph = nodal.graph
     points = np.full((nodal.n, nodal.dim), np.nan)
     evidence, freedoms, exact, warnings = [], [], [], []
@@ -86,7 +86,7 @@ def _settled(found: NullFields) -> bool:
     return len(found.values) > d and bool(found.values[d] <= EXACT < found.values[-1])
 
 
-def _pieces(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
+def pieces_of(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
     """Pieces held together by valid identities; -1 for nodes that none of them touches."""
     pairs = valid if valid.ndim == 3 else np.asarray(valid.any(axis=3))
     live = (np.abs(nodal.data) * pairs[nodal.node]).max(axis=(1, 2)) > 0
