@@ -60,6 +60,18 @@ def unconfirmed(
     return np.asarray(outside)
 
 
+def guessed_directions(numbering: Numbering, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(N,) rows whose direction is the likeliest and no more: those of nodes without coordinates, `loose`, (n,).
+
+    Where unknowns stand node by node and rows are missing, sums over directions tell which. On regular meshes wrong
+    ones vanish, too. Rows that fit the coordinates of their node are right; of others nothing shows it.
+    """
+    if numbering.unnamed is None or not numbering.incomplete:
+        return np.zeros(len(numbering.node_of_row), dtype=bool)
+    whole = np.bincount(numbering.node_of_row) == numbering.block_size  # in order, with all of its directions
+    return np.asarray((loose & ~whole)[numbering.node_of_row])
+
+
 def _neighbourhoods(nodal: NodalMatrix) -> NDArray[np.uint64]:
     """(n,) equal for nodes that couple to the same nodes."""
     key = np.random.default_rng(0).integers(1, 2**62, nodal.n, dtype=np.uint64)

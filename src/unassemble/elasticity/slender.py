@@ -66,7 +66,7 @@ def unbent(
 
 
 def _equations(local: Identities) -> sp.csr_array:
-    """(m s, n d) what sticks out of the boundary terms, in coordinates: s equations a node, fewer where less is valid."""
+    """(r, n d) what sticks out of the boundary terms, in coordinates: some equations for each node."""
     d, m = local.dim, len(local.rows)
     code = local.valid.reshape(m, -1) @ (1 << np.arange(d**3))
     row = np.repeat(np.arange(m), np.diff(local.indptr))

@@ -106,7 +106,7 @@ def verdict(
     if solution.exact and nearly < _NEARLY:
         return "uncertified", (
             f"a field that is no translation or scale satisfies the identities up to {nearly:.1e}: nodes that it moves "
-            "feel the rounding of the entries, magnified by as much, and may be wrong by more than 1e-8; nodes that few "
+            "feel the rounding of entries, magnified by as much, and may be wrong by more than 1e-8: nodes that few "
             "rows hold have such fields, and slender bodies, which bend the more easily the longer they are"
         )
     if not solution.exact:
