@@ -68,6 +68,20 @@ def _by_likeness(numbering: Numbering) -> bool:
     return numbering.kind == "pattern" and numbering.common < 1
 
 
+def guessed_directions(numbering: Numbering, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(N,) rows whose direction is the likeliest and no more: those of nodes without coordinates, `loose`, (n,).
+
+    Where unknowns stand node by node and rows are missing, or at random, sums over directions tell which. On regular
+    meshes wrong ones vanish, too. Rows that fit the coordinates of their node are right; of others nothing shows it.
+    """
+    if numbering.unnamed is None:
+        return np.zeros(len(numbering.node_of_row), dtype=bool)
+    whole = np.bincount(numbering.node_of_row) == numbering.block_size
+    if numbering.kind == "pattern":  # no order tells which row of a whole node is which
+        whole[:] = False
+    return np.asarray((loose & ~whole)[numbering.node_of_row])
+
+
 def _neighbourhoods(nodal: NodalMatrix) -> NDArray[np.uint64]:
     """(n,) equal for nodes that couple to the same nodes."""
     key = np.random.default_rng(0).integers(1, 2**62, nodal.n, dtype=np.uint64)

@@ -113,11 +113,12 @@ def verdict(
     remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
     if remaining:
         return "uncertified", f"the null space is larger than it should be: {remaining[0]}{_unless(nodal, numbering)}"
-    nearly = min((one.gap for one in solution.evidence if one.gap > 0), default=1.0)
+    nearly = min((one.gap for one in solution.evidence if one.gap > 0 and not one.settled), default=1.0)
     if solution.exact and nearly < _NEARLY:
         return "uncertified", (
             f"a field that is no translation or scale satisfies the identities up to {nearly:.1e}: nodes that it moves "
-            "feel the rounding of the entries, magnified by as much, and may be wrong by more than 1e-8"
+            "feel the rounding of entries, magnified by as much, and may be wrong by more than 1e-8: nodes that few "
+            "rows hold have such fields, and slender bodies, which bend the more easily the longer they are"
         )
     if not solution.exact:
         worst = max(solution.evidence, key=lambda one: one.residual)
