@@ -72,3 +72,19 @@ def test_quadratic_solids_come_back_with_rows_at_random(kind, support, missing):
 
 def test_rows_in_order_are_left_to_their_order():
     assert scattered(quadratic("hex-s2", "roller", "interleaved").matrix, (3, 2)) is None
+
+
+@pytest.mark.parametrize("support", ["roller", "symmetry"])
+def test_where_zeros_were_dropped_patterns_do_not_show_nodes(support):
+    """At a corner the rows of one node reach different ones; the half of it is no node on a plane."""
+    body = permuted_nodes(stiffness("tri-p2", box("tri-p2", (6, 7), perturb=0.2), lam=1.5), seed=1)
+    case = given(body, support, "at random", "dropped")
+    assert scattered(case.matrix, (3, 2)) is None
+    assert judged(recover_elasticity(case.matrix), case).error < 1e-9
+
+
+def test_two_directions_of_three_are_not_taken_for_one():
+    """Sums over both vanish as well."""
+    mesh = box("hex-q1", (4, 5, 4))
+    body = permuted_nodes(stiffness("hex-q1", mesh, lam=heterogeneous, mu=lambda x: 1 + x[1] + x[0] * x[1]), seed=1)
+    assert scattered(given(body, "roller", "at random", "stored").matrix, (2,)) is None

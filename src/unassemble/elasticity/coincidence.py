@@ -27,7 +27,7 @@ _ROUNDS = 4
 
 def single_nodes(group: NDArray[np.int64], direction: NDArray[np.int64], d: int) -> NDArray[np.int64]:
     """(N,) nodes of rows of the same pattern with one row of each direction at most; all other rows by themselves."""
-    count = _by_direction(group, direction, d)
+    count = by_direction(group, direction, d)
     lone = np.asarray((count <= 1).all(axis=1))[group]
     return by_first_row(np.where(lone, group, len(group) + np.arange(len(group))))
 
@@ -78,7 +78,7 @@ def placed_together(
     return node, _open(group, node, direction, d) & may
 
 
-def _by_direction(label: NDArray[np.int64], direction: NDArray[np.int64], d: int, n: int = 0) -> NDArray[np.int64]:
+def by_direction(label: NDArray[np.int64], direction: NDArray[np.int64], d: int, n: int = 0) -> NDArray[np.int64]:
     """(n or more, d) rows of each label and direction."""
     count = np.zeros((max(int(label.max(initial=-1)) + 1, n), d), dtype=np.int64)
     np.add.at(count, (label, direction), 1)
@@ -87,9 +87,9 @@ def _by_direction(label: NDArray[np.int64], direction: NDArray[np.int64], d: int
 
 def _open(group: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[np.int64], d: int) -> NDArray[np.bool_]:
     """(N,) rows of nodes that lack a direction which others of the same pattern, that lack some too, have."""
-    absent = (_by_direction(node, direction, d) == 0)[node]
+    absent = (by_direction(node, direction, d) == 0)[node]
     lacks = absent.any(axis=1)
-    on_offer = _by_direction(group[lacks], direction[lacks], d, int(group.max()) + 1) > 0
+    on_offer = by_direction(group[lacks], direction[lacks], d, int(group.max()) + 1) > 0
     return np.asarray((absent & on_offer[group]).any(axis=1))
 
 
@@ -107,7 +107,7 @@ def _whole_rows(
     excused = (label > 0) & (own > PENALTY * size)[:, None]
     failing = np.zeros((int(group.max()) + 1, d))
     np.add.at(failing, group, (np.abs(matrix @ label) > least[:, None]) & ~excused)
-    count = _by_direction(group, direction, d)
+    count = by_direction(group, direction, d)
     lacking = (count < count.max(axis=1, keepdims=True))[group] & live[:, None]
     pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
     return np.asarray((failing[group] == 0) & ~excused & (pattern @ lacking.astype(float) == 0) & live[:, None])
@@ -140,7 +140,7 @@ def _joined(
     first, second = pairs[alike].T
     link = sp.csr_array((np.ones(len(first), np.int8), (first, second)), shape=(n, n))
     label = sp.csgraph.connected_components(link, directed=False)[1].astype(np.int64)[node]
-    twice = np.asarray((_by_direction(label, direction, d) > 1).any(axis=1))[label]
+    twice = np.asarray((by_direction(label, direction, d) > 1).any(axis=1))[label]
     return by_first_row(np.where(twice, n + node, label))
 
 
@@ -164,7 +164,7 @@ def _with_sums(
     n, d = nodal.n, nodal.dim
     touched = np.zeros(n, dtype=bool)
     touched[nodal.indices[(np.abs(nodal.data) * valid[nodal.node]).max(axis=(1, 2)) > 0]] = True
-    count = _by_direction(group, direction, d)
+    count = by_direction(group, direction, d)
     several: NDArray[np.bool_] = np.asarray((count == count[:, :1]).all(axis=1) & (count[:, 0] > 1))
     several[group[~touched[node]]] = False
     number = np.cumsum(several) - 1
@@ -199,7 +199,7 @@ def _remaining(
     group: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[np.int64], d: int, may: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
     """(N,) nodes after all that is left of a pattern was joined where that is one row of each direction."""
-    left = (_by_direction(node, direction, d) == 0).any(axis=1)[node] & may
-    rest = _by_direction(group[left], direction[left], d, int(group.max()) + 1)
+    left = (by_direction(node, direction, d) == 0).any(axis=1)[node] & may
+    rest = by_direction(group[left], direction[left], d, int(group.max()) + 1)
     last = left & np.asarray((rest == 1).all(axis=1))[group]
     return by_first_row(np.where(last, len(node) + group, node))
