@@ -9,6 +9,8 @@ from supported import given, judged
 
 from unassemble import recover
 from unassemble.elasticity import recover_elasticity
+from unassemble.elasticity.nodal import nodal_matrix
+from unassemble.elasticity.pictures import picture
 from unassemble.elasticity.unknowns import given_numbering
 
 COUNTS = {"tet-p1": (8, 7, 8), "tet-p2": (6, 6, 6), "hex-q1": (7, 7, 7), "hex-s2": (6, 6, 6), "hex-q2": (5, 6, 5)}
@@ -83,6 +85,13 @@ def test_clamped_between_rollers(kind, perturb):
     assert found.certified
     assert error(found.points, case.points[nodes]) < 1e-10
     assert np.isfinite(found.points).all(axis=1).mean() > (0.5 if kind == "hex-q1" and not perturb else 0.8)
+
+
+def test_no_picture_is_drawn_where_no_row_is_inside():
+    matrix = stiffness("tri-p1", box("tri-p1", (4, 4))).matrix
+    nodal = nodal_matrix(matrix, given_numbering(matrix, *np.divmod(np.arange(matrix.shape[0]), 2)))
+    fields = np.linalg.qr(np.random.default_rng(0).standard_normal((2 * nodal.n, 5)))[0].reshape(-1, 2, 5)
+    assert picture(nodal, np.zeros((nodal.n, 2, 2), dtype=bool), np.arange(nodal.n), fields) is None
 
 
 @pytest.mark.parametrize("kind", ["quad-q1", "hex-q1"])

@@ -66,6 +66,8 @@ def picture(
     null : (N, d, k) float64
         Orthonormal fields that satisfy its identities.
     """
+    if not inside[nodes].any():
+        return None
     null = _without_terms(nodal, inside, nodes, null)
     d, functions = nodal.dim, _functions(null)
     if functions.shape[1] < d:
