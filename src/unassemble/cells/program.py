@@ -18,7 +18,7 @@ from ..linalg import quiet
 from .numbered import Numbered
 
 _ROUNDING = 1e-6  # of angle sums
-_NODES = 200  # of the search tree of one solution
+_NODES = 40  # of the search tree of one solution
 
 Rows = tuple[sp.csr_array, NDArray, NDArray]
 

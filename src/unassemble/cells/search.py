@@ -30,7 +30,6 @@ _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 _DRAWINGS = 3  # that a graph may have, about
 _LAST = 60  # solves for small changes of the best reading, when all others are spent
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
-_EASY = 0.1  # as many again for leaps in each drawing, before shapes are counted
 _FIRST = 0.7  # part of them for the likeliest reading
 
 
@@ -88,32 +87,24 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
             if begun[-1].settled:
                 first = begun[-1].starts[0]
                 return first if first.fits or first.fits_but_for_few else _better(best, first)
-        if not covered:  # in no drawing, so only once
-            covered = True
-            found = _easily(begun, effort) or read_by_cover(n, edges, weights, scale)
-            if found is not None:
-                return found
         for one in begun:
+            hopeless = False
             try:
                 best = _finished(best, one, effort)
-            except HopelessError:  # drawings differ little
-                best = _better(best, one.starts[0])
-                return best if best.pieces else None
+            except HopelessError:
+                best, hopeless = _better(best, one.starts[0]), True
             if best is not None and (best.fits or best.like_noise):
                 return best
+            if not covered:  # in no drawing, so only once
+                covered = True
+                cover = read_by_cover(n, edges, weights, scale)
+                if cover is not None:
+                    return cover
+            if hopeless:  # drawings differ little
+                return best if best is not None and best.pieces else None
     if best is None or not best.pieces:
         return None
     return _descent(best, Effort(_LAST))
-
-
-def _easily(begun: list[Begun], effort: Effort) -> Reading | None:
-    """A reading that a few leaps lead to, or none; what they cost is not taken from repairs."""
-    for one in begun:
-        if one.starts and not one.starts[0].like_noise:
-            found = _leaps(one.starts[0], Effort(int(_EASY * effort.solves)))
-            if found.fits:
-                return found
-    return None
 
 
 def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Iterator[Candidates]:
