@@ -125,9 +125,9 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
         starts.append(effort.reading(candidates, labels))
         if starts[-1].fits:
             return Begun(starts[-1:], settled=True)
-    for start in starts[:_STARTS]:
-        if (spoilt := without_wrong_entries(start)) is not None:
-            return Begun([spoilt], settled=True)
+    # Of a reading of triangles alone, all there are, this has been asked before.
+    if starts and not _all_triangles(starts[0]) and (spoilt := without_wrong_entries(starts[0])) is not None:
+        return Begun([spoilt], settled=True)
     if starts and entries_are_to_blame(starts[0]):
         return Begun(starts[:1], settled=True)
     likeliest = next((start for start in starts if start.pieces), None)
@@ -137,6 +137,12 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
         if starts[k].fits:
             return Begun([starts[k]], settled=True)
     return Begun(starts, likeliest)
+
+
+def _all_triangles(reading: Reading) -> bool:
+    """Whether the 3-cycles, all of them, are the cells."""
+    candidates = reading.candidates
+    return bool((reading.labels == (candidates.first & (candidates.size == 3))).all())
 
 
 def _finished(best: Reading | None, begun: Begun, effort: Effort) -> Reading | None:
