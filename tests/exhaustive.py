@@ -40,7 +40,7 @@ def all_meshes(n: int, weights: dict[tuple[int, int], float], c: float | None = 
     graph = networkx.Graph(list(weights))
     found = []
     for cells in _choices(graph):
-        if _fits(n, weights, [path for path, _ in cells], c):
+        if fits(n, weights, [path for path, _ in cells], c):
             found.append(frozenset(named(path) for path, _ in cells))
     return found
 
@@ -96,7 +96,7 @@ def _choices(graph: networkx.Graph) -> Iterator[list[tuple[Cell, bool]]]:
         yield [cells[k] for k in chosen]
 
 
-def _fits(n: int, weights: dict[tuple[int, int], float], cells: list[Cell], c: float | None) -> bool:
+def fits(n: int, weights: dict[tuple[int, int], float], cells: list[Cell], c: float | None) -> bool:
     """Whether these cells make one planar mesh with these weights: the least quotient of the pencil, and its vector."""
     given = {frozenset(edge) for edge in weights}
     triangles = []

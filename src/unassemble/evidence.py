@@ -95,6 +95,10 @@ def _suspects(
 ) -> tuple[NDArray[np.int64], bool]:
     pairs, certain = [], False
     for piece, mesh in zip(topology.pieces, meshes, strict=True):
+        if mesh.aside is not None:  # and all others fit
+            pairs.append(matrix.edges[piece.edge_rows[mesh.aside]])
+            certain = True
+            continue
         if piece.n_vertices > _SUSPECT_LIMIT:
             continue
         weights = -matrix.entries[piece.edge_rows]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from .errors import GeometryError, InputError, RecoveryError
 from .matrix import OperatorMatrix
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
     from .structures import StructuralNumbering
 
 OPERATORS = ("auto", "laplacian", "elasticity")
-NUMBERINGS = ("interleaved", "by component")
 _ANNIHILATED = 0.05  # share of rows and directions that annihilate constants; in scalar matrices there are none
 _TURNING = 6  # unknowns of a node that has rotations, in space
 _COMMON = 0.8  # how far the rows of a node couple to the same nodes
@@ -31,10 +31,14 @@ class VectorReading:
         Of solids, or of frames, shells and plates, whose nodes have rotations too.
     why : str
         What speaks for it; empty where the caller asked for it.
+    exact : ((N, N) sparse, float), optional
+        Of entries with few digits: the matrix, whose rows annihilate translations exactly where they did up to
+        rounding, and that rounding.
     """
 
     numbering: Numbering | StructuralNumbering
     why: str
+    exact: tuple[sp.csr_array, float] | None = None
 
 
 def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) -> VectorReading:
@@ -53,30 +57,30 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
     RecoveryError
         If no numbering makes rows annihilate translations.
     """
-    from .elasticity.rounded import with_exact_sums
+    from .elasticity.orders import ORDERS
     from .elasticity.unknowns import find_numbering, given_numbering, regular_numbering
     from .structures import find_structure, given_structure, truss_numbering
 
-    whole, _ = with_exact_sums(matrix.csr())
+    whole, exact = _exact(matrix)
     if numbering is None or isinstance(numbering, str):
-        if numbering not in (None, *NUMBERINGS):
-            raise InputError(f"`numbering` is {' or '.join(map(repr, NUMBERINGS))}, not {numbering!r}")
+        if numbering not in (None, *ORDERS):
+            raise InputError(f"`numbering` is {' or '.join(map(repr, ORDERS))}, not {numbering!r}")
         structure = find_structure(whole, numbering, block_size)
         if structure is not None:
-            return VectorReading(structure, "")
+            return VectorReading(structure, "", exact)
         if block_size == _TURNING:
             raise GeometryError(
                 "with 6 unknowns per node, three displacements and three rotations, no row annihilates translations"
             )
         try:
             if numbering is None:
-                return VectorReading(find_numbering(whole, block_size), "")
-            return VectorReading(regular_numbering(whole, numbering, block_size), "")
+                return VectorReading(find_numbering(whole, block_size), "", exact)
+            return VectorReading(regular_numbering(whole, numbering, block_size), "", exact)
         except RecoveryError:
             truss = truss_numbering(whole, block_size, numbering)
             if truss is None:
                 raise
-            return VectorReading(truss, "")
+            return VectorReading(truss, "", exact)
     try:
         node, direction = numbering
     except (TypeError, ValueError) as error:
@@ -84,7 +88,7 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
     found = given_structure(whole, node, direction) or given_numbering(whole, node, direction)
     if block_size not in (None, found.block_size):
         raise InputError(f"`numbering` has {found.block_size} directions, and `block_size` is {block_size}")
-    return VectorReading(found, "")
+    return VectorReading(found, "", exact)
 
 
 def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
@@ -95,53 +99,58 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
     crowded = matrix.n >= 3 and len(matrix.edges) > 3 * matrix.n - 6
     if not crowded and not _twins_interleaved(matrix):
         return None
-    from .elasticity.rounded import with_exact_sums
     from .elasticity.unknowns import numbering_at_sight
     from .structures import find_structure
 
-    whole, _ = with_exact_sums(matrix.csr())
+    whole, exact = _exact(matrix)
     structure = find_structure(whole) if crowded else None
     if structure is not None:
-        return VectorReading(
-            structure, f"the graph has more edges than a planar one can have, and {_evidence(structure)}"
-        )
+        why = f"the graph has more edges than a planar one can have, and {_evidence(structure)}"
+        return VectorReading(structure, why, exact)
     found = numbering_at_sight(whole)
     if found is None or found.share < _ANNIHILATED or found.common < _COMMON:
-        return _truss(whole, "the graph has more edges than a planar one can have") if crowded else None
+        return _truss(whole, exact, "the graph has more edges than a planar one can have") if crowded else None
     graph = "the graph has more edges than a planar one can have" if crowded else "no even row is coupled to an odd one"
-    return VectorReading(found, f"{graph}, and {_evidence(found)}")
+    return VectorReading(found, f"{graph}, and {_evidence(found)}", exact)
 
 
 def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     """Read a matrix as vector-valued after it turned out not to be a planar mesh; None where little speaks for it."""
-    from .elasticity.rounded import with_exact_sums
     from .elasticity.sampling import promising
     from .elasticity.unknowns import find_numbering
     from .structures import find_structure
 
     if not matrix.diagonal.all():  # every unknown of an elastic body has a stiffness
         return None
-    whole, _ = with_exact_sums(matrix.csr())
+    whole, exact = _exact(matrix)
     structure = find_structure(whole)
     if structure is not None:
-        return VectorReading(structure, f"it is no planar mesh, and {_evidence(structure)}")
+        return VectorReading(structure, f"it is no planar mesh, and {_evidence(structure)}", exact)
     try:
         found = find_numbering(whole) if promising(whole, (3, 2)) else None
     except RecoveryError:
         found = None
     if found is None or found.share < _ANNIHILATED or found.common < _COMMON:
-        return _truss(whole, "it is no planar mesh")
-    return VectorReading(found, f"it is no planar mesh, and {_evidence(found)}")
+        return _truss(whole, exact, "it is no planar mesh")
+    return VectorReading(found, f"it is no planar mesh, and {_evidence(found)}", exact)
 
 
-def _truss(whole: Any, reason: str) -> VectorReading | None:
+def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, tuple[sp.csr_array, float] | None]:
+    """The matrix to look at, and of entries with few digits what a reading keeps of it."""
+    from .elasticity.rounded import with_exact_sums
+
+    whole, rounding = with_exact_sums(matrix.csr())
+    return whole, (whole, rounding) if rounding else None
+
+
+def _truss(whole: sp.csr_array, exact: tuple[sp.csr_array, float] | None, reason: str) -> VectorReading | None:
     from .structures import truss_numbering
 
     found = truss_numbering(whole)
     if found is None:
         return None
     bars = f"{found.n_nodes} nodes with {found.block_size} unknowns each, {found.kind}, whose blocks are those of bars"
-    return VectorReading(found, f"{reason}, and its rows form {bars}")
+    return VectorReading(found, f"{reason}, and its rows form {bars}", exact)
 
 
 def refuse(**options: Any) -> None:

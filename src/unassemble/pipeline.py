@@ -164,7 +164,7 @@ def recover(
         refuse(**scalar_only)
         if isinstance(reading.numbering, StructuralNumbering):
             return serve_structure(checked, reading.numbering, clock, anchors=anchors, choice=reading.why, cells=cells)
-        return serve(checked, reading.numbering, clock, anchors=anchors, choice=reading.why, cells=cells, scalar=scalar)
+        return serve(checked, reading, clock, anchors=anchors, cells=cells, scalar=scalar)
 
     with thread_limit(threads):
         if operator == "elasticity" or block_size is not None or numbering is not None:

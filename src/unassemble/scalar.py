@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import certify as certificates
-from .cells import AGREE, Alternative, OrientedMesh, alternatives
+from .cells import AGREE, Alternative, OrientedMesh, alternatives, coincident
 from .clock import Clock
 from .evidence import pooled_noise, weigh
 from .joined import JoinedMesh
@@ -23,7 +23,7 @@ from .planar.piece import PieceMesh
 from .recovery import Recovery
 from .solving import solve
 from .topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
-from .verdict import ambiguous, far_away, passes, verdict
+from .verdict import all_alike, ambiguous, far_away, passes, verdict
 
 _SIGMAS = 10.0  # noise by which numbers that a reading takes for equal may differ
 
@@ -101,8 +101,11 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     if status == "certified" and topology.method == "the numbers":
         with clock("ambiguity"):
             others = _alternatives(topology, stored, placement, mesh, stretch, noise, known)
+            by_coincidence = known is None and bool(coincident(stored, topology).any())
         if others:
             status, reason = ambiguous(others, certificate)
+        elif by_coincidence:
+            status, reason = all_alike(certificate)
     distant = False
     if origins.any():
         near, (certificate, chi_square) = certificate, _held_against(stored, mesh, points, placement, noise, freedom)

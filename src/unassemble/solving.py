@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import Outcome, completed, in_doubt
+from .cells import Outcome, completed, in_doubt, wrong_entries
 from .errors import GeometryError, RecoveryError, SolverError
 from .linalg import Factorisation, UpperTriangle, factorisation
 from .matrix import OperatorMatrix
@@ -61,14 +61,22 @@ def solve(
 
     with clock(method):
         doubtful = in_doubt(matrix, topology, start)
+        spoilt: dict[Piece, PieceMesh] = {}
+        if doubtful.any():
+            spoilt, doubtful = wrong_entries(matrix, topology, start, doubtful, scale)
+
+    def attempt(piece: Piece) -> Outcome:
+        return spoilt.get(piece) or start(piece)
+
     if doubtful.any():
         with clock("faces"):
-            matrix, topology, outcomes = completed(matrix, topology, start, doubtful, scale)
+            matrix, topology, outcomes = completed(matrix, topology, attempt, doubtful, scale)
             # The search leaves c free in its solves, stops early and knows one method.
             if scale is not None or not refine or method != "conformal":
-                outcomes = [start(piece) for piece in topology.pieces]
+                found = zip(topology.pieces, outcomes, strict=True)
+                outcomes = [mesh if _is_spoilt(mesh) else attempt(piece) for piece, mesh in found]
     else:
-        outcomes = [start(piece) for piece in topology.pieces]
+        outcomes = [attempt(piece) for piece in topology.pieces]
     topology, meshes = _successes(topology, outcomes)
     if refine:
         vanished = np.zeros(len(matrix.edges), dtype=bool)
@@ -89,6 +97,11 @@ def solve(
                 for piece, mesh in zip(topology.pieces, meshes, strict=True)
             ]
     return matrix, topology, meshes
+
+
+def _is_spoilt(mesh: Outcome) -> bool:
+    """Whether it leaves out entries that are wrong."""
+    return isinstance(mesh, PieceMesh) and mesh.aside is not None
 
 
 def _successes(topology: Topology, outcomes: list[Outcome]) -> tuple[Topology, list[PieceMesh]]:

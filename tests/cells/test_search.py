@@ -35,10 +35,12 @@ def test_pieces_that_share_vertices_have_one_factor():
     c = float(rng.choice([1.0, -2.5, 1e-3]))
     known = forgotten(specimen(*FAMILIES["lattice"](rng), c=c, seed=29))
     found = recover(known.matrix)
-    if not found.certified:
-        assert "different factors c" in found.reason
-    else:
-        assert triangle_set(found.triangles) == triangle_set(known.triangles)
+    assert found.certified, found.reason
+    assert found.scale == pytest.approx(c, rel=1e-9)
+    given = {frozenset(triangle) for triangle in known.triangles.tolist()}
+    whole = recover(known.matrix, triangulate=True)
+    assert len(whole.triangles) == len(given)
+    assert {frozenset(triangle) for triangle in found.triangles.tolist()} <= given  # the others lie in polygons
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -69,7 +71,7 @@ def test_hopeless_matrices_are_given_up_soon(name, n, monkeypatch):
     except RecoveryError:
         status = "refused"
     assert status in ("uncertified", "refused")
-    assert 0 < count <= 220
+    assert 0 < count <= 300
 
 
 def test_known_scale_is_part_of_the_search():

@@ -35,7 +35,7 @@ def test_3_written_but_not_certified(work):
     result = work.recover("--report", "r.json", "--plot", "p.png", matrix="B.mtx")
     assert result.exit_code == 3, result.stderr
     assert result.stdout.startswith("uncertified: ")
-    assert "worst fit" in result.stdout
+    assert "\n  stands out" in result.stdout
     assert work.files() == {"A.mtx", "B.mtx", "mesh.npz", "r.json", "p.png"}
     report = json.loads((work.folder / "r.json").read_text())
     assert report["status"] == "uncertified"

@@ -61,29 +61,59 @@ def box(kind: str, counts, *, perturb: float = 0.0, seed: int = 0, grading: floa
     return mesh_type(p, mesh.t)
 
 
-def stiffness(kind: str, mesh, *, lam=1.0, mu=1.0, form=None, intorder=None, quadrature=None) -> Assembled:
+def stiffness(kind: str, mesh, *, lam=1.0, mu=1.0, tensor=None, form=None, intorder=None, quadrature=None) -> Assembled:
     """Assemble; lam and mu are numbers, (m, 1) numbers of each cell, or functions of the position.
 
+    Other material has a `tensor` of elasticity (d, d, d, d), another operator a `form` of vector-valued functions.
     A quadrature is given as its points and weights.
 
     Hexahedra of 27 nodes get three points in each direction, as in most codes, where scikit-fem would take seven.
     """
     intorder = intorder or {"hex-q2": 5}.get(kind)
-    element = skfem.ElementVector(ELEMENTS[kind][1]())
-    basis = skfem.Basis(mesh, element, intorder=intorder, quadrature=quadrature)
-
-    @skfem.BilinearForm
-    def isotropic(u, v, w):
-        first = lam(w.x) if callable(lam) else lam
-        second = mu(w.x) if callable(mu) else mu
-        return first * trace(sym_grad(u)) * trace(sym_grad(v)) + 2 * second * ddot(sym_grad(u), sym_grad(v))
-
-    matrix = (form or isotropic).assemble(basis)
+    element = ELEMENTS[kind][1]()
+    basis = skfem.Basis(mesh, element if form is None else skfem.ElementVector(element), intorder=intorder,
+                        quadrature=quadrature)  # fmt: skip
     groups = (basis.nodal_dofs, basis.edge_dofs, basis.facet_dofs, basis.interior_dofs)
     dofs = np.concatenate([g for g in groups if g is not None and g.size], axis=1)
-    order = dofs.T.ravel()
+    if form is not None:
+        matrix = form.assemble(basis)
+    elif tensor is not None:
+        matrix = _of_tensor(tensor, _gradients(basis, 1.0))
+    else:
+        x = basis.global_coordinates()
+        first, second = (_gradients(basis, one(x) if callable(one) else one) for one in (lam, mu))
+        matrix = _isotropic(first, second)
+    order = dofs.T.ravel() if form is not None else (dofs[0][:, None] + np.arange(mesh.dim()) * basis.N).ravel()
     matrix = sp.csr_array(matrix.tocsr()[order][:, order])
     return Assembled(matrix, basis.doflocs[:, dofs[0]].T.copy(), mesh.t.T.copy())
+
+
+def _gradients(basis: skfem.Basis, factor) -> list[list[sp.csr_matrix]]:
+    """Integrals of factor d_a phi_i d_e phi_j for scalar shape functions, by a and e.
+
+    Vector-valued shape functions make far more, and dearer, integrals of the same d^2 numbers.
+    """
+    d = basis.mesh.dim()
+    found = [[None] * d for _ in range(d)]
+    for a in range(d):
+        for e in range(a, d):
+            form = skfem.BilinearForm(lambda u, v, w, a=a, e=e: factor * v.grad[a] * u.grad[e])
+            found[a][e] = form.assemble(basis)
+            found[e][a] = found[a][e].T
+    return found
+
+
+def _isotropic(first, second):
+    """The matrix, direction by direction, from the integrals with lambda and with mu."""
+    d = range(len(first))
+    shear = sum(second[a][a] for a in d)
+    return sp.bmat([[first[c][b] + second[b][c] + (shear if c == b else 0 * shear) for b in d] for c in d])
+
+
+def _of_tensor(tensor, gradients):
+    """The matrix, direction by direction, of a constant tensor of elasticity."""
+    d = range(len(gradients))
+    return sp.bmat([[sum(tensor[c, a, b, e] * gradients[a][e] for a in d for e in d) for b in d] for c in d])
 
 
 def heterogeneous(x):

@@ -69,7 +69,7 @@ def reduced(kind, counts, perturb):
 
 @pytest.mark.parametrize(
     ("kind", "counts", "accuracy"),
-    [("quad-q1", (24, 25), 1e-3), ("quad-q2", (13, 13), 1e-5), ("hex-q1", (6, 7, 6), 0.02)],
+    [("quad-q1", (24, 25), 1e-3), ("quad-q2", (13, 13), 1e-5), ("hex-q1", (5, 6, 5), 0.02)],
 )
 @pytest.mark.parametrize("perturb", [0.0, 0.2])
 @pytest.mark.parametrize("clamped", [False, True])

@@ -4,16 +4,17 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 import skfem
-from assembled import ELEMENTS, Assembled, box, eliminated, error, permuted_nodes, stiffness
-from skfem.helpers import grad
+from assembled import ELEMENTS, Assembled, box, eliminated, error, on_plane, permuted_nodes, stiffness
 from supported import given, judged
 
 from unassemble import recover
 from unassemble.elasticity import recover_elasticity
+from unassemble.elasticity.nodal import nodal_matrix
+from unassemble.elasticity.pictures import picture
 from unassemble.elasticity.unknowns import given_numbering
 
 COUNTS = {"tet-p1": (8, 7, 8), "tet-p2": (6, 6, 6), "hex-q1": (7, 7, 7), "hex-s2": (6, 6, 6), "hex-q2": (5, 6, 5)}
-CASES = [(kind, perturb) for kind in ELEMENTS for perturb in (0.0, 0.2) if perturb or not kind.startswith("hex")]
+CASES = [(kind, perturb) for kind in ELEMENTS for perturb in (0.0, 0.2)]
 
 
 def rim(case: Assembled) -> np.ndarray:
@@ -44,11 +45,62 @@ def test_elements_tell_the_axes(kind, perturb):
     found = found_with_numbering(matrix, d)
     assert found.certified
     assert found.backward_error < 1e-11
-    assert [one.null_dimension for one in found.evidence] == [d * (d + 1)]  # of the identities alone
+    assert len(found.evidence) == 1
+    assert found.evidence[0].null_dimension >= d * (d + 1)  # of the identities alone
     assert np.isfinite(found.points).all(axis=1).sum() > 0.3 * len(truth)
     assert error(found.points, truth) < 1e-10
     assert found.poisson_ratio == pytest.approx(0.3, abs=1e-9)
     assert found.cells.lame[:, 0] / found.cells.lame[:, 1] == pytest.approx(np.full(found.cells.n_cells, 1.5), abs=1e-6)
+
+
+@pytest.mark.parametrize("shape", ["equal", "graded", "thin", "sheared"])
+def test_cells_tell_affine_functions_from_others(shape):
+    """In boxes of hexahedra eight more functions satisfy all scalar equations, r^(i + j + k) in equal ones."""
+    counts = (6, 6, 14) if shape == "thin" else (7, 6, 8)
+    mesh = box("hex-q1", counts, grading=2.0 if shape == "graded" else 1.0)
+    x = box("hex-q1", counts).p
+    if shape == "sheared":
+        mesh = skfem.MeshHex(np.array([[1, 0.3, 0], [0, 1, 0.2], [0, 0, 1]]) @ mesh.p, mesh.t)
+    case = stiffness("hex-q1", mesh, lam=1.5)
+    outside = ((x < 1e-9) | (x > 1 - 1e-9)).any(axis=0)
+    matrix, nodes = eliminated(case, np.repeat(outside[:, None], 3, axis=1))
+    found = found_with_numbering(matrix, 3)
+    assert found.certified
+    assert found.evidence[0].null_dimension >= 3 * 12
+    assert np.isfinite(found.points).all()
+    assert error(found.points, case.points[nodes]) < 1e-11
+
+
+@pytest.mark.parametrize("perturb", [0.0, 0.2])
+@pytest.mark.parametrize("kind", ["tet-p1", "hex-q1", "hex-s2"])
+def test_clamped_between_rollers(kind, perturb):
+    """Rollers on all other sides fix two axes and nothing else; nodes on them are placed all the same."""
+    counts = (5, 5, 5) if kind == "hex-s2" else (8, 7, 8)
+    case = stiffness(kind, box(kind, counts, perturb=perturb), lam=1.5)
+    gone = np.stack([on_plane(case, axis) | on_plane(case, axis, 1.0) for axis in range(3)], axis=1)
+    gone |= gone[:, :1]
+    matrix, nodes = eliminated(case, gone)
+    row = np.flatnonzero(~gone.ravel())
+    found = recover_elasticity(matrix, numbering=given_numbering(matrix, np.searchsorted(nodes, row // 3), row % 3))
+    assert found.certified
+    assert error(found.points, case.points[nodes]) < 1e-10
+    assert np.isfinite(found.points).all(axis=1).mean() > (0.5 if kind == "hex-q1" and not perturb else 0.8)
+
+
+def test_no_picture_is_drawn_where_no_row_is_inside():
+    matrix = stiffness("tri-p1", box("tri-p1", (4, 4))).matrix
+    nodal = nodal_matrix(matrix, given_numbering(matrix, *np.divmod(np.arange(matrix.shape[0]), 2)))
+    fields = np.linalg.qr(np.random.default_rng(0).standard_normal((2 * nodal.n, 5)))[0].reshape(-1, 2, 5)
+    assert picture(nodal, np.zeros((nodal.n, 2, 2), dtype=bool), np.arange(nodal.n), fields) is None
+
+
+@pytest.mark.parametrize("kind", ["quad-q1", "hex-q1"])
+def test_reduced_integration_is_not_certified(kind):
+    """Cells would tell affine functions from hourglass modes, but the entries do not change with these."""
+    d = 3 if kind == "hex-q1" else 2
+    centre = np.full((d, 1), 0.5), np.ones(1)
+    matrix, _ = held(kind, 0.0, counts=(6, 5, 6)[:d], lam=1.3, quadrature=centre)
+    assert not found_with_numbering(matrix, d).certified
 
 
 @pytest.mark.parametrize("lam", [-0.5, 0.0, 1e4])
@@ -110,22 +162,16 @@ def anisotropic(d, seed, share):
                 for k, m in {(c, e), (e, c)}:
                     other[i, j, k, m] = (factor @ factor.T)[p, q]
     stiff = np.einsum("ab,ce->abce", unit, unit) + np.einsum("ac,be->abce", unit, unit)
-    stiff = stiff + np.einsum("ae,bc->abce", unit, unit) + share * other
-
-    @skfem.BilinearForm
-    def form(u, v, w):
-        return np.einsum("iakl,ia...,kl...->...", stiff, grad(v), grad(u))
-
-    return form
+    return stiff + np.einsum("ae,bc->abce", unit, unit) + share * other
 
 
 @pytest.mark.parametrize("kind", ["tri-p1", "quad-q1", "tri-p2", "tet-p1", "hex-q1"])
-@pytest.mark.parametrize("share", [1.0, 1e-6])
-def test_other_homogeneous_materials_are_not_certified(kind, share):
+@pytest.mark.parametrize(("share", "perturb"), [(1.0, 0.2), (1e-6, 0.0)])
+def test_other_homogeneous_materials_are_not_certified(kind, share, perturb):
     """Linear fields satisfy the identities inside any homogeneous material; no isotropic one explains the entries."""
     d = 3 if kind.startswith(("tet", "hex")) else 2
-    for seed in range(2):
-        matrix, _ = held(kind, 0.2, seed=seed, form=anisotropic(d, seed, share))
+    for seed in range(2 if d == 2 else 1):
+        matrix, _ = held(kind, perturb, seed=seed, tensor=anisotropic(d, seed, share))
         found = found_with_numbering(matrix, d)
         assert not found.certified
         assert found.poisson_ratio is None
@@ -149,7 +195,8 @@ def test_checkerboards_are_not_certified(which):
 @pytest.mark.parametrize("kind", ["tri-p1", "quad-q1", "tri-p2", "quad-s2"])
 @pytest.mark.parametrize("perturb", [0.0, 0.2])
 def test_several_supports_on_all_sides(kind, perturb):
-    truth = given(stiffness(kind, box(kind, (9, 8), perturb=perturb), lam=1.5), "several", "interleaved", "stored")
+    counts = (9, 8) if kind in ("tri-p1", "quad-q1") else (7, 7)
+    truth = given(stiffness(kind, box(kind, counts, perturb=perturb), lam=1.5), "several", "interleaved", "stored")
     found = recover_elasticity(truth.matrix)
     verdict = judged(found, truth)
     assert found.certified

@@ -10,7 +10,7 @@ from unassemble.paper.corners import corners_of
 from unassemble.paper.equations import AngleSystem
 from unassemble.paper.experiments.claims import perturbed_boundary
 from unassemble.paper.experiments.examples import wheel
-from unassemble.paper.experiments.ranks import ranks
+from unassemble.paper.experiments.ranks import Ranks
 from unassemble.paper.harmonic import HarmonicReduction, tube_triangles
 from unassemble.paper.parts import part
 from unassemble.paper.starts import angles_of
@@ -57,7 +57,7 @@ def test_the_tubes_own_equations_are_square_and_singular(paper_case):
     assert tube.piece.n_loops == 2
     corners = corners_of(tube.piece)
     system = AngleSystem(corners, np.zeros(len(tube.piece.edges)))
-    found = ranks(system, system.pack(paper_case.angles[tube.corners]))
+    found = Ranks(system, system.pack(paper_case.angles[tube.corners]))
     assert system.n_equations == system.n_unknowns
     assert found.deficiency >= 1
 

@@ -54,9 +54,8 @@ def test_one_entry_changed(options, relative, edge):
     found = recover(with_entries(KNOWN.matrix, {(i, j): value * (1 + relative)}), **options)
     assert found.status == "uncertified"
     assert (i, j) in set(map(tuple, found.worst_entries))
-    if relative <= 1e-5:  # least squares are linear here, and leave no doubt
-        assert found.suspects.tolist() == [[i, j]]
-        assert f"entry of rows {i} and {j} stands out" in found.reason
+    assert found.suspects.tolist() == [[i, j]]
+    assert f"entry of rows {i} and {j} stands out" in found.reason
 
 
 def redundancy():
@@ -119,7 +118,7 @@ def test_two_entries_far_apart_are_both_named():
     assert "2 entries stand out" in found.reason
 
 
-@pytest.mark.parametrize("options", OPTIONS, ids=str)
+@pytest.mark.parametrize("options", [OPTIONS[0], OPTIONS[-1]], ids=str)  # others change nothing in the search
 def test_hole_filled_with_wrong_weights(options):
     """New entries close a hole with a fan; they are the weights of no mesh with this rim."""
     rim = recover(KNOWN.matrix)

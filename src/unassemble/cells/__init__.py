@@ -4,10 +4,12 @@ Where entries vanish the graph alone does not tell: see the page on theory in th
 """
 
 from .ambiguity import AGREE, alternatives
+from .coincidence import coincident
 from .completion import completed, guessed
 from .corners import Alternative, OrientedMesh
 from .doubt import Attempt, Outcome, in_doubt
 from .search import read_cells
+from .spoilt import wrong_entries
 
 __all__ = [
     "AGREE",
@@ -16,8 +18,10 @@ __all__ = [
     "OrientedMesh",
     "Outcome",
     "alternatives",
+    "coincident",
     "completed",
     "guessed",
     "in_doubt",
     "read_cells",
+    "wrong_entries",
 ]

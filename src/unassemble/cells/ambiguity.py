@@ -16,6 +16,7 @@ from .flips import turned_over
 from .hinged import as_one_piece
 from .hubs import Hub, hubs, rearranged
 from .loose import is_loose, other_reading
+from .regrouped import fitting, regrouped
 from .rereading import other_readings
 from .twins import twins
 
@@ -51,22 +52,30 @@ def alternatives(
     """
     found: list[Alternative] = []
     if len(topology.vanished) > (topology.polygons.size - 3).sum():  # not on diagonals only
-        found = _by_rules(stored, topology, mesh, scale_known=scale is not None, agree=agree)
+        found = _by_rules(stored, topology, mesh, factors, scale_known=scale is not None, agree=agree)
     return found or other_readings(stored, mesh, factors, scale)
 
 
 def _by_rules(
-    stored: OperatorMatrix, topology: Topology, mesh: OrientedMesh, *, scale_known: bool, agree: float
+    stored: OperatorMatrix,
+    topology: Topology,
+    mesh: OrientedMesh,
+    factors: NDArray,
+    *,
+    scale_known: bool,
+    agree: float,
 ) -> list[Alternative]:
     corners = Corners.of(stored.n, stored.edges, mesh)
     around = list(hubs(corners, mesh.z))
     found = twins(stored, mesh, agree)
-    found += [other for hub in around if (other := rearranged(hub, agree)) is not None]
+    orders = [other for hub in around if (other := rearranged(hub, agree)) is not None]
+    # Parts that hang together at a hub only may yet be joined by other pieces.
+    found += fitting(stored, mesh, factors, orders) if len(topology.hinges) else orders
     found += turned_over(corners, mesh.z, agree)
     if not scale_known:
         found += _loose_pieces(stored, topology, corners, around)
         found += as_one_piece(stored, topology, corners, around)
-    return _each_once(found)
+    return _each_once(found or regrouped(stored, mesh, corners, factors, agree))
 
 
 def _loose_pieces(stored: OperatorMatrix, topology: Topology, corners: Corners, around: list[Hub]) -> list[Alternative]:

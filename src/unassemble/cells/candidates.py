@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from ..topology import Polygons
 from ..topology.faces import FaceComplex, joined
 from .angles import face_sums, facing_angles, likeliest_scale, vertex_excess
+from .cell_set import CellSet
 from .crosses import Crosses
+from .half_circles import half_circles
 from .open_corners import OpenCorners
 from .turning import Turns
 
@@ -24,20 +26,17 @@ _INNER = (-0.35 * np.pi, -0.55 * np.pi)  # angle excess above which a vertex may
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
+class Candidates(CellSet):
     """Cells that a graph may have; any set of them that shares no half-edge is a reading of the graph.
+
+    Corners are two consecutive edges of an empty face.
 
     Attributes
     ----------
     drawing : FaceComplex
         Of the graph.
-    weights : (e,) float64
-        -A_ij of each edge.
-    scale : float or None
-        c, where it is known.
     relative : (e,) float64
         The weights over c, or over the likeliest c, from the angles.
-    cells : Polygons
     sides : (s, 2) int64
         Pairs (cell, half-edge) of what each cell takes up.
     belief : (cells,) float64
@@ -46,26 +45,22 @@ class Candidates:
         The faces that make the likeliest reading without vanished boundary edges.
     outer : (cells,) bool
         The face of each block that bounds it from outside.
-    corner : (cells,) bool
-        Triangles a-b-c of two edges a-b, b-c of an empty face; the third has vanished from the boundary, which it
-        does if the angle at b is a right one.
     strip : (cells,) bool
         Corners inside paths, all of them right angles if the path is a strip, none if pieces hang together there.
+    half : (cells,) bool
+        Cells on half circles, whose diameter has vanished from the boundary.
     turns : Turns
         Parts that can be turned over; its corners are numbered after the faces.
     """
 
     drawing: FaceComplex
-    weights: NDArray[np.float64]
-    scale: float | None
     relative: NDArray[np.float64]
-    cells: Polygons
     sides: NDArray[np.int64]
     belief: NDArray[np.float64]
     first: NDArray[np.bool_]
     outer: NDArray[np.bool_]
-    corner: NDArray[np.bool_]
     strip: NDArray[np.bool_]
+    half: NDArray[np.bool_]
     turns: Turns
 
     @classmethod
@@ -83,55 +78,47 @@ class Candidates:
         # How parts hang together at crosses is known, and at other vertices a guess.
         whole = blocks.joined(outside) if crosses is None else drawing
         corners = OpenCorners.of(whole, outside[blocks.face])
-        size = np.r_[blocks.size[faces], np.full(len(corners), 3)]
+        about = vertex_excess(blocks, angles)
+        paths = half_circles(whole, outside[blocks.face], angles, about)
+        size = np.r_[blocks.size[faces], np.full(len(corners), 3), np.full(len(paths), 4)]
+        open_ones, none = len(corners) + len(paths), np.zeros(len(size), dtype=bool)
         chosen = np.isin(blocks.face[blocks.order], faces)
         number = np.full(len(blocks.size), -1)
         number[faces] = np.arange(len(faces))
-        excess = vertex_excess(blocks, angles)[corners.vertices[:, 1]]
+        excess = about[corners.vertices[:, 1]]
         belief = np.where(corners.in_strip, 1.0, 0.5 - np.abs(excess) / np.pi) - np.where(corners.turned, _TURNED, 0.0)
         if crosses is not None:
             belief[np.isin(corners.vertices[:, 1], crosses.hub) & ~corners.turned] = 1.0
         return cls(
+            n_vertices=drawing.n_vertices,
+            edges=drawing.edges,
             drawing=drawing,
             weights=weights,
             scale=scale,
             relative=relative,
             cells=Polygons(
-                np.append(0, np.cumsum(size)), np.r_[blocks.tail[blocks.order[chosen]], corners.vertices.ravel()]
+                np.append(0, np.cumsum(size)),
+                np.r_[
+                    blocks.tail[blocks.order[chosen]],
+                    corners.vertices.ravel(),
+                    np.column_stack([whole.tail[paths], whole.head[paths[:, -1]]]).ravel(),
+                ],
             ),
             sides=np.concatenate(
                 [
                     np.column_stack([number[blocks.face[blocks.order[chosen]]], blocks.order[chosen]]),
                     corners.sides + [len(faces), 0],
+                    np.column_stack([np.repeat(np.arange(len(size) - len(paths), len(size)), 3), paths.ravel()]),
                 ]
             ),
-            belief=np.r_[1 - np.abs(sums[faces] / np.pi - 1), belief],
-            first=np.r_[(blocks.size <= _SHORT)[faces] & ~outer[faces], np.zeros(len(corners), bool)],
-            outer=np.r_[outer[faces], np.zeros(len(corners), bool)],
-            corner=np.r_[np.zeros(len(faces), bool), np.ones(len(corners), bool)],
-            strip=np.r_[np.zeros(len(faces), bool), corners.in_strip],
+            belief=np.r_[1 - np.abs(sums[faces] / np.pi - 1), belief, np.full(len(paths), 0.5)],
+            first=np.r_[(blocks.size <= _SHORT)[faces] & ~outer[faces], none[:open_ones]],
+            outer=np.r_[outer[faces], none[:open_ones]],
+            corner=np.r_[none[: len(faces)], np.ones(len(corners), bool), none[: len(paths)]],
+            strip=np.r_[none[: len(faces)], corners.in_strip, none[: len(paths)]],
+            half=np.arange(len(size)) >= len(size) - len(paths),
             turns=corners.turns,
         )
-
-    @property
-    def n_vertices(self) -> int:
-        """Number of vertices."""
-        return self.drawing.n_vertices
-
-    @property
-    def edges(self) -> NDArray[np.int64]:
-        """(e, 2) pairs i < j."""
-        return self.drawing.edges
-
-    @property
-    def count(self) -> int:
-        """Number of candidates."""
-        return len(self.belief)
-
-    @property
-    def size(self) -> NDArray[np.int64]:
-        """(cells,) number of vertices."""
-        return self.cells.size
 
     @cached_property
     def chorded(self) -> NDArray[np.bool_]:
@@ -151,17 +138,19 @@ class Candidates:
 
     def turned(self, labels: NDArray[np.bool_]) -> Iterator[NDArray[np.bool_]]:
         """Labels with one part of the drawing turned over, where that changes any."""
-        faces = self.count - int(self.corner.sum())
-        for corners in self.turns.turned(labels[faces:]):
-            yield np.r_[labels[:faces], corners]
+        for corners in self.turns.turned(labels[self.corner]):
+            turned = labels.copy()
+            turned[self.corner] = corners
+            yield turned
 
     def starts(self) -> Iterator[NDArray[np.bool_]]:
         """Readings to begin with, the likeliest first."""
-        by_angles = ~self.corner & (self.belief > 2 - _FULL / np.pi) & (self.size > 3)
+        by_angles = ~self.corner & ~self.half & (self.belief > 2 - _FULL / np.pi) & (self.size > 3)
         corners = [self.corner & (self.belief > 0.5 + excess / np.pi) for excess in _INNER]
         faces = (self.first, (self.first & (self.size == 3)) | (by_angles & ~self.outer))
         none = np.zeros_like(self.corner)
         corners += [chosen & ~self.strip for chosen in (*corners, self.corner & (self.belief == 1.0))]
+        corners += [chosen | self.half for chosen in (*corners, none)] if self.half.any() else []
         tried = {(chosen | extra).tobytes(): chosen | extra for chosen in faces for extra in (*corners, none)}
         seen = set()
         for chosen in sorted(tried.values(), key=self._strain):
@@ -179,9 +168,9 @@ class Candidates:
         used = np.zeros(2 * len(self.edges), dtype=bool)
         used[half] = True
         angles = np.bincount(cell, facing_angles(self.relative[half >> 1] * np.where(used[half ^ 1], 1, 2)), self.count)
-        # A corner has a right angle, and two others, the mean of what its sides show.
+        # A corner has a right angle, and two others, the mean of what its sides show; half circles see one as well.
         sides = np.maximum(np.bincount(cell, minlength=self.count), 1)
-        sums = np.where(self.corner, np.pi / 2 + 2 * angles / sides, angles)[labels]
+        sums = (np.where(self.corner, 2 * angles / sides, angles) + np.pi / 2 * (self.corner | self.half))[labels]
         return float(((sums / np.pi - 1) ** 2).sum()) + _LEFT_OUT * float((self.first & ~labels).sum())
 
     def compatible(self, value: NDArray) -> NDArray[np.bool_]:

@@ -16,6 +16,7 @@ from ..topology.keys import contains, distinct, pair_keys
 from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained
 from .reading import Reading
 from .search import first_reading, read_cells
+from .undivided import undivided
 
 _BETTER = 0.1  # a reading that does not fit replaces the triangles only if its misfit is below this times theirs
 
@@ -124,7 +125,7 @@ def _read_again(
     """One component: the reading that fits, or the triangles that there were, or the best reading."""
     weights = -matrix.entries[numbering.edge_rows]
     reading = read_cells(len(numbering.vertices), numbering.edges, weights, scale)
-    if reading is not None and reading.fits:
+    if reading is not None and (reading.fits or reading.fits_but_for_few):
         return _part(matrix, numbering, reading)
     before = float(np.sqrt(np.mean(misfit_of_triangles()[numbering.edge_rows] ** 2)))
     if reading is not None and reading.size < _BETTER * before and reading.misfit.max() < 1:
@@ -153,8 +154,7 @@ def _part(matrix: OperatorMatrix, numbering: Numbering, reading: Reading) -> _Pa
     ]
     pairs = np.sort(vertices[reading.edges], axis=1)
     added = ~contains(pair_keys(matrix.n, *matrix.edges.T), pair_keys(matrix.n, *pairs.T))
-    cells = reading.candidates.cells
-    return _Part(pieces, pairs[added], cells.chosen(reading.labels & (cells.size > 3), vertices))
+    return _Part(pieces, pairs[added], undivided([piece for piece, _ in pieces], added)[1])
 
 
 def _merged(

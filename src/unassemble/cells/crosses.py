@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..topology.adjacency import adjacency
+from ..topology.keys import pair_keys
 from .agreement import common_values
 
 _AGREE = 1e-7
@@ -85,3 +86,21 @@ class Crosses:
         return np.concatenate(
             [np.column_stack([order[:, k], hub, order[:, (k + 1) % 4]]) for k in range(4)], dtype=np.int64
         )
+
+    def cotangents(self, n: int, edges: NDArray, weights: NDArray) -> NDArray[np.float64]:
+        """(e, 4) of the angles that face each edge about the crosses at both of its ends; NaN for none.
+
+        From w_k = (r_k-1 + r_k+1) / 2 r_k the legs follow up to a common factor.
+        """
+        result = np.full((len(edges), 4), np.nan)
+        if self.scale is None:
+            return result
+        hub, order = self.hub[self.unique, None], self.order[self.unique]
+        row = np.searchsorted(edges[:, 0] * n + edges[:, 1], pair_keys(n, hub, order))
+        w = weights[row].T / self.scale
+        first = 2 * w[1] / (1 + w[0] / w[2])
+        leg = np.stack([first, np.ones_like(first), first * w[0] / w[2], w[1] / w[3]], axis=1)
+        column = 2 * (edges[row, 1] == hub)
+        result[row, column] = np.roll(leg, -1, axis=1) / leg
+        result[row, column + 1] = np.roll(leg, 1, axis=1) / leg
+        return result

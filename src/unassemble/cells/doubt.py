@@ -17,7 +17,8 @@ from ..topology import Piece, Topology
 from .reading import FITS, even, misfits
 
 _WIDE = 200  # rows of a matrix on which the misfit of a wrong cell stays near it
-_SURE = 1e-3  # misfit that no wrong cell is known to leave
+SURE = 1e-3
+"""Misfit, even if spread evenly, that no wrong cell is known to leave."""
 
 _SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 
@@ -50,7 +51,7 @@ def in_doubt(matrix: OperatorMatrix, topology: Topology, attempt: Attempt) -> ND
 
 def _like_noise(misfit: NDArray, n: int) -> bool:
     """Whether a misfit is that of errors in the entries; small meshes spread that of a wrong cell as evenly."""
-    return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < _SURE)
+    return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < SURE)
 
 
 def _shortly_polished(matrix: OperatorMatrix, solved: Solved) -> Solved:
@@ -89,7 +90,12 @@ def _components_of(matrix: OperatorMatrix, rows: NDArray) -> NDArray[np.bool_]:
     chosen = np.zeros(matrix.n, dtype=bool)
     if not len(rows):
         return chosen
-    graph = sp.coo_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
-    label = csgraph.connected_components(graph, directed=False)[1]
+    label = components_of(matrix)
     chosen[label[matrix.edges[rows, 0]]] = True
     return chosen[label]
+
+
+def components_of(matrix: OperatorMatrix) -> NDArray[np.int32]:
+    """(n,) number of the connected component of each row."""
+    graph = sp.coo_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
+    return np.asarray(csgraph.connected_components(graph, directed=False)[1])

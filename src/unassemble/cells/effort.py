@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..planar.piece import PieceMesh
-from .candidates import Candidates
-from .reading import Reading
+from .reading import C, Reading
 
 SMALL_GRAPH = 1000
 """Vertices up to which all drawings are begun with before one is repaired, and labels relaxed first."""
@@ -30,7 +29,7 @@ class Effort:
         """As much as a graph of n vertices is worth."""
         return cls(int(np.clip(_WORK / n, 12, _SOLVES)))
 
-    def reading(self, candidates: Candidates, labels: NDArray[np.bool_]) -> Reading:
+    def reading(self, candidates: C, labels: NDArray[np.bool_]) -> Reading[C]:
         """A reading, counted."""
         reading = Reading.of(candidates, labels, self.known)
         self.solves -= 1 + len(reading.pieces) // _MANY
@@ -46,3 +45,38 @@ class Effort:
     def spent(self) -> bool:
         """Whether it is time to give up."""
         return self.solves <= 0
+
+    def progress(self, reading: Reading, patience: int) -> Progress:
+        """Of repairs that begin with a reading and may go on for some solves in any case."""
+        return Progress(self, reading.size, self.solves, patience)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Whether repairs are worth going on with.
+
+    The squared misfit is about proportional to the number of wrong cells. Had it to go on falling as it has since the
+    beginning, the solves that are left must do.
+
+    Attributes
+    ----------
+    effort : Effort
+    size : float
+        Of the misfit at the beginning.
+    solves : int
+        That were left then.
+    patience : int
+        Solves after which progress is asked for.
+    """
+
+    effort: Effort
+    size: float
+    solves: int
+    patience: int
+
+    def suffices(self, size: float) -> bool:
+        """Whether the misfit, now `size`, would be gone in time."""
+        used = self.solves - self.effort.solves
+        if self.effort.spent or used <= self.patience:
+            return not self.effort.spent
+        return (self.size**2 - size**2) * self.effort.solves > size**2 * used

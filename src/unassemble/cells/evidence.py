@@ -11,6 +11,9 @@ residuals need not surround the wrong cell; the labels that take part in the bes
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -32,13 +35,55 @@ LONGEST = 40  # edges of a face that may be a cell
 _STEEPEST = 20.0  # cotangents beyond belong to slivers of a wrong start
 
 
-def label_changes(reading: Reading) -> NDArray[np.float64]:
-    """(cells,) the change of each label that explains the misfit best; NaN where nothing can be said."""
-    changes = np.full(reading.candidates.count, np.nan)
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """The misfit of one piece to first order, each row divided by its weight.
+
+    Attributes
+    ----------
+    chosen : (cells,) bool
+        Candidates within the piece.
+    misfit : (m,) float64
+        r; m edges, then diagonals of candidates that are no cells yet, where it is 0.
+    motion : (m, p) sparse
+        Of displacements, but for two fixed vertices, and of the scale where c is not known.
+    cells : (m, k) sparse
+        B of the chosen candidates.
+    spread : (m,) float64
+        What the rows are divided by.
+    pairs : (m', 2) int64
+        Vertices of the edges, which come first.
+    """
+
+    chosen: NDArray[np.bool_]
+    misfit: NDArray[np.float64]
+    motion: sp.csr_array
+    cells: sp.csr_array
+    spread: NDArray[np.float64]
+    pairs: NDArray[np.int64]
+
+
+def explanations(reading: Reading) -> Iterator[Linear]:
+    """One for each piece that does not fit and has more weights than coordinates."""
     for piece, mesh in zip(reading.pieces, reading.meshes, strict=True):
         overdetermined = len(piece.edges) > 2 * piece.n_vertices - 3
         if mesh and overdetermined and (reading.misfit[piece.edge_rows] > FITS).any():
-            _explain(reading, piece, mesh, changes)
+            linear = _linear(reading, piece, mesh)
+            if linear is not None:
+                yield linear
+
+
+def label_changes(reading: Reading) -> NDArray[np.float64]:
+    """(cells,) the change of each label that explains the misfit best; NaN where nothing can be said."""
+    changes = np.full(reading.candidates.count, np.nan)
+    for linear in explanations(reading):
+        columns = sp.hstack([linear.motion, linear.cells]).tocsr()
+        n_motion, n_labels = linear.motion.shape[1], linear.cells.shape[1]
+        ridge = np.r_[np.zeros(n_motion), np.full(n_labels, _RIDGE**2)]
+        normal = (columns.T @ columns + sp.diags_array(ridge)).tocsr()
+        solution = solved_normal(normal, columns.T @ linear.misfit)
+        if solution is not None:
+            changes[linear.chosen] = solution[n_motion:]
     return changes
 
 
@@ -54,8 +99,8 @@ def entries_are_to_blame(reading: Reading) -> bool:
     return float(np.nan_to_num(np.abs(label_changes(reading))).max(initial=0.0)) < _SUSPECT
 
 
-def _explain(reading: Reading, piece: Piece, mesh: PieceMesh, changes: NDArray) -> None:
-    """Fill in the changes of the candidates within one piece."""
+def _linear(reading: Reading, piece: Piece, mesh: PieceMesh) -> Linear | None:
+    """None where the mesh is too far off to say anything."""
     candidates = reading.candidates
     local = np.full(candidates.n_vertices, -1)
     local[piece.vertices] = np.arange(piece.n_vertices)
@@ -69,7 +114,7 @@ def _explain(reading: Reading, piece: Piece, mesh: PieceMesh, changes: NDArray) 
         size = np.abs(w + misfit)
     comparable = _FAR * np.abs(w).max() > size.max(initial=0.0) > 0  # not where c is given and out of all proportion
     if not (np.isfinite(w).all() and np.isfinite(misfit).all() and chosen.any() and comparable):
-        return
+        return None
     response = _response(reading, piece, z, local, chosen)
     extra = response.shape[0] - len(w)  # diagonals of candidates that are no cells yet
     typical = float(np.median(size[size > 0]))
@@ -79,17 +124,17 @@ def _explain(reading: Reading, piece: Piece, mesh: PieceMesh, changes: NDArray) 
     free = np.ones(2 * piece.n_vertices, dtype=bool)
     pins = distant_pair(z)
     free[np.r_[2 * pins, 2 * pins + 1]] = False
-    scaled = sp.diags_array(1 / spread)
-    free_scale = 0.0 if candidates.scale else 1.0
-    scale_column = sp.csr_array((free_scale * np.append(w, np.zeros(extra)) / spread)[:, None])
-    columns = sp.hstack([jacobian[:, free], scaled @ response, scale_column]).tocsr()
-    n_labels = response.shape[1]
-    ridge = np.r_[np.zeros(free.sum()), np.full(n_labels, _RIDGE**2), 1 - free_scale]
-    normal = (columns.T @ columns + sp.diags_array(ridge)).tocsr()
-    rhs = columns.T @ (np.append(misfit, np.zeros(extra)) / spread)
-    solution = solved_normal(normal, rhs)
-    if solution is not None:
-        changes[chosen] = solution[free.sum() : -1]
+    motion = [jacobian[:, free]]
+    if not candidates.scale:
+        motion.append(sp.csr_array((np.append(w, np.zeros(extra)) / spread)[:, None]))
+    return Linear(
+        chosen,
+        np.append(misfit, np.zeros(extra)) / spread,
+        sp.hstack(motion).tocsr(),
+        (sp.diags_array(1 / spread) @ response).tocsr(),
+        spread,
+        piece.vertices[piece.edges],
+    )
 
 
 def _response(reading: Reading, piece: Piece, z: NDArray, local: NDArray, chosen: NDArray[np.bool_]) -> sp.csr_array:

@@ -9,16 +9,18 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RecoveryError, SolverError
+from ..errors import RecoveryError
+from ..planar.piece import PieceMesh
+from .candidates import Candidates
 from .fitting import Fitted, cost, fitted
 from .neighbourhood import Neighbourhoods, Trial
-from .relaxation import Aim, Path, central_path
+from .reading import Reading
+from .reopening import REOPENINGS, reopened
 from .sheet import Placed, Sheet
 
 _log = logging.getLogger(__name__)
@@ -30,28 +32,15 @@ NEARLY = 0.005
 _SUSPECTS = 60  # cells, or this part of all of them, that are turned over in a round
 _SHARE = 0.05
 _FAINT = 0.1  # misfit about a suspect, relative to the largest, below which it waits for a later round
-_CLEAR, _WORTH = 0.3, 0.02  # gain, relative to the best and to the cost, of what is turned over along with the best
-_PLACES, _BREADTH, _DEPTH = 3, 24, 4
-_PROGRESS, _QUICK = 0.99, 0.9
-_COLD, _SURE = 5.0, 1e-3  # price of a change, and distance from a whole label, of labels far from the misfit
+_CLEAR = 0.3  # gain, relative to the best, of what is turned over along with it
+_PLACES, _BREADTH, _DEPTH = 3, 24, 4  # of the beam search: edges about which, sets kept, and labels in one
+_QUICK = 0.9  # cost, relative to the former one, after a round that is followed by another of the same kind
 
 
-@dataclass(frozen=True)
-class _Reopening:
-    """Labels near misfits above a part of the largest, and what they start from on a path."""
-
-    above: float
-    rings: int
-    strength: float
-    path: Path
-
-
-_WARM = Path(first=0.05, last=1e-3, factor=0.7, slack=0.01, mapped_above=np.inf)
-_REOPENINGS = (
-    _Reopening(0.3, 0, 0.7, _WARM),
-    _Reopening(0.1, 0, 0.7, _WARM),
-    _Reopening(0.1, 1, 0.5, Path(first=0.2, last=1e-3, factor=0.7, slack=0.01, mapped_above=np.inf)),
-)
+def whole(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """A reading of the graph: no two cells on one half-edge, and cells on all edges."""
+    taken = candidates.compatible(np.where(labels, 1.0, -np.inf))
+    return candidates.covering(taken, candidates.belief)
 
 
 class Exchange:
@@ -64,46 +53,74 @@ class Exchange:
         Labels to which reopened ones are drawn.
     trials : int
         How many may be made.
+    known : dict
+        Pieces that have been solved, see :class:`~unassemble.cells.reading.Reading`.
+
+    Attributes
+    ----------
+    answer : (cells,) bool or None
+        Labels that fit when every piece is solved by itself. Pieces that share vertices only may lie in wrong places
+        when few labels are wrong, or none, and then cost something.
     """
 
-    def __init__(self, sheet: Sheet, usual: NDArray[np.bool_], trials: int):
+    def __init__(
+        self, sheet: Sheet, usual: NDArray[np.bool_], trials: int, known: dict[bytes, PieceMesh | None] | None = None
+    ):
         self.sheet = sheet
         self.usual = usual
-        self._near = Neighbourhoods(sheet)
         self.left = trials
+        self.known = {} if known is None else known
+        self.answer: NDArray[np.bool_] | None = None
+        self._near = Neighbourhoods(sheet)
+        self._seen: set[bytes] = set()
 
     def settled(self, fit: Fitted, *, deep: bool = False) -> Fitted:
         """The labels that explain most; with a beam search, if `deep`, where nothing else helps."""
         moves: list[Callable[[Fitted], Fitted]] = [
-            *(partial(self._reopened, how=how) for how in _REOPENINGS),
+            *(partial(reopened, self.sheet, self._near, self.usual, how) for how in REOPENINGS),
             self._redrawn,
         ]
         if deep:
             moves.append(self._deep)
         begun = fit.cost, self.left
-        fit, turn = self._rounds(fit), 0
-        while fit.cost > SETTLED and turn < len(moves) and self._suffices(fit, *begun):
-            other = self._rounds(moves[turn](fit))
+        fit, turn = self._rounds(fit, begun), 0
+        while not self._done(fit) and turn < len(moves) and self._suffices(fit, begun):
+            other = self._rounds(moves[turn](fit), begun)
             _log.debug("cost %.3g, then %.3g, %d trials left", fit.cost, other.cost, self.left)
-            fit, turn = (other, 0) if other.cost < _PROGRESS * fit.cost else (fit, turn + 1)
+            turn = 0 if other.cost < _QUICK * fit.cost else turn + 1
+            fit = min(fit, other, key=lambda either: either.cost)
         return fit
 
-    def _suffices(self, fit: Fitted, cost_then: float, left_then: int) -> bool:
-        """Whether the trials that are left would do if the cost went on falling as it has since `then`.
+    def _done(self, fit: Fitted) -> bool:
+        """Whether the labels are an answer; asked once for each that leave little."""
+        if (
+            self.answer is None
+            and fit.cost <= NEARLY * len(self.sheet.edges)
+            and fit.labels.tobytes() not in self._seen
+        ):
+            self._seen.add(fit.labels.tobytes())
+            labels = whole(self.sheet.candidates, fit.labels)
+            if Reading.of(self.sheet.candidates, labels, self.known).fits:
+                self.answer = labels
+        return self.answer is not None or fit.cost <= SETTLED
+
+    def _suffices(self, fit: Fitted, begun: tuple[float, int]) -> bool:
+        """Whether the trials that are left would do if the cost went on falling as it has since it was `begun` with.
 
         Where little is left to do a single label may make the difference.
         """
+        cost_then, left_then = begun
         if fit.cost <= NEARLY * len(self.sheet.edges):
             return self.left > 0
         return (cost_then - fit.cost) * self.left > fit.cost * (left_then - self.left)
 
-    def _rounds(self, fit: Fitted) -> Fitted:
-        while fit.cost > SETTLED and self.left > 0:
+    def _rounds(self, fit: Fitted, begun: tuple[float, int]) -> Fitted:
+        while not self._done(fit) and self.left > 0:
             other = self._pairs(fit)
             slow = not other.cost < _QUICK * fit.cost
             _log.debug("round: cost %.3g, then %.3g, %d trials left", fit.cost, other.cost, self.left)
             fit = other
-            if slow:
+            if slow or not self._suffices(fit, begun):
                 break
         return fit
 
@@ -139,7 +156,7 @@ class Exchange:
         """The best trials that do not touch each other, all together; or the best one alone."""
         if not trials or trials[0].gain <= 0:
             return fit
-        least = max(_CLEAR * trials[0].gain, _WORTH * fit.cost)
+        least = _CLEAR * trials[0].gain
         together: list[Trial] = []
         used = np.zeros(self.sheet.n_vertices, dtype=bool)
         for trial in trials:
@@ -155,28 +172,6 @@ class Exchange:
             if other.cost < fit.cost:
                 return other
         return fit
-
-    def _reopened(self, fit: Fitted, how: _Reopening) -> Fitted:
-        """Labels around the misfit fractional again, the others nearly fixed."""
-        sheet = self.sheet
-        size = np.abs(fit.misfit)
-        at = np.zeros(sheet.n_vertices, dtype=bool)
-        at[sheet.edges[size > how.above * min(float(size.max()), 0.3)]] = True
-        for _ in range(how.rings):
-            at = self._near.next_vertex @ at > 0
-        near = np.zeros(sheet.candidates.count, dtype=bool)
-        near[sheet.cell[at[sheet.triangles].any(axis=1)]] = True
-        opened = near[sheet.chosen]
-        labels = np.where(opened, self.usual[sheet.chosen], fit.labels[sheet.chosen])
-        distance = np.where(opened, 1 - how.strength, _SURE)
-        strength = np.zeros(sheet.candidates.count)
-        strength[sheet.chosen] = np.abs(labels - distance)
-        aim = Aim(labels, np.where(opened, 1.0, _COLD))
-        try:
-            strength, placed = central_path(sheet, aim, strength, fit.placed, how.path)
-        except SolverError:
-            return fit
-        return fitted(sheet, strength > 0.5, placed)
 
     def _redrawn(self, fit: Fitted) -> Fitted:
         """The same labels, fitted from the conformal map: a fit may be caught where a triangle is flat."""

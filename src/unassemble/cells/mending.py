@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecoveryError
+from ..planar.piece import PieceMesh
 from .candidates import Candidates
 from .effort import Effort
-from .exchange import NEARLY, SETTLED, Exchange
+from .exchange import NEARLY, SETTLED, Exchange, whole
 from .fitting import Fitted, cost, fitted
 from .reading import Reading
 from .redrawing import redrawings
-from .relaxation import Aim, Path, central_path
+from .relaxation import HOPELESS, Aim, HopelessError, Path, central_path
 from .sheet import Placed, Sheet
 
 MOST_VERTICES = 20_000
@@ -23,9 +24,7 @@ _WIDE = 20  # vertices of the largest piece for which it is worth its while
 _SOLVES = 20  # that this is worth
 _NEAR = 0.95  # strength of the first labels
 _SHORT = Path(first=0.1, slack=0.01)
-_HOPELESS = 0.05  # mean cost of an edge after a relaxation with which there is nothing to begin with
-_NO_MESH = 2 * _HOPELESS  # the same after the first one with which others are not tried: 0.03 at most on seven meshes
-_TRIALS, _TRIALS_PER_VERTEX = 6000, 10  # the lesser number is made
+_TRIALS, _TRIALS_PER_VERTEX = 6000, 10  # the lesser number is made: some twenty times what relaxations cost
 _DEAREST, _STEEP, _CHEAPEST = 1.5, 4.0, 0.3  # price of a change: with angles that add up to pi, its fall, and the least
 
 
@@ -33,16 +32,21 @@ def mended(start: Reading, effort: Effort) -> Reading | None:
     """A reading with fewer wrong labels than one with many, maybe in another drawing.
 
     None where none is found, the graph is too large, or so small that trying labels one by one is as good.
+
+    Raises
+    ------
+    HopelessError
+        If not even labels between 0 and 1 come near the weights.
     """
     widest = max((piece.n_vertices for piece in start.pieces), default=0)
     if widest < _WIDE or start.candidates.n_vertices > MOST_VERTICES:
         return None
     effort.solves -= _SOLVES
-    found = _mended_labels(start)
+    found = _mended_labels(start, effort.known)
     return None if found is None else effort.reading(*found)
 
 
-def _mended_labels(start: Reading) -> tuple[Candidates, NDArray[np.bool_]] | None:
+def _mended_labels(start: Reading, known: dict[bytes, PieceMesh | None]) -> tuple[Candidates, NDArray[np.bool_]] | None:
     solved = [(piece, mesh) for piece, mesh in zip(start.pieces, start.meshes, strict=True) if mesh]
     if not solved:
         return None
@@ -53,18 +57,17 @@ def _mended_labels(start: Reading) -> tuple[Candidates, NDArray[np.bool_]] | Non
         return None
     best = relaxed[0]
     trials = min(_TRIALS, _TRIALS_PER_VERTEX * sheet.n_vertices)
-    exchange = Exchange(sheet, start.labels, trials)
+    exchange = Exchange(sheet, start.labels, trials, known)
     for fit in relaxed:
-        if best.cost > SETTLED and fit.cost <= _HOPELESS * len(sheet.edges):
+        if exchange.answer is None and best.cost > SETTLED and fit.cost <= HOPELESS * len(sheet.edges):
             best = min(best, exchange.settled(fit), key=lambda either: either.cost)
-    if best.cost <= NEARLY * len(sheet.edges):
+    if exchange.answer is None and best.cost <= NEARLY * len(sheet.edges):
         again, best = _redrawn(exchange, best)
         # In a drawing that fits better there is more to gain.
         again.left = again.left + trials // 2 if again is not exchange else min(again.left, trials // 4)
         exchange, best = again, again.settled(best, deep=True)
     candidates = exchange.sheet.candidates
-    taken = candidates.compatible(np.where(best.labels, 1.0, -np.inf))
-    return candidates, candidates.covering(taken, candidates.belief)
+    return candidates, whole(candidates, best.labels) if exchange.answer is None else exchange.answer
 
 
 def _relaxations(sheet: Sheet, labels: NDArray[np.bool_]) -> list[Fitted]:
@@ -78,9 +81,16 @@ def _relaxations(sheet: Sheet, labels: NDArray[np.bool_]) -> list[Fitted]:
     believed = Aim(first, _prices(sheet, labels))
     found: list[Fitted] = []
     for aim, path in ((believed, Path()), (Aim(first, even), Path()), (Aim(first, even), _SHORT)):
-        fit = _relaxed(sheet, aim, path)
-        if fit is None or (fit.cost > _NO_MESH * len(sheet.edges) and not found):
+        try:
+            fit = _relaxed(sheet, aim, path)
+        except HopelessError:
+            if not found:
+                raise
             break
+        if fit is None:
+            break
+        if fit.cost > HOPELESS * len(sheet.edges) and not found:
+            raise HopelessError
         found.append(fit)
         if fit.cost <= NEARLY * len(sheet.edges):
             break
@@ -98,14 +108,15 @@ def _prices(sheet: Sheet, labels: NDArray[np.bool_]) -> NDArray[np.float64]:
 def _redrawn(exchange: Exchange, fit: Fitted) -> tuple[Exchange, Fitted]:
     """The same labels in other drawings, as long as that makes them better."""
     better = True
-    while better and _faults(exchange.sheet, fit) > SETTLED:
+    while better and exchange.answer is None and _faults(exchange.sheet, fit) > SETTLED:
         better = False
         sheet = exchange.sheet
         for other in redrawings(sheet.candidates, _faults_at(sheet, fit)):
-            trials = Exchange(Sheet(other.candidates, sheet.unit), other.carried(exchange.usual), exchange.left)
+            usual = other.carried(exchange.usual)
+            trials = Exchange(Sheet(other.candidates, sheet.unit), usual, exchange.left, exchange.known)
             trial = trials.settled(_carried(trials.sheet, other.carried(fit.labels), fit.placed))
             exchange.left = trials.left
-            if _faults(trials.sheet, trial) < _faults(sheet, fit):
+            if trials.answer is not None or _faults(trials.sheet, trial) < _faults(sheet, fit):
                 exchange, fit, better = trials, trial, True
                 break
     return exchange, fit

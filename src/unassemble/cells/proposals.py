@@ -1,17 +1,20 @@
 """Which labels to turn over next.
 
-Two things speak for a change: the linear explanation of the misfit (see :mod:`unassemble.cells.evidence`), which is
-right from afar, and the misfit itself, which gathers around the last wrong cells.
+Three things speak for a change: the linear explanation of the misfit (see :mod:`unassemble.cells.evidence`), which is
+right from afar; what the entries of a cell's sides say by themselves (:mod:`unassemble.cells.left_out`); and the
+misfit itself, which gathers around the last wrong cells.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .left_out import left_out
 from .reading import Reading
 
 _CLEAR = 0.35  # a label that is to change by so much is turned over
@@ -37,7 +40,7 @@ def proposals(reading: Reading, changes: NDArray) -> Iterator[NDArray[np.bool_]]
     if top > 0:
         clear = np.flatnonzero(gain >= (max(_CLEAR, 0.6 * top) if top > _CLEAR else 0.7 * top))
     seen = {reading.labels.tobytes()}
-    for turned in (clear, *_singles(reading, gain, nearby), *_exchanges(reading, gain, nearby)):
+    for turned in chain([clear], left_out(reading), _singles(reading, gain, nearby), _exchanges(reading, gain, nearby)):
         labels = _turned(reading, changes, turned)
         if labels.tobytes() not in seen:
             seen.add(labels.tobytes())

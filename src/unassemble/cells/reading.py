@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from ..planar.triangles import lone_triangles
 from ..topology import Piece, Topology
 from ..topology.keys import contains, pair_keys, with_sides
 from ..topology.pieces import planar_pieces
-from .candidates import Candidates
+from .cell_set import CellSet
 from .small import SMALL, small_map
 
 FITS = 1e-6
@@ -28,13 +29,16 @@ _RIGHT_ANGLES = 4
 _OPTIONS = ConformalOptions(max_factorisations=4)  # what takes more has wrong cells
 
 
+C = TypeVar("C", bound=CellSet)
+
+
 @dataclass(frozen=True, eq=False)
-class Reading:
+class Reading(Generic[C]):
     """Cells, the triangulated pieces that they make, and how the weights of these fit.
 
     Attributes
     ----------
-    candidates : Candidates
+    candidates : CellSet
     labels : (cells,) bool
         What is taken for a cell.
     edges : (e', 2) int64
@@ -49,7 +53,7 @@ class Reading:
         |c w - a| relative to the smaller of both rows' largest entries, at most 1; 1 on edges of no piece.
     """
 
-    candidates: Candidates
+    candidates: C
     labels: NDArray[np.bool_]
     edges: NDArray[np.int64]
     weights: NDArray[np.float64]
@@ -58,7 +62,7 @@ class Reading:
     misfit: NDArray[np.float64]
 
     @classmethod
-    def unsolved(cls, candidates: Candidates, labels: NDArray[np.bool_]) -> Reading:
+    def unsolved(cls, candidates: C, labels: NDArray[np.bool_]) -> Reading[C]:
         """Triangulate the cells, without positions."""
         n = candidates.n_vertices
         triangles = triangulation(candidates, labels)
@@ -70,11 +74,11 @@ class Reading:
 
     @classmethod
     def of(
-        cls, candidates: Candidates, labels: NDArray[np.bool_], known: dict[bytes, PieceMesh | None] | None = None
-    ) -> Reading:
+        cls, candidates: C, labels: NDArray[np.bool_], known: dict[bytes, PieceMesh | None] | None = None
+    ) -> Reading[C]:
         """Triangulate the cells and solve every piece, but for those `known`, to which new ones are added."""
         bare = cls.unsolved(candidates, labels)
-        n, edges, weights = candidates.n_vertices, bare.edges, bare.weights
+        weights = bare.weights
         known = {} if known is None else known
         meshes: dict[Piece, PieceMesh | None] = {**lone_triangles(bare.pieces, weights)}
         for piece in bare.pieces:
@@ -83,16 +87,26 @@ class Reading:
                 if name not in known:
                     known[name] = _solved(piece, weights[piece.edge_rows])
                 meshes[piece] = known[name]
-        solved = [(piece, mesh) for piece in bare.pieces if (mesh := meshes[piece])]
-        misfit = misfits(n, edges, weights, solved)
+        return bare.placed(tuple(meshes[piece] for piece in bare.pieces))
+
+    def placed(self, meshes: tuple[PieceMesh | None, ...]) -> Reading:
+        """With positions of each piece, or None."""
+        candidates, n, edges = self.candidates, self.candidates.n_vertices, self.edges
+        solved = [(piece, mesh) for piece, mesh in zip(self.pieces, meshes, strict=True) if mesh]
+        misfit = misfits(n, edges, self.weights, solved)
         _add_discord(n, edges, solved, misfit, candidates.scale)
-        misfit[np.isin(edges, _crowded(candidates, labels)).any(axis=1)] = 1.0
-        return replace(bare, meshes=tuple(meshes[piece] for piece in bare.pieces), misfit=misfit)
+        misfit[np.isin(edges, _crowded(candidates, self.labels)).any(axis=1)] = 1.0
+        return replace(self, meshes=meshes, misfit=misfit)
 
     @property
     def fits(self) -> bool:
         """Whether every entry is reproduced."""
         return bool(len(self.pieces) and (self.misfit <= FITS).all())
+
+    @property
+    def fits_but_for_few(self) -> bool:
+        """Whether entries have been set aside as wrong."""
+        return any(mesh is not None and mesh.aside is not None for mesh in self.meshes)
 
     @cached_property
     def size(self) -> float:
@@ -105,7 +119,7 @@ class Reading:
         return bool(len(self.pieces)) and self.size < 1e-3 and even(self.misfit)
 
 
-def _crowded(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _crowded(candidates: CellSet, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Vertices with more than four right angles: the mesh would wind around them more than once."""
     apex = candidates.cells.vertices[candidates.cells.offsets[:-1] + 1]
     return np.flatnonzero(
@@ -159,7 +173,7 @@ def even(misfit: NDArray) -> bool:
     return size < 0.03 and float(misfit.max()) < 8 * size and float(np.median(misfit)) > 0.3 * size
 
 
-def triangulation(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
+def triangulation(candidates: CellSet, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
     """(m, 3) triangles of the chosen cells, longer ones in fans.
 
     The apex of a fan moves on where a diagonal would be an edge already, of the graph or of another cell.
@@ -182,7 +196,7 @@ def triangulation(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[
     return triangles
 
 
-def _fans(candidates: Candidates, labels: NDArray, shift: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+def _fans(candidates: CellSet, labels: NDArray, shift: NDArray) -> tuple[NDArray, NDArray, NDArray]:
     """Triangles, the cell of each, and whether its last side is a diagonal."""
     cells = np.flatnonzero(labels)
     size = candidates.size[cells]
@@ -193,7 +207,7 @@ def _fans(candidates: Candidates, labels: NDArray, shift: NDArray) -> tuple[NDAr
     return candidates.cells.vertices[start[:, None] + corner], cell, step < length - 2
 
 
-def fans_of(candidates: Candidates, labels: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def fans_of(candidates: CellSet, labels: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """(m, 3) triangles of cells, each in a fan about its first vertex, and (m,) the cell of each."""
     triangles, cell, _ = _fans(candidates, labels, np.zeros(candidates.count, dtype=np.int64))
     return triangles, cell

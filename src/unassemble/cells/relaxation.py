@@ -19,10 +19,17 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..linalg import solved
+from .fitting import cost
 from .sheet import Placed, Sheet, unpinned
 
+HOPELESS = 0.05
+"""Mean cost of an edge at the end of a path with which there is nothing to begin with: 0.03 at most on meshes."""
 _HELD = 1e-9  # keeps the problem definite where labels of zero leave vertices free
 _NEAREST = 0.1  # of the way to 0 or 1 that one step leaves
+
+
+class HopelessError(Exception):
+    """Not even labels between 0 and 1 come near the weights."""
 
 
 @dataclass(frozen=True)
@@ -73,13 +80,20 @@ def central_path(
     ------
     RecoveryError
         If there is no conformal map on the way, or an equation is singular.
+    HopelessError
+        If no map on the way leaves less of the weights than no cells at all.
     """
     strength = strength.copy()
     drawn_to = aim.price * np.where(aim.labels > 0.5, -1.0, 1.0)
     t = path.first
+    nothing = float(cost(sheet.weights / sheet.spread(1.0)).sum())  # is what no cells explain
+    least = 0.0 if t <= path.mapped_above else np.inf
     while t > path.last:
         if placed is None or t > path.mapped_above:
             placed = sheet.mapped(strength, placed)
+            least = min(least, float(cost(sheet.misfit(placed, strength)).sum()))
+        elif least > nothing:
+            raise HopelessError
         slack = path.slack * t / path.first
         new, d, log_scale = _step(sheet, placed, strength, drawn_to, t, slack)
         if t <= path.mapped_above:

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from ..matrix import OperatorMatrix
 from ..topology import Numbering, components
 from ..topology.faces import joined
+from ..topology.keys import contains, pair_keys
 from .corners import Alternative, OrientedMesh
 from .reading import Reading
 from .search import fitting_starts, read_cells
+from .undivided import undivided
 
 _MOST_VERTICES = 60
 _ORDERS = 5
@@ -99,8 +101,12 @@ def _shuffled(part: Numbering, rng: np.random.Generator) -> Numbering:
 
 
 def _cells(reading: Reading, numbering: Numbering) -> set[tuple[int, ...]]:
-    chosen = reading.candidates.cells.chosen(reading.labels, numbering.vertices)
-    return _polygons(chosen.offsets, chosen.vertices)
+    """However they were put together."""
+    n = reading.candidates.n_vertices
+    vanished = ~contains(pair_keys(n, *reading.candidates.edges.T), pair_keys(n, *reading.edges.T))
+    triangles, polygons = undivided(reading.pieces, vanished)
+    cells = _polygons(polygons.offsets, numbering.vertices[polygons.vertices])
+    return cells | set(map(_cell, numbering.vertices[triangles].tolist()))
 
 
 def _polygons(offsets: NDArray, vertices: NDArray) -> set[tuple[int, ...]]:

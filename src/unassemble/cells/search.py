@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 from ..planar.piece import PieceMesh
 from ..topology.embedding import drawing_with_corners, face_complexes
 from .candidates import Candidates
+from .covering import read_by_cover
 from .crosses import Crosses
 from .effort import SMALL_GRAPH, Effort
 from .evidence import FEW, entries_are_to_blame, label_changes
 from .mending import MOST_VERTICES, mended
 from .proposals import proposals
 from .reading import Reading
+from .relaxation import HopelessError
+from .spoilt import without_wrong_entries
 from .triangles_only import read_triangles
 
 _log = logging.getLogger(__name__)
@@ -25,6 +28,7 @@ _log = logging.getLogger(__name__)
 _STARTS = 2  # readings to begin with that are worth repairing
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 _DRAWINGS = 3  # that a graph may have, about
+_LAST = 60  # solves for small changes of the best reading, when all others are spent
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
 
@@ -74,6 +78,7 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
     drawings = _drawings(n, edges, weights, scale)
     together = n <= SMALL_GRAPH
     turning = _TURNING / (_DRAWINGS if together else 1)
+    covered = False
     # Repairs take most of the effort: small graphs are begun with in all drawings before.
     for some in [drawings] if together else ([drawing] for drawing in drawings):
         begun = []
@@ -81,12 +86,25 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
             begun.append(_begun(drawing, effort, int(turning * effort.solves)))
             if begun[-1].settled:
                 first = begun[-1].starts[0]
-                return first if first.fits else _better(best, first)
+                return first if first.fits or first.fits_but_for_few else _better(best, first)
         for one in begun:
-            best = _finished(best, one, effort)
+            hopeless = False
+            try:
+                best = _finished(best, one, effort)
+            except HopelessError:
+                best, hopeless = _better(best, one.starts[0]), True
             if best is not None and (best.fits or best.like_noise):
                 return best
-    return best if best is not None and best.pieces else None
+            if not covered:  # in no drawing, so only once
+                covered = True
+                cover = read_by_cover(n, edges, weights, scale)
+                if cover is not None:
+                    return cover
+            if hopeless:  # drawings differ little
+                return best if best is not None and best.pieces else None
+    if best is None or not best.pieces:
+        return None
+    return _descent(best, Effort(_LAST))
 
 
 def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Iterator[Candidates]:
@@ -107,6 +125,9 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
         starts.append(effort.reading(candidates, labels))
         if starts[-1].fits:
             return Begun(starts[-1:], settled=True)
+    # Of a reading of triangles alone, all there are, this has been asked before.
+    if starts and not _all_triangles(starts[0]) and (spoilt := without_wrong_entries(starts[0])) is not None:
+        return Begun([spoilt], settled=True)
     if starts and entries_are_to_blame(starts[0]):
         return Begun(starts[:1], settled=True)
     likeliest = next((start for start in starts if start.pieces), None)
@@ -118,28 +139,41 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
     return Begun(starts, likeliest)
 
 
+def _all_triangles(reading: Reading) -> bool:
+    """Whether the 3-cycles, all of them, are the cells."""
+    candidates = reading.candidates
+    return bool((reading.labels == (candidates.first & (candidates.size == 3))).all())
+
+
 def _finished(best: Reading | None, begun: Begun, effort: Effort) -> Reading | None:
     """The best of what repairs make of the starts in one drawing, and of a former one."""
     starts = list(begun.starts)
-    likeliest = begun.likeliest
-    if likeliest is not None and starts[0].like_noise:
-        likeliest = None
+    likeliest = begun.likeliest if starts and not starts[0].like_noise else None
     if likeliest is not None and likeliest.candidates.n_vertices <= SMALL_GRAPH:
         candidates = likeliest.candidates
         triangles = 2 * (candidates.first & (candidates.size == 3)).sum() > candidates.first.sum()
-        place = 0 if candidates.n_vertices >= FEW and triangles else len(starts)
-        starts[place:place] = _mended(likeliest, effort)
-        likeliest = None
-    for number, start in enumerate(starts):
-        share = effort.share(_FIRST if number == 0 and len(starts) > 1 else 1 / (len(starts) - number))
+        first = candidates.n_vertices >= FEW and triangles
+        starts, likeliest = _with_mended(starts, likeliest, effort, 0 if first else len(starts)), None
+    number = 0
+    while starts:
+        start = starts.pop(0)
+        share = effort.share(_FIRST if number == 0 and starts else 1 / (len(starts) + 1))
         best = _better(best, start if start.like_noise else _repaired(start, share))
         if best.fits or best.like_noise:
             return best
         effort.solves += max(share.solves, 0)
-    if likeliest is not None:  # on large graphs this costs more than all repairs
-        for start in _mended(likeliest, effort):
-            best = _better(best, _repaired(start, effort))
+        number += 1
+        if likeliest is not None:  # on large graphs this costs more than repairs
+            starts, likeliest = _with_mended(starts, likeliest, effort, 0), None
     return best
+
+
+def _with_mended(starts: list[Reading], likeliest: Reading, effort: Effort, place: int) -> list[Reading]:
+    """Starts with a mended one among them, or this alone if it fits."""
+    found = mended(likeliest, effort)
+    if found is None:
+        return starts
+    return [found] if found.fits else [*starts[:place], found, *starts[place:]]
 
 
 def fitting_starts(n: int, edges: NDArray, weights: NDArray, scale: float | None = None) -> Iterator[Reading]:
@@ -170,12 +204,6 @@ def _better(one: Reading | None, other: Reading) -> Reading:
     return other if one is None or other.size < one.size else one
 
 
-def _mended(reading: Reading, effort: Effort) -> list[Reading]:
-    """A better reading to begin with, or none."""
-    better = mended(reading, effort)
-    return [] if better is None else [better]
-
-
 def _turned_over(reading: Reading, effort: Effort, solves: int) -> Reading:
     """Parts of the drawing turned over, each because that lowers the misfit; at no more than so many solves."""
     least = effort.solves - solves
@@ -195,10 +223,10 @@ def _repaired(reading: Reading, effort: Effort) -> Reading:
 
 def _leaps(reading: Reading, effort: Effort) -> Reading:
     """All clear changes at once, uphill too: with many wrong cells the misfit of the way is no guide."""
-    best, since_best = reading, 0
+    best, since_best, progress = reading, 0, effort.progress(reading, _PATIENCE)
     patience = np.clip(3e4 / reading.candidates.n_vertices, 2, _PATIENCE)
     seen = {reading.labels.tobytes()}
-    while reading.pieces and not reading.fits and since_best < patience and not effort.spent:
+    while reading.pieces and not reading.fits and since_best < patience and progress.suffices(best.size):
         changes = np.nan_to_num(label_changes(reading))
         labels = next((x for x in proposals(reading, changes) if x.tobytes() not in seen), None)
         if labels is None:

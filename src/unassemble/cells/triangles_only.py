@@ -6,6 +6,8 @@ others by holes, or hang on them by vertices, their numbers tell c, and by that 
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,7 @@ from .evidence import entries_are_to_blame
 from .mending import MOST_VERTICES, mended
 from .peeling import ContradictionError, peeled, scales_of_lone_triangles
 from .reading import Reading
+from .relaxation import HopelessError
 
 
 def read_triangles(n: int, edges: NDArray, weights: NDArray, scale: float | None, effort: Effort) -> Reading | None:
@@ -50,7 +53,8 @@ def read_triangles(n: int, edges: NDArray, weights: NDArray, scale: float | None
         return None
     reading = effort.reading(candidates, labels)
     if not (reading.fits or reading.like_noise or entries_are_to_blame(reading)):
-        reading = mended(reading, effort) or reading
+        with suppress(HopelessError):  # c may be wrong
+            reading = mended(reading, effort) or reading
     return reading if reading.fits else None
 
 

@@ -104,28 +104,26 @@ def rearranged(
     One domain after the other takes the directions that cost least, even if they cost more than the ones before, and
     keeps them; of all stages the best counts.
     """
-    d = sums.value.shape[1]
     rows = np.concatenate(cluster)
     touched = np.unique(sums.matrix[rows].indices)
-    block = sp.csc_array(sp.diags_array(sums.scale[touched]) @ sums.matrix[touched][:, rows])
-    blocks = [sp.csr_array(block[:, some]) for some in np.split(np.arange(len(rows)), _ends(cluster))]
     choices = [_choices(one, group, direction, names) for one in cluster]
+    moves = [(k, choice) for k, some in enumerate(choices) for choice in some]
+    if not moves:
+        return None
+    domain = np.array([k for k, _ in moves])
+    which, row, step = _steps(sums, touched, [cluster[k] for k in domain], [choice for _, choice in moves], direction)
     local = sums.value[touched]
-    total = cost(local).sum()
+    total = float(cost(local).sum())
     best, stage, taken = total - GAIN, 0, []
-    left = {k for k in range(len(cluster)) if len(choices[k])}
-    while left:
-        total, k, chosen, local = min(
-            (
-                (float(cost(after).sum()), k, choice, after)
-                for k in left
-                for choice in range(len(choices[k]))
-                for after in [local + blocks[k] @ (np.eye(d)[choices[k][choice]] - np.eye(d)[direction[cluster[k]]])]
-            ),
-            key=lambda one: one[:3],
-        )
-        taken.append((k, chosen))
-        left.remove(k)
+    left = np.ones(len(moves), dtype=bool)
+    while left.any():
+        more = (cost(local[row] + step) - cost(local[row])).sum(axis=1)
+        change = np.where(left, np.bincount(which, more, minlength=len(moves)), np.inf)
+        chosen = int(np.argmin(change))
+        total += float(change[chosen])
+        taken.append(chosen)
+        local[row[which == chosen]] += step[which == chosen]
+        left &= domain != domain[chosen]
         if total < best:
             best, stage = total, len(taken)
         if len(taken) > stage + _PATIENCE:
@@ -133,13 +131,38 @@ def rearranged(
     if not stage:
         return None
     direction = direction.copy()
-    for k, chosen in taken[:stage]:
-        direction[cluster[k]] = choices[k][chosen]
+    for chosen in taken[:stage]:
+        direction[cluster[domain[chosen]]] = moves[chosen][1]
     return direction
 
 
-def _ends(cluster: list[NDArray[np.int64]]) -> NDArray[np.int64]:
-    return np.cumsum([len(one) for one in cluster])[:-1]
+def _steps(
+    sums: Sums,
+    touched: NDArray[np.int64],
+    rows: list[NDArray[np.int64]],
+    choices: list[NDArray[np.int64]],
+    direction: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """What the sums of touched rows change by when one set of rows after the other takes other directions.
+
+    Returns
+    -------
+    which : (m,) int64
+        The set of rows, increasing.
+    row : (m,) int64
+        Place of the row among those touched.
+    step : (m, d) float64
+    """
+    d = sums.value.shape[1]
+    block = sp.csc_array(sp.diags_array(sums.scale[touched]) @ sums.matrix[touched])
+    which, row, steps = [np.empty(0, np.int64)], [np.empty(0, np.int64)], [np.empty((0, d))]
+    for k, (some, choice) in enumerate(zip(rows, choices, strict=True)):
+        change = block[:, some] @ (np.eye(d)[choice] - np.eye(d)[direction[some]])
+        here = np.flatnonzero(change.any(axis=1))
+        which.append(np.full(len(here), k))
+        row.append(here)
+        steps.append(change[here])
+    return np.concatenate(which), np.concatenate(row), np.concatenate(steps)
 
 
 def _choices(

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .coincidence import placed_together
 from .grouping import same_pattern
 from .matching import matched_by_likeness, matched_by_pattern
 from .orders import Reading
@@ -31,7 +32,11 @@ def by_component(matrix: sp.csr_array, d: int) -> Reading | None:
     if cuts is None:
         return None
     direction = np.searchsorted(cuts, np.arange(matrix.shape[0]), side="right")
-    node, open_row = matched_by_pattern(same_pattern(matrix, np.zeros(matrix.shape[0], dtype=bool)), direction, d)
+    everywhere = np.ones(matrix.shape[0], dtype=bool)
+    group = same_pattern(matrix, ~everywhere)
+    node, open_row = matched_by_pattern(group, direction, d)
+    if open_row.any():
+        node, open_row = placed_together(matrix, everywhere, group, node, direction, d, open_row)
     found = Reading(node, direction, open_row)
     if 2 * np.count_nonzero(np.bincount(node)[node] == d) > len(node) and shows_all(matrix, found, d):
         return found

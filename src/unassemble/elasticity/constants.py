@@ -42,6 +42,13 @@ def annihilated_share(
     return float((zero & own[:, None]).mean())
 
 
+def whole_share(matrix: sp.csr_array, identity: NDArray) -> float:
+    """Share of rows, among those that couple, that add up to zero over all directions together."""
+    size = np.asarray(abs(matrix).sum(axis=1)).ravel() - np.abs(matrix.diagonal())
+    zero = np.abs(np.asarray(matrix.sum(axis=1)).ravel()) <= _ROUNDING * size
+    return float(zero[~identity].mean()) if not identity.all() else 0.0
+
+
 def proven_directions(
     matrix: sp.csr_array, direction: NDArray[np.int64], group: NDArray[np.int64], d: int
 ) -> NDArray[np.bool_]:

@@ -127,16 +127,16 @@ class _Search:
         self._coupling = sp.csr_array(entries, shape=matrix.shape)
         self._strength = np.asarray(abs(self._coupling).sum(axis=1)).ravel()
         diagonal = np.where(identity, 0, sign * matrix.diagonal())
-        penalised = np.abs(diagonal) > PENALTY * self._strength  # they would hide what all others say
-        self._diagonal = float(diagonal[~penalised].sum())
-        self._trace = float(np.abs(diagonal[~penalised]).sum()) or 1.0
+        self._told = np.abs(diagonal) <= PENALTY * self._strength  # penalties would hide what all others say
+        self._diagonal = float(diagonal[self._told].sum())
+        self._trace = float(np.abs(diagonal[self._told]).sum()) or 1.0
         self._members, self._live, self._d = members, ~identity, len(names)
         self._choices = names
 
     def energy(self, direction: NDArray) -> float:
-        """Sum of the entries between rows of the same direction, relative to the trace."""
+        """Sum of the entries of rows with those of the same direction, relative to the trace."""
         label = self._labels(direction)
-        return (self._diagonal - float((label * (self._coupling @ label)).sum())) / self._trace
+        return (self._diagonal - float((label * (self._coupling @ label))[self._told].sum())) / self._trace
 
     def complete(self, direction: NDArray[np.int64]) -> NDArray[np.int64]:
         """Fill in directions of -1, then let every node reconsider until nothing changes."""

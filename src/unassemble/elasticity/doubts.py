@@ -47,17 +47,39 @@ def unconfirmed(
     """(n,) nodes with coordinates next to doubtful ones that cells do not confirm.
 
     Rows that were joined wrongly can be placed all the same; that entries re-assemble which are not zero, some of each
-    row, shows that these were not. They are `shown`, (n, d).
+    row, shows that these were not. They are `shown`, (n, d). Where neither order nor patterns say which rows belong
+    together, all nodes are as good as doubtful.
     """
     if nodal.doubtful is None:
         return np.zeros(nodal.n, dtype=bool)
     if numbering.open_row is not None:  # nothing was joined that order does not join
         return nodal.doubtful
-    doubtful = nodal.doubtful | without_trace(nodal).any(axis=1)
-    outside = determined(points) & (nodal.graph @ doubtful.astype(float) > 0)
+    outside = determined(points)
+    if not _by_likeness(numbering):
+        doubtful = nodal.doubtful | without_trace(nodal).any(axis=1)
+        outside &= nodal.graph @ doubtful.astype(float) > 0
     if shown is not None:
         outside &= ~(shown | (nodal.row_of < 0)).all(axis=1)
     return np.asarray(outside)
+
+
+def _by_likeness(numbering: Numbering) -> bool:
+    """Whether rows of different patterns were joined for no other reason than being alike."""
+    return numbering.kind == "pattern" and numbering.common < 1
+
+
+def guessed_directions(numbering: Numbering, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(N,) rows whose direction is the likeliest and no more: those of nodes without coordinates, `loose`, (n,).
+
+    Where unknowns stand node by node and rows are missing, or at random, sums over directions tell which. On regular
+    meshes wrong ones vanish, too. Rows that fit the coordinates of their node are right; of others nothing shows it.
+    """
+    if numbering.unnamed is None:
+        return np.zeros(len(numbering.node_of_row), dtype=bool)
+    whole = np.bincount(numbering.node_of_row) == numbering.block_size
+    if numbering.kind == "pattern":  # no order tells which row of a whole node is which
+        whole[:] = False
+    return np.asarray((loose & ~whole)[numbering.node_of_row])
 
 
 def _neighbourhoods(nodal: NodalMatrix) -> NDArray[np.uint64]:

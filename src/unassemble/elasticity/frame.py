@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from .candidates import Block, candidates, coupled
 from .entries import Entries, Pairs, added, contributions
-from .model import FITS
+from .model import FITS, Model
 from .nodal import NodalMatrix, determined
 from .reference import Rule, rules
 from .surface import contested
@@ -46,10 +46,16 @@ class Frame:
         M in x = M y.
     ratio : float
         lambda / mu.
+    models : tuple of Model
+        The elements, at the points of the picture.
+    entries : Entries
+        Those that they explain.
     """
 
     map: NDArray[np.float64]
     ratio: float
+    models: tuple[Model, ...]
+    entries: Entries
 
 
 def frame(nodal: NodalMatrix, picture: NDArray[np.float64]) -> Frame | None:
@@ -66,17 +72,18 @@ def frame(nodal: NodalMatrix, picture: NDArray[np.float64]) -> Frame | None:
         told = entries.explained_by([Pairs.of(one.cells, entries) for one in blocks], graph, FITS)
         if told is None or not len(told.key):
             continue
-        for tables, values in _tables(blocks, picture, told):
+        for chosen, tables, values in _tables(blocks, picture, told):
             tensors = _tensors(tables, values)
             found = None if tensors is None else _isotropic(tensors)
             if found is not None:
-                return found
+                models = (Model(picture, one.cells, one.kind, rule) for one, rule in zip(blocks, chosen, strict=True))
+                return Frame(*found, tuple(models), told)
     return None
 
 
 def _tables(
     blocks: Sequence[Block], picture: NDArray[np.float64], entries: Entries
-) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+) -> Iterator[tuple[tuple[Rule, ...], NDArray[np.float64], NDArray[np.float64]]]:
     """Tables G and entries of pairs of nodes, (e, d, d) each and relative to their row, for one rule after the other.
 
     Of the rows of some nodes; without the pairs of cells of which not all can be there.
@@ -91,7 +98,7 @@ def _tables(
     weight = 1 / some.size[sure, None, None]
     for chosen in product(*(rules(one.kind) for one in blocks)):
         parts = [_assembled(one, picture, rule, some) for one, rule in zip(blocks, chosen, strict=True)]
-        yield np.sum(parts, axis=0)[sure] * weight, some.value[sure] * weight
+        yield chosen, np.sum(parts, axis=0)[sure] * weight, some.value[sure] * weight
 
 
 def _sampled(entries: Entries) -> NDArray[np.int64]:
@@ -126,8 +133,8 @@ def _tensors(tables: NDArray, values: NDArray) -> NDArray[np.float64] | None:
     return np.asarray((t + t.swapaxes(2, 3)) / 2)
 
 
-def _isotropic(tensors: NDArray[np.float64]) -> Frame | None:
-    """The frame in which the tensors are those of an isotropic material; None where there is none.
+def _isotropic(tensors: NDArray[np.float64]) -> tuple[NDArray[np.float64], float] | None:
+    """The map to the frame in which the tensors are those of an isotropic material, and its lambda / mu; None if none.
 
     In the plane kappa < 0 would be the same matrix as kappa > 0 with the body turned by a right angle. Only the
     latter has positive energy.
@@ -150,4 +157,4 @@ def _isotropic(tensors: NDArray[np.float64]) -> Frame | None:
     model += mu * np.einsum("cb,ae->cbae", np.eye(d), np.eye(d))
     if not (mu > 0 and np.abs(r - model).max() <= FITS * kappa):
         return None
-    return Frame(u @ inverse, float(kappa / mu - 1))
+    return u @ inverse, float(kappa / mu - 1)

@@ -13,8 +13,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .alignment import aligned
 from .grouping import by_first_row
-from .likeness import alike, doubtful, partners, reach
+from .likeness import compared, doubtful, reach
+
+_STEPS = 4  # of the graph, over which rows are compared
 
 Pairs = tuple[NDArray[np.int64], NDArray[np.int64]]
 
@@ -95,11 +98,11 @@ def _uncrossed(r: NDArray, s: NDArray, label: NDArray) -> Pairs:
 
 def matched_by_likeness(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> NDArray[np.int64]:
     """The same where entries that vanished are not stored, from what rows reach over some steps of the graph."""
-    reached = reach(matrix)
+    reached = reach(matrix, _STEPS)
     pattern = sp.csr_array((np.ones(matrix.nnz, np.float32), matrix.indices, matrix.indptr), shape=matrix.shape)
     rows = [np.flatnonzero(direction == a) for a in range(d)]
     pairs = [
-        _aligned(pattern, reached, rows[c], rows[b])
+        _paired(pattern, reached, rows[c], rows[b])
         for c, b in combinations(range(d), 2)
         if len(rows[c]) and len(rows[b])
     ]
@@ -122,36 +125,13 @@ def _joined(pairs: list[Pairs], direction: NDArray[np.int64], d: int) -> tuple[N
     return by_first_row(np.where(torn, order + np.arange(order), label)), torn
 
 
-def _aligned(pattern: sp.csr_array, reached: sp.csr_array, rows_c: NDArray, rows_b: NDArray) -> Pairs:
-    """Pairs of rows of two directions: the likest both ways, in increasing order; what fits in between is added."""
-    r, s, value = partners(pattern, reached, rows_c, rows_b)
-    kept = np.flatnonzero(_as_many(r, s, len(rows_c), len(rows_b)))
-    kept = kept[longest_increasing(r[kept], s[kept])]
-    r, s = r[kept], s[kept]
-    if not len(r):
-        return rows_c[r], rows_b[s]
-    least = doubtful(value[kept])
-    # Between two pairs as many rows of one direction as of the other: they are the same nodes, in order.
-    r = np.concatenate([[-1], r, [len(rows_c)]])
-    s = np.concatenate([[-1], s, [len(rows_b)]])
-    gap = np.diff(r) - 1
-    fits = (gap > 0) & (gap == np.diff(s) - 1)
-    step = np.arange(gap[fits].sum()) - np.repeat(np.cumsum(gap[fits]) - gap[fits], gap[fits]) + 1
-    more_r, more_s = np.repeat(r[:-1][fits], gap[fits]) + step, np.repeat(s[:-1][fits], gap[fits]) + step
-    found = np.concatenate([rows_c[r[1:-1]], rows_c[more_r]]), np.concatenate([rows_b[s[1:-1]], rows_b[more_s]])
-    sure = alike(reached, *found) >= least
-    return found[0][sure], found[1][sure]
-
-
-def _as_many(r: NDArray[np.int64], s: NDArray[np.int64], n_c: int, n_b: int) -> NDArray[np.bool_]:
-    """(k,) pairs among rows equally alike of which there are as many in both directions.
-
-    Where one direction has a row less, order does not tell which of the other's lacks it.
-    """
-    link = sp.csr_array((np.ones(len(r), np.int8), (r, n_c + s)), shape=(n_c + n_b,) * 2)
-    label = sp.csgraph.connected_components(link, directed=False)[1]
-    as_many = np.bincount(label[:n_c], minlength=label.max() + 1) == np.bincount(label[n_c:], minlength=label.max() + 1)
-    return np.asarray(as_many[label[r]])
+def _paired(pattern: sp.csr_array, reached: sp.csr_array, rows_c: NDArray, rows_b: NDArray) -> Pairs:
+    """Rows of two directions, both increasing, that are alike, in increasing order."""
+    r, s, value = compared(pattern, reached, rows_c, rows_b)
+    chosen = aligned(r, s, value)
+    r, s, value = r[chosen], s[chosen], value[chosen]
+    sure = value >= doubtful(value)
+    return rows_c[r[sure]], rows_b[s[sure]]
 
 
 def longest_increasing(r: NDArray[np.int64], s: NDArray[np.int64]) -> NDArray[np.int64]:

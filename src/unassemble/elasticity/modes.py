@@ -34,6 +34,7 @@ def rigid_body_modes(
     points : (n, d) float64
         NaN rows get translations only.
     node_of_row, direction_of_row : (N,) int64
+        A direction of -1 is not known, and gets zeros.
 
     Returns
     -------
@@ -50,7 +51,7 @@ def rigid_body_modes(
     row = np.arange(len(node_of_row))
     planes = [(0, 1)] if d == 2 else [(0, 1), (2, 0), (1, 2)]
     modes = np.zeros((len(row), d + len(planes)))
-    modes[row, direction_of_row] = 1
+    modes[row, direction_of_row] = direction_of_row >= 0
     for k, (a, b) in enumerate(planes, start=d):
         modes[:, k] = np.where(direction_of_row == b, x[:, a], 0) - np.where(direction_of_row == a, x[:, b], 0)
     return modes

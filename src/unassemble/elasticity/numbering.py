@@ -13,6 +13,7 @@ from .grouping import coupled_in_common
 from .traces import unaccounted
 
 _LIKELY = 0.6  # quality of nodes apart from the share of sums that vanish; made-up ones have half or less
+WHOLE = 0.5  # share of sums that vanish in most rows, supports apart
 ANNIHILATED = 0.02  # share of rows and directions below which an orderly numbering calls for a search
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -11,8 +13,11 @@ from .atlas import NullFields, null_fields
 from .nodal import NodalMatrix, determined
 from .results import Evidence
 from .shape import EXACT, Shape, in_gauge, shape
+from .slender import affordable, unbent
 from .solution import Solution
 
+_SLENDER = 1e-5  # gap below which a step on the whole piece is worth its cost
+_SETTLED = 1e-8  # residual over gap: what coordinates may be wrong by
 # Nodes of a body whose best fit, where none is exact, one factorisation finds. Charts are no help there: each fits in
 # its own way, and where two of them meet the joined field has a kink that costs far more than the misfit itself.
 _WHOLE = {2: 250_000, 3: 30_000}
@@ -44,7 +49,7 @@ def placed(
     GeometryError
         If no piece has positions.
     """
-    component, n_pieces = _pieces(nodal, valid)
+    component, n_pieces = pieces_of(nodal, valid)
     graph = nodal.graph
     points = np.full((nodal.n, nodal.dim), np.nan)
     evidence, freedoms, exact, warnings = [], [], [], []
@@ -72,6 +77,14 @@ def placed(
         points[found.nodes] = one.points
         points[body] = in_gauge(points[body], graph[body][:, body])
         evidence.append(_evidence(found, one))
+        if one.exact and not one.freedom and evidence[-1].gap < _SLENDER and affordable(points[body]):
+            whole = np.full_like(points, np.nan)
+            whole[body] = points[body]
+            better, residual = unbent(nodal, valid, whole, terms)
+            if residual < evidence[-1].residual:
+                points[body] = in_gauge(better[body], graph[body][:, body])
+                settled = residual <= _SETTLED * evidence[-1].gap
+                evidence[-1] = replace(evidence[-1], residual=residual, settled=settled)
         freedoms.append(one.freedom)
         exact.append(one.exact)
     if not exact:
@@ -86,7 +99,7 @@ def _settled(found: NullFields) -> bool:
     return len(found.values) > d and bool(found.values[d] <= EXACT < found.values[-1])
 
 
-def _pieces(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
+def pieces_of(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
     """Pieces held together by valid identities; -1 for nodes that none of them touches."""
     pairs = valid if valid.ndim == 3 else np.asarray(valid.any(axis=3))
     live = (np.abs(nodal.data) * pairs[nodal.node]).max(axis=(1, 2)) > 0

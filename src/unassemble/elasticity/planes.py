@@ -54,10 +54,10 @@ def with_planes(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NodalMatr
     missing = -nodal.row_sums() / np.maximum(count, 1)[:, None, :]
     i, j = nodal.node, nodal.indices
     data = nodal.data + np.where(held, missing, 0)[i] * gone[j][:, None, :]
-    flat = gone & (count > 1) & (nodal.size > 0)[:, None]
-    if nodal.doubtful is not None:
-        flat &= ~nodal.doubtful[:, None]
-    level = np.where(i == j, 1.0, 0.0)[:, None] - gone[j] / np.maximum(count, 1)[i]
+    surely = gone if nodal.doubtful is None else gone & ~nodal.doubtful[:, None]
+    fellows = graph @ surely.astype(float)
+    flat = surely & (fellows > 1) & (nodal.size > 0)[:, None]
+    level = np.where(i == j, 1.0, 0.0)[:, None] - surely[j] / np.maximum(fellows, 1)[i]
     full: NDArray[np.bool_] = np.repeat(valid[..., None], d, axis=3)
     for b in range(d):
         data[:, b, b] += np.where(flat[i, b], nodal.size[i] * level[:, b], 0)

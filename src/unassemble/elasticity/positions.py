@@ -36,7 +36,7 @@ def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
         if completed is not None:
             found = _with_planes(*completed, found, rows, patch)
         if strict and not (found is not None and found.unique):
-            found = straightened(nodal, found, valid, patch)
+            found = straightened(nodal, found, valid, completed, patch)
         if found is None:
             continue
         found = replace(_with_ratio(nodal, found, completed, patch), strict=strict)

@@ -10,9 +10,10 @@ from ..clock import Clock
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..matrix import check_matrix
+from ..words import count_of
 from .cells import no_cells, recognise_cells
 from .certificate import largest_residual
-from .doubts import unconfirmed, with_doubts
+from .doubts import guessed_directions, unconfirmed, with_doubts
 from .halves import joined
 from .material import poisson_ratio
 from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled
@@ -22,7 +23,7 @@ from .results import ElasticityRecovery, ScalarParts
 from .rounded import SPREADS, with_exact_sums
 from .solution import Solution
 from .unknowns import find_numbering
-from .verdict import about_cells, about_nodes, of_few_digits, verdict
+from .verdict import about_cells, about_nodes, about_open_rows, of_few_digits, verdict
 
 _SAME = 1e-6  # difference up to which Poisson's ratios of pieces are one
 _NEAR = 1e-6  # residual up to which positions are good enough to look for elements
@@ -110,6 +111,8 @@ def place_nodes(
         except RecoveryError as error:
             if numbering.kind == "given" or (numbering.common == 1 and not numbering.incomplete):
                 raise
+            if about_open_rows(numbering):
+                raise GeometryError(f"no positions were found: {about_open_rows(numbering)}") from error
             raise GeometryError(
                 f"{error}; but which rows belong to one node, and to which direction, was inferred and may be wrong: "
                 "give the numbering if it is known"
@@ -187,8 +190,15 @@ def _describe(
         )
     if solution.ratio is not None:
         warnings.append("Poisson's ratio, read off the nodes that determine it, was used to determine others")
+    guessed = guessed_directions(numbering, loose)
+    if guessed.any():
+        warnings.append(
+            f"which directions {count_of(int(guessed.sum()), 'row', 'rows')} of nodes without coordinates belong to is "
+            "not proven: `direction_of_row` is -1 there, and rigid-body modes are zero"
+        )
+    direction = np.where(guessed, -1, numbering.direction_of_row)
     return ElasticityRecovery(
-        points, numbering.node_of_row, numbering.direction_of_row, np.asarray(loose, dtype=np.int8), component,
+        points, numbering.node_of_row, direction, np.asarray(loose, dtype=np.int8), component,
         solution.evidence, ratio, found, backward, status, reason, numbering.kind, tuple(warnings), clock.timings,
     )  # fmt: skip
 

@@ -29,12 +29,15 @@ class Evidence:
         Singular value of the best field that is none of these; an upper bound on large bodies.
     rows : int
         Nodes with valid identities.
+    settled : bool
+        Whether the residual is that small beside the gap that no other field has a part in the coordinates.
     """
 
     null_dimension: int
     residual: float
     gap: float
     rows: int
+    settled: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +50,7 @@ class ElasticityRecovery:
         Row i belongs to node i; NaN where the matrix does not determine it. Axes are those of the matrix; per piece the
         centroid is the origin and the mean edge length of the graph 1. The sign (a point reflection) is free.
     node_of_row, direction_of_row : (N,) int64
+        A direction of -1 is not known.
     node_status : (n,) int8
         0 determined, 1 not.
     component : (n,) int64

@@ -16,6 +16,7 @@ from .orders import ORDERS, regular
 _LAYOUTS = {3: (3, 2, 1), 2: (2,), 6: (3,)}  # unknowns of a node, and how many of these may be displacements
 SPREADS = 20  # times the rounding of the entries: what an identity, or a sum of forces, may be off by
 _FULL = 1e-10  # rounding below which nothing needs to be set right
+_EXACT = 1e-14  # sums this small, beside the largest entry, are those of entries in full precision
 _FEW = range(3, 10)  # numbers of decimal digits to look for
 _LEAST = 0.05  # of the rows that have to annihilate all translations
 
@@ -68,7 +69,7 @@ def with_exact_sums(matrix: sp.csr_array) -> tuple[sp.csr_array, float]:
             share = max(float(zero[:, :moves].all(axis=1).mean()) for moves in displacements)
             if share > most:
                 best, most = (node, b, kind, np.where(zero, sums, 0.0)), share
-    if best is None:
+    if best is None or np.abs(best[3]).max() <= _EXACT * size.max():  # dyadic numbers are exact, few digits or not
         return matrix, 0.0
     node, b, kind, excess = best
     row, direction = np.nonzero(excess)

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from .constants import proven_directions
 from .directions import find_directions, reconsidered
 from .grouping import by_first_row, same_pattern
-from .likeness import alike, doubtful, likest, reach
+from .likeness import alike, doubtful, likest, next_to_likest, reach
 from .orders import Reading
 from .sums import names_of, set_right
 from .traces import shows_all, unaccounted
 
 _ROUNDS = 3
+_IN_TURN = 0.12  # share of rows next to the one likest them below which nodes do not stand one after the other
 
 
 def node_by_node(matrix: sp.csr_array, d: int) -> list[Reading]:
@@ -72,6 +73,8 @@ def _by_likeness(matrix: sp.csr_array, d: int) -> list[Reading]:
     """
     nobody = np.zeros(matrix.shape[0], dtype=bool)
     reached = reach(matrix)
+    if next_to_likest(matrix, reached) < _IN_TURN:
+        return []
     node, link = stretches(reached, d)
     for _ in range(_ROUNDS):
         directions = find_directions(matrix, node, nobody, d)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,8 +23,10 @@ from .nodal import nodal_matrix, uncoupled
 from .numbering import Numbering
 from .recover import parts_of, place_nodes
 from .results import ElasticityRecovery, ScalarParts
-from .rounded import with_exact_sums
 from .surface import boundary_loops
+
+if TYPE_CHECKING:
+    from ..operators import VectorReading
 
 _THIN = 1e-14  # of the largest variance of the coordinates: rounding
 _SAME = 1e-12  # relative difference up to which the matrices of two directions are one
@@ -34,11 +36,10 @@ Scalar = Callable[[OperatorMatrix, Sequence[Any]], Recovery]
 
 def serve(
     matrix: OperatorMatrix,
-    numbering: Numbering,
+    reading: VectorReading,
     clock: Clock,
     *,
     anchors: Sequence[Any] | None,
-    choice: str,
     cells: bool,
     scalar: Scalar,
 ) -> Recovery:
@@ -47,18 +48,18 @@ def serve(
     Parameters
     ----------
     matrix : OperatorMatrix
-    numbering : Numbering
+    reading : VectorReading
+        Whose numbering is a Numbering.
     clock : Clock
     anchors : sequence of (row, x, y) or (row, x, y, z), optional
-    choice : str
-        Why the matrix was taken for a vector-valued one.
     cells : bool
         Look for elements too.
     scalar : callable
         Recovers a scalar matrix with anchors, for directions that are not coupled.
     """
+    numbering, choice = cast("Numbering", reading.numbering), reading.why
     with clock("numbering"):
-        whole, rounding = with_exact_sums(matrix.csr())
+        whole, rounding = reading.exact or (matrix.csr(), 0.0)
         nodal = nodal_matrix(whole, numbering)
     if uncoupled(nodal):
         parts = parts_of(whole, nodal, numbering)

@@ -41,15 +41,14 @@ def unaccounted(
     return np.asarray(~present & (missed == 0) & present.any(axis=1)[:, None])
 
 
-def shows_all(matrix: sp.csr_array, reading: Reading, d: int) -> bool:
+def shows_all(matrix: sp.csr_array, reading: Reading, d: int, live: NDArray[np.bool_] | None = None) -> bool:
     """Whether all nodes that lack a direction without a trace are among those that the reading leaves open.
 
-    If not, equal patterns do not show every node, as where entries that vanished are not stored.
+    If not, equal patterns do not show every node, as where entries that vanished are not stored. Rows that are not
+    `live`, (N,), do not count.
     """
-    everywhere = np.ones(len(reading.node), dtype=bool)
-    lost: NDArray[np.bool_] = np.asarray(
-        unaccounted(matrix, everywhere, reading.node, reading.direction, d).any(axis=1)
-    )
+    rows = np.ones(len(reading.node), dtype=bool) if live is None else live
+    lost: NDArray[np.bool_] = np.asarray(unaccounted(matrix, rows, reading.node, reading.direction, d).any(axis=1))
     if reading.open_row is not None:
         lost[reading.node[reading.open_row]] = False
     return not lost.any()

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, RecoveryError
 from .constants import annihilated_share, uncoupled_rows
-from .directions import find_directions, nodes_by_neighbours
+from .directions import find_directions
 from .gaps import by_component_with_gaps, interleaved_with_gaps
-from .grouping import by_first_row, coupled_in_common, possible_nodes, same_pattern
-from .leftover import leftover_joined
-from .numbering import Numbering, measured
+from .grouping import by_first_row, coupled_in_common, same_pattern
+from .numbering import WHOLE, Numbering, measured
 from .orders import ORDERS, regular
 from .sampling import promising
+from .scattered import scattered
+from .searching import searched
 
 __all__ = [
     "Numbering",
@@ -32,10 +33,8 @@ __all__ = [
     "uncoupled_rows",
 ]
 
-_ROUNDS = 4
 _FEW = 4  # places to start from where a glance is all that a matrix gets
 _LARGE = 20_000  # rows beyond which a few places are looked at before every row is asked
-_WHOLE = 0.5  # share of sums that vanish in most rows, supports apart
 _ALIKE = 0.9  # rows of one node couple to common nodes by so much, where unknowns stand by component
 _ORDERLY = 0.8  # rows of made-up nodes couple to common nodes less than this
 
@@ -59,13 +58,16 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
     """
     sizes = _sizes(block_size)
     best = _best(_regular(matrix, d, kind) for d in sizes for kind in ORDERS)
-    if best is None or best.share < _WHOLE or (best.kind == "by component" and best.common < _ALIKE):
+    if best is None or best.share < WHOLE or (best.kind == "by component" and best.common < _ALIKE):
         best = _best([best, *by_component_with_gaps(matrix, sizes)])
         clear = best is not None and best.sound and best.common == 1
+        apart = None if clear else scattered(matrix, sizes)
+        if apart is not None:
+            best, clear = apart, True
         if not clear and (matrix.shape[0] <= _LARGE or promising(matrix, sizes)):
             best = _best([best, *interleaved_with_gaps(matrix, sizes)])
             if best is None or not best.sound:
-                best = _best([best, *_searched(matrix, sizes)])
+                best = _best([best, *searched(matrix, sizes)])
     if best is None:
         raise RecoveryError(
             f"no numbering with {block_size or '2 or 3'} unknowns per node makes the rows annihilate translations: "
@@ -127,27 +129,6 @@ def _best(readings: Iterable[Numbering | None]) -> Numbering | None:
     """The one that most speaks for; None if nothing does for any."""
     some = [one for one in readings if one is not None and one.quality > 0]
     return max(some, key=lambda one: one.quality, default=None)
-
-
-def _searched(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[Numbering]:
-    """Numberings without any order to rely on: directions first, then nodes."""
-    identity = uncoupled_rows(matrix)
-    group = same_pattern(matrix, identity)
-    found = []
-    for d in (d for d in sizes if d <= len(group)):
-        for start in possible_nodes(group, d):
-            node = start
-            for _ in range(_ROUNDS):  # directions tell nodes apart, and nodes help to find directions
-                direction = find_directions(matrix, node, identity, d)
-                found.append(measured(matrix, node, direction, d))
-                if found[-1].share > _WHOLE and found[-1].sound:
-                    return found
-                merged = nodes_by_neighbours(matrix, direction, d)
-                if len(np.unique(merged * d + direction)) < len(merged) or merged.max() == node.max():
-                    break
-                node = leftover_joined(matrix, ~identity, by_first_row(merged), direction, d)
-                found.append(measured(matrix, node, direction, d))
-    return found
 
 
 def _regular(matrix: sp.csr_array, d: int, kind: str, *, checked: bool = True) -> Numbering | None:

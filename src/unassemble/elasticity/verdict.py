@@ -68,6 +68,17 @@ def about_nodes(nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[
     return told
 
 
+def about_open_rows(numbering: Numbering) -> str:
+    """What is not known of rows that may belong to one node with others; empty where there are none."""
+    rows = 0 if numbering.open_row is None else int(numbering.open_row.sum())
+    if not rows:
+        return ""
+    return (
+        f"{count_of(rows, 'row couples', 'rows couple')} to the same unknowns as rows of other nodes, and neither "
+        "order nor positions tell which of them belong together; give the numbering if it is known"
+    )
+
+
 def of_few_digits(rounding: float, error: float) -> str:
     """Why a matrix whose entries are rounded is not certified though all is well."""
     return (
@@ -101,12 +112,13 @@ def verdict(
     """
     remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
     if remaining:
-        return "uncertified", f"the null space is larger than it should be: {remaining[0]}"
-    nearly = min((one.gap for one in solution.evidence if one.gap > 0), default=1.0)
+        return "uncertified", f"the null space is larger than it should be: {remaining[0]}{_unless(nodal, numbering)}"
+    nearly = min((one.gap for one in solution.evidence if one.gap > 0 and not one.settled), default=1.0)
     if solution.exact and nearly < _NEARLY:
         return "uncertified", (
             f"a field that is no translation or scale satisfies the identities up to {nearly:.1e}: nodes that it moves "
-            "feel the rounding of the entries, magnified by as much, and may be wrong by more than 1e-8"
+            "feel the rounding of entries, magnified by as much, and may be wrong by more than 1e-8: nodes that few "
+            "rows hold have such fields, and slender bodies, which bend the more easily the longer they are"
         )
     if not solution.exact:
         worst = max(solution.evidence, key=lambda one: one.residual)
@@ -155,6 +167,19 @@ def verdict(
     if error <= CERTIFIED:
         return "certified", "the valid identities hold to rounding, and only translations and scale satisfy them"
     return "uncertified", f"the largest residual of a valid identity is {error:.1e}"
+
+
+def _unless(nodal: NodalMatrix, numbering: Numbering) -> str:
+    """What may be to blame instead, where it was inferred which rows make up a node."""
+    if numbering.open_row is not None and numbering.open_row.any():
+        return f"; {about_open_rows(numbering)}"
+    odd = int(np.asarray(without_trace(nodal).any(axis=1)).sum())
+    if numbering.kind == "given" or not (odd or (numbering.kind == "pattern" and numbering.common < 1)):
+        return ""
+    lacking = f" {count_of(odd, 'node lacks', 'nodes lack')} directions without a trace, and" if odd else ""
+    return (
+        f". Or rows were not joined to nodes as they should be:{lacking} it was inferred which rows belong to one node"
+    )
 
 
 def _torn(nodal: NodalMatrix, solution: Solution) -> bool:

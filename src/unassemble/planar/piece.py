@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
 from .pivoted import PivotedEquations, affordable
 from .polish import PolishedMesh, polish
+from .robust import ASIDE
 
 _ROUNDING = 1e-12
 """Errors of the weights that may be rounding."""
@@ -40,6 +41,8 @@ class PieceMesh:
         all equal by default.
     doubt : float
         About the error of z relative to its extent, where a polish came to no end for reasons of conditioning.
+    aside : (k,) int64 or None
+        Edges whose entries are wrong and have no part in the fit, see :mod:`unassemble.planar.robust`.
     """
 
     z: NDArray[np.complex128]
@@ -47,6 +50,7 @@ class PieceMesh:
     notes: tuple[str, ...] = ()
     spread: NDArray[np.float64] | None = None
     doubt: float = 0.0
+    aside: NDArray[np.int64] | None = None
 
 
 def positions(
@@ -77,26 +81,38 @@ def refined(
     With `rounding`, errors are taken to be those of assembly in floating-point arithmetic, unless the misfit is beyond
     that and more likely to be noise of one size. Noise leaves the entries `exact`, (e,) bool, as they are: these have
     vanished.
+    Without it the noise is known, and tested: entries set aside count as any other.
     """
     noise = None if exact is None or not exact.any() else np.where(exact, EXACT, 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         flat = not np.isfinite(edge_weights(piece, mesh.z)).all()
     if flat:
-        return PieceMesh(mesh.z, mesh.scale, (*mesh.notes, "no polish: triangles are flat"))
+        return replace(mesh, notes=(*mesh.notes, "no polish: triangles are flat"))
     spread = weight_roundings(piece, mesh.z) if rounding else noise
+    if rounding and mesh.aside is not None:  # fitted as what they should have been, or what they are counts as noise
+        weights, noise = weights.copy(), _set_aside(mesh.aside, len(weights), noise)
+        weights[mesh.aside] = mesh.scale * edge_weights(piece, mesh.z)[mesh.aside]
+        spread = _set_aside(mesh.aside, len(weights), spread)
     try:
         found = _polished(piece, weights, mesh.z, scale, spread)
         if rounding and spread is not None and _is_uniform_noise(piece, weights, found, spread):
             spread = noise
             found = _polished(piece, weights, found.z, scale, spread)
     except SolverError as error:
-        return PieceMesh(mesh.z, mesh.scale, (*mesh.notes, f"no polish: {error}"))
+        return replace(mesh, notes=(*mesh.notes, f"no polish: {error}"))
     if not (np.isfinite(found.z).all() and np.isfinite(found.scale)):
-        return PieceMesh(mesh.z, mesh.scale, (*mesh.notes, "the polish did not stay finite and was left out"))
+        return replace(mesh, notes=(*mesh.notes, "the polish did not stay finite and was left out"))
     if found.converged:
-        return PieceMesh(found.z, found.scale, mesh.notes, spread)
+        return PieceMesh(found.z, found.scale, mesh.notes, spread, aside=mesh.aside)
     note = f"the polish did not converge: its last step moved points by {found.last_step:.0e} of the size"
-    return PieceMesh(found.z, found.scale, (*mesh.notes, note), spread, found.last_step)
+    return PieceMesh(found.z, found.scale, (*mesh.notes, note), spread, found.last_step, mesh.aside)
+
+
+def _set_aside(edges: NDArray[np.int64], count: int, spread: NDArray | None) -> NDArray[np.float64]:
+    """The standard deviations with those of some edges beyond all others."""
+    spread = np.ones(count) if spread is None else spread.copy()
+    spread[edges] *= ASIDE
+    return spread
 
 
 def _polished(

@@ -1,0 +1,42 @@
+"""Where equal factors c of pieces are no evidence."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse import csgraph
+
+from ..matrix import OperatorMatrix
+from ..topology import Topology
+
+_EQUAL = 1e-9
+
+
+def coincident(stored: OperatorMatrix, topology: Topology) -> NDArray[np.bool_]:
+    """(pieces,) pieces whose cells other cells may replace, since all entries are equal.
+
+    A piece with no more entries, vanished ones counted, than coordinates and c fits by itself. That several hang
+    together and have one c is evidence, but not where all entries of the component are equal: squares, and halves of
+    squares, have the same c wherever they are put.
+
+    Parameters
+    ----------
+    stored : OperatorMatrix
+        Without the vanished entries.
+    topology : Topology
+        Of the mesh that was found.
+    """
+    n = stored.n
+    graph = sp.coo_array((np.ones(len(stored.edges)), stored.edges.T), shape=(n, n))
+    count, label = csgraph.connected_components(graph, directed=False)
+    lowest, highest = np.full(count, np.inf), np.full(count, -np.inf)
+    owner = label[stored.edges[:, 0]]
+    np.minimum.at(lowest, owner, stored.entries)
+    np.maximum.at(highest, owner, stored.entries)
+    part = np.array([label[piece.vertices[0]] for piece in topology.pieces])
+    loose = np.array([len(piece.edges) <= 2 * piece.n_vertices - 3 for piece in topology.pieces])
+    alike = (highest - lowest)[part] <= _EQUAL * np.abs(highest[part])
+    several = np.bincount(part, minlength=count) > 1
+    all_loose = np.bincount(part, ~loose, count) == 0
+    return np.asarray(alike & several[part] & all_loose[part])

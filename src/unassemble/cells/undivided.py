@@ -1,0 +1,55 @@
+"""Triangles that share a vanished side are one cell, however a reading came by them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse import csgraph
+
+from ..topology import Piece, Polygons
+from ..topology.together import Together
+
+
+def undivided(pieces: Sequence[Piece], vanished: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Polygons]:
+    """Cells in the numbering of ``piece.vertices``: triangles, and the outlines of those made of several triangles.
+
+    Parameters
+    ----------
+    pieces : sequence of Piece
+    vanished : (e,) bool
+        Rows of the edge list that ``piece.edge_rows`` refer to.
+    """
+    if not pieces:
+        return np.empty((0, 3), np.int64), Polygons.none()
+    whole = Together(pieces)
+    diagonal = vanished[whole.edge_rows] & whole.inner
+    owner, corner = np.divmod(np.flatnonzero(diagonal[whole.opposite].ravel()), 3)
+    order = np.argsort(whole.opposite[owner, corner], kind="stable")  # both triangles of each diagonal in turn
+    one, other = owner[order].reshape(-1, 2).T
+    m = len(whole.triangles)
+    _, group = csgraph.connected_components(
+        sp.coo_array((np.ones(len(one)), (one, other)), shape=(m, m)), directed=False
+    )
+    joined = (np.bincount(group) > 1)[group]
+    triangle, turn = np.nonzero(joined[:, None] & ~diagonal[whole.opposite])
+    tail, head = (whole.triangles[triangle, (turn + step) % 3] for step in (1, 2))
+    return whole.vertices[whole.triangles[~joined]], _cycles(group[triangle], tail, head, whole.vertices)
+
+
+def _cycles(group: NDArray, tail: NDArray, head: NDArray, name: NDArray) -> Polygons:
+    """Polygons of directed sides, all of a group being one; vertex v is called ``name[v]``."""
+    order = np.lexsort((tail, group))
+    group, tail, head = group[order], tail[order], head[order]
+    start = np.flatnonzero(np.diff(group, prepend=-1))
+    size = np.diff(np.append(start, len(group)))
+    n = int(tail.max(initial=0)) + 1
+    following = np.searchsorted(group * n + tail, group * n + head)
+    place, at = np.empty(len(group), dtype=np.int64), start
+    for step in range(int(size.max(initial=0))):
+        running = step < size
+        place[start[running] + step] = at[running]
+        at = following[at]
+    return Polygons(np.append(0, np.cumsum(size)), name[tail[place]])

@@ -1,0 +1,87 @@
+"""Unknowns that stand in no order, in matrices that store entries even where they vanish."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .coincidence import by_direction, placed_together, single_nodes
+from .constants import PENALTY, proven_directions, uncoupled_rows
+from .extension import extended_directions
+from .grouping import possible_nodes, same_pattern
+from .numbering import Numbering, measured
+from .orders import Reading
+from .sums import names_of, set_right
+from .traces import shows_all
+
+_ROUNDING = 1e-9
+_ORDERED = 0.3  # share of neighbouring rows with the same pattern: 2/3 node by node, some more where nodes share one
+_SETTLED = 0.9  # share of whole rows that have to annihilate translations
+_EVEN = 0.6  # share of rows, far from supports, in patterns with as many rows in each direction
+
+
+def scattered(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
+    """The numbering with which all rows that can annihilate translations do; None where none is found.
+
+    None, too, where rows of one node do not couple to the same unknowns, since zeros were dropped.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+    sizes : tuple of int
+        Block sizes to try.
+    """
+    identity = uncoupled_rows(matrix)
+    live = np.flatnonzero(~identity)
+    group = same_pattern(matrix, identity)
+    inner = group[live]
+    if len(live) < 2 or np.mean(inner[1:] == inner[:-1]) > _ORDERED:
+        return None
+    for d in sizes:
+        if 2 * np.count_nonzero(np.bincount(inner)[inner] >= d) < len(live):
+            continue  # rows of one node do not show by their pattern
+        direction, share = extended_directions(matrix, group, ~identity, d)
+        if share > _SETTLED and _even_share(matrix, group, direction, ~identity, d) > _EVEN:
+            return _with_nodes(matrix, group, direction, identity, d)
+    return None
+
+
+def _even_share(
+    matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], live: NDArray[np.bool_], d: int
+) -> float:
+    """Share of rows whose pattern has as many rows in each direction, where all of them add up to zero.
+
+    Two directions of three taken for one annihilate translations as well.
+    """
+    size = np.asarray(abs(matrix).sum(axis=1)).ravel() - np.abs(matrix.diagonal())
+    adds_up = np.abs(np.asarray(matrix.sum(axis=1)).ravel()) <= _ROUNDING * size
+    adds_up |= np.abs(matrix.diagonal()) > PENALTY * size
+    count = by_direction(group, direction, d)
+    whole = live & (np.bincount(group, ~adds_up) == 0)[group]
+    return float((count == count[:, :1]).all(axis=1)[group[whole]].mean()) if whole.any() else 0.0
+
+
+def _with_nodes(
+    matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], identity: NDArray[np.bool_], d: int
+) -> Numbering | None:
+    direction = _set_right(matrix, group, direction, ~identity, d)
+    node = single_nodes(group, direction, d)
+    node, open_row = placed_together(matrix, ~identity, group, node, direction, d)
+    if not shows_all(matrix, Reading(node, direction, open_row), d, ~identity):
+        return None
+    unnamed = ~proven_directions(matrix, direction, group, d) & ~identity
+    return replace(measured(matrix, node, direction, d), open_row=open_row, unnamed=unnamed)
+
+
+def _set_right(
+    matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], live: NDArray[np.bool_], d: int
+) -> NDArray[np.int64]:
+    """Directions next to supports, where translations are in equilibrium no more, set right by the rows around."""
+    node = possible_nodes(group, d)[0]
+    order, size = np.argsort(node, kind="stable"), np.bincount(node)
+    many = size[node[order]]
+    members = [order[many == k].reshape(-1, k) for k in range(1, d + 1)]
+    return set_right(matrix, node, members, live, direction, names_of(d))

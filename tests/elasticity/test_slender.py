@@ -1,0 +1,37 @@
+"""Slender bodies, which bend so easily that rounding of the entries shows in the identities."""
+
+import numpy as np
+import pytest
+from assembled import box, eliminated, error, on_plane, stiffness
+
+from unassemble.elasticity import recover_elasticity
+
+
+def beam(kind, length):
+    """So many nodes by 3, of about equal distances."""
+    return stiffness(kind, box(kind, (length, 3), stretch=(0.53 * length, 1)), lam=1.5)
+
+
+@pytest.mark.parametrize("kind", ["tri-p1", "quad-q1"])
+def test_free_beams(kind):
+    case = beam(kind, 3001)
+    found = recover_elasticity(case.matrix)
+    assert found.certified
+    assert found.evidence[0].gap < 1e-6
+    assert found.evidence[0].settled
+    assert error(found.points, case.points) < 1e-11
+
+
+def test_a_beam_clamped_at_one_end():
+    case = beam("quad-q1", 1601)
+    matrix, nodes = eliminated(case, np.repeat(on_plane(case, 0)[:, None], 2, axis=1))
+    found = recover_elasticity(matrix)
+    assert found.certified
+    assert error(found.points, case.points[nodes]) < 1e-11
+
+
+def test_beams_in_space():
+    case = stiffness("hex-q1", box("hex-q1", (601, 2, 2), stretch=(531, 1, 1)), lam=1.5)
+    found = recover_elasticity(case.matrix)
+    assert found.certified
+    assert error(found.points, case.points) < 1e-11

@@ -1,0 +1,20 @@
+"""What compiled code prints."""
+
+import ctypes
+import sys
+
+import pytest
+
+from unassemble.linalg import quiet
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the C library goes by another name")
+def test_only_what_compiled_code_prints_is_lost(capfd):
+    library = ctypes.CDLL(None)
+    sys.stdout.write("before\n")
+    with quiet():
+        library.printf(b"noise\n")
+    sys.stdout.write("after\n")
+    library.printf(b"wanted\n")
+    library.fflush(None)
+    assert capfd.readouterr().out.split() == ["before", "after", "wanted"]
