@@ -99,8 +99,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble, doubt)
     others: list[Alternative] = []
     if status == "certified" and topology.method != "the numbers" and known is None:
-        with clock("ambiguity"):
-            others = filled_holes(stored, topology, stretch * mesh.scale[mesh.component])
+        others = filled_holes(stored, topology, stretch * mesh.scale[mesh.component])  # next to nothing on most meshes
         if others:
             status, reason = ambiguous(others, certificate)
     elif status == "certified" and topology.method == "the numbers":
