@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import certify as certificates
-from .cells import AGREE, Alternative, OrientedMesh, alternatives, coincident
+from .cells import AGREE, Alternative, OrientedMesh, alternatives, coincident, filled_holes
 from .clock import Clock
 from .evidence import pooled_noise, weigh
 from .joined import JoinedMesh
@@ -98,7 +98,11 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     doubt = max(m.doubt for m in meshes)
     status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble, doubt)
     others: list[Alternative] = []
-    if status == "certified" and topology.method == "the numbers":
+    if status == "certified" and topology.method != "the numbers" and known is None:
+        others = filled_holes(stored, topology, stretch * mesh.scale[mesh.component])  # next to nothing on most meshes
+        if others:
+            status, reason = ambiguous(others, certificate)
+    elif status == "certified" and topology.method == "the numbers":
         with clock("ambiguity"):
             others = _alternatives(topology, stored, placement, mesh, stretch, noise, known)
             by_coincidence = known is None and bool(coincident(stored, topology).any())

@@ -131,11 +131,15 @@ def ambiguous(others: list[Alternative], certificate: Certificate) -> tuple[str,
         else ""
     )
     claim = "but so does another" if first.tested else "but there are no more entries than unknowns, and another may"
-    instead = f" in place of {_cells(first.cells)}" if first.cells else " besides"
+    if first.other_cells:
+        cells = f"the cells {_cells(first.other_cells)}" + (
+            f" in place of {_cells(first.cells)}" if first.cells else " besides"
+        )
+    else:
+        cells = f"{_cells(first.cells)} left out as a hole"
     factor = "" if all(other.same_scale for other in others) else ", each with a factor c of its own: known, it decides"
     return "uncertified", (
-        f"the mesh gives the matrix back to {certificate.backward_error:.1e}, {claim}: {order}the cells "
-        f"{_cells(first.other_cells)}{instead}{more}{factor}"
+        f"the mesh gives the matrix back to {certificate.backward_error:.1e}, {claim}: {order}{cells}{more}{factor}"
     )
 
 

@@ -8,6 +8,7 @@ from .coincidence import coincident
 from .completion import completed, guessed
 from .corners import Alternative, OrientedMesh
 from .doubt import Attempt, Outcome, in_doubt
+from .filled import filled_holes
 from .search import read_cells
 from .spoilt import wrong_entries
 
@@ -20,6 +21,7 @@ __all__ = [
     "alternatives",
     "coincident",
     "completed",
+    "filled_holes",
     "guessed",
     "in_doubt",
     "read_cells",

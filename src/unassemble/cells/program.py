@@ -43,17 +43,11 @@ class Program:
         """(m,) what each cell adds to the number of fans at all vertices: few belong to meshes that hang together."""
         return np.asarray(self._rows.fans.sum(axis=0)).ravel()[: len(self.cells.cell)]
 
-    def exclude(self, together: NDArray[np.int64], most: int | None = None) -> None:
-        """Take no more than `most` of some cells, by default not all of them."""
+    def exclude(self, together: NDArray[np.int64]) -> None:
+        """Take not all of some cells."""
         row = np.zeros((1, self._matrix.shape[1]))
         row[0, together] = 1
-        self._add(row, -np.inf, len(together) - 1 if most is None else most)
-
-    def near(self, chosen: NDArray[np.int64], changes: int) -> None:
-        """Keep all but so many of some cells."""
-        row = np.zeros((1, self._matrix.shape[1]))
-        row[0, chosen] = 1
-        self._add(row, len(chosen) - changes, np.inf)
+        self._add(row, -np.inf, len(together) - 1)
 
     def solution(self, cost: NDArray[np.float64]) -> NDArray[np.int64] | None:
         """Rows of the cells (m,) of least cost that fulfil all conditions; None if none are found."""

@@ -46,8 +46,11 @@ def read_triangles(n: int, edges: NDArray, weights: NDArray, scale: float | None
             state = peeled(sides, 2 * weights / c)
         except ContradictionError:
             continue
+        # With another scale there are other candidates; but faces come first, and in the same order.
+        kept = np.flatnonzero(labels)[state >= 0]
         candidates = Candidates.of(drawing, weights, c)
-        labels[labels] = state >= 0
+        labels = np.zeros(candidates.count, dtype=bool)
+        labels[kept] = True
         break
     else:
         return None

@@ -36,20 +36,29 @@ def undivided(pieces: Sequence[Piece], vanished: NDArray[np.bool_]) -> tuple[NDA
     joined = (np.bincount(group) > 1)[group]
     triangle, turn = np.nonzero(joined[:, None] & ~diagonal[whole.opposite])
     tail, head = (whole.triangles[triangle, (turn + step) % 3] for step in (1, 2))
-    return whole.vertices[whole.triangles[~joined]], _cycles(group[triangle], tail, head, whole.vertices)
+    outlines = _cycles(group[triangle], tail, head, whole.vertices)
+    if outlines is None:
+        return whole.vertices[whole.triangles], Polygons.none()
+    return whole.vertices[whole.triangles[~joined]], outlines
 
 
-def _cycles(group: NDArray, tail: NDArray, head: NDArray, name: NDArray) -> Polygons:
-    """Polygons of directed sides, all of a group being one; vertex v is called ``name[v]``."""
+def _cycles(group: NDArray, tail: NDArray, head: NDArray, name: NDArray) -> Polygons | None:
+    """Polygons of directed sides, all of a group being one; vertex v is called ``name[v]``.
+
+    None if the sides of a group are no single cycle, as may be where cells do not fit.
+    """
     order = np.lexsort((tail, group))
     group, tail, head = group[order], tail[order], head[order]
     start = np.flatnonzero(np.diff(group, prepend=-1))
     size = np.diff(np.append(start, len(group)))
     n = int(tail.max(initial=0)) + 1
-    following = np.searchsorted(group * n + tail, group * n + head)
+    key, wanted = group * n + tail, group * n + head
+    following = np.minimum(np.searchsorted(key, wanted), max(len(key) - 1, 0))
     place, at = np.empty(len(group), dtype=np.int64), start
     for step in range(int(size.max(initial=0))):
         running = step < size
         place[start[running] + step] = at[running]
         at = following[at]
+    if (key[following] != wanted).any() or len(np.unique(place)) < len(place):
+        return None
     return Polygons(np.append(0, np.cumsum(size)), name[tail[place]])

@@ -121,6 +121,8 @@ class _Body:
         direction = known.copy()
         while (direction < 0).any():
             near = (direction < 0) & (self._pattern @ (direction >= 0).astype(np.int32) > 0)
+            if not near.any():  # nothing is coupled to what is left
+                return direction
             best, margin = self._guessed(np.flatnonzero(near), direction)
             count = int(np.clip(_GROWTH * (direction >= 0).sum(), self._d, near.sum()))
             least = min(np.partition(margin[near], -count)[-count], _CLEAR)

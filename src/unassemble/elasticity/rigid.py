@@ -36,6 +36,8 @@ def rigid(models: tuple[Model, ...], entries: Entries, ratio: float, functions: 
     models = tuple(
         replace(model, cells=model.cells[seen]) for model in models if (seen := Pairs.of(model.cells, some).seen).any()
     )
+    if not models:
+        return False
     points, edge = models[0].points, _mean_edge(models)
     effects = [_entries(models, some, points, ratio), _entries(models, some, points, ratio + 1)]
     effects[1] -= effects[0]
@@ -46,7 +48,7 @@ def rigid(models: tuple[Model, ...], entries: Entries, ratio: float, functions: 
             there, back = (_entries(models, some, points + sign * step, ratio) for sign in (1, -1))
             effects.append((there - back) / (2 * _STEP))
     size = np.linalg.svd(np.linalg.qr(np.column_stack(effects), mode="r"), compute_uv=False)
-    return bool(size[-2] > _RIGID * size[0])
+    return len(size) == len(effects) and bool(size[-2] > _RIGID * size[0])
 
 
 def _moved(entries: Entries, functions: NDArray) -> NDArray[np.int64]:

@@ -13,7 +13,9 @@ from .cycles import three_cycles
 from .faces import FaceComplex, around, from_cycles, from_rotation, joined
 from .keys import contains, distinct, pair_keys, with_sides
 from .separating import not_faces
-from .short_cycles import chordless_four_cycles
+from .short_cycles import chordless_five_cycles, chordless_four_cycles
+
+_FEW = 1000  # vertices of a graph in which 5-cycles are looked for: large ones cost too much to be drawn once more
 
 
 def short_faces(n: int, edges: NDArray) -> list[NDArray[np.int64]]:
@@ -43,7 +45,7 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
 
     Where the graph is not tri-connected it has many. A mesh has nearly all of its short cycles as faces: first the
     surface that they make by themselves, then an embedding in which all of them are faces, or all but those on edges
-    with more than two 3-cycles, last any.
+    with more than two 3-cycles, then one in which 5-cycles are faces as well, last any.
 
     Parameters
     ----------
@@ -71,9 +73,25 @@ def _drawings(n: int, edges: NDArray, cycles: list[NDArray]) -> Iterator[FaceCom
         drawing = drawing_with_faces(n, edges, [triangles[~crowded(n, edges, triangles).any(axis=1)], quads])
     if drawing is not None:
         yield drawing
+    fives = _five_cycles(n, edges, cycles) if n <= _FEW else None
+    drawing = drawing_with_faces(n, edges, [*cycles, fives]) if fives is not None and len(fives) else None
+    if drawing is not None:
+        yield drawing
     rotation = planarity.rotation_system(n, edges)
     if rotation is not None:
         yield from_rotation(n, edges, *rotation)
+
+
+def _five_cycles(n: int, edges: NDArray, cycles: list[NDArray]) -> NDArray[np.int64]:
+    """Chordless 5-cycles that may all be faces beside given cycles."""
+    count = np.zeros(len(edges), dtype=np.int64)
+    for some in cycles:
+        count += np.bincount((around(n, edges, some) >> 1).ravel(), minlength=len(edges))
+    fives = chordless_five_cycles(n, edges, count < 2)
+    if not len(fives):
+        return fives
+    sides = around(n, edges, fives) >> 1
+    return fives[((count + np.bincount(sides.ravel(), minlength=len(edges)))[sides] <= 2).all(axis=1)]
 
 
 def drawing_with_faces(n: int, edges: NDArray, cycles: list[NDArray]) -> FaceComplex | None:
