@@ -16,8 +16,9 @@ from .flips import turned_over
 from .hinged import as_one_piece
 from .hubs import Hub, hubs, rearranged
 from .loose import is_loose, other_reading
+from .other_scales import other_scales
 from .regrouped import fitting, regrouped
-from .rereading import other_readings
+from .rereading import other_readings, own_cells
 from .twins import twins
 
 AGREE = 1e-9
@@ -53,6 +54,10 @@ def alternatives(
     found: list[Alternative] = []
     if len(topology.vanished) > (topology.polygons.size - 3).sum():  # not on diagonals only
         found = _by_rules(stored, topology, mesh, factors, scale_known=scale is not None, agree=agree)
+        if not found and scale is None:
+            found = other_scales(
+                stored, topology, own_cells(mesh), factors, list(hubs(Corners.of(stored.n, stored.edges, mesh), mesh.z))
+            )
     return found or other_readings(stored, mesh, factors, scale)
 
 

@@ -47,12 +47,12 @@ def as_one_piece(stored: OperatorMatrix, topology: Topology, corners: Corners, h
     found = []
     for numbers in members:
         pieces = [topology.pieces[k] for k in numbers.tolist()]
-        if len(pieces) > 1 and any(apex[piece.vertices].any() for piece in pieces) and _all_loose(pieces, hubs):
+        if len(pieces) > 1 and any(apex[piece.vertices].any() for piece in pieces) and all_loose(pieces, hubs):
             found += _first_that_fits(stored, pieces)
     return found
 
 
-def _all_loose(pieces: list[Piece], hubs: list[Hub]) -> bool:
+def all_loose(pieces: list[Piece], hubs: list[Hub]) -> bool:
     """Whether each piece has as many entries as unknowns, and no ring of pieces is closed."""
     count = sum(piece.n_vertices for piece in pieces)
     if len(np.unique(np.concatenate([piece.vertices for piece in pieces]))) != count - len(pieces) + 1:

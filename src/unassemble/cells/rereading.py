@@ -72,9 +72,14 @@ def _other_reading(
     if not found and (reading := read_cells(*graph)) is not None and reading.fits:
         found = [reading]
     for reading in found:
-        if (cells := _cells(reading, part)) != own:
+        if (cells := cells_of(reading, part)) != own:
             return cells, next(solved.scale for solved in reading.meshes if solved)
     return None
+
+
+def own_cells(mesh: OrientedMesh) -> set[tuple[int, ...]]:
+    """Triangles and polygons, each as its rows in increasing order."""
+    return set(map(_cell, mesh.triangles.tolist())) | _polygons(mesh.polygons.offsets, mesh.polygons.vertices)
 
 
 def _own_cells(n: int, parts: list[Numbering], mesh: OrientedMesh) -> list[set[tuple[int, ...]]]:
@@ -100,7 +105,7 @@ def _shuffled(part: Numbering, rng: np.random.Generator) -> Numbering:
     return Numbering(order, rows, edges[rows])
 
 
-def _cells(reading: Reading, numbering: Numbering) -> set[tuple[int, ...]]:
+def cells_of(reading: Reading, numbering: Numbering) -> set[tuple[int, ...]]:
     """However they were put together."""
     n = reading.candidates.n_vertices
     vanished = ~contains(pair_keys(n, *reading.candidates.edges.T), pair_keys(n, *reading.edges.T))
