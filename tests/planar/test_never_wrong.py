@@ -79,7 +79,7 @@ def redundancy():
 CHECKED = np.flatnonzero(redundancy() > 0.2)  # errors of the others hide in the position of a vertex
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15, deadline=None, derandomize=True)
 @given(edge=st.sampled_from(CHECKED.tolist()), exponent=st.floats(-7.5, -0.5), sign=st.sampled_from([-1, 1]))
 def test_any_entry_changed_by_any_amount(edge, exponent, sign):
     """Of size one, that is: the change is relative to the typical entry."""
@@ -94,7 +94,7 @@ def test_any_entry_changed_by_any_amount(edge, exponent, sign):
     assert "entry of rows" in found.reason or "turned over" in found.reason
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10, deadline=None, derandomize=True)
 @given(first=st.integers(0, len(EDGES) - 1), second=st.integers(0, len(EDGES) - 1), refine=st.booleans())
 def test_two_entries_swapped(first, second, refine):
     a, b = (tuple(map(int, EDGES[k])) for k in (first, second))
