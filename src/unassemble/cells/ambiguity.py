@@ -18,7 +18,7 @@ from .hubs import Hub, hubs, rearranged
 from .loose import is_loose, other_reading
 from .other_scales import other_scales
 from .regrouped import fitting, regrouped
-from .rereading import other_readings, own_cells
+from .rereading import other_readings
 from .twins import twins
 
 AGREE = 1e-9
@@ -54,10 +54,6 @@ def alternatives(
     found: list[Alternative] = []
     if len(topology.vanished) > (topology.polygons.size - 3).sum():  # not on diagonals only
         found = _by_rules(stored, topology, mesh, factors, scale_known=scale is not None, agree=agree)
-        if not found and scale is None:
-            found = other_scales(
-                stored, topology, own_cells(mesh), factors, list(hubs(Corners.of(stored.n, stored.edges, mesh), mesh.z))
-            )
     return found or other_readings(stored, mesh, factors, scale)
 
 
@@ -80,7 +76,10 @@ def _by_rules(
     if not scale_known:
         found += _loose_pieces(stored, topology, corners, around)
         found += as_one_piece(stored, topology, corners, around)
-    return _each_once(found or regrouped(stored, mesh, corners, factors, agree))
+    found = found or regrouped(stored, mesh, corners, factors, agree)
+    if not found and not scale_known:
+        found = other_scales(stored, topology, mesh, factors, around)
+    return _each_once(found)
 
 
 def _loose_pieces(stored: OperatorMatrix, topology: Topology, corners: Corners, around: list[Hub]) -> list[Alternative]:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from ..matrix import OperatorMatrix
 from ..topology import Topology
+from .doubt import components_of
 
 _EQUAL = 1e-9
 
@@ -27,9 +26,8 @@ def coincident(stored: OperatorMatrix, topology: Topology) -> NDArray[np.bool_]:
     topology : Topology
         Of the mesh that was found.
     """
-    n = stored.n
-    graph = sp.coo_array((np.ones(len(stored.edges)), stored.edges.T), shape=(n, n))
-    count, label = csgraph.connected_components(graph, directed=False)
+    label = components_of(stored)
+    count = int(label.max()) + 1
     lowest, highest = np.full(count, np.inf), np.full(count, -np.inf)
     owner = label[stored.edges[:, 0]]
     np.minimum.at(lowest, owner, stored.entries)

@@ -17,13 +17,12 @@ from ..topology import Numbering, Piece, Polygons, Topology, components
 from ..topology.cycles import three_cycles
 from .cell_set import CellSet
 from .corners import Alternative
+from .covering import MOST_VERTICES
 from .peeling import scales_of_lone_triangles
 from .reading import Reading
-from .search import read_cells
+from .rereading import cells_of, with_another_scale
 
-_MOST_VERTICES = 400
 _MOST_TRIALS = 60
-_SAME_SCALE = 1e-6
 
 
 def filled_holes(stored: OperatorMatrix, topology: Topology, factors: NDArray) -> list[Alternative]:
@@ -50,7 +49,7 @@ def filled_holes(stored: OperatorMatrix, topology: Topology, factors: NDArray) -
         suspects = list(_suspects(pieces))
         if not suspects:
             continue
-        if len(part.vertices) > _MOST_VERTICES:
+        if len(part.vertices) > MOST_VERTICES:
             found.append(_without(suspects[:1], tested=False))
             continue
         triangles = np.concatenate([piece.vertices[piece.triangles] for piece in pieces])
@@ -80,14 +79,11 @@ def _holes(
         if Reading.of(some, np.ones(len(rest), dtype=bool)).fits:
             return [triangle]
     _, opposite = three_cycles(n, part.edges)
-    for other in scales_of_lone_triangles(opposite, weights):
-        if abs(other / c - 1) > _SAME_SCALE:
-            reading = read_cells(n, part.edges, weights, other)
-            if reading is not None and reading.fits:
-                cells = reading.candidates.cells.chosen(reading.labels, part.vertices)
-                kept = {tuple(sorted(cell.tolist())) for cell in np.split(cells.vertices, cells.offsets[1:-1])}
-                return [triangle for triangle in suspects if triangle not in kept] or suspects[:1]
-    return []
+    reading = with_another_scale(part, weights, c, scales_of_lone_triangles(opposite, weights))
+    if reading is None:
+        return []
+    kept = cells_of(reading, part)
+    return [triangle for triangle in suspects if triangle not in kept] or suspects[:1]
 
 
 def _suspects(pieces: Sequence[Piece]) -> Iterator[tuple[int, ...]]:

@@ -12,22 +12,20 @@ from numpy.typing import NDArray
 from ..matrix import OperatorMatrix
 from ..topology import Topology, components
 from .agreement import common_values
-from .corners import Alternative
+from .corners import Alternative, OrientedMesh
 from .covering import MOST_VERTICES
 from .hinged import all_loose
 from .hubs import Hub
-from .rereading import cells_of
-from .search import read_cells
+from .rereading import cells_of, own_cells, with_another_scale
 from .shapes import Shapes
 
 _MOST_SHAPES = 3000
 _MOST_SCALES = 4
 _AGREE = 1e-9
-_SAME_SCALE = 1e-6
 
 
 def other_scales(
-    stored: OperatorMatrix, topology: Topology, own: set[tuple[int, ...]], factors: NDArray, hubs: list[Hub]
+    stored: OperatorMatrix, topology: Topology, mesh: OrientedMesh, factors: NDArray, hubs: list[Hub]
 ) -> list[Alternative]:
     """One alternative for each component of loose pieces that fits with another c in which its numbers agree.
 
@@ -36,32 +34,30 @@ def other_scales(
     stored : OperatorMatrix
         Without the vanished entries.
     topology : Topology
-    own : set of tuple
-        Cells of the mesh that was found.
+        Of the mesh that was found.
+    mesh : OrientedMesh
     factors : (n,) float64
         c of the piece of each row.
     hubs : list of Hub
         Vertices that right angles surround.
     """
-    found = []
+    parts = []
     for part in components(stored.n, stored.edges):
-        n = len(part.vertices)
         inside = np.zeros(stored.n, dtype=bool)
         inside[part.vertices] = True
         pieces = [piece for piece in topology.pieces if inside[piece.vertices[0]]]
-        if n > MOST_VERTICES or len(pieces) < 2 or not all_loose(pieces, hubs):
-            continue
+        if len(part.vertices) <= MOST_VERTICES and len(pieces) > 1 and all_loose(pieces, hubs):
+            parts.append(part)
+    found = []
+    for part, own in zip(parts, own_cells(stored.n, parts, mesh), strict=True):
         weights = -stored.entries[part.edge_rows]
-        shapes = Shapes.of(n, part.edges, _MOST_SHAPES)
-        c = factors[part.vertices[0]]
-        for other in _of_right_angles(shapes, weights) if shapes is not None and len(shapes) else []:
-            if abs(other / c - 1) > _SAME_SCALE:
-                reading = read_cells(n, part.edges, weights, other)
-                if reading is not None and reading.fits:
-                    cells, here = cells_of(reading, part), {cell for cell in own if inside[cell[0]]}
-                    gone, new = tuple(sorted(here - cells)), tuple(sorted(cells - here))
-                    found.append(Alternative((), (), (), gone, new, same_scale=False))
-                    break
+        shapes = Shapes.of(len(part.vertices), part.edges, _MOST_SHAPES)
+        scales = _of_right_angles(shapes, weights) if shapes is not None and len(shapes) else []
+        reading = with_another_scale(part, weights, factors[part.vertices[0]], scales)
+        if reading is not None:
+            cells = cells_of(reading, part)
+            gone, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
+            found.append(Alternative((), (), (), gone, new, same_scale=False))
     return found
 
 

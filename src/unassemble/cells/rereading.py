@@ -36,7 +36,7 @@ def other_readings(
     small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= _MOST_VERTICES]
     n_orders = int(np.clip(_WORK // max(sum(len(part.vertices) for part in small), 1), 1, _ORDERS))
     half = _with_vanished_sides(stored, mesh)
-    for part, own in zip(small, _own_cells(stored.n, small, mesh), strict=True):
+    for part, own in zip(small, own_cells(stored.n, small, mesh), strict=True):
         supposed = bool(half[part.vertices].any())
         for _ in range(n_orders):
             shuffled = part.then(_shuffled(part, rng))
@@ -77,12 +77,7 @@ def _other_reading(
     return None
 
 
-def own_cells(mesh: OrientedMesh) -> set[tuple[int, ...]]:
-    """Triangles and polygons, each as its rows in increasing order."""
-    return set(map(_cell, mesh.triangles.tolist())) | _polygons(mesh.polygons.offsets, mesh.polygons.vertices)
-
-
-def _own_cells(n: int, parts: list[Numbering], mesh: OrientedMesh) -> list[set[tuple[int, ...]]]:
+def own_cells(n: int, parts: list[Numbering], mesh: OrientedMesh) -> list[set[tuple[int, ...]]]:
     """The cells of each part of the graph."""
     label = np.full(n, -1)
     for k, part in enumerate(parts):
@@ -94,6 +89,16 @@ def _own_cells(n: int, parts: list[Numbering], mesh: OrientedMesh) -> list[set[t
     for cell in (*map(_cell, triangles.tolist()), *_polygons(polygons.offsets, polygons.vertices)):
         own[label[cell[0]]].add(cell)
     return own
+
+
+def with_another_scale(part: Numbering, weights: NDArray, c: float, others: list[float]) -> Reading | None:
+    """A reading that fits with the first of some factors that allows one, c left out."""
+    for other in others:
+        if abs(other / c - 1) > _SAME_SCALE:
+            reading = read_cells(len(part.vertices), part.edges, weights, other)
+            if reading is not None and reading.fits:
+                return reading
+    return None
 
 
 def _shuffled(part: Numbering, rng: np.random.Generator) -> Numbering:
