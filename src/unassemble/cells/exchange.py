@@ -18,7 +18,7 @@ from ..errors import RecoveryError
 from ..planar.piece import PieceMesh
 from .candidates import Candidates
 from .fitting import Fitted, cost, fitted
-from .neighbourhood import Neighbourhoods, Trial
+from .neighbourhood import Neighbourhoods, Trial, adjacent_to
 from .reading import Reading
 from .reopening import REOPENINGS, reopened
 from .sheet import Placed, Sheet
@@ -206,16 +206,9 @@ class Exchange:
                 break
             if used[sheet.edges[e]].any():
                 continue
-            facing = near.facing_edge.indices[near.facing_edge.indptr[e] : near.facing_edge.indptr[e + 1]]
-            corners = np.unique(sheet.triangles[facing])
-            around = np.unique(
-                np.concatenate(
-                    [
-                        near.around_vertex.indices[near.around_vertex.indptr[v] : near.around_vertex.indptr[v + 1]]
-                        for v in corners.tolist()
-                    ]
-                )
-            )
+            corners = np.unique(sheet.triangles[adjacent_to(near.facing_edge, np.array([e]))])
+            around = adjacent_to(near.around_vertex, corners)
             used[sheet.triangles[around]] = True
-            places.append(np.unique(sheet.cell[around]).tolist())
+            if len(around):  # no candidate may have the edge
+                places.append(np.unique(sheet.cell[around]).tolist())
         return places

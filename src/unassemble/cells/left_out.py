@@ -27,7 +27,8 @@ from ..linalg.upper import UpperTriangle
 from .evidence import Linear, explanations
 from .reading import Reading
 
-_ASKED = 200  # candidates of a piece, those with the largest misfits
+_ASKED = 200  # candidates of a piece, those of whose sides one alone takes most off the misfit
+_PROBES = 32  # random vectors that estimate the diagonal of P to a quarter or so
 _PAIRED = 16  # of which pairs are made
 _KEPT = 8  # candidates, and pairs, to be tried
 _ANGLES = 0.3  # what the sum of angles may differ from pi, in units of pi: displacements are not small
@@ -78,8 +79,15 @@ class _Sides:
         solver = factorisation(normal)
         try:
             solver.factorise(normal)
-            left = linear.misfit - linear.motion @ solver.solve(linear.motion.T @ linear.misfit)
-            candidate, rows, angle = _asked(reading, linear, left)
+
+            def off(vectors: NDArray) -> NDArray:
+                return np.asarray(vectors - linear.motion @ solver.solve(linear.motion.T @ vectors))
+
+            left = off(linear.misfit)
+            # P is a projection: its diagonal is the mean square of what it makes of normal random numbers.
+            probes = off(np.random.default_rng(0).standard_normal((len(left), _PROBES)))
+            taken = left**2 / np.maximum((probes**2).mean(axis=1), _DETERMINED)
+            candidate, rows, angle = _asked(reading, linear, taken)
             if not len(candidate):
                 return None
             used, place = np.unique(np.concatenate(rows), return_inverse=True)
@@ -129,8 +137,10 @@ class _Sides:
         return float(half @ left), fits
 
 
-def _asked(reading: Reading, linear: Linear, left: NDArray) -> tuple[NDArray, list[NDArray], NDArray]:
+def _asked(reading: Reading, linear: Linear, taken: NDArray) -> tuple[NDArray, list[NDArray], NDArray]:
     """Candidates, the rows of their sides, and what their angles add up to.
+
+    First come those with sides that take most off the squared misfit, (m,), when they are left out alone.
 
     The side of a cell that has vanished from the boundary faces a right angle: it has an entry, zero, if the cell is
     there, and none otherwise.
@@ -149,7 +159,7 @@ def _asked(reading: Reading, linear: Linear, left: NDArray) -> tuple[NDArray, li
     following[last] = cells.offsets[chosen]
     ends = cells.vertices[at], cells.vertices[following]
     row = np.asarray(row_of[np.minimum(*ends), np.maximum(*ends)]).ravel() - 1
-    share = np.bincount(owner, np.where(row >= 0, left[row], 0) ** 2, len(chosen)) / size
+    share = np.bincount(owner, np.where(row >= 0, taken[row], 0), len(chosen)) / size
     kept = np.sort(np.argsort(-share, kind="stable")[:_ASKED])
     missing = np.bincount(owner, row < 0, len(chosen))
     kept = kept[(missing[kept] <= 1) & (share[kept] > 0)]

@@ -22,6 +22,7 @@ MOST_VERTICES = 20_000
 """Up to which labels are relaxed and exchanged."""
 _WIDE = 20  # vertices of the largest piece for which it is worth its while
 _SOLVES = 20  # that this is worth
+_SOUND = 0.5  # cost, relative to the hopeless one, of labels to go on with where paths are hopeless
 _NEAR = 0.95  # strength of the first labels
 _SHORT = Path(first=0.1, slack=0.01)
 _TRIALS, _TRIALS_PER_VERTEX = 6000, 10  # the lesser number is made: some twenty times what relaxations cost
@@ -83,18 +84,29 @@ def _relaxations(sheet: Sheet, labels: NDArray[np.bool_]) -> list[Fitted]:
     for aim, path in ((believed, Path()), (Aim(first, even), Path()), (Aim(first, even), _SHORT)):
         try:
             fit = _relaxed(sheet, aim, path)
+            if fit is not None and fit.cost > HOPELESS * len(sheet.edges) and not found:
+                raise HopelessError
         except HopelessError:
             if not found:
-                raise
+                return [_unrelaxed(sheet, labels)]
             break
         if fit is None:
             break
-        if fit.cost > HOPELESS * len(sheet.edges) and not found:
-            raise HopelessError
         found.append(fit)
         if fit.cost <= NEARLY * len(sheet.edges):
             break
     return sorted(found, key=lambda fit: fit.cost)
+
+
+def _unrelaxed(sheet: Sheet, labels: NDArray[np.bool_]) -> Fitted:
+    """The labels themselves, which may be better than where paths lead."""
+    try:
+        fit = fitted(sheet, labels, sheet.mapped(labels.astype(np.float64)))
+    except RecoveryError as error:
+        raise HopelessError from error
+    if fit.cost > _SOUND * HOPELESS * len(sheet.edges):
+        raise HopelessError
+    return fit
 
 
 def _prices(sheet: Sheet, labels: NDArray[np.bool_]) -> NDArray[np.float64]:

@@ -74,7 +74,7 @@ class Neighbourhoods:
     def with_rivals(self, labels: NDArray[np.bool_], cells: Sequence[int]) -> tuple[int, ...]:
         """The cells, and those that have to give way to the new ones among them."""
         new = [k for k in cells if not labels[k]]
-        rivals = _rows(self._rivals, np.array(new, dtype=np.int64)) if new else np.empty(0, np.int64)
+        rivals = adjacent_to(self._rivals, np.array(new, dtype=np.int64)) if new else np.empty(0, np.int64)
         gone = rivals[labels[rivals]]
         return tuple(sorted({*cells, *gone.tolist()}))
 
@@ -84,11 +84,11 @@ class Neighbourhoods:
         They start from where they are or from the conformal map, whichever fits better; if `redrawn`, from both.
         """
         sheet = self._sheet
-        vertices = np.unique(sheet.triangles[_rows(self.of_cell, np.array(cells))])
+        vertices = np.unique(sheet.triangles[adjacent_to(self.of_cell, np.array(cells))])
         for _ in range(rings):
-            vertices = np.union1d(vertices, _rows(self.next_vertex, vertices))
-        rows = np.unique(sheet.row[_rows(self.around_vertex, vertices)])
-        triangles = _rows(self.facing_edge, rows)
+            vertices = np.union1d(vertices, adjacent_to(self.next_vertex, vertices))
+        rows = np.unique(sheet.row[adjacent_to(self.around_vertex, vertices)])
+        triangles = adjacent_to(self.facing_edge, rows)
         labels = fit.labels.copy()
         labels[list(cells)] ^= True
         patch = _Patch(sheet, fit.placed, labels, vertices, rows, triangles, self._local)
@@ -216,7 +216,7 @@ def _incidence(row: NDArray, column: NDArray, shape: tuple[int, int]) -> sp.csr_
     return sp.csr_array((np.ones(len(row)), (row, column)), shape=shape)
 
 
-def _rows(matrix: sp.csr_array, rows: NDArray) -> NDArray[np.int64]:
-    """Distinct columns of some rows."""
+def adjacent_to(matrix: sp.csr_array, rows: NDArray) -> NDArray[np.int64]:
+    """Distinct columns of some rows (k,) of an incidence matrix."""
     parts = [matrix.indices[matrix.indptr[k] : matrix.indptr[k + 1]] for k in rows.tolist()]
     return np.unique(np.concatenate(parts)).astype(np.int64) if parts else np.empty(0, np.int64)

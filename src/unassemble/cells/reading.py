@@ -230,6 +230,8 @@ def _solved(piece: Piece, weights: NDArray) -> PieceMesh | None:
 
 
 def _key_of(piece: Piece) -> bytes:
-    """The same for the same triangles."""
-    triangles = np.sort(piece.vertices[piece.triangles], axis=1)
+    """The same for the same triangles in the same orientation, which positions go with."""
+    triangles = piece.vertices[piece.triangles]
+    first = triangles.argmin(axis=1)[:, None]
+    triangles = np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1)
     return triangles[np.lexsort(triangles.T)].tobytes()

@@ -31,6 +31,7 @@ _DRAWINGS = 3  # that a graph may have, about
 _LAST = 60  # solves for small changes of the best reading, when all others are spent
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
+_CLOSE, _SOON = 0.15, 0.1  # misfit of starts with few wrong labels, and the part of them for a short repair of each
 
 
 @dataclass(frozen=True)
@@ -132,6 +133,14 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
         return Begun(starts[:1], settled=True)
     likeliest = next((start for start in starts if start.pieces), None)
     starts = sorted(starts, key=lambda reading: reading.size)[:_STARTS]
+    for start in starts:
+        if start.size > _CLOSE:
+            break
+        share = effort.share(_SOON)
+        soon = _repaired(start, share)
+        effort.give_back(share)
+        if soon.fits:
+            return Begun([soon], settled=True)
     for k, start in enumerate(starts):
         starts[k] = _turned_over(start, effort, turns // len(starts))
         if starts[k].fits:
@@ -161,7 +170,7 @@ def _finished(best: Reading | None, begun: Begun, effort: Effort) -> Reading | N
         best = _better(best, start if start.like_noise else _repaired(start, share))
         if best.fits or best.like_noise:
             return best
-        effort.solves += max(share.solves, 0)
+        effort.give_back(share)
         number += 1
         if likeliest is not None:  # on large graphs this costs more than repairs
             starts, likeliest = _with_mended(starts, likeliest, effort, 0), None
