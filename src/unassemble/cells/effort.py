@@ -41,10 +41,6 @@ class Effort:
         self.solves -= solves
         return Effort(solves, self.known)
 
-    def give_back(self, share: Effort) -> None:
-        """What is left of a share."""
-        self.solves += max(share.solves, 0)
-
     @property
     def spent(self) -> bool:
         """Whether it is time to give up."""

@@ -25,7 +25,7 @@ _LIKELY = 100  # cells that take part in exchanges
 
 
 def proposals(reading: Reading, changes: NDArray) -> Iterator[NDArray[np.bool_]]:
-    """Labels to try: all clear changes together, single ones, exchanges of a cell and a hole; each once.
+    """Labels to try: all clear changes together, single ones, exchanges of a cell and an empty candidate; each once.
 
     Parameters
     ----------
@@ -40,7 +40,13 @@ def proposals(reading: Reading, changes: NDArray) -> Iterator[NDArray[np.bool_]]
     if top > 0:
         clear = np.flatnonzero(gain >= (max(_CLEAR, 0.6 * top) if top > _CLEAR else 0.7 * top))
     seen = {reading.labels.tobytes()}
-    for turned in chain([clear], left_out(reading), _singles(reading, gain, nearby), _exchanges(reading, gain, nearby)):
+    for turned in chain(
+        [clear],
+        left_out(reading),
+        _moved_corners(reading, nearby),
+        _singles(reading, gain, nearby),
+        _exchanges(reading, gain, nearby),
+    ):
         labels = _turned(reading, changes, turned)
         if labels.tobytes() not in seen:
             seen.add(labels.tobytes())
@@ -56,13 +62,33 @@ def _misfit_nearby(reading: Reading) -> NDArray[np.float64]:
     return np.bincount(owner, at_vertex[cells.vertices], cells.count) / cells.size
 
 
+def _moved_corners(reading: Reading, nearby: NDArray) -> Iterator[NDArray[np.int64]]:
+    """A right angle that is to move to the other side of an edge which ends there: both candidates fit that one."""
+    candidates = reading.candidates
+    corner = np.flatnonzero(candidates.corner)
+    a, apex, b = (candidates.cells.vertices[candidates.cells.offsets[corner] + k] for k in range(3))
+    last = np.bincount(candidates.edges.ravel(), minlength=candidates.n_vertices) == 1
+    loose, far = np.concatenate([np.column_stack([last[a], a]), np.column_stack([last[b], b])]).T
+    corner, apex = np.tile(corner, 2)[loose > 0], np.tile(apex, 2)[loose > 0]
+    end = far[loose > 0]
+    full = reading.labels[corner]
+    pairs = np.array(
+        [
+            (one, other)
+            for one, tip in zip(corner[full], end[full], strict=True)
+            for other in corner[~full & (end == tip)]
+        ],
+        dtype=np.int64,
+    ).reshape(-1, 2)
+    yield from pairs[np.argsort(-nearby[pairs].sum(axis=1), kind="stable")[:_SINGLES]]
+
+
 def _singles(reading: Reading, gain: NDArray, nearby: NDArray) -> Iterator[NDArray[np.int64]]:
-    faces = np.where(reading.candidates.corner | reading.candidates.outer, 0.0, nearby)
-    by_gain = np.argsort(-gain, kind="stable")[:_SINGLES]
-    by_misfit = np.argsort(-faces, kind="stable")[:_SINGLES]
-    for one, other in zip(by_gain, by_misfit, strict=True):
-        yield np.array([one])
-        yield np.array([other])
+    """Those with the clearest changes, the faces and the corners amid the largest misfits."""
+    corner = reading.candidates.corner
+    faces = np.where(corner | reading.candidates.outer, 0.0, nearby)
+    for some in zip(*(np.argsort(-score, kind="stable")[:_SINGLES] for score in (gain, faces, nearby * corner))):
+        yield from (np.array([one]) for one in some)
 
 
 def _exchanges(reading: Reading, gain: NDArray, nearby: NDArray) -> Iterator[NDArray[np.int64]]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import heapq
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +29,13 @@ _log = logging.getLogger(__name__)
 
 _STARTS = 2  # readings to begin with that are worth repairing
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
+_BATCH, _IN_VAIN = 8, 100  # small changes of one reading that are tried at a time, and of all without an improvement
+_UPHILL = 1.5  # misfit, relative to the best, of readings that are changed further
 _DRAWINGS = 3  # that a graph may have, about
 _LAST = 60  # solves for small changes of the best reading, when all others are spent
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
-_CLOSE, _SOON = 0.15, 0.1  # misfit of starts with few wrong labels, and the part of them for a short repair of each
+_CLOSE, _SOON = 0.15, 0.3  # misfit of starts with few wrong labels, and what part of them a first repair may take more
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,10 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
                 return best
             if not covered:  # in no drawing, so only once
                 covered = True
+                if best is not None and best.size < _CLOSE:  # covers take longer than a few small changes
+                    best = _descent(best, Effort(_LAST))
+                    if best.fits:
+                        return best
                 cover = read_by_cover(n, edges, weights, scale)
                 if cover is not None:
                     return cover
@@ -136,9 +144,7 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
     for start in starts:
         if start.size > _CLOSE:
             break
-        share = effort.share(_SOON)
-        soon = _repaired(start, share)
-        effort.give_back(share)
+        soon = _repaired(start, Effort(int(_SOON * effort.solves), effort.known))
         if soon.fits:
             return Begun([soon], settled=True)
     for k, start in enumerate(starts):
@@ -170,7 +176,7 @@ def _finished(best: Reading | None, begun: Begun, effort: Effort) -> Reading | N
         best = _better(best, start if start.like_noise else _repaired(start, share))
         if best.fits or best.like_noise:
             return best
-        effort.give_back(share)
+        effort.solves += max(share.solves, 0)
         number += 1
         if likeliest is not None:  # on large graphs this costs more than repairs
             starts, likeliest = _with_mended(starts, likeliest, effort, 0), None
@@ -249,15 +255,39 @@ def _leaps(reading: Reading, effort: Effort) -> Reading:
 
 
 def _descent(reading: Reading, effort: Effort) -> Reading:
-    """Small changes, each of which lowers the misfit."""
-    while reading.pieces and not reading.fits and not effort.spent:
-        changes = np.nan_to_num(label_changes(reading))
-        for labels in proposals(reading, changes):
+    """Small changes, the likeliest first, from the best of all readings that they have led to.
+
+    The last wrong labels may have to be put right together: a change for the better can raise the misfit a little. So
+    of the changes of each reading a few are tried, then a few of another that is as good.
+    """
+    best, in_vain = reading, 0
+    seen = {reading.labels.tobytes()}
+    # Misfit times what has been tried of it in units of a batch, a number that settles ties, and the changes.
+    waiting = [(reading.size, 0, reading, _changed(reading))]
+    while waiting and best.pieces and not (best.fits or effort.spent) and in_vain < _IN_VAIN:
+        value, number, reading, changed = heapq.heappop(waiting)
+        if reading.size > _UPHILL * best.size:
+            continue
+        some = list(islice(changed, _BATCH))
+        for labels in some:
+            if labels.tobytes() in seen or effort.spent:
+                continue
+            seen.add(labels.tobytes())
             trial = effort.reading(reading.candidates, labels)
-            if trial.size < reading.size or effort.spent:
+            in_vain = 0 if trial.size < best.size else in_vain + 1
+            best = _better(best, trial)
+            if trial.size <= _UPHILL * best.size:
+                heapq.heappush(waiting, (trial.size, len(seen), trial, _changed(trial)))
+            if trial.size < reading.size:
                 break
         else:
-            return reading
-        reading = _better(reading, trial)
-        _log.debug("descent: misfit %.1e", reading.size)
-    return reading
+            value += reading.size
+        if some:
+            heapq.heappush(waiting, (value, number, reading, changed))
+    _log.debug("descent: misfit %.1e", best.size)
+    return best
+
+
+def _changed(reading: Reading) -> Iterator[NDArray[np.bool_]]:
+    """Small changes of the labels of a reading; nothing is computed before the first is asked for."""
+    yield from proposals(reading, np.nan_to_num(label_changes(reading)))
