@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from dense_mesh import signed_areas
+from domains import bisected, cut_cells, stairs
 from meshes import delaunay, random_mesh
 from vanishing import Mesh, refined, squares, triangular_holes, used
 
@@ -137,6 +138,9 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Mesh]] = {
         polygon,
         scattered,
         integer,
+        cut_cells,
+        stairs,
+        bisected,
     )
 }
 

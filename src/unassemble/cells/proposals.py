@@ -84,10 +84,11 @@ def _moved_corners(reading: Reading, nearby: NDArray) -> Iterator[NDArray[np.int
 
 
 def _singles(reading: Reading, gain: NDArray, nearby: NDArray) -> Iterator[NDArray[np.int64]]:
-    """Those with the clearest changes, the faces and the corners amid the largest misfits."""
-    corner = reading.candidates.corner
-    faces = np.where(corner | reading.candidates.outer, 0.0, nearby)
-    for some in zip(*(np.argsort(-score, kind="stable")[:_SINGLES] for score in (gain, faces, nearby * corner))):
+    """Those with the clearest changes; faces, corners that are cells, and others, amid the largest misfits."""
+    corner, labels = reading.candidates.corner, reading.labels
+    faces = ~corner & ~reading.candidates.outer
+    scores = (gain, *(np.where(which, nearby, 0.0) for which in (faces, corner & labels, corner & ~labels)))
+    for some in zip(*(np.argsort(-score, kind="stable")[:_SINGLES] for score in scores), strict=True):
         yield from (np.array([one]) for one in some)
 
 

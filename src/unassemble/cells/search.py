@@ -29,7 +29,8 @@ _log = logging.getLogger(__name__)
 
 _STARTS = 2  # readings to begin with that are worth repairing
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
-_BATCH, _IN_VAIN = 8, 100  # small changes of one reading that are tried at a time, and of all without an improvement
+_BATCH, _IN_VAIN = 24, 100  # small changes of a reading that are tried at a time, and of all without an improvement
+_TRIED = 0.25  # a reading with a batch tried is put off behind those with so much more misfit
 _UPHILL = 1.5  # misfit, relative to the best, of readings that are changed further
 _DRAWINGS = 3  # that a graph may have, about
 _LAST = 60  # solves for small changes of the best reading, when all others are spent
@@ -262,7 +263,7 @@ def _descent(reading: Reading, effort: Effort) -> Reading:
     """
     best, in_vain = reading, 0
     seen = {reading.labels.tobytes()}
-    # Misfit times what has been tried of it in units of a batch, a number that settles ties, and the changes.
+    # Misfit, more where batches have been tried, a number that settles ties, the reading and its changes.
     waiting = [(reading.size, 0, reading, _changed(reading))]
     while waiting and best.pieces and not (best.fits or effort.spent) and in_vain < _IN_VAIN:
         value, number, reading, changed = heapq.heappop(waiting)
@@ -281,7 +282,7 @@ def _descent(reading: Reading, effort: Effort) -> Reading:
             if trial.size < reading.size:
                 break
         else:
-            value += reading.size
+            value += _TRIED * reading.size
         if some:
             heapq.heappush(waiting, (value, number, reading, changed))
     _log.debug("descent: misfit %.1e", best.size)
