@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
+from irregular import largest_piece
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from dense_mesh import signed_areas
-from irregular import largest_piece
 from vanishing import Mesh, used
 
 _LEAST = 0.05  # part of an edge on either side of a cut
@@ -43,7 +45,7 @@ def cut_cells(rng: np.random.Generator) -> Mesh:
         for one, other in zip(square, np.roll(square, -1), strict=True):
             corners += [one] if side[one] > 0 else []
             corners += [cut(one, other)] if (side[one] > 0) != (side[other] > 0) else []
-        triangles += [(corners[0], *pair) for pair in zip(corners[1:], corners[2:], strict=False)]
+        triangles += [(corners[0], *pair) for pair in pairwise(corners[1:])]
     return used(np.array(points), np.array(triangles))
 
 

@@ -4,7 +4,7 @@ import networkx
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from families import integer
@@ -88,9 +88,10 @@ def test_polygons_are_counter_clockwise_cells():
     assert any("29 cells" in warning for warning in found.warnings)
 
 
-# The same examples on every run: some such grids (seed 47 with width 0.3125, for one) are not read, and say so.
+# The same examples on every run; in the one named the way to the right cells leads past better drawings of wrong ones.
 @settings(max_examples=12, deadline=None, derandomize=True)
 @given(st.integers(0, 10**6), st.floats(0.3, 3))
+@example(47, 0.3125)
 def test_random_grids(seed, width):
     """Sets of rectangles that hang together by their sides."""
     rng = np.random.default_rng(seed)
