@@ -7,25 +7,22 @@ from numpy.typing import NDArray
 from families import FAMILIES
 from meshes import largest_error, random_mesh, specimen
 from unassemble import recover
-from unassemble.cells.candidates import Candidates
 from unassemble.cells.cell_set import CellSet
-from unassemble.cells.exchange import Exchange
-from unassemble.cells.fitting import fitted
 from unassemble.cells.left_out import left_out
 from unassemble.cells.reading import Reading
 from unassemble.cells.search import read_cells
-from unassemble.cells.sheet import Placed, Sheet
 from unassemble.matrix import check_matrix
 from unassemble.planar.piece import PieceMesh
 from unassemble.topology import Polygons
-from unassemble.topology.embedding import face_complexes
 from vanishing import area, forgotten
 
 
 # Corners of a twentieth of a square; a cell across the mouth of a slit; corners that have to change places.
-@pytest.mark.parametrize(("family", "seed"), [("cut_cells", 2), ("bisected", 5), ("stairs", 6)])
+@pytest.mark.parametrize(("family", "seed"), [("cut_cells", 4), ("bisected", 5), ("stairs", 6)])
 def test_domain(family, seed):
-    known = forgotten(specimen(*FAMILIES[family](np.random.default_rng(seed)), c=-2.5, seed=seed))
+    rng = np.random.default_rng(seed)
+    c = float(rng.choice([1.0, -2.5, 1e-3]))  # as benchmarks/cells.py draws them
+    known = forgotten(specimen(*FAMILIES[family](rng), c=c, seed=seed))
     found = recover(known.matrix)
     assert found.certified, found.reason
     assert largest_error(found.points, known.points) <= 1e-10
@@ -55,26 +52,10 @@ def test_corners_that_hardly_matter_are_asked_of():
     cells = right.candidates.cells
     corner = np.flatnonzero(right.labels & right.candidates.corner)
     tiny = [k for k in corner if area(known.points, cells.vertices[cells.offsets[k] :][:3][None]) < 0.02]
-    assert len(tiny) >= 5
+    assert len(tiny) >= 4
     named = 0
     for k in tiny:
         labels = right.labels.copy()
         labels[k] = False
         named += (k,) in [tuple(some) for some in left_out(Reading.of(right.candidates, labels))]
-    assert named >= 0.7 * len(tiny)
-
-
-def test_edges_of_no_candidate_are_no_place_for_a_search():
-    """A bridge between meshes: no cell can have it."""
-    points, triangles = random_mesh(40, holes=False)
-    known = specimen(points, triangles)
-    n, edges, weights = graph(known)
-    edges = np.concatenate([edges, edges + n, [[n - 1, n]]])
-    order = np.lexsort(edges.T[::-1])
-    edges, weights = edges[order], np.concatenate([weights, weights, [10.0]])[order]
-    candidates = Candidates.of(next(iter(face_complexes(2 * n, edges))), weights)
-    sheet = Sheet(candidates, 1.0)
-    labels = candidates.first & (candidates.size == 3)
-    fit = fitted(sheet, labels, Placed(np.tile(known.points @ [1, 1j], 2), 1.0))
-    exchange = Exchange(sheet, labels, 10)
-    assert exchange.settled(fit, deep=True).cost <= fit.cost
+    assert named >= 0.75 * len(tiny)
