@@ -31,7 +31,6 @@ _STARTS = 2  # readings to begin with that are worth repairing
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 _BATCH, _IN_VAIN = 24, 100  # small changes of a reading that are tried at a time, and of all without an improvement
 _TRIED = 0.25  # a reading with a batch tried is put off behind those with so much more misfit
-_UPHILL = 1.5  # misfit, relative to the best, of readings that are changed further
 _DRAWINGS = 3  # that a graph may have, about
 _LAST = 60  # solves for small changes of the best reading, when all others are spent
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
@@ -259,7 +258,7 @@ def _descent(reading: Reading, effort: Effort) -> Reading:
     """Small changes, the likeliest first, from the best of all readings that they have led to.
 
     The last wrong labels may have to be put right together: a change for the better can raise the misfit a little. So
-    of the changes of each reading a few are tried, then a few of another that is as good.
+    of the changes of each reading a few are tried, then a few of another that is about as good.
     """
     best, in_vain = reading, 0
     seen = {reading.labels.tobytes()}
@@ -267,23 +266,22 @@ def _descent(reading: Reading, effort: Effort) -> Reading:
     waiting = [(reading.size, 0, reading, _changed(reading))]
     while waiting and best.pieces and not (best.fits or effort.spent) and in_vain < _IN_VAIN:
         value, number, reading, changed = heapq.heappop(waiting)
-        if reading.size > _UPHILL * best.size:
-            continue
-        some = list(islice(changed, _BATCH))
-        for labels in some:
+        asked = 0
+        for labels in islice(changed, _BATCH):
+            asked += 1
             if labels.tobytes() in seen or effort.spent:
                 continue
             seen.add(labels.tobytes())
             trial = effort.reading(reading.candidates, labels)
             in_vain = 0 if trial.size < best.size else in_vain + 1
             best = _better(best, trial)
-            if trial.size <= _UPHILL * best.size:
+            if trial.pieces:
                 heapq.heappush(waiting, (trial.size, len(seen), trial, _changed(trial)))
             if trial.size < reading.size:
                 break
         else:
             value += _TRIED * reading.size
-        if some:
+        if asked:
             heapq.heappush(waiting, (value, number, reading, changed))
     _log.debug("descent: misfit %.1e", best.size)
     return best
