@@ -60,7 +60,7 @@ def solve(
             return error
 
     with clock(method):
-        doubtful = in_doubt(matrix, topology, start)
+        doubtful = in_doubt(matrix, topology, start, scale)
         spoilt: dict[Piece, PieceMesh] = {}
         if doubtful.any():
             spoilt, doubtful = wrong_entries(matrix, topology, start, doubtful, scale)
