@@ -65,13 +65,18 @@ def _in_component(
         (piece for piece in pieces if (misfit[piece.edge_rows] > FITS).any()), key=lambda piece: piece.n_vertices
     )
     found: dict[Piece, PieceMesh] = {}
+    aside = [np.empty(0, dtype=np.int64)]
     for piece in wrong:
         start = meshes[piece]
         z = start.z if isinstance(start, PieceMesh) else None
         mesh = _without_few(piece, -matrix.entries[piece.edge_rows], z, scale)
-        if mesh is None or (mesh.aside is not None and not _apart(len(mesh.z), piece.edges, piece.edges[mesh.aside])):
+        if mesh is None:
             return None
         found[piece] = mesh
+        aside += [] if mesh.aside is None else [piece.edge_rows[mesh.aside]]
+        # Of all pieces together: the sides of a cell that is missing where two of them meet belong to both.
+        if not _apart(matrix.n, matrix.edges, matrix.edges[np.concatenate(aside)]):
+            return None
     scales = np.array([mesh.scale for mesh in (meshes | found).values() if isinstance(mesh, PieceMesh)])
     return found if np.abs(scales / scales[0] - 1).max() < _SAME_SCALE else None
 
