@@ -23,7 +23,7 @@ from .planar.piece import PieceMesh
 from .recovery import Recovery
 from .solving import solve
 from .topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
-from .verdict import all_alike, ambiguous, far_away, passes, verdict
+from .verdict import all_alike, ambiguous, far_away, passes, unproved, verdict
 
 _SIGMAS = 10.0  # noise by which numbers that a reading takes for equal may differ
 
@@ -98,18 +98,18 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     doubt = max(m.doubt for m in meshes)
     status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble, doubt)
     others: list[Alternative] = []
-    if status == "certified" and topology.method != "the numbers" and known is None:
+    if status == "certified" and known is None:
         others = filled_holes(stored, topology, stretch * mesh.scale[mesh.component])  # next to nothing on most meshes
-        if others:
-            status, reason = ambiguous(others, certificate)
-    elif status == "certified" and topology.method == "the numbers":
+    if status == "certified" and not others and topology.method == "the numbers":
         with clock("ambiguity"):
-            others = _alternatives(topology, stored, placement, mesh, stretch, noise, known)
+            others, left_open = _alternatives(topology, stored, placement, mesh, stretch, noise, known)
             by_coincidence = known is None and bool(coincident(stored, topology).any())
-        if others:
-            status, reason = ambiguous(others, certificate)
-        elif by_coincidence:
+        if by_coincidence and not others:
             status, reason = all_alike(certificate)
+        elif left_open and not others:
+            status, reason = unproved(certificate)
+    if others:
+        status, reason = ambiguous(others, certificate)
     distant = False
     if origins.any():
         near, (certificate, chi_square) = certificate, _held_against(stored, mesh, points, placement, noise, freedom)
@@ -160,8 +160,8 @@ def _alternatives(
     stretch: float,
     noise: float | None,
     known: float | None,
-) -> list[Alternative]:
-    """Other meshes that fit, in the frame in which the operator is the Laplacian."""
+) -> tuple[list[Alternative], bool]:
+    """Other meshes that fit, in the frame in which the operator is the Laplacian, and whether there may be more."""
     z = mesh.points @ [1, 1j]
     oriented = OrientedMesh(
         mesh.triangles[~mesh.in_polygon],

@@ -151,6 +151,15 @@ def all_alike(certificate: Certificate) -> tuple[str, str]:
     )
 
 
+def unproved(certificate: Certificate) -> tuple[str, str]:
+    """The status and reason of pieces that fit, as others may."""
+    return "uncertified", (
+        f"the mesh gives the matrix back to {certificate.backward_error:.1e}, but it has hardly more entries than "
+        "unknowns, and not all other cells that may have the same ones, with another factor c, could be tried: known, "
+        "it decides"
+    )
+
+
 def far_away(origins: NDArray, written: Certificate, near: Certificate) -> tuple[str, str]:
     """The status and reason of a mesh that fits until its coordinates are written, too far from the origin."""
     origin = complex(origins[np.abs(origins).argmax()])

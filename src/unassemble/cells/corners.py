@@ -115,8 +115,8 @@ class Corners:
     def __len__(self) -> int:
         return len(self.apex)
 
-    def chosen(self, which: NDArray[np.bool_]) -> Corners:
-        """Some of them."""
+    def chosen(self, which: NDArray) -> Corners:
+        """Some of them, by a mask or by their numbers."""
         return replace(
             self,
             apex=self.apex[which],

@@ -73,7 +73,7 @@ def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None) -> 
     c = np.array([mesh.scale for _, mesh in having])
     right = np.full(count, scale or 0.0)
     if scale is None:  # the last one counts
-        order = np.lexsort(([piece.n_vertices for piece, _ in having], ~loose))
+        order = np.lexsort((np.array([piece.n_vertices for piece, _ in having]), ~loose))
         right[own[order]] = c[order]
     apart = np.abs(c / right[own] - 1) > bound[own]
     wrong, hopeless = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
