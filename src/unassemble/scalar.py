@@ -98,11 +98,13 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     doubt = max(m.doubt for m in meshes)
     status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble, doubt)
     others: list[Alternative] = []
+    agree = AGREE if noise is None else max(AGREE, _SIGMAS * noise / float(np.abs(factors).min()))
     if status == "certified" and known is None:
-        others = filled_holes(stored, topology, stretch * mesh.scale[mesh.component])  # next to nothing on most meshes
+        factors_of_rows = stretch * mesh.scale[mesh.component]
+        others = filled_holes(stored, topology, factors_of_rows, agree)  # next to nothing on most meshes
     if status == "certified" and not others and topology.method == "the numbers":
         with clock("ambiguity"):
-            others, left_open = _alternatives(topology, stored, placement, mesh, stretch, noise, known)
+            others, left_open = _alternatives(topology, stored, placement, mesh, stretch, agree, known)
             by_coincidence = known is None and bool(coincident(stored, topology).any())
         if by_coincidence and not others:
             status, reason = all_alike(certificate)
@@ -158,7 +160,7 @@ def _alternatives(
     placement: Placement,
     mesh: JoinedMesh,
     stretch: float,
-    noise: float | None,
+    agree: float,
     known: float | None,
 ) -> tuple[list[Alternative], bool]:
     """Other meshes that fit, in the frame in which the operator is the Laplacian, and whether there may be more."""
@@ -170,8 +172,6 @@ def _alternatives(
         mesh.boundary_offsets,
         np.asarray(placement.tensor.to_laplacian(z) if placement.tensor else z, dtype=np.complex128),
     )
-    smallest = stretch * float(np.abs(mesh.scale).min())
-    agree = AGREE if noise is None else max(AGREE, _SIGMAS * noise / smallest)
     factors = stretch * mesh.scale[mesh.component]
     return alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
 

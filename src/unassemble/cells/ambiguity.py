@@ -74,7 +74,7 @@ def alternatives(
             found += as_one_piece(stored, topology, corners, closed)
         found = found or regrouped(stored, mesh, corners, factors, agree)
     if not found and scale is None:
-        found, left_open = other_scales(stored, topology, mesh, factors, closed)
+        found, left_open = other_scales(stored, topology, mesh, factors, closed, agree)
     return _each_once(found) or other_readings(stored, mesh, factors, scale), left_open
 
 

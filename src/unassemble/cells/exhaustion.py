@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from ..planar.piece import PieceMesh
 from ..topology import Numbering, Polygons
 from .cell_set import CellSet
-from .reading import FITS, Reading
+from .reading import NEARLY, Reading
 from .rereading import cells_of
 
 _MOST_CELLS = 100
@@ -32,8 +32,8 @@ class TooManyError(Exception):
     """Not all could be tried."""
 
 
-def all_readings(part: Numbering, weights: NDArray) -> Iterator[tuple[set[Cell], float]]:
-    """The cells, and the c, of every mesh that has these entries.
+def all_readings(part: Numbering, weights: NDArray, agree: float) -> Iterator[tuple[set[Cell], float]]:
+    """The cells, and the c, of every mesh that has these entries, or nearly.
 
     Parameters
     ----------
@@ -41,6 +41,8 @@ def all_readings(part: Numbering, weights: NDArray) -> Iterator[tuple[set[Cell],
         A component of the graph.
     weights : (e,) float64
         -A_ij of its edges.
+    agree : float
+        Relative difference of numbers that noise may cause.
 
     Raises
     ------
@@ -54,7 +56,7 @@ def all_readings(part: Numbering, weights: NDArray) -> Iterator[tuple[set[Cell],
     for chosen in choices:
         count = np.bincount(np.concatenate([choices.sides[k] for k in chosen]))
         lone = [c for k in chosen if (c := alone[k]) is not None and (count[choices.sides[k]] == 1).all()]
-        if lone and not np.ptp(lone) <= FITS * np.max(lone):  # nor if one is none
+        if lone and not np.ptp(lone) <= max(NEARLY, agree) * np.max(lone):  # nor if one is none
             continue
         solved += 1
         if solved > _MOST_READINGS:
@@ -63,7 +65,7 @@ def all_readings(part: Numbering, weights: NDArray) -> Iterator[tuple[set[Cell],
         vertices = Polygons(np.append(0, np.cumsum([len(cell) for cell in cells])), np.array(list(chain(*cells))))
         some = CellSet(n, part.edges, weights, None, vertices, np.zeros(len(cells), dtype=bool))
         reading = Reading.of(some, np.ones(len(cells), dtype=bool), known)
-        if reading.fits and _lies_flat(reading):
+        if reading.nearly_fits(agree) and _lies_flat(reading):
             yield cells_of(reading, part), next(mesh.scale for mesh in reading.meshes if mesh)
 
 

@@ -20,15 +20,14 @@ from .by_component import with_pieces
 from .cell_set import CellSet
 from .corners import Alternative
 from .covering import MOST_VERTICES
-from .reading import Reading
+from .reading import FITS, NEARLY, Reading
 from .rereading import cells_of, with_another_scale
 
 _MOST_TRIALS = 60
 _MOST_SCALES = 8
-_AGREE = 1e-7  # relative difference of the c of two parts
 
 
-def filled_holes(stored: OperatorMatrix, topology: Topology, factors: NDArray) -> list[Alternative]:
+def filled_holes(stored: OperatorMatrix, topology: Topology, factors: NDArray, agree: float) -> list[Alternative]:
     """Triangles of loose pieces without which the matrix is given back, too; c is not known.
 
     Of components that are too large, and where there are too many triangles to try, one that is not tried stands for
@@ -41,6 +40,8 @@ def filled_holes(stored: OperatorMatrix, topology: Topology, factors: NDArray) -
         Of the mesh that was found.
     factors : (n,) float64
         c of the piece of each row.
+    agree : float
+        Relative difference of numbers that noise may cause.
     """
     if not any(_suspects(topology.pieces)):
         return []
@@ -56,7 +57,7 @@ def filled_holes(stored: OperatorMatrix, topology: Topology, factors: NDArray) -
         local[part.vertices] = np.arange(len(part.vertices))
         triangles = np.concatenate([local[piece.vertices[piece.triangles]] for piece in pieces])
         weights = -stored.entries[part.edge_rows]
-        holes = _holes(part, weights, triangles, suspects, local, float(factors[part.vertices[0]]))
+        holes = _holes(part, weights, triangles, suspects, local, float(factors[part.vertices[0]]), agree)
         if holes:
             found.append(_without(holes))
         elif len(suspects) > _MOST_TRIALS:
@@ -75,6 +76,7 @@ def _holes(
     suspects: list[tuple[int, ...]],
     local: NDArray[np.int64],
     c: float,
+    agree: float,
 ) -> list[tuple[int, ...]]:
     """Triangles of a component that may be holes together; none if all must be cells.
 
@@ -88,16 +90,16 @@ def _holes(
         cells = Polygons(np.arange(0, 3 * len(rest) + 1, 3), rest.ravel())
         some = CellSet(n, part.edges, weights, None, cells, np.zeros(len(rest), dtype=bool))
         reading = Reading.of(some, np.ones(len(rest), dtype=bool))
-        if reading.fits:
+        if reading.nearly_fits(agree):
             return [triangle]
         for piece, mesh in zip(reading.pieces, reading.meshes, strict=True):
             if mesh and sign * mesh.scale > 0:
                 scales.append(sign * mesh.scale)
                 places.append(piece.edge_rows.min())
-    common = common_values(np.array(scales), np.array(places, dtype=np.int64), _AGREE)[:_MOST_SCALES]
+    common = common_values(np.array(scales), np.array(places, dtype=np.int64), max(FITS, agree))[:_MOST_SCALES]
     whole = with_another_scale(part, weights, c, [sign * float(other) for other in common])
-    if whole is None:
-        return []
+    if whole is None:  # with noise no reading fits as it is
+        return suspects[:1] if len(common) and agree > NEARLY else []
     kept = cells_of(whole, part)
     return [triangle for triangle in suspects if triangle not in kept] or suspects[:1]
 

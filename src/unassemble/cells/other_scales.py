@@ -20,19 +20,25 @@ from .covering import MOST_VERTICES
 from .crosses import Crosses
 from .exhaustion import TooManyError, all_readings
 from .loose import is_loose
+from .reading import NEARLY
 from .rereading import SAME_SCALE, cells_of, own_cells, with_another_scale
 from .shapes import Shapes
 
 _MOST_SHAPES = 3000
 _MOST_SCALES = 6
 _MOST_ROWS = 400  # of all components in which everything is tried, together: each takes a second or two
-_AGREE = 1e-9
+_AGREE = 1e-7
 
 Cells = set[tuple[int, ...]]
 
 
 def other_scales(
-    stored: OperatorMatrix, topology: Topology, mesh: OrientedMesh, factors: NDArray, closed: NDArray[np.int64]
+    stored: OperatorMatrix,
+    topology: Topology,
+    mesh: OrientedMesh,
+    factors: NDArray,
+    closed: NDArray[np.int64],
+    agree: float,
 ) -> tuple[list[Alternative], bool]:
     """Other meshes for components of loose pieces, c not being known.
 
@@ -47,6 +53,8 @@ def other_scales(
         c of the piece of each row.
     closed : (n,) int64
         1 for rows that four right angles surround.
+    agree : float
+        Relative difference of numbers that noise may cause.
 
     Returns
     -------
@@ -67,9 +75,9 @@ def other_scales(
         weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
         try:
             left -= len(part.vertices)
-            other = _other_of_all(part, weights, own, enough=left >= 0)
+            other = _other_of_all(part, weights, own, agree, enough=left >= 0)
         except TooManyError:
-            left_open |= count == 1 or len(part.vertices) > MOST_VERTICES
+            left_open |= count == 1 or len(part.vertices) > MOST_VERTICES or agree > NEARLY
             other = _with_common_scale(part, weights, c) if count > 1 else None
         if other is not None:
             cells, factor = other
@@ -79,7 +87,9 @@ def other_scales(
     return found, left_open
 
 
-def _other_of_all(part: Numbering, weights: NDArray, own: Cells, *, enough: bool) -> tuple[Cells, float] | None:
+def _other_of_all(
+    part: Numbering, weights: NDArray, own: Cells, agree: float, *, enough: bool
+) -> tuple[Cells, float] | None:
     """Any other mesh of a component.
 
     Raises
@@ -89,7 +99,7 @@ def _other_of_all(part: Numbering, weights: NDArray, own: Cells, *, enough: bool
     """
     if not enough:
         raise TooManyError
-    return next((reading for reading in all_readings(part, weights) if reading[0] != own), None)
+    return next((reading for reading in all_readings(part, weights, agree) if reading[0] != own), None)
 
 
 def _with_common_scale(part: Numbering, weights: NDArray, c: float) -> tuple[Cells, float] | None:
