@@ -130,7 +130,7 @@ def ambiguous(others: list[Alternative], certificate: Certificate) -> tuple[str,
         if first.found != first.other
         else ""
     )
-    claim = "but so does another" if first.tested else "but there are no more entries than unknowns, and another may"
+    claim = "but so does another" if first.tested else "but so may another, which was not tried"
     if first.other_cells:
         cells = f"the cells {_cells(first.other_cells)}" + (
             f" in place of {_cells(first.cells)}" if first.cells else " besides"
