@@ -78,7 +78,7 @@ def other_scales(
             other = _other_of_all(part, weights, own, agree, enough=left >= 0)
         except TooManyError:
             left_open |= count == 1 or len(part.vertices) > MOST_VERTICES or agree > NEARLY
-            other = _with_common_scale(part, weights, c) if count > 1 else None
+            other = _with_common_scale(part, weights, c)
         if other is not None:
             cells, factor = other
             gone_cells, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
