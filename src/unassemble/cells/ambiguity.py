@@ -72,7 +72,7 @@ def alternatives(
         if scale is None:
             found += _loose_pieces(stored, topology, corners, around, closed)
             found += as_one_piece(stored, topology, corners, closed)
-        found = found or regrouped(stored, mesh, corners, factors, agree)
+    found = found or regrouped(stored, mesh, corners, factors, agree)
     if not found and scale is None:
         found, left_open = other_scales(stored, topology, mesh, factors, closed, agree)
     return _each_once(found) or other_readings(stored, mesh, factors, scale), left_open

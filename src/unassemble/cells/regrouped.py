@@ -1,9 +1,10 @@
 """Right angles at one vertex that might as well lie between other pairs of its edges.
 
-Two right angles a-h-b and d-h-f with vanished far sides give h-a the cotangent |hb| / |ha|, in units of 2 c, and h-b
-its inverse. Where d or f gets the same as b, the corners a-h-d and b-h-f, or a-h-f and b-h-d, give all four edges what
-they have. Whether that makes another mesh depends on how the rest hangs together: the rest has the same entries, so
-that what it holds without these corners stays where it is.
+Two right angles a-h-b and d-h-f (:mod:`unassemble.cells.right_angles`) give h-a the cotangent |hb| / |ha|, in units of
+2 c, and h-b its inverse. Where d or f gets the same as b, the corners a-h-d and b-h-f, or a-h-f and b-h-d, give all
+four edges what they have. Two rectangles of one shape that touch in a vertex, say, are their outer halves and two right
+triangles in the gaps between them as well. Whether that makes another mesh depends on how the rest hangs together: it
+has the same entries, so that what it holds without these right angles stays where it is.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from ..topology.keys import with_sides
 from .cell_set import CellSet
 from .corners import Alternative, Corners, OrientedMesh, cell
 from .reading import FITS, Reading
+from .right_angles import right_angles
 
 _MOST_VERTICES = 400
 _MOST_TRIALS = 60
@@ -39,9 +41,9 @@ def regrouped(
     Parameters are those of :func:`unassemble.cells.ambiguity.alternatives`, and
 
     corners : Corners
-        All right angles of the mesh that was found.
+        All corners of the mesh that was found.
     """
-    return fitting(stored, mesh, factors, list(_regroupings(corners, mesh.z, agree)), first=True)
+    return fitting(stored, mesh, factors, list(_regroupings(stored, mesh, corners, agree)), first=True)
 
 
 def fitting(
@@ -103,48 +105,56 @@ def _solved(
             yield other
 
 
-def _regroupings(corners: Corners, z: NDArray, agree: float) -> Iterator[Alternative]:
-    h, a, b = corners.apex, corners.first, corners.second
-    gets = np.log(np.abs(z[b] - z[h]) / np.abs(z[a] - z[h]))  # of h-a; h-b has the opposite
-    order = np.argsort(h, kind="stable")
-    for group in np.split(order, np.flatnonzero(np.diff(h[order])) + 1):
-        for i, j in combinations(group.tolist(), 2):
-            for d, f, other in ((a[j], b[j], gets[j]), (b[j], a[j], -gets[j])):
-                apart = not {a[i], b[i]} & {d, f}  # with an edge in common they would come out as they are
-                if apart and abs(gets[i] + other) <= agree:  # h-d has the inverse of h-a
-                    old = (int(a[i]), int(b[i])), (int(a[j]), int(b[j]))
-                    new = (int(a[i]), int(d)), (int(b[i]), int(f))
-                    top = int(h[i])
-                    gone, added = (tuple(sorted(cell(top, frozenset(pair)) for pair in two)) for two in (old, new))
-                    yield Alternative((top,), (*old[0], *old[1]), (*new[0], *new[1]), gone, added)
+def _regroupings(stored: OperatorMatrix, mesh: OrientedMesh, corners: Corners, agree: float) -> Iterator[Alternative]:
+    for group in right_angles(stored.n, stored.edges, mesh, corners):
+        for one, two in combinations(group, 2):
+            a, b, h = one.first, one.second, one.apex
+            for d, f, gets in ((two.first, two.second, two.gets), (two.second, two.first, -two.gets)):
+                apart = not {a, b} & {d, f}  # with an edge in common they would come out as they are
+                if apart and one.cell != two.cell and abs(one.gets + gets) <= agree:  # h-d has the inverse of h-a
+                    new = cell(h, frozenset((a, d))), cell(h, frozenset((b, f)))
+                    added = (*new, *one.rest, *two.rest)
+                    yield Alternative((h,), (a, b, d, f), (a, d, b, f), (one.cell, two.cell), added)
 
 
 def _cells(mesh: OrientedMesh, number: NDArray[np.int64], other: Alternative) -> tuple[Polygons, NDArray[np.bool_]]:
     """All cells of a mesh with the difference made, and which of them are its new corners."""
-    gone = np.sort(number[np.array(other.cells, dtype=np.int64).reshape(-1, 3)], axis=1)
-    kept = ~(np.sort(mesh.triangles, axis=1)[:, None, :] == gone).all(axis=2).any(axis=1)
-    # The vertex of the right angle stands in the middle.
-    added = [[a, h, b] for new in other.other_cells for h in other.around for a, b in [[v for v in new if v != h]]]
-    three = np.concatenate([mesh.triangles[kept], number[np.array(added, dtype=np.int64).reshape(-1, 3)]])
-    whole = Polygons.joined([Polygons(3 * np.arange(len(three) + 1), three.ravel()), mesh.polygons])
-    place = np.arange(whole.count)
-    return whole, (place >= len(three) - len(added)) & (place < len(three))
+    gone = {tuple(sorted(number[list(old)].tolist())) for old in other.cells}
+    outlines = np.split(mesh.polygons.vertices, mesh.polygons.offsets[1:-1]) if mesh.polygons.count else []
+    own = mesh.triangles.tolist() + [outline.tolist() for outline in outlines]
+    cells = [old for old in own if tuple(sorted(old)) not in gone]
+    for row in other.around:
+        h = int(number[row])
+        for old in own:
+            if tuple(sorted(old)) in gone and len(old) > 3:
+                k = old.index(h)
+                cells.append(old[k + 1 :] + old[:k])
+        # The vertex of the right angle stands in the middle.
+        ends = [[int(number[v]) for v in new if v != row] for new in other.other_cells if row in new]
+        cells += [[a, h, b] for a, b in ends]
+    new_corners = sum(row in new for row in other.around for new in other.other_cells)
+    whole = Polygons(np.append(0, np.cumsum([len(c) for c in cells])), np.array([v for c in cells for v in c]))
+    return whole, np.arange(len(cells)) >= len(cells) - new_corners
 
 
 def _excluded(n: int, mesh: OrientedMesh, others: list[Alternative]) -> list[bool]:
     """Whether the rest of the mesh shows that each is none.
 
-    If all rows of both corners belong to one piece without any of these corners, they are where they are, and the new
+    If all rows of both corners belong to one piece without any of these cells, they are where they are, and the new
     corners have to have right angles there, and room.
     """
-    triangles = np.concatenate([mesh.triangles, mesh.polygons.fans()[0]])
-    corners = {old for other in others for old in other.cells}
+    gone = {old for other in others for old in other.cells}
+    at: dict[int, list[int]] = {row: [] for other in others for row in (*other.around, *other.found)}
     near = np.zeros(n, dtype=bool)
-    near[[h for other in others for h in other.around]] = True
-    gone = [k for k in np.flatnonzero(near[triangles].any(axis=1)) if tuple(sorted(triangles[k].tolist())) in corners]
-    rest = np.delete(triangles, gone, axis=0)
-    at: dict[int, list[int]] = {row: [] for corner in corners for row in corner}
     near[list(at)] = True
+    touched = np.flatnonzero(near[mesh.triangles].any(axis=1))
+    kept = np.delete(mesh.triangles, [k for k in touched if tuple(sorted(mesh.triangles[k].tolist())) in gone], axis=0)
+    fans, _ = mesh.polygons.fans()
+    owner = np.repeat(np.arange(mesh.polygons.count), mesh.polygons.size - 2)
+    touched = np.unique(np.repeat(np.arange(mesh.polygons.count), mesh.polygons.size)[near[mesh.polygons.vertices]])
+    outlines = [mesh.polygons.vertices[mesh.polygons.offsets[k] : mesh.polygons.offsets[k + 1]] for k in touched]
+    cut = [k for k, outline in zip(touched, outlines, strict=True) if tuple(sorted(outline.tolist())) in gone]
+    rest = np.concatenate([kept, fans[~np.isin(owner, cut)]])
     for k in np.flatnonzero(near[rest].any(axis=1)).tolist():
         for row in rest[k].tolist():
             if row in at:
@@ -153,9 +163,10 @@ def _excluded(n: int, mesh: OrientedMesh, others: list[Alternative]) -> list[boo
     excluded = []
     for other in others:
         (h,) = other.around
-        surfaces = [{surface[k] for k in at[row]} for old in other.cells for row in old]
+        surfaces = [{surface[k] for k in at[row]} for row in (h, *other.found)]
         fixed = bool(set.intersection(*surfaces))
-        excluded.append(fixed and not all(_has_room(mesh.z, h, new, rest[at[h]]) for new in other.other_cells))
+        corners = [new for new in other.other_cells if h in new]
+        excluded.append(fixed and not all(_has_room(mesh.z, h, new, rest[at[h]]) for new in corners))
     return excluded
 
 
