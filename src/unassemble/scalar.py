@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import certify as certificates
-from .cells import AGREE, Alternative, OrientedMesh, alternatives, coincident, filled_holes
+from .cells import AGREE, Alternative, OrientedMesh, alternatives, coincident, filled_holes, touching
 from .clock import Clock
 from .evidence import pooled_noise, weigh
 from .joined import JoinedMesh
@@ -98,18 +100,12 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     doubt = max(m.doubt for m in meshes)
     status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble, doubt)
     others: list[Alternative] = []
-    agree = AGREE if noise is None else max(AGREE, _SIGMAS * noise / float(np.abs(factors).min()))
-    if status == "certified" and known is None:
-        factors_of_rows = stretch * mesh.scale[mesh.component]
-        others = filled_holes(stored, topology, factors_of_rows, agree)  # next to nothing on most meshes
-    if status == "certified" and not others and topology.method == "the numbers":
-        with clock("ambiguity"):
-            others, left_open = _alternatives(topology, stored, placement, mesh, stretch, agree, known)
-            by_coincidence = known is None and bool(coincident(stored, topology).any())
-        if by_coincidence and not others:
-            status, reason = all_alike(certificate)
-        elif left_open and not others:
-            status, reason = unproved(certificate)
+    if status == "certified":
+        with clock("ambiguity") if topology.method == "the numbers" else nullcontext():  # else next to nothing
+            agree = AGREE if noise is None else max(AGREE, _SIGMAS * noise / float(np.abs(factors).min()))
+            others, doubt_of_cells = _alternatives(topology, stored, placement, mesh, stretch, agree, known)
+        if doubt_of_cells and not others:
+            status, reason = doubt_of_cells(certificate)
     if others:
         status, reason = ambiguous(others, certificate)
     distant = False
@@ -162,8 +158,8 @@ def _alternatives(
     stretch: float,
     agree: float,
     known: float | None,
-) -> tuple[list[Alternative], bool]:
-    """Other meshes that fit, in the frame in which the operator is the Laplacian, and whether there may be more."""
+) -> tuple[list[Alternative], Callable[[certificates.Certificate], tuple[str, str]] | None]:
+    """Other meshes that fit, in the frame in which the operator is the Laplacian; or what says that there may be some."""
     z = mesh.points @ [1, 1j]
     oriented = OrientedMesh(
         mesh.triangles[~mesh.in_polygon],
@@ -173,7 +169,15 @@ def _alternatives(
         np.asarray(placement.tensor.to_laplacian(z) if placement.tensor else z, dtype=np.complex128),
     )
     factors = stretch * mesh.scale[mesh.component]
-    return alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
+    others = filled_holes(stored, topology, factors, agree) if known is None else []
+    if topology.method != "the numbers":
+        return others or touching(stored, oriented, factors, agree), None
+    left_open = False
+    if not others:
+        others, left_open = alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
+    if known is None and coincident(stored, topology).any():
+        return others, all_alike
+    return others, unproved if left_open else None
 
 
 def _held_against(

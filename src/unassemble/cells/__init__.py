@@ -3,7 +3,7 @@
 Where entries vanish the graph alone does not tell: see the page on theory in the documentation.
 """
 
-from .ambiguity import AGREE, alternatives
+from .ambiguity import AGREE, alternatives, touching
 from .coincidence import coincident
 from .completion import completed, guessed
 from .corners import Alternative, OrientedMesh
@@ -25,5 +25,6 @@ __all__ = [
     "guessed",
     "in_doubt",
     "read_cells",
+    "touching",
     "wrong_entries",
 ]

@@ -78,6 +78,16 @@ def alternatives(
     return _each_once(found) or other_readings(stored, mesh, factors, scale), left_open
 
 
+def touching(stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, agree: float) -> list[Alternative]:
+    """Other meshes in which right angles of cells that touch in a vertex are regrouped, as where none need be supposed.
+
+    Parameters are those of :func:`alternatives`.
+    """
+    if (np.bincount(mesh.boundary[:, 0], minlength=stored.n) < 2).all():
+        return []
+    return regrouped(stored, mesh, Corners.of(stored.n, stored.edges, mesh), factors, agree)
+
+
 def _loose_pieces(
     stored: OperatorMatrix, topology: Topology, corners: Corners, around: list[Hub], closed: NDArray[np.int64]
 ) -> list[Alternative]:
