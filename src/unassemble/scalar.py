@@ -159,7 +159,7 @@ def _alternatives(
     agree: float,
     known: float | None,
 ) -> tuple[list[Alternative], Callable[[certificates.Certificate], tuple[str, str]] | None]:
-    """Other meshes that fit, in the frame in which the operator is the Laplacian; or what says that there may be some."""
+    """Other meshes that fit, in the frame in which the operator is the Laplacian; or what says that there may be."""
     z = mesh.points @ [1, 1j]
     oriented = OrientedMesh(
         mesh.triangles[~mesh.in_polygon],
