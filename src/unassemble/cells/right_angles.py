@@ -34,7 +34,7 @@ class RightAngle:
     cell : tuple of int
         Sorted.
     rest : tuple of tuple of int
-        What is left of the cell without the triangle, if that has a side that no other cell has.
+        What is left of a cell of more than three corners, in running order.
     """
 
     apex: int
@@ -70,9 +70,10 @@ def right_angles(n: int, edges: NDArray, mesh: OrientedMesh, corners: Corners) -
         own = cell(top, frozenset((one, two)))
         rest: Cells = ()
         if polygon[k] >= 0:
-            outline = mesh.polygons.vertices[mesh.polygons.offsets[polygon[k]] : mesh.polygons.offsets[polygon[k] + 1]]
-            own = tuple(sorted(outline.tolist()))
-            rest = (tuple(v for v in own if v != top),)
+            start, end = mesh.polygons.offsets[polygon[k] : polygon[k] + 2].tolist()
+            outline = mesh.polygons.vertices[start:end].tolist()
+            own, place = tuple(sorted(outline)), outline.index(top)
+            rest = ((*outline[place + 1 :], *outline[:place]),)
         found.setdefault(top, []).append(RightAngle(top, one, two, float(gets[k]), own, rest))
     return list(found.values())
 
