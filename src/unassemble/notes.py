@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .cells import incomplete_rows
 from .matrix import OperatorMatrix
 from .topology import Topology
 from .words import count_of
-
-_SUM = 1e-10  # sum of a row, relative to its entries, that is rounding
-_MANY = 0.7  # share of rows; more would be a mass matrix that was added, or no Laplacian at all
 
 
 def topology_notes(topology: Topology) -> list[str]:
@@ -66,13 +64,8 @@ def elimination_notes(matrix: OperatorMatrix, suspects: NDArray) -> list[str]:
 
     Nothing if the entries that stand out, (k, 2), are in all of these rows: a wrong entry spoils two sums.
     """
-    size = np.abs(matrix.diagonal)
-    sums = matrix.diagonal.copy()
-    for end in matrix.edges.T:
-        sums += np.bincount(end, matrix.entries, matrix.n)
-        size += np.bincount(end, np.abs(matrix.entries), matrix.n)
-    rest = np.flatnonzero(np.abs(sums) > _SUM * size)
-    if not 0 < len(rest) < _MANY * matrix.n or np.isin(rest, suspects).all():
+    rest = np.flatnonzero(incomplete_rows(matrix))
+    if not len(rest) or np.isin(rest, suspects).all():
         return []
     return [
         f"all rows add up to zero but for {len(rest):,}: {_some(rest)}; unknowns next to these seem to have been "
