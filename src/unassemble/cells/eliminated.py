@@ -64,32 +64,26 @@ def without_boundary(n: int, edges: NDArray, weights: NDArray, incomplete: NDArr
     """
     if not incomplete.any():
         return None
-    whole = first_reading(n, edges, weights)
-    known = whole is not None and np.array_equal(_on_boundary(whole), incomplete)
-    if whole is not None and known:  # a diagonal matrix may have been added on the boundary
-        whole = Reading.of(whole.candidates, whole.labels)
-        if whole.fits:
-            return None
-    between = incomplete[edges].all(axis=1)
-    halved = first_reading(n, edges, np.where(between, weights / 2, weights))
-    if halved is not None and np.array_equal(_on_boundary(halved), incomplete):
-        found = _left_to_others(halved, incomplete)
-        if found.fits_but_for_few:
-            return found
-    return whole if known else None
+    between = np.asarray(incomplete[edges].all(axis=1))
+    readings = [first_reading(n, edges, some) for some in (weights, np.where(between, weights / 2, weights))]
+    inside = [one for one in readings if one is not None and np.array_equal(_on_boundary(one), incomplete)]
+    if not inside:
+        return None
+    whole = [Reading.of(replace(one.candidates, weights=weights), one.labels) for one in inside]
+    if any(one.fits for one in whole):  # a diagonal matrix was added on the boundary
+        return None
+    inner = _left_to_others(whole[-1], incomplete)
+    return inner if inner.fits_but_for_few else whole[0]
 
 
-def _left_to_others(halved: Reading, incomplete: NDArray[np.bool_]) -> Reading:
+def _left_to_others(reading: Reading, incomplete: NDArray[np.bool_]) -> Reading:
     """The same cells, placed without the entries on their boundary between incomplete rows."""
-    lost = np.asarray(incomplete[halved.edges].all(axis=1))
-    weights = np.where(lost, 2 * halved.weights, halved.weights)
+    between = np.asarray(incomplete[reading.edges].all(axis=1))
     meshes = []
-    for piece in halved.pieces:
-        aside = np.flatnonzero(~piece.inner & lost[piece.edge_rows])
-        start = weights[piece.edge_rows]
-        start[aside] /= 2
-        meshes.append(_without(piece, start, aside))
-    return replace(halved, weights=weights).placed(tuple(meshes))
+    for piece in reading.pieces:
+        aside = np.flatnonzero(~piece.inner & between[piece.edge_rows])
+        meshes.append(_without(piece, reading.weights[piece.edge_rows], aside))
+    return reading.placed(tuple(meshes))
 
 
 def _on_boundary(reading: Reading) -> NDArray[np.bool_]:
@@ -104,7 +98,9 @@ def _on_boundary(reading: Reading) -> NDArray[np.bool_]:
 
 
 def _without(piece: Piece, weights: NDArray, aside: NDArray[np.int64]) -> PieceMesh | None:
-    """Positions that fit all weights but some, which they begin with; None where there are none."""
+    """Positions that fit all weights but some, with half of which they begin; None where there are none."""
+    weights = weights.copy()
+    weights[aside] /= 2
     try:
         start = conformal_map(piece, weights, sharp=False)
         spread = np.ones(len(weights))
