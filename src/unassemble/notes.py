@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,13 +33,35 @@ def topology_notes(topology: Topology) -> list[str]:
     return notes
 
 
+def piece_notes(remarks: Sequence[Sequence[str]]) -> list[str]:
+    """Remarks on each piece, one sentence for all pieces that share one."""
+    pieces: dict[str, list[int]] = {}
+    for label, some in enumerate(remarks):
+        for remark in some:
+            pieces.setdefault(remark, []).append(label)
+    if len(remarks) == 1:
+        return list(pieces)
+    return [f"{_pieces(labels)}: {remark}" for remark, labels in pieces.items()]
+
+
 def image_notes(topology: Topology, free: NDArray) -> list[str]:
     """Pieces, by number, of which the mirror image fits as well."""
+    if len(free) == 1:
+        (label,) = free.tolist()
+        return [
+            f"piece {label}, of row {topology.pieces[label].vertices.min()}: its mirror image meets the other pieces "
+            "in the same vertices, and the matrix does not tell which of the two it is"
+        ]
+    if not len(free):
+        return []
     return [
-        f"piece {label}, of row {topology.pieces[label].vertices.min()}: its mirror image meets the other pieces in "
-        "the same vertices, and the matrix does not tell which of the two it is"
-        for label in free.tolist()
+        f"{_pieces(free.tolist())}: their mirror images meet the other pieces in the same vertices, and the matrix "
+        "does not tell which of the two each is"
     ]
+
+
+def _pieces(labels: list[int]) -> str:
+    return f"piece {labels[0]}" if len(labels) == 1 else f"{len(labels):,} pieces ({_some(np.array(labels))})"
 
 
 def vanished_notes(topology: Topology) -> list[str]:
