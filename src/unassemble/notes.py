@@ -12,6 +12,8 @@ from .matrix import OperatorMatrix
 from .topology import Topology
 from .words import count_of
 
+_EQUAL = 1e-12  # relative difference of entries that is rounding
+
 
 def topology_notes(topology: Topology) -> list[str]:
     """Pieces, hinges, rows without a position."""
@@ -83,12 +85,19 @@ def vanished_notes(topology: Topology) -> list[str]:
     return notes
 
 
-def elimination_notes(matrix: OperatorMatrix, suspects: NDArray) -> list[str]:
-    """What row sums say of unknowns that were taken out, where no mesh fits.
+def origin_notes(matrix: OperatorMatrix, suspects: NDArray) -> list[str]:
+    """What the entries say of where the matrix may come from, where no mesh fits.
 
-    Nothing if the entries that stand out, (k, 2), are in all of these rows: a wrong entry spoils two sums.
+    Row sums tell of unknowns that were taken out; not if the entries that stand out, (k, 2), are in all of these rows:
+    a wrong entry spoils two sums.
     """
     rest = np.flatnonzero(incomplete_rows(matrix))
+    size = np.abs(matrix.entries)
+    if not len(rest) and np.ptp(matrix.entries) <= _EQUAL * size.max():
+        return [
+            "all entries are equal, as in the Laplacian of a graph without weights; on a mesh, entries on the boundary "
+            "have one triangle each and others two"
+        ]
     if not len(rest) or np.isin(rest, suspects).all():
         return []
     return [

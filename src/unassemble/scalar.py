@@ -14,7 +14,7 @@ from .evidence import pooled_noise, weigh
 from .joined import JoinedMesh
 from .linalg import AnalysisAhead, factorisation
 from .matrix import OperatorMatrix
-from .notes import elimination_notes, image_notes, piece_notes, topology_notes, vanished_notes
+from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
 from .placement import Placement
 from .planar.deviations import coordinate_covariances
 from .planar.hinges import free_images, join
@@ -122,7 +122,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     if chi_square and evidence.noise is not None and evidence.noise < 0.5 * chi_square["sigma"]:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
     if status == "uncertified" and not (others or chi_square or distant):
-        notes += elimination_notes(stored, evidence.suspects)
+        notes += origin_notes(stored, evidence.suspects)
     polygons = Polygons.none() if options.triangulate else mesh.polygons
     return Recovery(
         points=points,
