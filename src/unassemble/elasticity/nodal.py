@@ -8,10 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .constants import PENALTY
+from .constants import PENALTY, ROUNDING
 from .numbering import Numbering
-
-_ROUNDING = 1e-9  # a row that annihilates constants does so to rounding; supports leave 1e-3 and more
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +189,7 @@ def without_trace(nodal: NodalMatrix) -> NDArray[np.bool_]:
 def _annihilating(nodal: NodalMatrix) -> NDArray[np.bool_]:
     """(n, d, d) rows of blocks that annihilate constants."""
     size = np.where(nodal.size > 0, nodal.size, np.inf)[:, None, None]
-    return np.asarray(np.abs(nodal.row_sums()) <= _ROUNDING * size)
+    return np.asarray(np.abs(nodal.row_sums()) <= ROUNDING * size)
 
 
 def _with_penalty(nodal: NodalMatrix) -> NDArray[np.bool_]:

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..errors import GeometryError
-from .constants import PENALTY
+from .constants import least_sums, row_sizes, with_penalty
 from .grouping import by_first_row
 from .nodal import NodalMatrix, determined, nodal_matrix
 from .numbering import Numbering
 from .placing import placed
 
-_ROUNDING = 1e-9
 _APART = 1e-6  # of the mean edge length, up to which two positions are one
 _ROUNDS = 4
 
@@ -101,10 +100,9 @@ def _whole_rows(
     All rows of the same pattern annihilate constants there, and none of what they couple to is known to lack it.
     """
     label = np.eye(d)[direction] * live[:, None]
-    own = np.abs(matrix.diagonal())
-    size = np.asarray(abs(matrix).sum(axis=1)).ravel() - own
-    least = _ROUNDING * np.where(size > 0, size, np.inf)
-    excused = (label > 0) & (own > PENALTY * size)[:, None]
+    size = row_sizes(matrix)
+    least = least_sums(size)
+    excused = (label > 0) & with_penalty(matrix, size)[:, None]
     failing = np.zeros((int(group.max()) + 1, d))
     np.add.at(failing, group, (np.abs(matrix @ label) > least[:, None]) & ~excused)
     count = by_direction(group, direction, d)
