@@ -152,7 +152,7 @@ def valid_pairs(nodal: NodalMatrix, *, strict: bool = True, inferred: bool = Fal
 
 
 def linked(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(nnz,) pairs of nodes the first of which has a row that touches the other and is valid, (n, d, d) or (n, d, d, d)."""
+    """(nnz,) pairs of nodes, the first of which has a row that touches the other; valid (n, d, d) or (n, d, d, d)."""
     pairs = valid if valid.ndim == 3 else np.asarray(valid.any(axis=3))
     return np.asarray((np.abs(nodal.data) * pairs[nodal.node]).max(axis=(1, 2)) > 0)
 
