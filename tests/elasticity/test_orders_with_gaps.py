@@ -98,6 +98,18 @@ def test_nodes_that_agree_on_a_wrong_direction_are_told_by_whole_ones():
     assert found.unnamed is not None
 
 
+@pytest.mark.parametrize("perturb", [0.0, 0.2])
+def test_nodes_known_only_to_lie_in_one_plane_are_no_piece(perturb):
+    case = given(permuted_nodes(stiffness("quad-s2", box("quad-s2", (6, 7), perturb=perturb)), seed=1),
+                 "symmetry", "by component", "stored")  # fmt: skip
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert len(found.evidence) == 1
+    assert truth.error < 1e-10
+    assert truth.missing < 0.1
+
+
 def test_nodes_that_may_be_halves_say_nothing_of_planes():
     """Their missing row may stand elsewhere; taken for nodes of a plane they spoiled all that hangs on them."""
     shape = box("quad-s2", (6, 7))

@@ -100,13 +100,17 @@ def _settled(found: NullFields) -> bool:
 
 
 def pieces_of(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
-    """Pieces held together by valid identities; -1 for nodes that none of them touches."""
+    """Pieces held together by valid identities; -1 for nodes that none of them touches.
+
+    That nodes lie in one plane is said in places of rows that they lack; nothing but that makes no piece.
+    """
     live = linked(nodal, valid)
     link = sp.csr_array((np.ones(live.sum()), (nodal.node[live], nodal.indices[live])), shape=(nodal.n, nodal.n))
     _, label = sp.csgraph.connected_components(link, directed=False)
-    size = np.bincount(label)
-    kept = np.flatnonzero(size > 1)
-    order = np.full(len(size), -1)
+    own = valid.reshape(nodal.n, nodal.dim, -1).any(axis=2) & (nodal.row_of >= 0)
+    told = np.bincount(label, own.any(axis=1)) > 0
+    kept = np.flatnonzero(told & (np.bincount(label) > 1))
+    order = np.full(len(told), -1)
     order[kept] = np.arange(len(kept))
     return order[label].astype(np.int64), len(kept)
 
