@@ -13,7 +13,8 @@ from .extension import extended_directions
 from .grouping import possible_nodes, same_pattern
 from .numbering import Numbering, measured
 from .orders import Reading
-from .row_positions import by_direction, placed_together, single_nodes
+from .patterns import by_direction
+from .row_positions import placed_together, single_nodes
 from .sums import names_of, set_right
 from .traces import shows_all
 
