@@ -7,6 +7,7 @@ each direction, added up, have the boundary terms of the same nodes: to the iden
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import scipy.sparse as sp
@@ -28,8 +29,12 @@ def with_patterns(
     group: NDArray[np.int64],
     node: NDArray[np.int64],
     direction: NDArray[np.int64],
+    whole: NDArray[np.bool_],
 ) -> tuple[NodalMatrix, NDArray[np.bool_]]:
-    """More equations for patterns that lack no direction, in nodes of their own, which have no positions.
+    """More equations for patterns of several nodes, which stand in nodes of their own, without positions.
+
+    They are for directions of which each of the nodes has a row: all, if there are as many rows of each; else those
+    with most rows, if columns of one of them are whole in all rows of the pattern, which are themselves among them.
 
     Parameters
     ----------
@@ -38,48 +43,65 @@ def with_patterns(
     valid : (n, d, d) bool
     group, node, direction : (N,) int64
         Pattern, node, and direction of each row.
+    whole : (N, d) bool
+        Rows that hold every coefficient in the columns of a direction.
 
     Returns
     -------
     nodal : NodalMatrix
     valid : (n, d, d, d) bool
     """
-    count = by_direction(group, direction, nodal.dim)
-    several: NDArray[np.bool_] = np.asarray((count == count[:, :1]).all(axis=1) & (count[:, 0] > 1))
-    row = np.flatnonzero(several[group])
-    place = (np.cumsum(several) - 1)[group[row]]
-    m = int(several.sum())
-    of_direction = [
-        sp.csr_array((np.ones(len(some)), (place[some], node[row[some]])), shape=(m, nodal.n))
-        for some in (np.flatnonzero(direction[row] == c) for c in range(nodal.dim))
-    ]
-    levels, levels_valid = _same_sums(nodal, valid, of_direction)
-    added, added_valid = _added(nodal, valid, of_direction)
-    full = np.repeat(valid[..., None], nodal.dim, axis=3)
-    return _extended(nodal, [levels, added]), np.concatenate([full, levels_valid, added_valid])
+    d = nodal.dim
+    count = by_direction(group, direction, d)
+    full: NDArray[np.bool_] = np.asarray((count == count.max(axis=1, keepdims=True)) & (count > 1))
+    broken = np.zeros(count.shape)
+    np.add.at(broken, group, ~whole)
+    full &= (full.all(axis=1) | (full & (broken == 0)).any(axis=1))[:, None]
+    several = np.asarray(full.sum(axis=1) > 1)
+    place, m = np.cumsum(several) - 1, int(several.sum())
+    of_direction = []
+    for c in range(d):
+        row = np.flatnonzero((direction == c) & (several & full[:, c])[group])
+        of_direction.append(sp.csr_array((np.ones(len(row)), (place[group[row]], node[row])), shape=(m, nodal.n)))
+    levels, levels_valid = _same_sums(nodal, valid, of_direction, full[several])
+    added, added_valid = _added(nodal, valid, of_direction, full[several])
+    every = np.repeat(valid[..., None], d, axis=3)
+    return _extended(nodal, [levels, added]), np.concatenate([every, levels_valid, added_valid])
 
 
 def _same_sums(
-    nodal: NodalMatrix, valid: NDArray[np.bool_], of_direction: list[sp.csr_array]
+    nodal: NodalMatrix, valid: NDArray[np.bool_], of_direction: list[sp.csr_array], full: NDArray[np.bool_]
 ) -> tuple[sp.csr_array, NDArray[np.bool_]]:
     """(r d, n d) differences of mean positions, and their places: without boundary terms.
 
-    For patterns all of whose nodes take part in some equation; `of_direction` has ones at the nodes of the rows of each
-    direction, (m, n).
+    For patterns all of whose rows take part in some equation.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    valid : (n, d, d) bool
+    of_direction : list of (m, n) sparse
+        Ones at the nodes of the rows of each direction, by pattern.
+    full : (m, d) bool
+        Directions that count.
     """
     d = nodal.dim
     touched = np.zeros(nodal.n, dtype=bool)
     touched[nodal.indices[linked(nodal, valid)]] = True
-    kept = np.flatnonzero(sum(one @ ~touched for one in of_direction) == 0)
-    mean = [one[kept] / one[kept].sum(axis=1)[:, None] for one in of_direction]
-    levels = sp.vstack([sp.csr_array((0, nodal.n)), *[one - mean[0] for one in mean[1:]]])
+    mean = [sp.diags_array(1 / np.maximum(one.sum(axis=1), 1)) @ one for one in of_direction]
+    first, kept = full.argmax(axis=1), sum(one @ ~touched for one in of_direction) == 0
+    level = [sp.csr_array((0, nodal.n))]
+    for b, c in combinations(range(d), 2):
+        some = np.flatnonzero(kept & (first == b) & full[:, c])
+        level.append(mean[c][some] - mean[b][some])
+    rows = sp.csr_array(sp.vstack(level))
     place = np.zeros((d, d, d), dtype=bool)
     place[np.arange(d), np.arange(d), np.arange(d)] = True
-    return sp.csr_array(sp.kron(levels, np.eye(d))), np.broadcast_to(place, (levels.shape[0], d, d, d))
+    return sp.csr_array(sp.kron(rows, np.eye(d))), np.broadcast_to(place, (rows.shape[0], d, d, d))
 
 
 def _added(
-    nodal: NodalMatrix, valid: NDArray[np.bool_], of_direction: list[sp.csr_array]
+    nodal: NodalMatrix, valid: NDArray[np.bool_], of_direction: list[sp.csr_array], full: NDArray[np.bool_]
 ) -> tuple[sp.csr_array, NDArray[np.bool_]]:
     """(m d, n d) rows of each pattern added up, relative to their size, and which blocks are whole."""
     n, d = nodal.n, nodal.dim
@@ -87,8 +109,8 @@ def _added(
     blocks = sp.bsr_array((nodal.data, nodal.indices, nodal.indptr), shape=(n * d, n * d)).tocsr()
     weight = sp.diags_array(1 / np.maximum(members @ nodal.size, np.finfo(float).tiny)) @ members
     broken = ((nodal.row_of >= 0)[:, :, None] & ~valid).reshape(n, -1)
-    whole = (members @ broken.astype(float) == 0).reshape(-1, d, d)
-    return sp.csr_array(sp.kron(weight, np.eye(d)) @ blocks), np.repeat(whole[..., None], d, axis=3)
+    sound = full[:, :, None] & (members @ broken.astype(float) == 0).reshape(-1, d, d)
+    return sp.csr_array(sp.kron(weight, np.eye(d)) @ blocks), np.repeat(sound[..., None], d, axis=3)
 
 
 def _extended(nodal: NodalMatrix, rows: list[sp.csr_array]) -> NodalMatrix:

@@ -115,7 +115,7 @@ def _joined(
     n, d = nodal.n, nodal.dim
     valid: NDArray[np.bool_] = whole[nodal.row_of] & (nodal.row_of >= 0)[:, :, None]
     try:
-        solution = placed(*with_patterns(nodal, valid, group, node, direction), None)
+        solution = placed(*with_patterns(nodal, valid, group, node, direction, whole), None)
     except GeometryError:
         return node
     if not solution.exact or "hourglass" in solution.freedoms:
