@@ -1,0 +1,93 @@
+"""Several nodes that couple to the same unknowns, rows at random: what holds whichever rows belong together."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from assembled import box, heterogeneous, permuted_nodes, stiffness
+from supported import given, judged
+
+from unassemble.elasticity import recover_elasticity
+from unassemble.elasticity.grouping import same_pattern
+from unassemble.elasticity.identities import identities
+from unassemble.elasticity.nodal import nodal_matrix
+from unassemble.elasticity.patterns import with_patterns
+from unassemble.elasticity.unknowns import given_numbering
+from unassemble.errors import GeometryError
+
+MATERIALS = {"one": {"lam": 1.5}, "varying": {"lam": heterogeneous, "mu": lambda x: 1 + x[1] + x[0] * x[1]}}
+
+
+def body(kind, support, material="varying", perturb=0.0, zeros="stored", counts=(6, 7)):
+    case = stiffness(kind, box(kind, counts, perturb=perturb), **MATERIALS[material])
+    return given(permuted_nodes(case, seed=1), support, "at random", zeros)
+
+
+@pytest.mark.parametrize("perturb", [0.0, 0.2])
+@pytest.mark.parametrize("material", ["one", "varying"])
+@pytest.mark.parametrize(("support", "missing"), [("free", 0.0), ("clamp", 0.11), ("symmetry", 0.31)])
+def test_quadrilaterals_of_nine_nodes(material, perturb, support, missing):
+    """In each cell of the rim at least two nodes share their neighbours, and so do 80 of 143 nodes here."""
+    case = body("quad-q2", support, material, perturb)
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert truth.error < 1e-10
+    assert truth.missing <= missing
+    assert truth.split == 0
+
+
+def test_the_equations_of_patterns_hold():
+    """Also where some nodes of a pattern lack a direction, which the other rows do not show."""
+    case = body("quad-q2", "symmetry", perturb=0.2)
+    matrix, n = case.matrix, len(case.node)
+    nodal = nodal_matrix(matrix, given_numbering(matrix, np.arange(n), case.direction))
+    group = same_pattern(matrix, np.zeros(n, dtype=bool))
+    sums = matrix @ np.eye(2)[case.direction]
+    whole = np.abs(sums) < 1e-9
+    for c in range(2):
+        whole[:, c] &= np.bincount(group, ~whole[:, c])[group] == 0
+    valid = whole[nodal.row_of] & (nodal.row_of >= 0)[:, :, None]
+    extended, places = with_patterns(nodal, valid, group, np.arange(n), case.direction, whole)
+    assert extended.n > nodal.n
+    points = np.concatenate([case.points[case.node], np.zeros((extended.n - nodal.n, 2))])
+    local = identities(extended, places, np.arange(nodal.n, extended.n))
+    assert len(local.rows) > 10
+    assert np.abs(local.residual(points[local.columns][:, :, None])).max() < 1e-12
+
+
+def mistaken(case, first, second, left_over):
+    """A numbering that gives one row of the second node to the first, whose own row stands alone."""
+    node = np.unique(case.node, return_inverse=True)[1]
+    wrong = node.copy()
+    own = np.flatnonzero((node == first) & (case.direction == left_over))
+    other = np.flatnonzero((node == second) & (case.direction == left_over))
+    wrong[own], wrong[other] = node.max() + 1, first
+    return replace(given_numbering(case.matrix, wrong, case.direction), kind="pattern")
+
+
+def neighbours(case):
+    """Two nodes coupled to each other, far from the rim."""
+    node = np.unique(case.node, return_inverse=True)[1]
+    first = int(node[np.argmin(np.linalg.norm(case.points[case.node] - 0.45, axis=1))])
+    row = np.flatnonzero(node == first)[0]
+    near = np.setdiff1d(node[case.matrix[[row]].indices], first)
+    return first, int(near[0])
+
+
+def test_a_row_joined_to_the_wrong_node_is_placed_by_itself():
+    case = body("tet-p1", "free", counts=(5, 5, 5))
+    numbering = mistaken(case, *neighbours(case), 2)
+    found = recover_elasticity(case.matrix, numbering=numbering)
+    truth = judged(found, case)
+    assert truth.error < 1e-10
+    assert truth.missing < 0.1
+    assert truth.split == 0
+
+
+def test_where_no_rows_can_be_placed_by_themselves_it_is_said():
+    """In the plane a row has one equation for two coordinates."""
+    case = body("quad-q1", "free", counts=(4, 5))
+    numbering = mistaken(case, *neighbours(case), 1)
+    with pytest.raises(GeometryError, match="numbering"):
+        recover_elasticity(case.matrix, numbering=numbering)
