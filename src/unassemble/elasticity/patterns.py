@@ -33,8 +33,8 @@ def with_patterns(
 ) -> tuple[NodalMatrix, NDArray[np.bool_]]:
     """More equations for patterns of several nodes, which stand in nodes of their own, without positions.
 
-    They are for directions of which each of the nodes has a row: all, if there are as many rows of each; else those
-    with most rows, if columns of one of them are whole in all rows of the pattern, which are themselves among them.
+    They are for directions of which each of the nodes has a row: those with most rows, if columns of one of them are
+    whole in all rows of the pattern, which are themselves among these columns.
 
     Parameters
     ----------
@@ -55,8 +55,9 @@ def with_patterns(
     count = by_direction(group, direction, d)
     full: NDArray[np.bool_] = np.asarray((count == count.max(axis=1, keepdims=True)) & (count > 1))
     broken = np.zeros(count.shape)
-    np.add.at(broken, group, ~whole)
-    full &= (full.all(axis=1) | (full & (broken == 0)).any(axis=1))[:, None]
+    excused = nodal.penalised[node, direction][:, None] & (direction[:, None] == np.arange(d))
+    np.add.at(broken, group, ~whole & ~excused)
+    full &= (full & (broken == 0)).any(axis=1, keepdims=True)
     several = np.asarray(full.sum(axis=1) > 1)
     place, m = np.cumsum(several) - 1, int(several.sum())
     of_direction = []
