@@ -37,6 +37,17 @@ def test_quadrilaterals_of_nine_nodes(material, perturb, support, missing):
     assert truth.split == 0
 
 
+def test_halves_are_not_joined_where_that_sets_others_free():
+    """More rows are whole then, and touch halves of which no row tells the place."""
+    shape = box("quad-q2", (4, 7), perturb=0.2, seed=162)
+    material = {"lam": heterogeneous, "mu": lambda x: 1 + x[1] + x[0] * x[1]}
+    case = permuted_nodes(stiffness("quad-q2", shape, **material), seed=162)
+    truth = given(case, "penalty rollers", "at random", "stored", seed=162)
+    found = judged(recover_elasticity(truth.matrix), truth)
+    assert found.error < 1e-10
+    assert found.missing < 0.3
+
+
 def with_two_rows_gone(case):
     """Without the first direction of one node, and the second of another that couples to the same unknowns."""
     x, y = case.points[case.node].T

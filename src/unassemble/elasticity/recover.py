@@ -132,11 +132,7 @@ def place_nodes(
                 "no positions fit the matrix exactly; which rows belong to one node was inferred, where some nodes "
                 "lack rows, and is probably wrong: give the numbering if it is known"
             )
-        better = joined(nodal, numbering, solution.points, solution.component)
-        if better is not None:
-            nodal, numbering = better
-            nodal = with_doubts(nodal, numbering)
-            solution = solve(nodal, patch)
+        nodal, numbering, solution = _rejoined(nodal, numbering, solution, patch)
     return _describe(nodal, numbering, solution, clock, cells, rounding)
 
 
@@ -170,6 +166,24 @@ def _row_by_row(
         if better.unique:
             return other, apart[1], better
     return nodal, numbering, solution
+
+
+def _rejoined(
+    nodal: NodalMatrix, numbering: Numbering, solution: Solution, patch: int | None
+) -> tuple[NodalMatrix, Numbering, Solution]:
+    """Halves of nodes that lie in one place joined, unless positions were unique and are not any more.
+
+    More rows are whole then, among them some that touch halves of which no row told the place.
+    """
+    better = joined(nodal, numbering, solution.points, solution.component)
+    if better is None:
+        return nodal, numbering, solution
+    other = with_doubts(*better)
+    try:
+        again = solve(other, patch)
+    except RecoveryError:
+        return nodal, numbering, solution
+    return (other, better[1], again) if again.unique or not solution.unique else (nodal, numbering, solution)
 
 
 def _describe(
