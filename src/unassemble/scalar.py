@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import certify as certificates
-from .cells import AGREE, Alternative, OrientedMesh, alternatives, coincident, filled_holes
+from .cells import AGREE, Alternative, OrientedMesh, alternatives, coincident, filled_holes, touching
 from .clock import Clock
 from .evidence import pooled_noise, weigh
 from .joined import JoinedMesh
 from .linalg import AnalysisAhead, factorisation
 from .matrix import OperatorMatrix
-from .notes import elimination_notes, image_notes, topology_notes, vanished_notes
+from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
 from .placement import Placement
 from .planar.deviations import coordinate_covariances
 from .planar.hinges import free_images, join
@@ -23,7 +25,7 @@ from .planar.piece import PieceMesh
 from .recovery import Recovery
 from .solving import solve
 from .topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
-from .verdict import all_alike, ambiguous, far_away, passes, verdict
+from .verdict import all_alike, ambiguous, far_away, passes, unproved, verdict
 
 _SIGMAS = 10.0  # noise by which numbers that a reading takes for equal may differ
 
@@ -98,18 +100,14 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     doubt = max(m.doubt for m in meshes)
     status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble, doubt)
     others: list[Alternative] = []
-    if status == "certified" and topology.method != "the numbers" and known is None:
-        others = filled_holes(stored, topology, stretch * mesh.scale[mesh.component])  # next to nothing on most meshes
-        if others:
-            status, reason = ambiguous(others, certificate)
-    elif status == "certified" and topology.method == "the numbers":
-        with clock("ambiguity"):
-            others = _alternatives(topology, stored, placement, mesh, stretch, noise, known)
-            by_coincidence = known is None and bool(coincident(stored, topology).any())
-        if others:
-            status, reason = ambiguous(others, certificate)
-        elif by_coincidence:
-            status, reason = all_alike(certificate)
+    if status == "certified":
+        with clock("ambiguity") if topology.method == "the numbers" else nullcontext():  # else next to nothing
+            agree = AGREE if noise is None else max(AGREE, _SIGMAS * noise / float(np.abs(factors).min()))
+            others, doubt_of_cells = _alternatives(topology, stored, placement, mesh, stretch, agree, known)
+        if doubt_of_cells and not others:
+            status, reason = doubt_of_cells(certificate)
+    if others:
+        status, reason = ambiguous(others, certificate)
     distant = False
     if origins.any():
         near, (certificate, chi_square) = certificate, _held_against(stored, mesh, points, placement, noise, freedom)
@@ -122,7 +120,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     if chi_square and evidence.noise is not None and evidence.noise < 0.5 * chi_square["sigma"]:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
     if status == "uncertified" and not (others or chi_square or distant):
-        notes += elimination_notes(stored, evidence.suspects)
+        notes += origin_notes(stored, evidence.suspects)
     polygons = Polygons.none() if options.triangulate else mesh.polygons
     return Recovery(
         points=points,
@@ -158,10 +156,10 @@ def _alternatives(
     placement: Placement,
     mesh: JoinedMesh,
     stretch: float,
-    noise: float | None,
+    agree: float,
     known: float | None,
-) -> list[Alternative]:
-    """Other meshes that fit, in the frame in which the operator is the Laplacian."""
+) -> tuple[list[Alternative], Callable[[certificates.Certificate], tuple[str, str]] | None]:
+    """Other meshes that fit, in the frame in which the operator is the Laplacian; or what says that there may be."""
     z = mesh.points @ [1, 1j]
     oriented = OrientedMesh(
         mesh.triangles[~mesh.in_polygon],
@@ -170,10 +168,16 @@ def _alternatives(
         mesh.boundary_offsets,
         np.asarray(placement.tensor.to_laplacian(z) if placement.tensor else z, dtype=np.complex128),
     )
-    smallest = stretch * float(np.abs(mesh.scale).min())
-    agree = AGREE if noise is None else max(AGREE, _SIGMAS * noise / smallest)
     factors = stretch * mesh.scale[mesh.component]
-    return alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
+    others = filled_holes(stored, topology, factors, agree) if known is None else []
+    if topology.method != "the numbers":
+        return others or touching(stored, oriented, factors, agree), None
+    left_open = False
+    if not others:
+        others, left_open = alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
+    if known is None and coincident(stored, topology).any():
+        return others, all_alike
+    return others, unproved if left_open else None
 
 
 def _held_against(
@@ -201,12 +205,12 @@ def _place(
     topology: Topology, placement: Placement, origins: NDArray, meshes: list[PieceMesh]
 ) -> tuple[list[NDArray], list[str]]:
     """Every piece in its final frame, relative to its origin, hinges joined; and what is to be said about it."""
-    placed, notes = [], []
+    placed, remarks = [], []
     for label, (piece, mesh) in enumerate(zip(topology.pieces, meshes, strict=True)):
-        z, remarks = placement.apply(piece, mesh.z, origins[label])
+        z, more = placement.apply(piece, mesh.z, origins[label])
         placed.append(z)
-        prefix = f"piece {label}: " if len(meshes) > 1 else ""
-        notes += [prefix + remark for remark in (*mesh.notes, *remarks)]
+        remarks.append((*mesh.notes, *more))
+    notes = piece_notes(remarks)
     known = np.array([placement.known_positions(piece) for piece in topology.pieces])
     placed = join(topology, placed, known)
     notes += placement.unused(topology)

@@ -130,7 +130,7 @@ def ambiguous(others: list[Alternative], certificate: Certificate) -> tuple[str,
         if first.found != first.other
         else ""
     )
-    claim = "but so does another" if first.tested else "but there are no more entries than unknowns, and another may"
+    claim = "but so does another" if first.tested else "but so may another, which was not tried"
     if first.other_cells:
         cells = f"the cells {_cells(first.other_cells)}" + (
             f" in place of {_cells(first.cells)}" if first.cells else " besides"
@@ -148,6 +148,15 @@ def all_alike(certificate: Certificate) -> tuple[str, str]:
     return "uncertified", (
         f"the mesh gives the matrix back to {certificate.backward_error:.1e}, but where all entries are equal small "
         "pieces that hang together at vertices may as well be others, with another factor c: known, it decides"
+    )
+
+
+def unproved(certificate: Certificate) -> tuple[str, str]:
+    """The status and reason of pieces that fit, as others may."""
+    return "uncertified", (
+        f"the mesh gives the matrix back to {certificate.backward_error:.1e}, but it has hardly more entries than "
+        "unknowns, and not all other cells that may have the same ones, with another factor c, could be tried: known, "
+        "it decides"
     )
 
 

@@ -88,6 +88,39 @@ def test_parts_that_can_be_turned_over(name):
     assert not recover(known.matrix, scale=-3.0).certified  # a known factor does not decide here
 
 
+def touching(kind):
+    """Cells about the origin and, on opposite sides of it, what may as well be cells in the gaps."""
+    points = np.array([(0, 0), (1.3, 0), (0, 0.8), (-1.3, 0), (0, -0.8), (1.3, 0.8), (-1.3, -0.8)])
+    if kind == "triangles":
+        points[5:] += [(0.1, 0.3), (-0.2, 0.1)]
+    own = np.array([(0, 1, 2), (1, 5, 2), (0, 3, 4), (3, 6, 4)])
+    other = np.array([(1, 5, 2), (3, 6, 4), (0, 2, 3), (0, 4, 1)])
+    return points, own, other
+
+
+@pytest.mark.parametrize("c", [None, 2.0])
+@pytest.mark.parametrize("kind", ["rectangles", "triangles"])
+def test_right_angles_that_touch_may_lie_in_the_gaps_between_them(kind, c):
+    points, own, other = touching(kind)
+    known, same = (forgotten(specimen(points, cells, c=2.0, seed=5)) for cells in (own, other))
+    assert abs(known.matrix - same.matrix).max() < 1e-14
+    found = recover(known.matrix, scale=c)
+    assert not found.certified
+    (alternative,) = found.alternatives
+    assert alternative.same_scale
+    added = {tuple(sorted(cell)) for cell in alternative.other_cells}
+    assert added >= triangle_set(same.triangles) - triangle_set(found.triangles)
+
+
+def test_rectangles_of_other_shapes_that_touch_are_certified():
+    points, own, _ = touching("rectangles")
+    points[[2, 5], 1] = 0.5
+    known = forgotten(specimen(points, own, seed=5))
+    found = recover(known.matrix, scale=1.0)
+    assert found.certified, found.reason
+    assert found.n_polygons == 2
+
+
 def test_rows_and_cells_are_in_the_report():
     star = np.array([[0.0, 0], [1, 0], [0, 2], [-3, 0], [0, -1.5]])
     triangles = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]])

@@ -7,6 +7,7 @@ from families import FAMILIES
 from meshes import specimen
 from named_meshes import cells_of, explains
 from unassemble import recover
+from unassemble.cells import regrouped
 from unassemble.cells.consistent import Assembly
 from unassemble.cells.covering import likely_scales, read_by_cover
 from unassemble.cells.numbered import Numbered, frequent_numbers
@@ -46,6 +47,22 @@ def test_other_meshes_of_a_lattice(seed):
         kept = [cell for cell in cells if tuple(sorted(cell)) not in gone]
         assert len(kept) == len(cells) - len(gone)
         assert explains(known.matrix, [*kept, *other.other_cells], c)
+
+
+def test_another_mesh_that_is_not_tried_is_named(monkeypatch):
+    monkeypatch.setattr(regrouped, "_MOST_VERTICES", 0)
+    found = recover(member("lattice", 83)[0].matrix)
+    assert not found.certified
+    assert "which was not tried" in found.reason
+
+
+@pytest.mark.parametrize("limit", ["_MOST_VERTICES", "_MOST_TRIALS"])
+def test_the_rest_of_a_mesh_excludes_what_is_not_tried(limit, monkeypatch):
+    """Between two holes right angles are opposite to each other, and might lie in the next quarters."""
+    monkeypatch.setattr(regrouped, limit, 0)
+    known = forgotten(specimen(*squares(holes(8, 5, (2, 2, 1, 1), (4, 2, 1, 1)), crossed=True)))
+    found = recover(known.matrix)
+    assert found.certified, found.reason
 
 
 # In the second parts that could be put in another order about a vertex are joined by another piece as well.

@@ -5,8 +5,11 @@ import numpy as np
 import pytest
 
 from exhaustive import all_meshes, matrix_of, named
-from meshes import specimen
+from meshes import delaunay, edge_list, specimen
 from unassemble import recover
+from unassemble.cells.by_component import with_pieces
+from unassemble.cells.exhaustion import TooManyError, all_readings
+from unassemble.topology import components, recognise
 from vanishing import holes, squares, used, without_zeros
 
 TREES = [tree for n in (3, 4, 5) for tree in networkx.nonisomorphic_trees(n)]
@@ -53,6 +56,39 @@ def test_random_weights(graph):
     weights = {tuple(sorted((int(row[a]), int(row[b])))): float(rng.uniform(0.5, 2)) for a, b in graph.edges}
     found = check(len(graph), weights)
     assert recover(matrix_of(len(graph), weights), scale=found.scale[0]).certified  # at most one fits each c
+
+
+@pytest.mark.parametrize("graph", TREES + GRAPHS, ids=str)
+def test_the_library_tries_all_sets_of_cells_as_well(graph):
+    rng = np.random.default_rng(graph.number_of_edges())
+    edges = np.array(sorted(tuple(sorted(edge)) for edge in graph.edges))
+    weights = rng.uniform(0.5, 2, len(edges))
+    (part,) = components(len(graph), edges)
+    found = [frozenset(cells) for cells, _ in all_readings(part, weights[part.edge_rows], agree=0.0)]
+    known = all_meshes(len(graph), dict(zip(map(tuple, edges.tolist()), weights.tolist(), strict=True)))
+    assert len(set(found)) == len(found) == len(known)
+    assert set(found) == {frozenset(tuple(sorted(cell)) for cell in cells) for cells in known}
+
+
+def test_a_long_path_is_too_much():
+    edges = np.column_stack([np.arange(60), np.arange(1, 61)])
+    (part,) = components(61, edges)
+    with pytest.raises(TooManyError):
+        list(all_readings(part, np.random.default_rng(0).uniform(0.5, 2, 60), agree=0.0))
+
+
+def test_pieces_by_component():
+    _, triangles = delaunay(np.random.default_rng(0).random((6, 2)))
+    many = np.concatenate([triangles + 6 * k for k in range(5)])
+    row = np.random.default_rng(1).permutation(32)
+    many = row[np.concatenate([many, [[30, 31, 0]]])]
+    edges = edge_list(many)
+    pieces = recognise(32, edges).pieces
+    found = with_pieces(32, edges, pieces)
+    assert len(found) == 5
+    assert sorted(len(own) for _, own in found) == [1, 1, 1, 1, 2]
+    for part, own in found:
+        assert set(np.concatenate([piece.vertices for piece in own]).tolist()) == set(part.vertices.tolist())
 
 
 @pytest.mark.parametrize("c", [None, 1.0])

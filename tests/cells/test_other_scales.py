@@ -4,7 +4,50 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from meshes import specimen
 from unassemble import recover
+from vanishing import forgotten
+
+
+def ring_of_right_triangles(count, seed, first=None):
+    """Right triangles hinged at the ends of their longest sides, outside of a regular polygon; one may be another."""
+    rng = np.random.default_rng(seed)
+    corner = np.exp(2j * np.pi * np.arange(count) / count)
+    following = np.roll(corner, -1)
+    middle, half = (corner + following) / 2, (corner - following) / 2
+    apex = middle + half * np.exp(1j * rng.uniform(0.5, np.pi - 0.5, count))
+    if first is not None:
+        apex[0] = middle[0] + half[0] * first
+    z = np.concatenate([corner, apex])
+    k = np.arange(count)
+    return np.column_stack([z.real, z.imag]), np.column_stack([k, count + k, (k + 1) % count])
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("count", "first"), [(3, None), (4, None), (3, 0.2 + 0.6j), (30, None)])
+def test_rings_of_right_triangles_are_undivided_polygons_as_well(count, first, seed):
+    known = forgotten(specimen(*ring_of_right_triangles(count, seed, first), c=-2.5, seed=seed))
+    found = recover(known.matrix)
+    assert not found.certified
+    if count < 5:
+        assert any(not other.same_scale for other in found.alternatives)
+    given = recover(known.matrix, scale=-2.5)
+    assert not given.certified or len(given.triangles) == count
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_one_undivided_polygon(seed):
+    """Random entries are those of one polygon only, but of long ones that takes too many trials to be certain."""
+    rng = np.random.default_rng(seed)
+    for n in (5, 40):
+        i, j = rng.permutation(n), np.empty(n, dtype=np.int64)
+        j[:] = np.roll(i, 1)
+        w = rng.uniform(0.5, 2, n)
+        found = recover(sp.coo_array((np.r_[-w, -w], (np.r_[i, j], np.r_[j, i])), shape=(n, n)))
+        assert found.certified == (n == 5), found.reason
+        assert not found.alternatives
+        assert found.n_polygons == 1
+        assert found.certified or "could be tried" in found.reason
 
 
 def rhombi(count, seed):

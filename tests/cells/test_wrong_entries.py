@@ -6,10 +6,12 @@ import scipy.sparse as sp
 
 from meshes import largest_error, random_mesh, specimen
 from unassemble import recover
-from unassemble.cells import search, triangles_only
+from unassemble.cells import in_doubt, search, triangles_only, wrong_entries
+from unassemble.matrix import check_matrix
 from unassemble.planar.conformal import conformal_map
+from unassemble.planar.piece import PieceMesh
 from unassemble.planar.robust import robust_fit
-from unassemble.topology import recognise
+from unassemble.topology import recognise, surfaces
 from vanishing import forgotten, half_jittered, holes, refined, squares, triangular_holes
 
 MESHES = {
@@ -72,6 +74,42 @@ def test_several_wrong_entries():
     found = recover(matrix)
     assert sorted(found.suspects.tolist()) == pairs
     assert largest_error(found.points, known.points) < 1e-10
+
+
+def bow(seed):
+    """Two random meshes that meet in one vertex, with a right angle between them there."""
+    points, triangles = random_mesh(60, seed)
+    z, n = points @ [1, 1j], len(points)
+    h = int(np.argmax(z.real))
+    z = z - z[h]
+    edges, count = np.unique(np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0,
+                             return_counts=True)  # fmt: skip
+    rim = edges[(count == 1) & (edges == h).any(axis=1)]
+    near = rim[rim != h]
+    a, b = near[np.argmax(z[near].imag)], near[np.argmin(z[near].imag)]
+    other = 0.8 * z * (z[a] / abs(z[a])) * -1j / (z[b] / abs(z[b]))
+    number = np.r_[n + np.arange(h), h, n + np.arange(h, n - 1)]
+    z = np.append(z, np.delete(other, h))
+    return np.column_stack([z.real, z.imag]), np.vstack([triangles, number[triangles], [a, h, number[b]]])
+
+
+@pytest.mark.parametrize("seed", [3, 5])
+def test_a_cell_between_two_pieces_is_no_wrong_entry_in_each(seed):
+    """Without it one edge of each does not fit; they share a vertex."""
+    known = forgotten(specimen(*bow(seed), seed=seed))
+    matrix = check_matrix(known.matrix)
+    topology = surfaces(matrix.n, matrix.edges)
+
+    def attempt(piece):
+        found = conformal_map(piece, -matrix.entries[piece.edge_rows])
+        return PieceMesh(found.z, found.scale)
+
+    assert len(topology.pieces) == 2
+    doubtful = in_doubt(matrix, topology, attempt)
+    assert doubtful.all()
+    found, doubtful = wrong_entries(matrix, topology, attempt, doubtful, None)
+    assert not found
+    assert doubtful.all()
 
 
 def test_sides_of_a_hole_are_no_wrong_entries():

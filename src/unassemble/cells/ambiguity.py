@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
 from ..topology import Topology
+from ..topology.keys import Grouped
 from .corners import Alternative, Corners, OrientedMesh
 from .flips import turned_over
 from .hinged import as_one_piece
-from .hubs import Hub, hubs, rearranged
+from .hubs import Hub, closed_at, hubs, rearranged
 from .loose import is_loose, other_reading
 from .other_scales import other_scales
 from .regrouped import fitting, regrouped
@@ -33,10 +34,10 @@ def alternatives(
     *,
     scale: float | None,
     agree: float = AGREE,
-) -> list[Alternative]:
+) -> tuple[list[Alternative], bool]:
     """Other meshes that fit as well as the one found: the places where they differ, each by itself.
 
-    Where the rules find none, small graphs are read again in other orders.
+    Where the rules find none, loose pieces are read with other factors, and small graphs again in other orders.
 
     Parameters
     ----------
@@ -50,51 +51,65 @@ def alternatives(
     scale : float, optional
         c, where it is known; otherwise a mesh with another c is as good.
     agree : float
+
+    Returns
+    -------
+    alternatives : list of Alternative
+    open : bool
+        Whether there may be others that could not be looked for.
     """
     found: list[Alternative] = []
-    if len(topology.vanished) > (topology.polygons.size - 3).sum():  # not on diagonals only
-        found = _by_rules(stored, topology, mesh, factors, scale_known=scale is not None, agree=agree)
-    return found or other_readings(stored, mesh, factors, scale)
-
-
-def _by_rules(
-    stored: OperatorMatrix,
-    topology: Topology,
-    mesh: OrientedMesh,
-    factors: NDArray,
-    *,
-    scale_known: bool,
-    agree: float,
-) -> list[Alternative]:
     corners = Corners.of(stored.n, stored.edges, mesh)
     around = list(hubs(corners, mesh.z))
-    found = twins(stored, mesh, agree)
-    orders = [other for hub in around if (other := rearranged(hub, agree)) is not None]
-    # Parts that hang together at a hub only may yet be joined by other pieces.
-    found += fitting(stored, mesh, factors, orders) if len(topology.hinges) else orders
-    found += turned_over(corners, mesh.z, agree)
-    if not scale_known:
-        found += _loose_pieces(stored, topology, corners, around)
-        found += as_one_piece(stored, topology, corners, around)
+    closed = closed_at(stored.n, around)
+    left_open = False
+    if len(topology.vanished) > (topology.polygons.size - 3).sum():  # not on diagonals only
+        found = twins(stored, mesh, agree)
+        orders = [other for hub in around if (other := rearranged(hub, agree)) is not None]
+        # Parts that hang together at a hub only may yet be joined by other pieces.
+        found += fitting(stored, mesh, factors, orders) if len(topology.hinges) else orders
+        found += turned_over(corners, mesh.z, agree)
+        if scale is None:
+            found += _loose_pieces(stored, topology, corners, around, closed)
+            found += as_one_piece(stored, topology, corners, closed)
     found = found or regrouped(stored, mesh, corners, factors, agree)
-    if not found and not scale_known:
-        found = other_scales(stored, topology, mesh, factors, around)
-    return _each_once(found)
+    if not found and scale is None:
+        found, left_open = other_scales(stored, topology, mesh, factors, closed, agree)
+    return _each_once(found) or other_readings(stored, mesh, factors, scale), left_open
 
 
-def _loose_pieces(stored: OperatorMatrix, topology: Topology, corners: Corners, around: list[Hub]) -> list[Alternative]:
+def touching(stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, agree: float) -> list[Alternative]:
+    """Other meshes in which right angles of cells that touch in a vertex are regrouped, as where none need be supposed.
+
+    Parameters are those of :func:`alternatives`.
+    """
+    if (np.bincount(mesh.boundary[:, 0], minlength=stored.n) < 2).all():
+        return []
+    return regrouped(stored, mesh, Corners.of(stored.n, stored.edges, mesh), factors, agree)
+
+
+def _loose_pieces(
+    stored: OperatorMatrix, topology: Topology, corners: Corners, around: list[Hub], closed: NDArray[np.int64]
+) -> list[Alternative]:
     """Pieces that no other shares a vertex with: what hangs on another has its c."""
+    single = [
+        piece
+        for piece in topology.pieces
+        if is_loose(piece, closed) and not (topology.multiplicity[piece.vertices] > 1).any()
+    ]
+    owner = np.full(stored.n, -1)
+    for k, piece in enumerate(single):
+        owner[piece.vertices] = k
+    corners_of = Grouped(owner[corners.apex], len(single))
+    hubs_of: list[list[Hub]] = [[] for _ in single]
+    for hub in around:
+        if owner[hub.row] >= 0:
+            hubs_of[owner[hub.row]].append(hub)
     found = []
-    for piece in topology.pieces:
-        if len(piece.edges) > 2.5 * piece.n_vertices or (topology.multiplicity[piece.vertices] > 1).any():
-            continue
-        own = np.zeros(stored.n, dtype=bool)
-        own[piece.vertices] = True
-        its_hubs = [hub for hub in around if own[hub.row]]
-        if is_loose(piece.n_vertices, len(piece.edges), its_hubs):
-            triangles = piece.vertices[piece.triangles]
-            other = other_reading(stored, triangles, corners.chosen(own[corners.apex]), its_hubs)
-            found += [other] if other is not None else []
+    for k, piece in enumerate(single):
+        own = corners.chosen(corners_of.order[corners_of.start[k] : corners_of.start[k + 1]])
+        other = other_reading(stored, piece.vertices[piece.triangles], own, hubs_of[k])
+        found += [other] if other is not None else []
     return found
 
 

@@ -25,7 +25,7 @@ class Alternative:
     same_scale : bool
         Whether both have the same factor c; otherwise a known c decides.
     tested : bool
-        Whether the other was solved and fits; otherwise there are as many entries as unknowns, and it should.
+        Whether the other was solved and fits; otherwise it was not tried, and might.
     """
 
     around: tuple[int, ...]
@@ -58,6 +58,12 @@ class OrientedMesh:
     boundary: NDArray[np.int64]
     boundary_offsets: NDArray[np.int64]
     z: NDArray[np.complex128]
+
+    def chosen(self, rows: NDArray[np.bool_], number: NDArray[np.int64]) -> OrientedMesh:
+        """The cells of whole pieces by their rows (n,), row v called ``number[v]``; the rest is left as it is."""
+        first = self.polygons.vertices[self.polygons.offsets[:-1]]
+        triangles = number[self.triangles[rows[self.triangles[:, 0]]]]
+        return replace(self, triangles=triangles, polygons=self.polygons.chosen(rows[first], number))
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +121,8 @@ class Corners:
     def __len__(self) -> int:
         return len(self.apex)
 
-    def chosen(self, which: NDArray[np.bool_]) -> Corners:
-        """Some of them."""
+    def chosen(self, which: NDArray) -> Corners:
+        """Some of them, by a mask or by their numbers."""
         return replace(
             self,
             apex=self.apex[which],

@@ -20,6 +20,8 @@ _WIDE = 200  # rows of a matrix on which the misfit of a wrong cell stays near i
 SURE = 1e-3
 """Misfit, even if spread evenly, that no wrong cell is known to leave."""
 
+_SAME_SCALE, _SCALE_ERROR = 1e-6, 1e5  # relative errors of c in small pieces: at least, and over those of the entries
+
 _SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 
 Outcome = PieceMesh | RecoveryError
@@ -31,22 +33,53 @@ Attempt = Callable[[Piece], Outcome]
 Solved = list[tuple[Piece, Outcome]]
 
 
-def in_doubt(matrix: OperatorMatrix, topology: Topology, attempt: Attempt) -> NDArray[np.bool_]:
-    """(n,) rows of components with nonzero entries on no triangle, or entries that do not fit.
+def in_doubt(
+    matrix: OperatorMatrix, topology: Topology, attempt: Attempt, scale: float | None = None
+) -> NDArray[np.bool_]:
+    """(n,) rows of components with nonzero entries on no triangle, entries that do not fit, or several factors c.
 
     A misfit that is small and spread evenly, at the latest after a short polish, is that of errors in the entries, and
-    raises no doubt. Pieces of components that are in doubt without it are not solved.
+    raises no doubt. Pieces of components that are in doubt without it are not solved. `scale` is c, where it is known.
     """
     doubtful = unexplained(matrix, topology)
     solved = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
+    doubtful |= _discordant(matrix, solved, scale)
+    solved = [(piece, mesh) for piece, mesh in solved if not doubtful[piece.vertices[0]]]
     rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
     misfit = misfits_of(matrix, solved)[rest]
     wrong = misfit > FITS
     if not wrong.any() or _like_noise(misfit, matrix.n):
         return doubtful
-    if _like_noise(misfits_of(matrix, _shortly_polished(matrix, solved))[rest], matrix.n):
+    if _like_noise(misfits_of(matrix, _shortly_polished(matrix, solved, scale))[rest], matrix.n):
         return doubtful
     return doubtful | _components_of(matrix, rest[wrong])
+
+
+def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None) -> NDArray[np.bool_]:
+    """(n,) rows of components whose pieces fit, but loose ones with another factor c than is known or others have.
+
+    With a hole filled such a piece still fits, with another c. That of pieces with more entries than unknowns is right,
+    if any is: where these differ from each other, or from the known one, other cells are no help.
+    """
+    having = [(piece, mesh) for piece, mesh in solved if isinstance(mesh, PieceMesh)]
+    if not having:
+        return np.zeros(matrix.n, dtype=bool)
+    label = components_of(matrix)
+    count = int(label.max()) + 1
+    bound = np.full(count, _SAME_SCALE)
+    np.maximum.at(bound, label[matrix.edges[:, 0]], _SCALE_ERROR * misfits_of(matrix, list(having)))
+    own = label[[piece.vertices[0] for piece, _ in having]]
+    loose = np.array([len(piece.edges) <= 2 * piece.n_vertices - 3 for piece, _ in having])
+    c = np.array([mesh.scale for _, mesh in having])
+    right = np.full(count, scale or 0.0)
+    if scale is None:  # the last one counts
+        order = np.lexsort((np.array([piece.n_vertices for piece, _ in having]), ~loose))
+        right[own[order]] = c[order]
+    apart = np.abs(c / right[own] - 1) > bound[own]
+    wrong, hopeless = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    wrong[own[apart]] = True
+    hopeless[own[apart & ~loose]] = True
+    return np.asarray((wrong & ~hopeless)[label])
 
 
 def _like_noise(misfit: NDArray, n: int) -> bool:
@@ -54,12 +87,12 @@ def _like_noise(misfit: NDArray, n: int) -> bool:
     return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < SURE)
 
 
-def _shortly_polished(matrix: OperatorMatrix, solved: Solved) -> Solved:
+def _shortly_polished(matrix: OperatorMatrix, solved: Solved, scale: float | None) -> Solved:
     polished: Solved = []
     for piece, mesh in solved:
         if isinstance(mesh, PieceMesh):
             try:
-                found = polish(piece, -matrix.entries[piece.edge_rows], mesh.z, options=_SHORT)
+                found = polish(piece, -matrix.entries[piece.edge_rows], mesh.z, scale=scale, options=_SHORT)
             except SolverError as error:
                 polished.append((piece, error))
                 continue

@@ -13,17 +13,19 @@ from dataclasses import replace
 from itertools import islice, pairwise, product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
 from ..planar.hinges import groups
 from ..topology import Piece, Topology
 from ..topology.faces import joined
 from .corners import Alternative, Corners, cell
-from .hubs import Hub
 from .loose import MOST_TRIALS, SURE, fits_as_one, is_loose
 
 
-def as_one_piece(stored: OperatorMatrix, topology: Topology, corners: Corners, hubs: list[Hub]) -> list[Alternative]:
+def as_one_piece(
+    stored: OperatorMatrix, topology: Topology, corners: Corners, closed: NDArray[np.int64]
+) -> list[Alternative]:
     """One alternative for each group of pieces that also fits as one piece.
 
     Where not all can be tried, or the group is too large to be solved well, the first stands for them, untested.
@@ -35,7 +37,8 @@ def as_one_piece(stored: OperatorMatrix, topology: Topology, corners: Corners, h
     topology : Topology
     corners : Corners
         All right angles of the mesh that was found.
-    hubs : list of Hub
+    closed : (n,) int64
+        1 for rows that four right angles surround.
     """
     if not len(topology.hinges):
         return []
@@ -47,21 +50,17 @@ def as_one_piece(stored: OperatorMatrix, topology: Topology, corners: Corners, h
     found = []
     for numbers in members:
         pieces = [topology.pieces[k] for k in numbers.tolist()]
-        if len(pieces) > 1 and any(apex[piece.vertices].any() for piece in pieces) and all_loose(pieces, hubs):
+        if len(pieces) > 1 and any(apex[piece.vertices].any() for piece in pieces) and _is_loose_tree(pieces, closed):
             found += _first_that_fits(stored, pieces)
     return found
 
 
-def all_loose(pieces: list[Piece], hubs: list[Hub]) -> bool:
+def _is_loose_tree(pieces: list[Piece], closed: NDArray[np.int64]) -> bool:
     """Whether each piece has as many entries as unknowns, and no ring of pieces is closed."""
     count = sum(piece.n_vertices for piece in pieces)
     if len(np.unique(np.concatenate([piece.vertices for piece in pieces]))) != count - len(pieces) + 1:
         return False
-    rows = [set(piece.vertices.tolist()) for piece in pieces]
-    return all(
-        is_loose(piece.n_vertices, len(piece.edges), [hub for hub in hubs if hub.row in own])
-        for piece, own in zip(pieces, rows, strict=True)
-    )
+    return all(is_loose(piece, closed) for piece in pieces)
 
 
 def _first_that_fits(stored: OperatorMatrix, pieces: list[Piece]) -> list[Alternative]:

@@ -11,7 +11,7 @@ it gets between its sides at will; only the sum is fixed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import groupby, permutations, product
 
@@ -110,6 +110,13 @@ def hubs(corners: Corners, z: NDArray) -> Iterator[Hub]:
         hub = _hub(corners, list(rows), h, loop, z)
         if 2 <= len(hub.parts) <= _MOST_PARTS:
             yield hub
+
+
+def closed_at(n: int, around: Iterable[Hub]) -> NDArray[np.int64]:
+    """(n,) 1 for vertices that four right angles surround: these add up to a full turn by themselves."""
+    closed = np.zeros(n, dtype=np.int64)
+    closed[[hub.row for hub in around if hub.closed and len(hub.parts) == 4]] = 1
+    return closed
 
 
 def rearranged(hub: Hub, agree: float) -> Alternative | None:

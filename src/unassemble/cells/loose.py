@@ -22,6 +22,7 @@ from ..matrix.operator import row_sizes
 from ..planar.cautious import count_flipped
 from ..planar.conformal import ConformalOptions, conformal_map
 from ..planar.cotangent import edge_weights
+from ..topology import Piece
 from ..topology.keys import with_sides
 from ..topology.pieces import planar_pieces
 from .corners import Alternative, Corners, cell
@@ -34,9 +35,12 @@ _FITS = 1e-6
 _OPTIONS = ConformalOptions(max_factorisations=4)
 
 
-def is_loose(n_vertices: int, n_edges: int, hubs: list[Hub]) -> bool:
-    """Whether a piece, of as many edges with the vanished ones, has no more entries than unknowns."""
-    return n_edges - (2 * n_vertices - 3) <= sum(hub.closed and len(hub.parts) == 4 for hub in hubs)
+def is_loose(piece: Piece, closed: NDArray[np.int64]) -> bool:
+    """Whether a piece has no more entries than unknowns, vanished ones counted, and c among the unknowns.
+
+    `closed`, (n,), is 1 for rows that four right angles surround.
+    """
+    return len(piece.edges) - (2 * piece.n_vertices - 3) <= int(closed[piece.vertices].sum())
 
 
 def other_reading(

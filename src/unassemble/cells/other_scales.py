@@ -1,7 +1,9 @@
-"""Loose pieces that hang together, read with another factor c.
+"""Loose pieces, read with another factor c.
 
-Each of them fits by itself, and that all have one c is the only evidence. It is none where their entries are of a kind:
-crossed rhombi of any shapes, for instance, are pairs of right triangles as well, all of them with one other c.
+A mesh of one loose piece, with as many entries as unknowns, fits whatever the entries are, and so do others; that
+nothing else fits can only be found out by trying everything. Where several such pieces hang together all of them have
+one c, and that is the only evidence. It is none where their entries are of a kind: crossed rhombi of any shapes, for
+instance, are pairs of right triangles as well, all of them with one other c.
 """
 
 from __future__ import annotations
@@ -10,24 +12,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
-from ..topology import Topology, components
+from ..topology import Numbering, Topology
 from .agreement import common_values
+from .by_component import with_pieces
 from .corners import Alternative, OrientedMesh
 from .covering import MOST_VERTICES
-from .hinged import all_loose
-from .hubs import Hub
-from .rereading import cells_of, own_cells, with_another_scale
+from .crosses import Crosses
+from .exhaustion import TooManyError, all_readings
+from .loose import is_loose
+from .reading import NEARLY
+from .rereading import SAME_SCALE, cells_of, own_cells, with_another_scale
 from .shapes import Shapes
 
 _MOST_SHAPES = 3000
-_MOST_SCALES = 4
-_AGREE = 1e-9
+_MOST_SCALES = 6
+_MOST_ROWS = 400  # of all components in which everything is tried, together: each takes a second or two
+_AGREE = 1e-7
+
+Cells = set[tuple[int, ...]]
 
 
 def other_scales(
-    stored: OperatorMatrix, topology: Topology, mesh: OrientedMesh, factors: NDArray, hubs: list[Hub]
-) -> list[Alternative]:
-    """One alternative for each component of loose pieces that fits with another c in which its numbers agree.
+    stored: OperatorMatrix,
+    topology: Topology,
+    mesh: OrientedMesh,
+    factors: NDArray,
+    closed: NDArray[np.int64],
+    agree: float,
+) -> tuple[list[Alternative], bool]:
+    """Other meshes for components of loose pieces, c not being known.
 
     Parameters
     ----------
@@ -38,33 +51,78 @@ def other_scales(
     mesh : OrientedMesh
     factors : (n,) float64
         c of the piece of each row.
-    hubs : list of Hub
-        Vertices that right angles surround.
+    closed : (n,) int64
+        1 for rows that four right angles surround.
+    agree : float
+        Relative difference of numbers that noise may cause.
+
+    Returns
+    -------
+    alternatives : list of Alternative
+        One for each component that fits with other cells.
+    open : bool
+        Whether there are components of which this could not be found out.
     """
-    parts = []
-    for part in components(stored.n, stored.edges):
-        inside = np.zeros(stored.n, dtype=bool)
-        inside[part.vertices] = True
-        pieces = [piece for piece in topology.pieces if inside[piece.vertices[0]]]
-        if len(part.vertices) <= MOST_VERTICES and len(pieces) > 1 and all_loose(pieces, hubs):
-            parts.append(part)
-    found = []
-    for part, own in zip(parts, own_cells(stored.n, parts, mesh), strict=True):
-        weights = -stored.entries[part.edge_rows]
-        shapes = Shapes.of(len(part.vertices), part.edges, _MOST_SHAPES)
-        scales = _of_right_angles(shapes, weights) if shapes is not None and len(shapes) else []
-        reading = with_another_scale(part, weights, factors[part.vertices[0]], scales)
-        if reading is not None:
-            cells = cells_of(reading, part)
-            gone, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
-            found.append(Alternative((), (), (), gone, new, same_scale=False))
-    return found
+    gone = np.zeros(stored.n, dtype=bool)
+    gone[topology.edges[topology.vanished]] = True
+    loose = [
+        (part, len(pieces))
+        for part, pieces in with_pieces(stored.n, stored.edges, topology.pieces)
+        if gone[part.vertices].any() and pieces and all(is_loose(piece, closed) for piece in pieces)
+    ]
+    found, left_open, left = [], False, _MOST_ROWS
+    for (part, count), own in zip(loose, own_cells(stored.n, [part for part, _ in loose], mesh), strict=True):
+        weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
+        try:
+            left -= len(part.vertices)
+            other = _other_of_all(part, weights, own, agree, enough=left >= 0)
+        except TooManyError:
+            left_open |= count == 1 or len(part.vertices) > MOST_VERTICES or agree > NEARLY
+            other = _with_common_scale(part, weights, c)
+        if other is not None:
+            cells, factor = other
+            gone_cells, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
+            same = abs(factor / c - 1) < SAME_SCALE
+            found.append(Alternative((), (), (), gone_cells, new, same_scale=same))
+    return found, left_open
 
 
-def _of_right_angles(shapes: Shapes, weights: NDArray) -> list[float]:
-    """The c of right angles between two edges that border no other cell, if they are found at several vertices."""
+def _other_of_all(
+    part: Numbering, weights: NDArray, own: Cells, agree: float, *, enough: bool
+) -> tuple[Cells, float] | None:
+    """Any other mesh of a component.
+
+    Raises
+    ------
+    TooManyError
+        If not all can be tried.
+    """
+    if not enough:
+        raise TooManyError
+    return next((reading for reading in all_readings(part, weights, agree) if reading[0] != own), None)
+
+
+def _with_common_scale(part: Numbering, weights: NDArray, c: float) -> tuple[Cells, float] | None:
+    """A mesh with another c in which several cells agree that border no other."""
+    n = len(part.vertices)
+    shapes = Shapes.of(n, part.edges, _MOST_SHAPES) if n <= MOST_VERTICES else None
+    if shapes is None or not len(shapes):
+        return None
+    reading = with_another_scale(part, weights, c, _of_lone_cells(shapes, weights))
+    if reading is None:
+        return None
+    return cells_of(reading, part), next(mesh.scale for mesh in reading.meshes if mesh)
+
+
+def _of_lone_cells(shapes: Shapes, weights: NDArray) -> list[float]:
+    """The c that right angles, triangles and crosses that border no other cell have at several places."""
     sign = float(np.sign(weights.sum()))
-    one, other = (sign * weights)[shapes.sides[:, :2]].T
-    usable = np.flatnonzero(shapes.corner & (one > 0) & (other > 0))
-    values = 2 * np.sqrt(one[usable] * other[usable])
-    return [sign * float(c) for c in common_values(values, shapes.vertices[usable, 1], _AGREE)[:_MOST_SCALES] if c]
+    a, b, d = (sign * weights)[shapes.sides[:, :3]].T
+    right = np.flatnonzero(shapes.corner & (a > 0) & (b > 0))
+    form = a * b + b * d + d * a
+    whole = np.flatnonzero(shapes.stored[:, 2] & (shapes.size == 3) & (form > 0))
+    values = 2 * np.sqrt(np.append((a * b)[right], form[whole]))
+    places = np.append(shapes.vertices[right, 1], shapes.n_vertices + whole)
+    crossed = Crosses.of(shapes.n_vertices, shapes.edges, weights).scale
+    common = common_values(values, places, _AGREE)[:_MOST_SCALES]
+    return [sign * float(c) for c in common if c] + ([] if crossed is None else [crossed])

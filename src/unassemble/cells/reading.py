@@ -25,6 +25,9 @@ from .small import SMALL, small_map
 FITS = 1e-6
 """Largest misfit, relative to the row, of a conformal solve with the right cells; the polish does the rest."""
 
+NEARLY = 1e-5
+"""Misfit up to which entries of few digits may keep a reading from fitting."""
+
 _RIGHT_ANGLES = 4
 _OPTIONS = ConformalOptions(max_factorisations=4)  # what takes more has wrong cells
 
@@ -102,6 +105,10 @@ class Reading(Generic[C]):
     def fits(self) -> bool:
         """Whether every entry is reproduced."""
         return bool(len(self.pieces) and (self.misfit <= FITS).all())
+
+    def nearly_fits(self, agree: float) -> bool:
+        """Whether it might fit, were it not for errors of the entries; those of noise are up to `agree`."""
+        return bool(len(self.pieces) and self.misfit.max() <= max(NEARLY, agree))
 
     @property
     def fits_but_for_few(self) -> bool:

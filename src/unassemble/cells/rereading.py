@@ -21,7 +21,8 @@ from .undivided import undivided
 _MOST_VERTICES = 60
 _ORDERS = 5
 _WORK = 3000  # vertices times orders; every component is read once again at least
-_SAME_SCALE = 1e-6
+SAME_SCALE = 1e-6
+"""Relative difference of factors c that count as one."""
 
 
 def other_readings(
@@ -44,7 +45,7 @@ def other_readings(
             if other is not None:
                 cells, c = other
                 gone, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
-                same = abs(c / factors[part.vertices[0]] - 1) < _SAME_SCALE
+                same = abs(c / factors[part.vertices[0]] - 1) < SAME_SCALE
                 others.append(Alternative((), (), (), gone, new, same_scale=same))
                 break
     return others
@@ -94,7 +95,7 @@ def own_cells(n: int, parts: list[Numbering], mesh: OrientedMesh) -> list[set[tu
 def with_another_scale(part: Numbering, weights: NDArray, c: float, others: list[float]) -> Reading | None:
     """A reading that fits with the first of some factors that allows one, c left out."""
     for other in others:
-        if abs(other / c - 1) > _SAME_SCALE:
+        if abs(other / c - 1) > SAME_SCALE:
             reading = read_cells(len(part.vertices), part.edges, weights, other)
             if reading is not None and reading.fits:
                 return reading

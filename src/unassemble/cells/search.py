@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import heapq
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache, partial
 from itertools import islice
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from ..planar.piece import PieceMesh
 from ..topology.embedding import drawing_with_corners, face_complexes
 from .candidates import Candidates
+from .cell_set import CellSet
 from .covering import read_by_cover
 from .crosses import Crosses
 from .effort import SMALL_GRAPH, Effort
@@ -75,45 +77,56 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
     Reading or None
         None if no reading makes a planar surface.
     """
-    best: Reading | None = None
     effort = Effort.for_graph(n)
     triangles = read_triangles(n, edges, weights, scale, effort)
     if triangles is not None:
         return triangles
-    drawings = _drawings(n, edges, weights, scale)
+    best: Reading | None = None
     together = n <= SMALL_GRAPH
     turning = _TURNING / (_DRAWINGS if together else 1)
-    covered = False
+    drawings = _drawings(n, edges, weights, scale)
+    cover = cache(partial(read_by_cover, n, edges, weights, scale))
     # Repairs take most of the effort: small graphs are begun with in all drawings before.
     for some in [drawings] if together else ([drawing] for drawing in drawings):
         begun = []
         for drawing in some:
             begun.append(_begun(drawing, effort, int(turning * effort.solves)))
             if begun[-1].settled:
-                first = begun[-1].starts[0]
-                return first if first.fits or first.fits_but_for_few else _better(best, first)
+                return _settled(best, begun[-1].starts[0])
         for one in begun:
-            hopeless = False
-            try:
-                best = _finished(best, one, effort)
-            except HopelessError:
-                best, hopeless = _better(best, one.starts[0]), True
-            if best is not None and (best.fits or best.like_noise):
+            best, done = _carried_on(best, one, effort, cover)
+            if done:
                 return best
-            if not covered:  # in no drawing, so only once
-                covered = True
-                if best is not None and best.size < _CLOSE:  # covers take longer than a few small changes
-                    best = _descent(best, Effort(_LAST))
-                    if best.fits:
-                        return best
-                cover = read_by_cover(n, edges, weights, scale)
-                if cover is not None:
-                    return cover
-            if hopeless:  # drawings differ little
-                return best if best is not None and best.pieces else None
-    if best is None or not best.pieces:
-        return None
-    return _descent(best, Effort(_LAST))
+    return _descent(best, Effort(_LAST)) if best is not None and best.pieces else None
+
+
+def _settled(best: Reading | None, first: Reading) -> Reading:
+    """The answer of a drawing whose first start settles it."""
+    return first if first.fits or first.fits_but_for_few else _better(best, first)
+
+
+def _carried_on(
+    best: Reading | None, begun: Begun, effort: Effort, cover: Callable[[], Reading[CellSet] | None]
+) -> tuple[Reading | None, bool]:
+    """The best reading after repairs in one drawing, or else by a `cover`, in no drawing; and whether that is the end.
+
+    It is if it fits, or if the weights are found to belong to no mesh: drawings differ little in that.
+    """
+    before, hopeless = best, False
+    try:
+        best = _finished(best, begun, effort)
+    except HopelessError:
+        best, hopeless = _better(best, begun.starts[0]), True
+    if best is not None and (best.fits or best.like_noise):
+        return best, True
+    if best is not None and best is not before and best.size < _CLOSE:  # covers take longer than a few small changes
+        best = _descent(best, Effort(_LAST))
+        if best.fits:
+            return best, True
+    covered = cover()
+    if covered is not None:
+        return covered, True
+    return (best if best is not None and best.pieces else None), hopeless
 
 
 def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Iterator[Candidates]:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
+from ..planar.cotangent import edge_weights
 from ..planar.piece import PieceMesh
-from ..planar.robust import robust_fit
+from ..planar.robust import RobustFit, robust_fit
 from ..topology import Piece, Topology
 from ..topology.keys import contains, pair_keys
 from .doubt import SURE, Attempt, components_of, misfits_of, unexplained
@@ -65,13 +66,18 @@ def _in_component(
         (piece for piece in pieces if (misfit[piece.edge_rows] > FITS).any()), key=lambda piece: piece.n_vertices
     )
     found: dict[Piece, PieceMesh] = {}
+    aside = [np.empty(0, dtype=np.int64)]
     for piece in wrong:
         start = meshes[piece]
         z = start.z if isinstance(start, PieceMesh) else None
         mesh = _without_few(piece, -matrix.entries[piece.edge_rows], z, scale)
-        if mesh is None or (mesh.aside is not None and not _apart(len(mesh.z), piece.edges, piece.edges[mesh.aside])):
+        if mesh is None:
             return None
         found[piece] = mesh
+        aside += [] if mesh.aside is None else [piece.edge_rows[mesh.aside]]
+        # Of all pieces together: the sides of a cell that is missing where two of them meet belong to both.
+        if not _apart(matrix.n, matrix.edges, matrix.edges[np.concatenate(aside)]):
+            return None
     scales = np.array([mesh.scale for mesh in (meshes | found).values() if isinstance(mesh, PieceMesh)])
     return found if np.abs(scales / scales[0] - 1).max() < _SAME_SCALE else None
 
@@ -113,7 +119,7 @@ def _without_few(piece: Piece, weights: NDArray, z: NDArray | None, scale: float
         return None
 
     fit = robust_fit(piece, weights, z, _settled, scale=scale)
-    if fit is None or not _provable(piece, len(fit.aside), scale):
+    if fit is None or not _provable(piece, len(fit.aside), scale, _left(piece, weights, fit)):
         return None
     return PieceMesh(fit.z, fit.scale, aside=fit.aside if len(fit.aside) else None)
 
@@ -123,10 +129,20 @@ def _settled(misfit: NDArray) -> bool:
     return bool((misfit <= FITS).all()) or (even(misfit) and float(np.sqrt(np.mean(misfit**2))) < SURE)
 
 
-def _provable(piece: Piece, aside: int, scale: float | None) -> bool:
-    """Whether that the others fit is no coincidence, whichever of them so many entries set aside are."""
-    left = len(piece.edges) - 2 * piece.n_vertices + 4 - (scale is None) - aside
-    return bool(left * np.log(FITS) + aside * np.log(len(piece.edges)) < _CHANCE)
+def _left(piece: Piece, weights: NDArray, fit: RobustFit) -> float:
+    """Root mean square of the misfit of the others, relative to the entry and a typical one."""
+    size = np.abs(weights) + np.median(np.abs(weights))
+    misfit = np.delete((weights - fit.scale * edge_weights(piece, fit.z)) / size, fit.aside)
+    return float(np.sqrt(np.mean(misfit**2)))
+
+
+def _provable(piece: Piece, aside: int, scale: float | None, left: float = FITS) -> bool:
+    """Whether that the others fit is no coincidence, whichever of them so many entries set aside are.
+
+    Each equation beyond the unknowns that holds to within `left` does so by chance about that often.
+    """
+    equations = len(piece.edges) - 2 * piece.n_vertices + 4 - (scale is None) - aside
+    return bool(equations * np.log(max(left, FITS)) + aside * np.log(len(piece.edges)) < _CHANCE)
 
 
 def _apart(n: int, edges: NDArray[np.int64], some: NDArray[np.int64]) -> bool:
