@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, RecoveryError
 from .constants import annihilated_share, uncoupled_rows
-from .directions import find_directions
 from .gaps import by_component_with_gaps, interleaved_with_gaps
 from .grouping import by_first_row, coupled_in_common, same_pattern
-from .numbering import WHOLE, Numbering, measured
+from .numbering import Numbering
 from .orders import ORDERS, regular
 from .sampling import promising
 from .scattered import scattered
@@ -33,9 +32,7 @@ __all__ = [
     "uncoupled_rows",
 ]
 
-_FEW = 4  # places to start from where a glance is all that a matrix gets
 _LARGE = 20_000  # rows beyond which a few places are looked at before every row is asked
-_ALIKE = 0.9  # rows of one node couple to common nodes by so much, where unknowns stand by component
 _ORDERLY = 0.8  # rows of made-up nodes couple to common nodes less than this
 
 
@@ -58,7 +55,7 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
     """
     sizes = _sizes(block_size)
     best = _best(_regular(matrix, d, kind) for d in sizes for kind in ORDERS)
-    if best is None or best.share < WHOLE or (best.kind == "by component" and best.common < _ALIKE):
+    if best is None or not best.clear:
         best = _best([best, *by_component_with_gaps(matrix, sizes)])
         clear = best is not None and best.sound and best.common == 1
         apart = None if clear else scattered(matrix, sizes)
@@ -77,19 +74,23 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
 
 
 def numbering_at_sight(matrix: sp.csr_array) -> Numbering | None:
-    """The same where it shows at once: unknowns in order, or rows of the same pattern. None if neither is so."""
+    """The same where a glance shows nodes: unknowns in order, or rows of the same pattern. None if neither is so.
+
+    The glance tells that there are nodes. Which rows are theirs next to supports takes the search, unless unknowns
+    stand in order and no row is missing.
+    """
     best = _best(_regular(matrix, d, kind) for d in (3, 2) for kind in ORDERS)
-    if best is not None and best.share > 0 and best.common > _ORDERLY:
+    if best is not None and best.clear:
         return best
-    identity = uncoupled_rows(matrix)
-    group = same_pattern(matrix, identity)
-    twins = [d for d in (3, 2) if 2 * np.count_nonzero(np.bincount(group)[group] == d) > len(group)]
-    found = []
-    for d in twins:
-        direction = find_directions(matrix, group, identity, d, starts=_FEW) if np.bincount(group).max() <= d else None
-        if direction is not None:
-            found.append(measured(matrix, group, direction, d))
-    return max(found, key=lambda one: one.quality, default=None)
+    if best is None or best.common <= _ORDERLY:
+        group = same_pattern(matrix, uncoupled_rows(matrix))
+        twins = tuple(d for d in (3, 2) if 2 * np.count_nonzero(np.bincount(group)[group] == d) > len(group))
+        if not twins or not promising(matrix, twins):
+            return None
+    try:
+        return find_numbering(matrix)
+    except RecoveryError:
+        return None
 
 
 def regular_numbering(matrix: sp.csr_array, kind: str, block_size: int | None = None) -> Numbering:
