@@ -135,6 +135,19 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     return VectorReading(found, f"it is no planar mesh, and {_evidence(found)}", exact)
 
 
+def about_translations(matrix: OperatorMatrix) -> str:
+    """Why a matrix that is no planar mesh is no stiffness matrix either though its rows form nodes; empty if not so."""
+    from .elasticity.unknowns import MORE_THAN_STIFFNESS, nodes_of_pattern
+
+    nodes = nodes_of_pattern(matrix.csr())
+    if nodes is None:
+        return ""
+    return (
+        f"its rows form {nodes[0]} nodes with {nodes[1]} unknowns each, as those of an elasticity matrix, but do not "
+        f"annihilate translations: perhaps {MORE_THAN_STIFFNESS}"
+    )
+
+
 def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, tuple[sp.csr_array, float] | None]:
     """The matrix to look at, and of entries with few digits what a reading keeps of it."""
     from .elasticity.rounded import with_exact_sums

@@ -125,7 +125,8 @@ def place_nodes(
         ):
             raise GeometryError(
                 "no positions fit the matrix exactly; which rows belong to one node was inferred, where some nodes "
-                "lack rows, and is probably wrong: give the numbering if it is known"
+                "lack rows, and is probably wrong, unless constraints tie unknowns together: give the numbering if it "
+                "is known"
             )
         better = joined(nodal, numbering, solution.points, solution.component)
         if better is not None:

@@ -8,6 +8,7 @@ tried first, whole and then with gaps; only where they fail is searched for node
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import product
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,9 +25,11 @@ from .scattered import scattered
 from .searching import searched
 
 __all__ = [
+    "MORE_THAN_STIFFNESS",
     "Numbering",
     "find_numbering",
     "given_numbering",
+    "nodes_of_pattern",
     "numbering_at_sight",
     "regular_numbering",
     "uncoupled_rows",
@@ -34,6 +37,11 @@ __all__ = [
 
 _LARGE = 20_000  # rows beyond which a few places are looked at before every row is asked
 _ORDERLY = 0.8  # rows of made-up nodes couple to common nodes less than this
+
+
+MORE_THAN_STIFFNESS = (
+    "a mass matrix, a multiple of the identity or springs at all nodes were added, or unknowns are scaled one by one"
+)
 
 
 def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbering:
@@ -68,7 +76,7 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
     if best is None:
         raise RecoveryError(
             f"no numbering with {block_size or '2 or 3'} unknowns per node makes the rows annihilate translations: "
-            "this is no elasticity matrix, or its unknowns are scaled one by one"
+            f"this is no elasticity matrix, or {MORE_THAN_STIFFNESS}"
         )
     return best
 
@@ -91,6 +99,21 @@ def numbering_at_sight(matrix: sp.csr_array) -> Numbering | None:
         return find_numbering(matrix)
     except RecoveryError:
         return None
+
+
+def nodes_of_pattern(matrix: sp.csr_array) -> tuple[int, int] | None:
+    """How many nodes there are and their unknowns, by what rows couple to; None where none show.
+
+    Sums are not asked: this is for matrices whose rows do not annihilate translations.
+    """
+    order = matrix.shape[0]
+    for d, kind in product((3, 2), ORDERS):
+        if order % d == 0 and coupled_in_common(matrix, *regular(order, d, kind)) > _ORDERLY:
+            return order // d, d
+    group = same_pattern(matrix, uncoupled_rows(matrix))
+    of_size = np.bincount(np.bincount(group)[group], minlength=4)
+    d = 3 if of_size[3] > of_size[2] else 2
+    return (int(group.max()) + 1, d) if of_size[d] > _ORDERLY * order else None
 
 
 def regular_numbering(matrix: sp.csr_array, kind: str, block_size: int | None = None) -> Numbering:
