@@ -114,3 +114,14 @@ def test_tied_nodes_are_not_certified():
     found = unassemble.recover(sp.csr_array(tie.T @ case.matrix @ tie))
     assert found.status == "uncertified"
     assert "tie together" in found.reason
+
+
+@pytest.mark.parametrize("factor", [1e-250, -1e200])
+@pytest.mark.parametrize("kind", ["quad-s2", "hex-q1"])
+def test_units_in_which_squares_overflow(kind, factor):
+    """The Lame coefficients come back in them; they go with the size of the body, which is free in space."""
+    case = stiffness(kind, box(kind, (5, 4) if kind == "quad-s2" else (4, 4, 4), perturb=0.2), lam=1.5)
+    found, plain = (unassemble.recover(sp.csr_array(one * case.matrix)) for one in (factor, 1.0))
+    assert found.status == "certified"
+    assert np.allclose(found.lame, factor * plain.lame, rtol=1e-8, atol=0)
+    assert error(found.points, case.points) < 1e-11
