@@ -137,14 +137,16 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
 
 def about_translations(matrix: OperatorMatrix) -> str:
     """Why a matrix that is no planar mesh is no stiffness matrix either though its rows form nodes; empty if not so."""
+    from .elasticity.rounded import rounding_of
     from .elasticity.unknowns import MORE_THAN_STIFFNESS, nodes_of_pattern
 
-    nodes = nodes_of_pattern(matrix.csr())
+    nodes, rounding = nodes_of_pattern(matrix.csr()), rounding_of(matrix.csr().data)
     if nodes is None:
         return ""
+    digits = f", or what shows it is lost in the entries, which are rounded to {rounding:.0e} of themselves"
     return (
         f"its rows form {nodes[0]} nodes with {nodes[1]} unknowns each, as those of an elasticity matrix, but do not "
-        f"annihilate translations: perhaps {MORE_THAN_STIFFNESS}"
+        f"annihilate translations: perhaps {MORE_THAN_STIFFNESS}{digits if rounding else ''}"
     )
 
 

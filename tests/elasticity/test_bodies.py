@@ -125,3 +125,14 @@ def test_units_in_which_squares_overflow(kind, factor):
     assert found.status == "certified"
     assert np.allclose(found.lame, factor * plain.lame, rtol=1e-8, atol=0)
     assert error(found.points, case.points) < 1e-11
+
+
+def test_symmetry_planes_of_a_graded_body():
+    """Directions there are not those of least energy, which a look at a few rows would ask for."""
+    case = stiffness("hex-q1", box("hex-q1", (6, 5, 5), grading=3.0), lam=1.5)
+    case = given(permuted_nodes(case), "symmetry", "interleaved", "stored")
+    found = unassemble.recover(case.matrix)
+    truth = judged(found, case)
+    assert found.status == "certified"
+    assert truth.error < 1e-11
+    assert truth.missing == 0

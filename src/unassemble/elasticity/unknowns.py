@@ -92,8 +92,8 @@ def numbering_at_sight(matrix: sp.csr_array) -> Numbering | None:
         return best
     if best is None or best.common <= _ORDERLY:
         group = same_pattern(matrix, uncoupled_rows(matrix))
-        twins = tuple(d for d in (3, 2) if 2 * np.count_nonzero(np.bincount(group)[group] == d) > len(group))
-        if not twins or not promising(matrix, twins):
+        of_size = np.bincount(np.bincount(group)[group], minlength=4)
+        if 2 * of_size[2:4].max() <= len(group):
             return None
     try:
         return find_numbering(matrix)
