@@ -62,7 +62,7 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
         If no numbering makes rows annihilate constants.
     """
     sizes = _sizes(block_size)
-    best = _best(_regular(matrix, d, kind) for d in sizes for kind in ORDERS)
+    best = _in_order(matrix, sizes)
     if best is None or not best.clear:
         best = _best([best, *by_component_with_gaps(matrix, sizes)])
         clear = best is not None and best.sound and best.common == 1
@@ -87,7 +87,7 @@ def numbering_at_sight(matrix: sp.csr_array) -> Numbering | None:
     The glance tells that there are nodes. Which rows are theirs next to supports takes the search, unless unknowns
     stand in order and no row is missing.
     """
-    best = _best(_regular(matrix, d, kind) for d in (3, 2) for kind in ORDERS)
+    best = _in_order(matrix, (3, 2))
     if best is not None and best.clear:
         return best
     if best is None or best.common <= _ORDERLY:
@@ -153,6 +153,21 @@ def _best(readings: Iterable[Numbering | None]) -> Numbering | None:
     """The one that most speaks for; None if nothing does for any."""
     some = [one for one in readings if one is not None and one.quality > 0]
     return max(some, key=lambda one: one.quality, default=None)
+
+
+def _in_order(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
+    """The best of the numberings that need no search.
+
+    A clear one whose nodes each couple to common nodes is the only such one, unless nearly all couple to all: rows of
+    one node of two such numberings would couple to the same unknowns, and theirs, and so on.
+    """
+    found = []
+    for d, kind in product(sizes, ORDERS):
+        one = _regular(matrix, d, kind)
+        if one is not None and one.clear and one.common == 1 and 2 * matrix.nnz < matrix.shape[0] ** 2:
+            return one
+        found.append(one)
+    return _best(found)
 
 
 def _regular(matrix: sp.csr_array, d: int, kind: str, *, checked: bool = True) -> Numbering | None:
