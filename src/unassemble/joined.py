@@ -63,13 +63,16 @@ class JoinedMesh:
         vanished = np.zeros(len(topology.edges), dtype=bool)
         vanished[topology.vanished] = True
         diagonal = vanished[pieces.edge_rows] & pieces.inner
+        in_polygon, polygons = np.asarray(diagonal[pieces.opposite].any(axis=1)), topology.polygons
+        if in_polygon.sum() != (polygons.size - 2).sum():  # some have no outline, as where cells do not fit
+            in_polygon, polygons = np.zeros_like(in_polygon), Polygons.none()
         lengths = pieces.loop_lengths[reversed_within(pieces.n_loops, mirrored)]
         return cls(
             points=points,
             triangles=pieces.vertices[triangles],
             triangle_piece=pieces.triangle_piece,
-            in_polygon=np.asarray(diagonal[pieces.opposite].any(axis=1)),
-            polygons=topology.polygons.counter_clockwise(points),
+            in_polygon=in_polygon,
+            polygons=polygons.counter_clockwise(points),
             component=component,
             scale=scale,
             boundary=pieces.vertices[boundary],

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
+from .cells import incomplete_rows
 from .matrix import OperatorMatrix
 from .topology import Topology
 from .words import count_of
 
-_SUM = 1e-10  # sum of a row, relative to its entries, that is rounding
-_MANY = 0.7  # share of rows; more would be a mass matrix that was added, or no Laplacian at all
+_EQUAL = 1e-12  # relative difference of entries that is rounding
 
 
 def topology_notes(topology: Topology) -> list[str]:
@@ -33,13 +35,35 @@ def topology_notes(topology: Topology) -> list[str]:
     return notes
 
 
+def piece_notes(remarks: Sequence[Sequence[str]]) -> list[str]:
+    """Remarks on each piece, one sentence for all pieces that share one."""
+    pieces: dict[str, list[int]] = {}
+    for label, some in enumerate(remarks):
+        for remark in some:
+            pieces.setdefault(remark, []).append(label)
+    if len(remarks) == 1:
+        return list(pieces)
+    return [f"{_pieces(labels)}: {remark}" for remark, labels in pieces.items()]
+
+
 def image_notes(topology: Topology, free: NDArray) -> list[str]:
     """Pieces, by number, of which the mirror image fits as well."""
+    if len(free) == 1:
+        (label,) = free.tolist()
+        return [
+            f"piece {label}, of row {topology.pieces[label].vertices.min()}: its mirror image meets the other pieces "
+            "in the same vertices, and the matrix does not tell which of the two it is"
+        ]
+    if not len(free):
+        return []
     return [
-        f"piece {label}, of row {topology.pieces[label].vertices.min()}: its mirror image meets the other pieces in "
-        "the same vertices, and the matrix does not tell which of the two it is"
-        for label in free.tolist()
+        f"{_pieces(free.tolist())}: their mirror images meet the other pieces in the same vertices, and the matrix "
+        "does not tell which of the two each is"
     ]
+
+
+def _pieces(labels: list[int]) -> str:
+    return f"piece {labels[0]}" if len(labels) == 1 else f"{len(labels):,} pieces ({_some(np.array(labels))})"
 
 
 def vanished_notes(topology: Topology) -> list[str]:
@@ -61,18 +85,20 @@ def vanished_notes(topology: Topology) -> list[str]:
     return notes
 
 
-def elimination_notes(matrix: OperatorMatrix, suspects: NDArray) -> list[str]:
-    """What row sums say of unknowns that were taken out, where no mesh fits.
+def origin_notes(matrix: OperatorMatrix, suspects: NDArray) -> list[str]:
+    """What the entries say of where the matrix may come from, where no mesh fits.
 
-    Nothing if the entries that stand out, (k, 2), are in all of these rows: a wrong entry spoils two sums.
+    Row sums tell of unknowns that were taken out; not if the entries that stand out, (k, 2), are in all of these rows:
+    a wrong entry spoils two sums.
     """
-    size = np.abs(matrix.diagonal)
-    sums = matrix.diagonal.copy()
-    for end in matrix.edges.T:
-        sums += np.bincount(end, matrix.entries, matrix.n)
-        size += np.bincount(end, np.abs(matrix.entries), matrix.n)
-    rest = np.flatnonzero(np.abs(sums) > _SUM * size)
-    if not 0 < len(rest) < _MANY * matrix.n or np.isin(rest, suspects).all():
+    rest = np.flatnonzero(incomplete_rows(matrix))
+    size = np.abs(matrix.entries)
+    if not len(rest) and np.ptp(matrix.entries) <= _EQUAL * size.max():
+        return [
+            "all entries are equal, as in the Laplacian of a graph without weights; on a mesh, entries on the boundary "
+            "have one triangle each and others two"
+        ]
+    if not len(rest) or np.isin(rest, suspects).all():
         return []
     return [
         f"all rows add up to zero but for {len(rest):,}: {_some(rest)}; unknowns next to these seem to have been "

@@ -14,7 +14,7 @@ from .evidence import pooled_noise, weigh
 from .joined import JoinedMesh
 from .linalg import AnalysisAhead, factorisation
 from .matrix import OperatorMatrix
-from .notes import elimination_notes, image_notes, topology_notes, vanished_notes
+from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
 from .placement import Placement
 from .planar.deviations import coordinate_covariances
 from .planar.hinges import free_images, join
@@ -122,7 +122,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     if chi_square and evidence.noise is not None and evidence.noise < 0.5 * chi_square["sigma"]:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
     if status == "uncertified" and not (others or chi_square or distant):
-        notes += elimination_notes(stored, evidence.suspects)
+        notes += origin_notes(stored, evidence.suspects)
     polygons = Polygons.none() if options.triangulate else mesh.polygons
     return Recovery(
         points=points,
@@ -201,12 +201,12 @@ def _place(
     topology: Topology, placement: Placement, origins: NDArray, meshes: list[PieceMesh]
 ) -> tuple[list[NDArray], list[str]]:
     """Every piece in its final frame, relative to its origin, hinges joined; and what is to be said about it."""
-    placed, notes = [], []
+    placed, remarks = [], []
     for label, (piece, mesh) in enumerate(zip(topology.pieces, meshes, strict=True)):
-        z, remarks = placement.apply(piece, mesh.z, origins[label])
+        z, more = placement.apply(piece, mesh.z, origins[label])
         placed.append(z)
-        prefix = f"piece {label}: " if len(meshes) > 1 else ""
-        notes += [prefix + remark for remark in (*mesh.notes, *remarks)]
+        remarks.append((*mesh.notes, *more))
+    notes = piece_notes(remarks)
     known = np.array([placement.known_positions(piece) for piece in topology.pieces])
     placed = join(topology, placed, known)
     notes += placement.unused(topology)

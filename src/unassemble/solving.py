@@ -16,7 +16,7 @@ from .linalg import Factorisation, UpperTriangle, factorisation
 from .matrix import OperatorMatrix
 from .planar.piece import EXACT, PieceMesh, positions, refined
 from .planar.triangles import lone_triangles
-from .topology import Piece, Topology
+from .topology import Piece, Polygons, Topology
 
 Clock = Callable[[str], AbstractContextManager[None]]
 
@@ -116,8 +116,20 @@ def _successes(topology: Topology, outcomes: list[Outcome]) -> tuple[Topology, l
         raise errors[0]
     if errors:
         pieces = [p for p, mesh in zip(topology.pieces, outcomes, strict=True) if isinstance(mesh, PieceMesh)]
-        topology = replace(topology, pieces=tuple(pieces), failures=(*topology.failures, *map(str, errors)))
+        failures = (*topology.failures, *map(str, errors))
+        topology = replace(topology, pieces=tuple(pieces), polygons=_of_pieces(topology, pieces), failures=failures)
     return topology, meshes
+
+
+def _of_pieces(topology: Topology, pieces: list[Piece]) -> Polygons:
+    """The polygons all of whose vertices belong to some pieces."""
+    polygons = topology.polygons
+    if not polygons.count:
+        return polygons
+    used = np.zeros(topology.n_vertices, dtype=bool)
+    used[np.concatenate([piece.vertices for piece in pieces])] = True
+    whole = np.logical_and.reduceat(used[polygons.vertices], polygons.offsets[:-1])
+    return polygons.chosen(whole, np.arange(topology.n_vertices))
 
 
 def _start(

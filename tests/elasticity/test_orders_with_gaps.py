@@ -89,6 +89,27 @@ def test_no_direction_that_sums_prove_is_wrong():
     assert not proven_directions(case.matrix, exchanged, group, 3)[row]
 
 
+def test_nodes_that_agree_on_a_wrong_direction_are_told_by_whole_ones():
+    """Three nodes on an edge where planes meet fit each other, and with zeros dropped no pattern contradicts."""
+    body = stiffness("hex-s2", box("hex-s2", (3, 4, 3)), lam=heterogeneous, mu=lambda x: 1 + x[1] + x[0] * x[1])
+    case = given(permuted_nodes(body, seed=1), "symmetry", "interleaved", "dropped")
+    found = find_numbering(case.matrix)
+    assert np.array_equal(found.direction_of_row, case.direction)
+    assert found.unnamed is not None
+
+
+@pytest.mark.parametrize("perturb", [0.0, 0.2])
+def test_nodes_known_only_to_lie_in_one_plane_are_no_piece(perturb):
+    case = given(permuted_nodes(stiffness("quad-s2", box("quad-s2", (6, 7), perturb=perturb)), seed=1),
+                 "symmetry", "by component", "stored")  # fmt: skip
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert len(found.evidence) == 1
+    assert truth.error < 1e-10
+    assert truth.missing < 0.1
+
+
 def test_nodes_that_may_be_halves_say_nothing_of_planes():
     """Their missing row may stand elsewhere; taken for nodes of a plane they spoiled all that hangs on them."""
     shape = box("quad-s2", (6, 7))

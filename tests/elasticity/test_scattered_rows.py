@@ -7,10 +7,10 @@ from assembled import box, heterogeneous, permuted_nodes, stiffness
 from supported import given, judged
 
 from unassemble.elasticity import recover_elasticity
-from unassemble.elasticity.coincidence import placed_together, single_nodes
 from unassemble.elasticity.constants import uncoupled_rows
 from unassemble.elasticity.extension import extended_directions
 from unassemble.elasticity.grouping import same_pattern
+from unassemble.elasticity.row_positions import placed_together, single_nodes
 from unassemble.elasticity.scattered import scattered
 
 

@@ -5,6 +5,9 @@ import pytest
 from assembled import box, eliminated, error, on_plane, stiffness
 
 from unassemble.elasticity import recover_elasticity
+from unassemble.elasticity.nodal import nodal_matrix, valid_pairs
+from unassemble.elasticity.slender import unbent
+from unassemble.elasticity.unknowns import given_numbering
 
 
 def beam(kind, length):
@@ -51,3 +54,17 @@ def test_thin_bodies_lose_no_digits_where_charts_meet():
     found = recover_elasticity(matrix, cells=False)
     assert found.certified
     assert error(found.points, case.points[nodes]) < 1e-12
+
+
+@pytest.mark.parametrize("loose", ["every other node", "the nodes in the middle"])
+def test_rows_that_do_not_hold_a_beam_together_leave_it_as_it_is(loose):
+    """Rows that touch a loose node do not count; the rest may be none, or fit two halves anywhere."""
+    case = beam("quad-q1", 201)
+    nodal = nodal_matrix(case.matrix, given_numbering(case.matrix, *np.divmod(np.arange(case.matrix.shape[0]), 2)))
+    points, x = case.points.copy(), case.points[:, 0]
+    middle = np.abs(x - x.mean()) < 0.4
+    points[middle if loose == "the nodes in the middle" else np.arange(len(x)) % 2 == 0] = np.nan
+    points[~middle] += 1e-6 * np.random.default_rng(0).standard_normal(2) * (x[~middle] > x.mean())[:, None]
+    better, residual = unbent(nodal, valid_pairs(nodal), points, 1e-4)
+    assert residual == np.inf
+    assert np.array_equal(better, points, equal_nan=True)

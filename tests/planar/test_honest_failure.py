@@ -166,6 +166,14 @@ def test_eliminated_boundary_is_suspected():
     assert not any("eliminated" in note for note in found.warnings)
 
 
+def test_the_laplacian_of_a_graph_is_named():
+    graph = networkx.convert_node_labels_to_integers(networkx.triangular_lattice_graph(5, 9))
+    order = np.random.default_rng(0).permutation(len(graph)).tolist()
+    found = recover(networkx.laplacian_matrix(graph, nodelist=order).astype(float))
+    assert not found.certified
+    assert any("Laplacian of a graph" in note for note in found.warnings)
+
+
 def test_a_wrong_entry_is_not_taken_for_an_elimination():
     known = specimen(*random_mesh(220, seed=1))
     spoilt = known.matrix.tolil()

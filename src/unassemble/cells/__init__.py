@@ -8,6 +8,7 @@ from .coincidence import coincident
 from .completion import completed, guessed
 from .corners import Alternative, OrientedMesh
 from .doubt import Attempt, Outcome, in_doubt
+from .eliminated import incomplete_rows
 from .filled import filled_holes
 from .search import read_cells
 from .spoilt import wrong_entries
@@ -24,6 +25,7 @@ __all__ = [
     "filled_holes",
     "guessed",
     "in_doubt",
+    "incomplete_rows",
     "read_cells",
     "wrong_entries",
 ]

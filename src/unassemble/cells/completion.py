@@ -14,6 +14,7 @@ from ..matrix import OperatorMatrix
 from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar, settled_numbering
 from ..topology.keys import contains, distinct, pair_keys
 from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained
+from .eliminated import incomplete_rows, without_boundary
 from .reading import Reading
 from .search import first_reading, read_cells
 from .undivided import undivided
@@ -74,6 +75,7 @@ def completed(
     def misfit_of_triangles() -> NDArray[np.float64]:
         return misfits_of(matrix, [(piece, attempt(piece)) for piece in topology.pieces])
 
+    incomplete = incomplete_rows(matrix)
     label = np.full(matrix.n, -1)
     for k, part in enumerate(numberings):
         label[part.vertices] = k
@@ -83,7 +85,7 @@ def completed(
         own = [piece for piece in topology.pieces if label[piece.vertices[0]] == k]
         near = _near(matrix, part)
         try:
-            parts.append(_read_again(matrix, near, own, attempt, misfit_of_triangles, scale))
+            parts.append(_read_again(matrix, near, own, attempt, misfit_of_triangles, scale, incomplete[near.vertices]))
         except RecoveryError as error:
             failures.append(located(error, near, named=len(numberings) > 1))
     if not any(part.pieces for part in parts):
@@ -121,9 +123,13 @@ def _read_again(
     attempt: Attempt,
     misfit_of_triangles: Callable[[], NDArray[np.float64]],
     scale: float | None,
+    incomplete: NDArray[np.bool_],
 ) -> _Part:
     """One component: the reading that fits, or the triangles that there were, or the best reading."""
     weights = -matrix.entries[numbering.edge_rows]
+    inside = without_boundary(len(numbering.vertices), numbering.edges, weights, incomplete)
+    if inside is not None:
+        return _part(matrix, numbering, inside)
     reading = read_cells(len(numbering.vertices), numbering.edges, weights, scale)
     if reading is not None and (reading.fits or reading.fits_but_for_few):
         return _part(matrix, numbering, reading)

@@ -33,6 +33,7 @@ def undivided(pieces: Sequence[Piece], vanished: NDArray[np.bool_]) -> tuple[NDA
     _, group = csgraph.connected_components(
         sp.coo_array((np.ones(len(one)), (one, other)), shape=(m, m)), directed=False
     )
+    group = group.astype(np.int64)
     joined = (np.bincount(group) > 1)[group]
     triangle, turn = np.nonzero(joined[:, None] & ~diagonal[whole.opposite])
     tail, head = (whole.triangles[triangle, (turn + step) % 3] for step in (1, 2))

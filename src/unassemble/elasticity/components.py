@@ -10,13 +10,13 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .coincidence import placed_together
+from .constants import ROUNDING
 from .grouping import same_pattern
 from .matching import matched_by_likeness, matched_by_pattern
 from .orders import Reading
+from .row_positions import placed_together
 from .traces import shows_all
 
-_ROUNDING = 1e-9
 _VOTES = 0.5  # share of the rows that add up to zero that has to vote for a cut: nearly all do, or a few by chance
 
 
@@ -56,8 +56,8 @@ def _cuts(matrix: sp.csr_array, d: int) -> NDArray[np.int64] | None:
     partial = _running_sums(matrix)
     inner = np.ones(matrix.nnz, dtype=bool)
     inner[matrix.indptr[1:] - 1] = False
-    whole = np.abs(partial[matrix.indptr[1:] - 1]) <= _ROUNDING * size
-    place = np.flatnonzero(inner & whole[row] & (np.abs(partial) <= _ROUNDING * size[row]))
+    whole = np.abs(partial[matrix.indptr[1:] - 1]) <= ROUNDING * size
+    place = np.flatnonzero(inner & whole[row] & (np.abs(partial) <= ROUNDING * size[row]))
     first, last = matrix.indices[place] + 1, matrix.indices[place + 1] + 1
     cuts: list[int] = []
     for _ in range(d - 1):

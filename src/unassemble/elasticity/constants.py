@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-_ROUNDING = 1e-9
+ROUNDING = 1e-9  # of its size: what entries of a row add up to that make up zero; supports leave 1e-3 and more
 PENALTY = 1e3  # a diagonal entry this many times the rest of its row is a penalty
 
 
@@ -15,6 +15,28 @@ def uncoupled_rows(matrix: sp.csr_array) -> NDArray[np.bool_]:
     off = matrix.copy()
     off.setdiag(0)
     return np.asarray(abs(off).sum(axis=1)).ravel() == 0
+
+
+def row_sizes(matrix: sp.csr_array) -> NDArray[np.float64]:
+    """(N,) sums of absolute entries off the diagonal, on which there may be a penalty."""
+    entry = matrix.tocoo()
+    off = np.where(entry.row == entry.col, 0.0, np.abs(entry.data))
+    return np.asarray(np.bincount(entry.row, off, matrix.shape[0]), dtype=np.float64)
+
+
+def least_sums(size: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N,) sums that are not zero in rows of given sizes: infinite where a row has no size."""
+    return np.asarray(ROUNDING * np.where(size > 0, size, np.inf))
+
+
+def with_penalty(matrix: sp.csr_array, size: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(N,) rows of given sizes with a penalty on the diagonal."""
+    return np.asarray(np.abs(matrix.diagonal()) > PENALTY * size)
+
+
+def adding_up(matrix: sp.csr_array, size: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(N,) rows of given sizes that add up to zero over all directions together."""
+    return np.asarray(np.abs(np.asarray(matrix.sum(axis=1)).ravel()) <= ROUNDING * size)
 
 
 def annihilated_share(
@@ -31,12 +53,11 @@ def annihilated_share(
         return 0.0
     ones = np.zeros((len(direction), d))
     ones[np.flatnonzero(live), direction[live]] = 1
-    off = abs(matrix).sum(axis=1) - np.abs(matrix.diagonal())
-    size = np.asarray(off).ravel()[live]
-    zero = np.abs(matrix @ ones)[live] <= _ROUNDING * size[:, None]
+    size = row_sizes(matrix)[live]
+    zero = np.abs(matrix @ ones)[live] <= ROUNDING * size[:, None]
     own = zero[np.arange(len(size)), direction[live]]
     other = np.arange(d) != direction[live][:, None]
-    coupled = other & ((abs(matrix) @ ones)[live] > _ROUNDING * size[:, None])
+    coupled = other & ((abs(matrix) @ ones)[live] > ROUNDING * size[:, None])
     if searched or coupled.any():
         own &= (zero & coupled).any(axis=1)
     return float((zero & own[:, None]).mean())
@@ -44,8 +65,7 @@ def annihilated_share(
 
 def whole_share(matrix: sp.csr_array, identity: NDArray) -> float:
     """Share of rows, among those that couple, that add up to zero over all directions together."""
-    size = np.asarray(abs(matrix).sum(axis=1)).ravel() - np.abs(matrix.diagonal())
-    zero = np.abs(np.asarray(matrix.sum(axis=1)).ravel()) <= _ROUNDING * size
+    zero = adding_up(matrix, row_sizes(matrix))
     return float(zero[~identity].mean()) if not identity.all() else 0.0
 
 
@@ -67,9 +87,9 @@ def proven_directions(
     d : int
     """
     own = np.eye(d, dtype=bool)[direction]
-    size = np.asarray(abs(matrix).sum(axis=1)).ravel() - np.abs(matrix.diagonal())
-    least = _ROUNDING * np.where(size > 0, size, np.inf)
-    excused = own & (np.abs(matrix.diagonal()) > PENALTY * size)[:, None]
+    size = row_sizes(matrix)
+    least = least_sums(size)
+    excused = own & with_penalty(matrix, size)[:, None]
     failing = np.zeros((int(group.max()) + 1, d))
     np.add.at(failing, group, (np.abs(matrix @ own.astype(float)) > least[:, None]) & ~excused)
     entry = matrix.tocoo()

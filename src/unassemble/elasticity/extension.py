@@ -15,10 +15,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..linalg import solved
-from .constants import PENALTY
+from .constants import ROUNDING, adding_up, row_sizes, with_penalty
 from .sums import names_of
 
-_ROUNDING = 1e-9
 _SHIFT = 1e-2  # of the diagonal: keeps bodies that are held in one node only from turning
 _GROWTH = 0.4  # share of rows to add at a time
 _CLEAR = 0.8  # how far apart the values of a row's two best directions are where there is no doubt
@@ -61,18 +60,18 @@ class _Body:
 
     def __init__(self, matrix: sp.csr_array, group: NDArray[np.int64], d: int):
         n, own = matrix.shape[0], matrix.diagonal()
+        size = row_sizes(matrix)
+        penalised = with_penalty(matrix, size)
         off = sp.csr_array(matrix * np.sign(own.sum()))
         off.setdiag(0)
         off.eliminate_zeros()
-        size = np.asarray(abs(off).sum(axis=1)).ravel()
-        penalised = np.abs(own) > PENALTY * size
         inferred = -np.asarray(off.sum(axis=1)).ravel()
         own = np.where(penalised, np.maximum(inferred, 1e-3 * size), np.abs(own))
         self._size, self._d = np.where(size > 0, size, np.inf), d
         self._whole = sp.csr_array(off + sp.diags_array(own))
         self._shifted = sp.csr_array(off + sp.diags_array((1 + _SHIFT) * own))
         self._pattern = sp.csr_array((np.ones(off.nnz, np.int32), off.indices, off.indptr), shape=off.shape)
-        adds_up = np.abs(self._whole.sum(axis=1)) <= _ROUNDING * self._size
+        adds_up = adding_up(self._whole, self._size)
         self.telling: NDArray[np.bool_] = np.asarray(adds_up & ~penalised)
         many = np.bincount(group)[group]
         order = np.argsort(group, kind="stable")
@@ -147,13 +146,13 @@ class _Body:
     def _good(self, direction: NDArray[np.int64]) -> NDArray[np.bool_]:
         """(n,) rows whose entries add up to zero in each direction."""
         sums = self._whole @ np.eye(self._d)[direction]
-        return np.asarray(self.telling & (np.abs(sums) <= _ROUNDING * self._size[:, None]).all(axis=1))
+        return np.asarray(self.telling & (np.abs(sums) <= ROUNDING * self._size[:, None]).all(axis=1))
 
     def _vouched(self, good: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(n,) rows of the largest domain tied together by good ones, which vouch for what they couple to."""
         n = len(good)
         entry = sp.coo_array(self._whole)
-        told = good[entry.row] & (np.abs(entry.data) > _ROUNDING * self._size[entry.row])
+        told = good[entry.row] & (np.abs(entry.data) > ROUNDING * self._size[entry.row])
         link = sp.csr_array((np.ones(told.sum(), np.int8), (entry.row[told] + n, entry.col[told])), shape=(2 * n,) * 2)
         label = sp.csgraph.connected_components(link, directed=False)[1][:n]
         return np.asarray(label == np.argmax(np.bincount(label)))

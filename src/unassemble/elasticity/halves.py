@@ -14,6 +14,7 @@ from .nodal import NodalMatrix, determined, without_trace
 from .numbering import Numbering
 
 _APART = 1e-7  # of the mean edge length, up to which two positions are one
+_MOST = 0.5  # share of nodes to take apart: single rows have fewer equations, and leave more fields to look for
 
 
 def joined(
@@ -45,23 +46,42 @@ def joined(
     label = by_first_row(np.asarray(np.where(fits, label, label.max() + 1 + np.arange(nodal.n))))
     if label.max() + 1 == nodal.n:
         return None
-    node = label[numbering.node_of_row]
+    return _relabelled(nodal, numbering, np.repeat(label[:, None], d, axis=1))
+
+
+def taken_apart(nodal: NodalMatrix, numbering: Numbering) -> tuple[NodalMatrix, Numbering] | None:
+    """Rows of nodes that lack directions without a trace, and of those next to them, each a node by itself.
+
+    Some of them belong to other nodes than they were joined to. None where no node lacks anything in this way, or so
+    many do that hardly a node would be left.
+    """
+    odd = np.asarray(without_trace(nodal).any(axis=1))
+    apart = nodal.graph @ odd.astype(float) > 0
+    if not odd.any() or apart.mean() > _MOST:
+        return None
+    single = np.arange(nodal.n * nodal.dim).reshape(nodal.n, nodal.dim)
+    return _relabelled(nodal, numbering, np.where(apart[:, None], nodal.n + single, np.arange(nodal.n)[:, None]))
+
+
+def _relabelled(nodal: NodalMatrix, numbering: Numbering, label: NDArray[np.int64]) -> tuple[NodalMatrix, Numbering]:
+    """The same blocks on other nodes, whose labels (n, d) are those of the unknowns."""
+    node = label[numbering.node_of_row, numbering.direction_of_row]
     again = by_first_row(node)
-    order = np.empty(label.max() + 1, np.int64)
-    order[node] = again
-    return _merged(nodal, order[label]), replace(numbering, node_of_row=again)
-
-
-def _merged(nodal: NodalMatrix, label: NDArray[np.int64]) -> NodalMatrix:
-    """The same blocks on fewer nodes."""
-    n, d = int(label.max()) + 1, nodal.dim
-    shape = (n * d, n * d)
+    place = np.full(int(label.max()) + 1, -1)
+    place[node] = again
+    n, d = int(again.max()) + 1, nodal.dim
     old = sp.coo_array(sp.bsr_array((nodal.data, nodal.indices, nodal.indptr), shape=(nodal.n * d,) * 2))
-    row, column = label[old.row // d] * d + old.row % d, label[old.col // d] * d + old.col % d
-    blocks = sp.csr_array((old.data, (row, column)), shape=shape).tobsr(blocksize=(d, d))
+    target = (place[label] * d + np.arange(d)).ravel()
+    there = (nodal.row_of >= 0).ravel()
+    kept = there[old.row] & there[old.col]
+    own = np.arange(n) * d
+    entries = np.concatenate([old.data[kept], np.zeros(n)])
+    ends = np.concatenate([target[old.row[kept]], own]), np.concatenate([target[old.col[kept]], own])
+    blocks = sp.csr_array((entries, ends), shape=(n * d, n * d)).tobsr(blocksize=(d, d))
     blocks.sort_indices()
-    row_of = np.full((n, d), -1, dtype=np.int64)
-    np.maximum.at(row_of, label, nodal.row_of)
-    penalised = np.zeros((n, d), dtype=bool)
-    np.logical_or.at(penalised, label, nodal.penalised)
-    return replace(NodalMatrix.of(blocks.indptr, blocks.indices, blocks.data, row_of), penalised=penalised)
+    row_of = np.full(n * d, -1, dtype=np.int64)
+    row_of[target[there]] = nodal.row_of.ravel()[there]
+    penalised = np.zeros(n * d, dtype=bool)
+    penalised[target[there]] = nodal.penalised.ravel()[there]
+    made = NodalMatrix.of(blocks.indptr, blocks.indices, blocks.data, row_of.reshape(n, d))
+    return replace(made, penalised=penalised.reshape(n, d)), replace(numbering, node_of_row=again)

@@ -98,7 +98,7 @@ class Identities:
     def _kinds(self) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]:
         """Rows with the same valid pairs, and the basis of their boundary terms."""
         d = self.dim
-        code = self.valid.reshape(len(self.rows), -1) @ (1 << np.arange(d**3))
+        code = self.valid.reshape(-1, d**3) @ (1 << np.arange(d**3))
         kinds = [np.flatnonzero(code == value) for value in np.unique(code)]
         return [(rows, boundary_basis(self.valid[rows[0]], self.terms)) for rows in kinds]
 
@@ -193,7 +193,7 @@ class Identities:
 def _telling(valid: NDArray[np.bool_], terms: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(m,) rows with an equation left once p and q are eliminated."""
     d = valid.shape[1]
-    code = valid.reshape(len(valid), -1) @ (1 << np.arange(d**3))
+    code = valid.reshape(-1, d**3) @ (1 << np.arange(d**3))
     telling = np.zeros(len(valid), dtype=bool)
     for value in np.unique(code):
         here = np.flatnonzero(code == value)

@@ -8,10 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .constants import PENALTY
+from .constants import PENALTY, ROUNDING
 from .numbering import Numbering
-
-_ROUNDING = 1e-9  # a row that annihilates constants does so to rounding; supports leave 1e-3 and more
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +151,12 @@ def valid_pairs(nodal: NodalMatrix, *, strict: bool = True, inferred: bool = Fal
     return np.asarray(valid & sure[:, None, :])
 
 
+def linked(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(nnz,) pairs of nodes, the first of which has a row that touches the other; valid (n, d, d) or (n, d, d, d)."""
+    pairs = valid if valid.ndim == 3 else np.asarray(valid.any(axis=3))
+    return np.asarray((np.abs(nodal.data) * pairs[nodal.node]).max(axis=(1, 2)) > 0)
+
+
 def eliminated(nodal: NodalMatrix) -> NDArray[np.bool_]:
     """(n, d) unknowns that were taken out of nodes of which others are left."""
     present = nodal.row_of >= 0
@@ -191,7 +195,7 @@ def without_trace(nodal: NodalMatrix) -> NDArray[np.bool_]:
 def _annihilating(nodal: NodalMatrix) -> NDArray[np.bool_]:
     """(n, d, d) rows of blocks that annihilate constants."""
     size = np.where(nodal.size > 0, nodal.size, np.inf)[:, None, None]
-    return np.asarray(np.abs(nodal.row_sums()) <= _ROUNDING * size)
+    return np.asarray(np.abs(nodal.row_sums()) <= ROUNDING * size)
 
 
 def _with_penalty(nodal: NodalMatrix) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import GeometryError
 from .atlas import NullFields, null_fields
-from .nodal import NodalMatrix, determined
+from .nodal import NodalMatrix, determined, linked
 from .results import Evidence
 from .shape import EXACT, Shape, in_gauge, shape
 from .slender import affordable, unbent
@@ -86,7 +86,7 @@ def placed(
         if one.exact and not one.freedom and evidence[-1].gap < _SLENDER[nodal.dim] and affordable(points[body]):
             whole = np.full_like(points, np.nan)
             whole[body] = points[body]
-            better, residual = unbent(nodal, valid, whole, terms)
+            better, residual = unbent(nodal, valid, whole, evidence[-1].gap, terms)
             if residual < evidence[-1].residual:
                 points[body] = in_gauge(better[body], graph[body][:, body])
                 settled = residual <= _SETTLED * evidence[-1].gap
@@ -119,14 +119,17 @@ def _settled(found: NullFields) -> bool:
 
 
 def pieces_of(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
-    """Pieces held together by valid identities; -1 for nodes that none of them touches."""
-    pairs = valid if valid.ndim == 3 else np.asarray(valid.any(axis=3))
-    live = (np.abs(nodal.data) * pairs[nodal.node]).max(axis=(1, 2)) > 0
+    """Pieces held together by valid identities; -1 for nodes that none of them touches.
+
+    That nodes lie in one plane is said in places of rows that they lack; nothing but that makes no piece.
+    """
+    live = linked(nodal, valid)
     link = sp.csr_array((np.ones(live.sum()), (nodal.node[live], nodal.indices[live])), shape=(nodal.n, nodal.n))
     _, label = sp.csgraph.connected_components(link, directed=False)
-    size = np.bincount(label)
-    kept = np.flatnonzero(size > 1)
-    order = np.full(len(size), -1)
+    own = valid.reshape(nodal.n, nodal.dim, -1).any(axis=2) & (nodal.row_of >= 0)
+    told = np.bincount(label, own.any(axis=1)) > 0
+    kept = np.flatnonzero(told & (np.bincount(label) > 1))
+    order = np.full(len(told), -1)
     order[kept] = np.arange(len(kept))
     return order[label].astype(np.int64), len(kept)
 

@@ -14,7 +14,7 @@ from ..words import count_of
 from .cells import no_cells, recognise_cells
 from .certificate import largest_residual
 from .doubts import guessed_directions, unconfirmed, with_doubts
-from .halves import joined
+from .halves import joined, taken_apart
 from .material import poisson_ratio
 from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled
 from .numbering import Numbering
@@ -23,7 +23,7 @@ from .results import ElasticityRecovery, ScalarParts
 from .rounded import SPREADS, with_exact_sums
 from .solution import Solution
 from .unknowns import find_numbering
-from .verdict import about_cells, about_nodes, about_open_rows, of_few_digits, verdict
+from .verdict import about_cells, about_made_up_nodes, about_nodes, about_open_rows, of_few_digits, verdict
 
 _SAME = 1e-6  # difference up to which Poisson's ratios of pieces are one
 _NEAR = 1e-6  # residual up to which positions are good enough to look for elements
@@ -117,6 +117,11 @@ def place_nodes(
                 f"{error}; but which rows belong to one node, and to which direction, was inferred and may be wrong: "
                 "give the numbering if it is known"
             ) from error
+        if numbering.kind != "given" and not solution.unique:
+            nodal, numbering, solution = _row_by_row(nodal, numbering, solution, patch)
+            why = about_made_up_nodes(nodal, numbering, solution)
+            if why:
+                raise GeometryError(f"no positions were found: {why}")
         if (
             not solution.exact
             and numbering.kind != "given"
@@ -128,11 +133,7 @@ def place_nodes(
                 "lack rows, and is probably wrong, unless constraints tie unknowns together: give the numbering if it "
                 "is known"
             )
-        better = joined(nodal, numbering, solution.points, solution.component)
-        if better is not None:
-            nodal, numbering = better
-            nodal = with_doubts(nodal, numbering)
-            solution = solve(nodal, patch)
+        nodal, numbering, solution = _rejoined(nodal, numbering, solution, patch)
     return _describe(nodal, numbering, solution, clock, cells, rounding)
 
 
@@ -150,6 +151,40 @@ def _solved(
             return nodal, solution
     nodal = with_doubts(nodal_matrix(whole, numbering, left_out=numbering.unnamed), numbering)
     return nodal, solve(nodal, patch)
+
+
+def _row_by_row(
+    nodal: NodalMatrix, numbering: Numbering, solution: Solution, patch: int | None
+) -> tuple[NodalMatrix, Numbering, Solution]:
+    """Rows that may have been joined to the wrong nodes placed each by itself, if all positions are unique then."""
+    apart = taken_apart(nodal, numbering)
+    if apart is not None:
+        other = with_doubts(*apart)
+        try:
+            better = solve(other, patch)
+        except RecoveryError:
+            return nodal, numbering, solution
+        if better.unique:
+            return other, apart[1], better
+    return nodal, numbering, solution
+
+
+def _rejoined(
+    nodal: NodalMatrix, numbering: Numbering, solution: Solution, patch: int | None
+) -> tuple[NodalMatrix, Numbering, Solution]:
+    """Halves of nodes that lie in one place joined, unless positions were unique and are not any more.
+
+    More rows are whole then, among them some that touch halves of which no row told the place.
+    """
+    better = joined(nodal, numbering, solution.points, solution.component)
+    if better is None:
+        return nodal, numbering, solution
+    other = with_doubts(*better)
+    try:
+        again = solve(other, patch)
+    except RecoveryError:
+        return nodal, numbering, solution
+    return (other, better[1], again) if again.unique or not solution.unique else (nodal, numbering, solution)
 
 
 def _describe(

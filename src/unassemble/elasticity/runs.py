@@ -89,11 +89,13 @@ def _cut_where(run: NDArray[np.int64], direction: NDArray[np.int64]) -> NDArray[
 
 
 def _by_likeness(matrix: sp.csr_array, d: int) -> list[Reading]:
-    """Two readings where entries that vanished are not stored.
+    """Three readings where entries that vanished are not stored.
 
     Neighbouring rows that reach the same rows are taken for one node to find directions by; then a node ends where
     directions stop increasing. In the second reading each row has chosen its direction for itself in the end, since
-    rows of two nodes taken for one would keep different ones for ever.
+    rows of two nodes taken for one would keep different ones for ever. In the third, directions have been found once
+    more, from those of whole nodes, which order leaves no choice: next to edges where symmetry planes meet, several
+    nodes that lack a direction may agree on a wrong one.
     """
     nobody = np.zeros(matrix.shape[0], dtype=bool)
     reached = reach(matrix)
@@ -108,7 +110,10 @@ def _by_likeness(matrix: sp.csr_array, d: int) -> list[Reading]:
         node = again
     freely = reconsidered(matrix, directions, d)
     other = _increasing(matrix, reached, freely, link)
-    return [Reading(_mended(matrix, *one, d), one[1]) for one in ((node, directions), (other, freely))]
+    found = [(_mended(matrix, *one, d), one[1]) for one in ((node, directions), (other, freely))]
+    node = found[0][0]
+    found.append((node, find_directions(matrix, node, nobody, d, ordered=True)))
+    return [Reading(*one, unnamed=~proven_directions(matrix, one[1], one[0], d)) for one in found]
 
 
 def _mended(matrix: sp.csr_array, node: NDArray[np.int64], direction: NDArray[np.int64], d: int) -> NDArray[np.int64]:

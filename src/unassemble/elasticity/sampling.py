@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .constants import ROUNDING
 from .directions import find_directions
 from .grouping import by_first_row, possible_nodes, same_pattern
 from .likeness import reach
@@ -13,7 +14,6 @@ from .runs import stretches
 
 _PLACES = (0.5, 0.2, 0.8)  # where to look, as parts of the rows
 _MOST = 3000  # rows of a sample beyond which it is no quick look
-_ROUNDING = 1e-9
 _STARTS = 5
 _ENOUGH = 0.3  # share of a sample's whole rows that annihilate constants, direction by direction
 
@@ -48,9 +48,9 @@ def _directions_show(matrix: sp.csr_array, group: NDArray[np.int64], seed: int, 
             ones = np.zeros((len(rows), d))
             ones[np.arange(len(rows)), direction] = 1
             size = abs(sample[whole]) @ ones
-            zero = np.abs(sample[whole] @ ones) <= _ROUNDING * size.sum(axis=1, keepdims=True)
+            zero = np.abs(sample[whole] @ ones) <= ROUNDING * size.sum(axis=1, keepdims=True)
             # Sums of nothing are no evidence, and those of a row's own direction none of more than one.
-            coupled = size > _ROUNDING * size.sum(axis=1, keepdims=True)
+            coupled = size > ROUNDING * size.sum(axis=1, keepdims=True)
             own = ones[whole].astype(bool)
             telling = (zero & coupled & ~own).any(axis=1) & (zero & own).any(axis=1)
             if telling.mean() > _ENOUGH:

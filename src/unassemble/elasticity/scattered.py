@@ -8,16 +8,16 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .coincidence import by_direction, placed_together, single_nodes
-from .constants import PENALTY, proven_directions, uncoupled_rows
+from .constants import adding_up, proven_directions, row_sizes, uncoupled_rows, with_penalty
 from .extension import extended_directions
 from .grouping import possible_nodes, same_pattern
 from .numbering import Numbering, measured
 from .orders import Reading
+from .patterns import by_direction
+from .row_positions import placed_together, single_nodes
 from .sums import names_of, set_right
 from .traces import shows_all
 
-_ROUNDING = 1e-9
 _ORDERED = 0.3  # share of neighbouring rows with the same pattern: 2/3 node by node, some more where nodes share one
 _SETTLED = 0.9  # share of whole rows that have to annihilate translations
 _EVEN = 0.6  # share of rows, far from supports, in patterns with as many rows in each direction
@@ -56,9 +56,8 @@ def _even_share(
 
     Two directions of three taken for one annihilate translations as well.
     """
-    size = np.asarray(abs(matrix).sum(axis=1)).ravel() - np.abs(matrix.diagonal())
-    adds_up = np.abs(np.asarray(matrix.sum(axis=1)).ravel()) <= _ROUNDING * size
-    adds_up |= np.abs(matrix.diagonal()) > PENALTY * size
+    size = row_sizes(matrix)
+    adds_up = adding_up(matrix, size) | with_penalty(matrix, size)
     count = by_direction(group, direction, d)
     whole = live & (np.bincount(group, ~adds_up) == 0)[group]
     return float((count == count[:, :1]).all(axis=1)[group[whole]].mean()) if whole.any() else 0.0

@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 from ..errors import SolverError
 from ..linalg.augmented import AugmentedSystem
 from .identities import Identities, boundary_basis, identities
-from .nodal import NodalMatrix
+from .nodal import NodalMatrix, determined, linked
 
 _STEPS = 2
 _WORK = 3e6  # nodes times the square of those across, up to which partial pivoting costs a few seconds
 _ROUNDING = 1e-15  # of an entry
+# How much softer, at most, a piece is whose first node is held, and not its centroid, is the root of its number of
+# nodes. Random numbers and all fields but the softest add less than this factor; a field that is free adds 1e6.
+_SOFTER = 30.0
 
 
 def affordable(points: NDArray[np.float64]) -> bool:
@@ -29,11 +32,16 @@ def affordable(points: NDArray[np.float64]) -> bool:
 
 
 def unbent(
-    nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64], terms: NDArray[np.float64] | None = None
+    nodal: NodalMatrix,
+    valid: NDArray[np.bool_],
+    points: NDArray[np.float64],
+    gap: float,
+    terms: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.float64], float]:
     """Coordinates nearer to the null vector of the valid identities, of which there is one but for translations.
 
-    And the norm of their residual, rounding of the entries included, over that of the centred coordinates.
+    And the norm of their residual, rounding of the entries included, over that of the centred coordinates; infinite
+    where the points are left as they are, since rows that touch no loose node do not hold the piece together.
 
     Parameters
     ----------
@@ -41,12 +49,16 @@ def unbent(
     valid : (n, d, d) or (n, d, d, d) bool
     points : (n, d) float64
         Of one piece, NaN elsewhere; of about unit size from node to node.
+    gap : float
+        Singular value of the next field, all rows counted.
     terms : (d, d, d, t) float64, optional
         Unknown boundary terms; see :func:`.identities.identities`.
     """
-    body = np.isfinite(points).all(axis=1)
-    apart = nodal.graph @ (~body).astype(float) > 0
+    body = determined(points)
+    apart = np.bincount(nodal.node, linked(nodal, valid) & ~body[nodal.indices], nodal.n) > 0
     local = identities(nodal, valid, np.flatnonzero(body & ~apart), terms)
+    if not len(local.columns):
+        return points, float("inf")
     equations = _equations(local)
     x = points[local.columns]
     free = np.ones(x.shape, dtype=bool)
@@ -55,6 +67,8 @@ def unbent(
     free.flat[far] = False
     try:
         system = AugmentedSystem(sp.csr_array(equations[:, np.flatnonzero(free.ravel())]))
+        if gap * _softness(system, equations.shape[0]) > _SOFTER * np.sqrt(len(x)):
+            return points, float("inf")
         for _ in range(_STEPS):
             x[free] -= system.solve(_residual(equations, x))
     except SolverError:
@@ -63,6 +77,12 @@ def unbent(
     better[local.columns] = x
     residual = np.linalg.norm(_residual(equations, x)) + _ROUNDING * np.sqrt(equations.shape[0])
     return better, float(residual / np.linalg.norm(x - x.mean(axis=0)))
+
+
+def _softness(system: AugmentedSystem, equations: int) -> float:
+    """About one over the least singular value: the norm of what solves for signs at random."""
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], equations)
+    return float(np.linalg.norm(system.solve(signs)))
 
 
 def _equations(local: Identities) -> sp.csr_array:

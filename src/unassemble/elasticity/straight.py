@@ -41,6 +41,10 @@ class Straight:
         """(n,) which nodes belong to it."""
         return determined(self.points)
 
+    def piece_in(self, found: Solution) -> int:
+        """The bent piece that this one is part of, -1 if none; nodes that are loose there are part of none."""
+        return int(found.component[self.nodes].max())
+
 
 def straightened(
     nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.bool_], completed: Rows | None, patch: int | None
@@ -72,9 +76,9 @@ def straightened(
         used = used & bent.reshape(-1, *(1,) * (used.ndim - 1))
         straight += _straight(nodal, inside, (rows, used), None, patch)
         for one in straight:
-            inside = inside & (found.component != found.component[np.argmax(one.nodes)])[:, None, None]
+            inside = inside & (found.component != one.piece_in(found))[:, None, None]
     straight += _straight(nodal, inside, (nodal, inside), no_terms(nodal.dim), patch)
-    return _merged(nodal, found, valid, straight) if straight else found
+    return in_place(found, valid, straight) if straight else found
 
 
 def _bent(nodal: NodalMatrix, found: Solution | None) -> NDArray[np.bool_]:
@@ -112,13 +116,13 @@ def _straight(
             yield Straight(points, one.ratio, Evidence(shown.fields, residual, gap, null.rows))
 
 
-def _merged(nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.bool_], straight: list[Straight]) -> Solution:
-    """Straight pieces in place of the bent ones that they are part of."""
-    component, points = np.full(nodal.n, -1), np.full((nodal.n, nodal.dim), np.nan)
+def in_place(found: Solution | None, valid: NDArray[np.bool_], straight: list[Straight]) -> Solution:
+    """Straight pieces, one at least, in place of the bent ones that they are part of."""
+    component, points = np.full(len(valid), -1), np.full(straight[0].points.shape, np.nan)
     evidence: list[Evidence] = []
     freedoms: list[str] = []
     if found is not None:
-        better = {found.component[np.argmax(one.nodes)] for one in straight}
+        better = {one.piece_in(found) for one in straight}
         for piece in range(len(found.freedoms)):
             if piece not in better:
                 here = found.component == piece

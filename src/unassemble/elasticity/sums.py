@@ -13,11 +13,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .clusters import GAIN, Sums, clusters, cost, rearranged
-from .constants import PENALTY
+from .constants import ROUNDING, row_sizes, with_penalty
 
 _ROUNDS = 200
 _HOPEFUL = 0.1  # share of rows that add up to zero below which nothing is to be set right
-_ROUNDING = 1e-9
 
 
 def names_of(d: int, *, ordered: bool = False) -> list[NDArray[np.int64]]:
@@ -51,12 +50,12 @@ def set_right(
         Directions that the rows of a group of k = 1 .. d rows may have; see :func:`names_of`.
     """
     d = len(names)
-    size = np.asarray(abs(matrix).sum(axis=1)).ravel() - np.abs(matrix.diagonal())  # there may be a penalty on it
+    size = row_sizes(matrix)
     scale = np.asarray(1 / np.where(size > 0, size, 1))
-    telling = live & (np.abs(matrix.diagonal()) <= PENALTY * size)
+    telling = live & ~with_penalty(matrix, size)
     for _ in range(_ROUNDS):
         sums = _sums(matrix, direction, live, d) * scale[:, None]
-        failing = (np.abs(sums).max(axis=1) > _ROUNDING) & live
+        failing = (np.abs(sums).max(axis=1) > ROUNDING) & live
         if np.count_nonzero(telling & ~failing) < _HOPEFUL * np.count_nonzero(telling):
             break
         near = abs(matrix) @ failing.astype(float) > 0

@@ -6,10 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .constants import PENALTY
+from .constants import ROUNDING, row_sizes, with_penalty
 from .orders import Reading
-
-_ROUNDING = 1e-9
 
 
 def unaccounted(
@@ -31,9 +29,8 @@ def unaccounted(
     labels = np.zeros((order, d))
     labels[np.flatnonzero(live), direction[live]] = 1
     size = np.asarray(abs(matrix).sum(axis=1)).ravel()
-    missing = (np.abs(matrix @ labels) > _ROUNDING * size[:, None]) & live[:, None]
-    diagonal = np.abs(matrix.diagonal())
-    missing[np.arange(order), direction] &= diagonal <= PENALTY * (size - diagonal)
+    missing = (np.abs(matrix @ labels) > ROUNDING * size[:, None]) & live[:, None]
+    missing[np.arange(order), direction] &= ~with_penalty(matrix, row_sizes(matrix))
     pattern = sp.csr_array((np.ones(matrix.nnz, np.int8), matrix.indices, matrix.indptr), shape=matrix.shape)
     onto = sp.csr_array((np.ones(order, np.int32), (node, np.arange(order))), shape=(n, order))
     missed = onto @ (pattern.astype(np.int32) @ missing.astype(np.int32))

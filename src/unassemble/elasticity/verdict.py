@@ -80,6 +80,25 @@ def about_open_rows(numbering: Numbering) -> str:
     )
 
 
+def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solution) -> str:
+    """Why the fields that are left say nothing of positions; empty where they are few, or nodes are beyond doubt.
+
+    Where it is not known which rows are one node's, those that are left move rows of one direction only, as if there
+    were more nodes; and the points that belong to rows of several nodes are none of the body's.
+    """
+    if not any(solution.freedoms):
+        return ""
+    if "hourglass" in solution.freedoms and about_open_rows(numbering):
+        return about_open_rows(numbering)
+    odd = int(np.asarray(without_trace(nodal).any(axis=1)).sum()) if numbering.open_row is None else 0
+    if not odd:
+        return ""
+    return (
+        f"{count_of(odd, 'node lacks', 'nodes lack')} directions without a trace, so that rows were not joined to "
+        "nodes as they should be, and no positions of the rows are unique; give the numbering if it is known"
+    )
+
+
 def of_few_digits(rounding: float, error: float) -> str:
     """Why a matrix whose entries are rounded is not certified though all is well."""
     return (

@@ -22,6 +22,8 @@ _ROUNDING = 1e-12
 """Errors of the weights that may be rounding."""
 EXACT = 1e-3
 """Standard deviation of entries without noise, relative to that of the others: next to none, and safe to divide by."""
+_FAR = 0.05
+"""Root mean square misfit, over c, that no rounding in the solution of a linear problem leaves."""
 _CAUTIOUS_LIMIT = 200_000
 """Most vertices for which a polish that fails is tried again with a factorisation in every step."""
 
@@ -127,13 +129,19 @@ def _polished(
     flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
     if found.converged and not flipped:
         return found
-    if not flipped and affordable(piece.edges, found.z):
+    if not flipped and _near(piece, weights, found) and affordable(piece.edges, found.z):
         return cautious_polish(piece, weights, found.z, scale=scale, spread=spread, equations=PivotedEquations)
     if piece.n_vertices > _CAUTIOUS_LIMIT:
         return found
     nearest = found.z if flipped <= count_flipped(piece, start) else start
     again = cautious_polish(piece, weights, nearest, scale=scale, spread=spread)
     return again if again.residual < found.residual or not finite else found
+
+
+def _near(piece: Piece, weights: NDArray, found: PolishedMesh) -> bool:
+    """Whether the misfit is so small that rounding may be what is left to mend."""
+    misfit = weights / found.scale - edge_weights(piece, found.z)
+    return bool(np.sqrt(np.mean(misfit**2)) < _FAR)
 
 
 def _is_uniform_noise(piece: Piece, weights: NDArray, found: PolishedMesh, spread: NDArray) -> bool:

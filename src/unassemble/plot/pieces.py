@@ -68,7 +68,7 @@ def apart(recovery: Recovery, triangles: NDArray) -> Pieces:
     tail, head = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
     half_edges = tail * n + head
     order = np.argsort(half_edges)
-    owner = np.repeat(_edge_connected(n, tail, head), 3)
+    owner = np.repeat(_edge_connected(n, tail, head), 3).astype(np.int64)
 
     def piece_of(edges: NDArray) -> NDArray:
         """Piece of directed edges, -1 where there is none."""

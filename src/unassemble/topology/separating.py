@@ -128,7 +128,7 @@ def _parts_nearby(graph: sp.csr_array, cycles: NDArray, radius: int) -> NDArray[
     goes_on = np.zeros(count, dtype=bool)
     goes_on[label[np.searchsorted(ball, rim)]] = True
     outside = ~contains(removed, heads[0])
-    touching = distinct(label[np.searchsorted(ball, heads[0][outside])] * n + tails[0][outside] % n)
+    touching = distinct(label[np.searchsorted(ball, heads[0][outside])].astype(np.int64) * n + tails[0][outside] % n)
     touches_all = np.bincount(touching // n, minlength=count) == 3
     parts = np.bincount(owner[touches_all], minlength=len(cycles))
     closed = np.bincount(owner[touches_all & ~goes_on], minlength=len(cycles))

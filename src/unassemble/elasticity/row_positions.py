@@ -6,21 +6,19 @@ unknowns nothing else tells which of their rows belong together.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..errors import GeometryError
-from .constants import PENALTY
+from .constants import least_sums, row_sizes, with_penalty
 from .grouping import by_first_row
 from .nodal import NodalMatrix, determined, nodal_matrix
 from .numbering import Numbering
+from .patterns import by_direction, with_patterns
 from .placing import placed
 
-_ROUNDING = 1e-9
 _APART = 1e-6  # of the mean edge length, up to which two positions are one
 _ROUNDS = 4
 
@@ -78,13 +76,6 @@ def placed_together(
     return node, _open(group, node, direction, d) & may
 
 
-def by_direction(label: NDArray[np.int64], direction: NDArray[np.int64], d: int, n: int = 0) -> NDArray[np.int64]:
-    """(n or more, d) rows of each label and direction."""
-    count = np.zeros((max(int(label.max(initial=-1)) + 1, n), d), dtype=np.int64)
-    np.add.at(count, (label, direction), 1)
-    return count
-
-
 def _open(group: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[np.int64], d: int) -> NDArray[np.bool_]:
     """(N,) rows of nodes that lack a direction which others of the same pattern, that lack some too, have."""
     absent = (by_direction(node, direction, d) == 0)[node]
@@ -101,10 +92,9 @@ def _whole_rows(
     All rows of the same pattern annihilate constants there, and none of what they couple to is known to lack it.
     """
     label = np.eye(d)[direction] * live[:, None]
-    own = np.abs(matrix.diagonal())
-    size = np.asarray(abs(matrix).sum(axis=1)).ravel() - own
-    least = _ROUNDING * np.where(size > 0, size, np.inf)
-    excused = (label > 0) & (own > PENALTY * size)[:, None]
+    size = row_sizes(matrix)
+    least = least_sums(size)
+    excused = (label > 0) & with_penalty(matrix, size)[:, None]
     failing = np.zeros((int(group.max()) + 1, d))
     np.add.at(failing, group, (np.abs(matrix @ label) > least[:, None]) & ~excused)
     count = by_direction(group, direction, d)
@@ -125,7 +115,7 @@ def _joined(
     n, d = nodal.n, nodal.dim
     valid: NDArray[np.bool_] = whole[nodal.row_of] & (nodal.row_of >= 0)[:, :, None]
     try:
-        solution = placed(*_with_sums(nodal, valid, group, node, direction), None)
+        solution = placed(*with_patterns(nodal, valid, group, node, direction, whole), None)
     except GeometryError:
         return node
     if not solution.exact or "hourglass" in solution.freedoms:
@@ -142,57 +132,6 @@ def _joined(
     label = sp.csgraph.connected_components(link, directed=False)[1].astype(np.int64)[node]
     twice = np.asarray((by_direction(label, direction, d) > 1).any(axis=1))[label]
     return by_first_row(np.where(twice, n + node, label))
-
-
-def _with_sums(
-    nodal: NodalMatrix,
-    valid: NDArray[np.bool_],
-    group: NDArray[np.int64],
-    node: NDArray[np.int64],
-    direction: NDArray[np.int64],
-) -> tuple[NodalMatrix, NDArray[np.bool_]]:
-    """One more equation for each pattern that lacks no direction, where each of its nodes takes part in some equation.
-
-    Whichever rows belong together, those of any direction have the same positions, and so the same sum of positions.
-    They stand in nodes of their own, which have no positions, in places without boundary terms.
-
-    Returns
-    -------
-    nodal : NodalMatrix
-    valid : (n, d, d, d) bool
-    """
-    n, d = nodal.n, nodal.dim
-    touched = np.zeros(n, dtype=bool)
-    touched[nodal.indices[(np.abs(nodal.data) * valid[nodal.node]).max(axis=(1, 2)) > 0]] = True
-    count = by_direction(group, direction, d)
-    several: NDArray[np.bool_] = np.asarray((count == count[:, :1]).all(axis=1) & (count[:, 0] > 1))
-    several[group[~touched[node]]] = False
-    number = np.cumsum(several) - 1
-    m = int(several.sum())
-    rows = np.flatnonzero(several[group])
-    weight = 1 / count[group[rows], 0]
-    parts = []
-    for c in range(1, d):
-        sign = np.where(direction[rows] == 0, 1.0, np.where(direction[rows] == c, -1.0, 0.0))
-        parts.append(sp.coo_array((sign * weight, (number[group[rows]], node[rows])), shape=(m, n)))
-    sums = sp.csr_array(sp.hstack([sp.vstack(parts), sp.eye_array((d - 1) * m)]))
-    sums.sort_indices()
-    own = sums.indices >= n
-    blocks = np.where(own, 0, sums.data)[:, None, None] * np.eye(d)
-    full = np.repeat(valid[..., None], d, axis=3)
-    alone = np.zeros((d, d, d), dtype=bool)
-    alone[np.arange(d), np.arange(d), np.arange(d)] = True
-    more = (d - 1) * m
-    extended = replace(
-        nodal,
-        indptr=np.concatenate([nodal.indptr, nodal.indptr[-1] + sums.indptr[1:]]).astype(np.int32),
-        indices=np.concatenate([nodal.indices, sums.indices]).astype(np.int32),
-        data=np.concatenate([nodal.data, blocks]),
-        row_of=np.vstack([nodal.row_of, np.full((more, d), -1)]),
-        size=np.concatenate([nodal.size, np.ones(more)]),
-        penalised=np.vstack([nodal.penalised, np.zeros((more, d), dtype=bool)]),
-    )
-    return extended, np.concatenate([full, np.broadcast_to(alone, (more, d, d, d))])
 
 
 def _remaining(

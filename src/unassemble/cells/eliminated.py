@@ -1,0 +1,115 @@
+"""Meshes whose boundary was eliminated: entries between two rows next to it still contain cells that are gone.
+
+What such an entry has from the cell that is left is unknown, so that it has no part in the fit. Half of it, as where
+the cells on both sides are alike, is what the fit begins with: on grids, which the other entries do not determine, the
+fit stays there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import GeometryError, SolverError
+from ..matrix import OperatorMatrix
+from ..planar.conformal import conformal_map
+from ..planar.cotangent import edge_weights
+from ..planar.piece import PieceMesh
+from ..planar.polish import PolishOptions, polish
+from ..planar.robust import ASIDE
+from ..topology import Piece
+from .reading import FITS, Reading
+from .search import first_reading
+
+_SUM = 1e-10  # sum of a row, relative to its entries, that is rounding
+_MANY = 0.7  # share of rows; more would be a mass matrix that was added, or no Laplacian at all
+_SHORT = PolishOptions(max_steps=20, max_factorisations=3)
+_NOTE = (
+    "these are entries between rows that do not add up to zero, as next to unknowns that were eliminated, which still "
+    "contain cells that are gone; all others fit"
+)
+
+
+def incomplete_rows(matrix: OperatorMatrix) -> NDArray[np.bool_]:
+    """(n,) rows that do not add up to zero, if most others do; none otherwise."""
+    size = np.abs(matrix.diagonal)
+    sums = matrix.diagonal.copy()
+    for end in matrix.edges.T:
+        sums += np.bincount(end, matrix.entries, matrix.n)
+        size += np.bincount(end, np.abs(matrix.entries), matrix.n)
+    incomplete = np.abs(sums) > _SUM * size
+    return incomplete & (incomplete.sum() < _MANY * matrix.n)
+
+
+def without_boundary(n: int, edges: NDArray, weights: NDArray, incomplete: NDArray[np.bool_]) -> Reading | None:
+    """What angles suggest, where incomplete rows are just those of its boundary, and where it does not fit whole.
+
+    Parameters
+    ----------
+    n : int
+    edges : (e, 2) int64
+        Pairs i < j in lexicographic order; at least one.
+    weights : (e,) float64
+        -A_ij of each edge.
+    incomplete : (n,) bool
+        See :func:`incomplete_rows`.
+
+    Returns
+    -------
+    Reading or None
+        With entries set aside if these are all that does not fit. None if the boundary is another: it takes a search
+        to tell which.
+    """
+    if not incomplete.any():
+        return None
+    between = np.asarray(incomplete[edges].all(axis=1))
+    readings = [first_reading(n, edges, some) for some in (weights, np.where(between, weights / 2, weights))]
+    inside = [one for one in readings if one is not None and np.array_equal(_on_boundary(one), incomplete)]
+    if not inside:
+        return None
+    whole = [Reading.of(replace(one.candidates, weights=weights), one.labels) for one in inside]
+    if any(one.fits for one in whole):  # a diagonal matrix was added on the boundary
+        return None
+    inner = _left_to_others(whole[-1], incomplete)
+    return inner if inner.fits_but_for_few else whole[0]
+
+
+def _left_to_others(reading: Reading, incomplete: NDArray[np.bool_]) -> Reading:
+    """The same cells, placed without the entries on their boundary between incomplete rows."""
+    between = np.asarray(incomplete[reading.edges].all(axis=1))
+    meshes = []
+    for piece in reading.pieces:
+        aside = np.flatnonzero(~piece.inner & between[piece.edge_rows])
+        meshes.append(_without(piece, reading.weights[piece.edge_rows], aside))
+    return reading.placed(tuple(meshes))
+
+
+def _on_boundary(reading: Reading) -> NDArray[np.bool_]:
+    """(n,) vertices on the boundary of pieces, or with edges on none."""
+    on_boundary = np.zeros(reading.candidates.n_vertices, dtype=bool)
+    bare = np.ones(len(reading.edges), dtype=bool)
+    for piece in reading.pieces:
+        on_boundary[piece.vertices[piece.boundary]] = True
+        bare[piece.edge_rows] = False
+    on_boundary[reading.edges[bare]] = True
+    return on_boundary
+
+
+def _without(piece: Piece, weights: NDArray, aside: NDArray[np.int64]) -> PieceMesh | None:
+    """Positions that fit all weights but some, with half of which they begin; None where there are none."""
+    weights = weights.copy()
+    weights[aside] /= 2
+    try:
+        start = conformal_map(piece, weights, sharp=False)
+        spread = np.ones(len(weights))
+        spread[aside] = ASIDE
+        found = polish(piece, weights, start.z, spread=spread, options=_SHORT)
+    except (GeometryError, SolverError):
+        return None
+    rest = np.ones(len(weights), dtype=bool)
+    rest[aside] = False
+    misfit = np.abs(edge_weights(piece, found.z) - weights / found.scale)[rest]
+    fits = bool((misfit <= FITS * np.abs(weights / found.scale).max()).all())
+    return PieceMesh(found.z, found.scale, (_NOTE,), aside=aside) if fits else None
