@@ -135,6 +135,21 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     return VectorReading(found, f"it is no planar mesh, and {_evidence(found)}", exact)
 
 
+def about_translations(matrix: OperatorMatrix) -> str:
+    """Why a matrix that is no planar mesh is no stiffness matrix either though its rows form nodes; empty if not so."""
+    from .elasticity.rounded import rounding_of
+    from .elasticity.unknowns import MORE_THAN_STIFFNESS, nodes_of_pattern
+
+    nodes, rounding = nodes_of_pattern(matrix.csr()), rounding_of(matrix.csr().data)
+    if nodes is None:
+        return ""
+    digits = f", or what shows it is lost in the entries, which are rounded to {rounding:.0e} of themselves"
+    return (
+        f"its rows form {nodes[0]} nodes with {nodes[1]} unknowns each, as those of an elasticity matrix, but do not "
+        f"annihilate translations: perhaps {MORE_THAN_STIFFNESS}{digits if rounding else ''}"
+    )
+
+
 def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, tuple[sp.csr_array, float] | None]:
     """The matrix to look at, and of entries with few digits what a reading keeps of it."""
     from .elasticity.rounded import with_exact_sums

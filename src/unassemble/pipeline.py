@@ -7,10 +7,10 @@ from os import PathLike
 from typing import Any
 
 from .clock import Clock
-from .errors import InputError, RecoveryError
+from .errors import InputError, NotPlanarError, RecoveryError
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, read_matrix
-from .operators import VectorReading, asked_for, refuse, second_reading, vector_valued
+from .operators import VectorReading, about_translations, asked_for, refuse, second_reading, vector_valued
 from .options import check_options, listed_anchors
 from .placement import Direction, Placement
 from .recovery import Recovery
@@ -193,6 +193,10 @@ def recover(
                 found = other if found is None or other.certified else found
         if found is None:
             assert failure is not None
+            if operator == "auto" and isinstance(failure, NotPlanarError):
+                why = about_translations(checked)
+                if why:
+                    raise NotPlanarError(f"the graph of the matrix is not planar; {why}", failure.witness) from failure
             raise failure
         return found
 

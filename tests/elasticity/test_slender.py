@@ -40,6 +40,22 @@ def test_beams_in_space():
     assert error(found.points, case.points) < 1e-11
 
 
+@pytest.mark.parametrize("kind", ["tri-p1", "quad-q1"])
+def test_strips_that_bend_less_easily_are_certified_without_elements(kind):
+    case = beam(kind, 601)
+    found = recover_elasticity(case.matrix, cells=False)
+    assert found.certified
+    assert error(found.points, case.points) < 1e-12
+
+
+def test_thin_bodies_lose_no_digits_where_charts_meet():
+    case = stiffness("tet-p1", box("tet-p1", (201, 4, 4), stretch=(60, 1, 1)), lam=1.5)
+    matrix, nodes = eliminated(case, np.repeat(on_plane(case, 0)[:, None], 3, axis=1))
+    found = recover_elasticity(matrix, cells=False)
+    assert found.certified
+    assert error(found.points, case.points[nodes]) < 1e-12
+
+
 @pytest.mark.parametrize("loose", ["every other node", "the nodes in the middle"])
 def test_rows_that_do_not_hold_a_beam_together_leave_it_as_it_is(loose):
     """Rows that touch a loose node do not count; the rest may be none, or fit two halves anywhere."""

@@ -86,6 +86,7 @@ def _simplices(kind: Kind, graph: Graph, points: NDArray, edges: Graph) -> Block
 def coupled(nodal: NodalMatrix, points: NDArray) -> Graph:
     """Pairs of determined nodes with an entry."""
     known = determined(points)
-    live = (np.abs(nodal.data).max(axis=(1, 2)) > 1e-13 * nodal.size[nodal.node]) & known[nodal.node]
-    live &= known[nodal.indices]
-    return Graph(sp.csr_array((np.ones(live.sum()), (nodal.node[live], nodal.indices[live])), shape=(nodal.n,) * 2))
+    i, j = nodal.node, nodal.indices
+    live = np.abs(nodal.data).max(axis=(1, 2)) > 1e-13 * np.minimum(nodal.size[i], nodal.size[j])  # symmetric
+    live &= known[i] & known[j]
+    return Graph(sp.csr_array((np.ones(live.sum()), (i[live], j[live])), shape=(nodal.n,) * 2))

@@ -111,10 +111,12 @@ def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: floa
     graph, known = coupled(nodal, points), determined(points)
     likely = Entries.of(nodal, known, surrounded(nodal, valid_pairs(nodal, inferred=True)))
     found = no_cells()
+    # The power of two next to the largest entry: squares of what is measured in it neither overflow nor vanish.
+    unit = float(2.0 ** np.frexp(nodal.size.max(initial=0.0))[1])
     for entries in [likely, Entries.of(nodal, known)] if (likely.complete != likely.sure).any() else [likely]:
-        other = _recognised(points, graph, entries, ratio)
+        other = _recognised(points, graph, entries.over(unit), ratio)
         if other.certified:
-            return other
+            return replace(other, lame=other.lame * unit)
         found = found if found.recognised else other
     return found
 

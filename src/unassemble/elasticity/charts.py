@@ -72,9 +72,7 @@ def chart(
     if not n:
         return Chart(local.columns, np.empty((0, d, 0)), np.empty(0), 0)
     count = min(4 * d, n * d)
-    normal = local.normal_matrix()
-    stored = sp.eye_array(n * d, format="bsr") * np.finfo(float).tiny  # rows of zeros have a diagonal too
-    with nearly_singular(UpperTriangle.of(sp.bsr_array((normal + stored).tobsr((d, d)))), _SHIFTS) as solver:
+    with nearly_singular(UpperTriangle.of(local.normal_matrix()), _SHIFTS) as solver:
         while True:
             fields, values = _least_fields(local, solver, count)
             if count == n * d or count >= 256 or values[-1] > (1e-7 if whole else _STIFF):

@@ -17,6 +17,8 @@ from .orders import Reading
 from .row_positions import placed_together
 from .traces import shows_all
 
+_VOTES = 0.5  # share of the rows that add up to zero that has to vote for a cut: nearly all do, or a few by chance
+
 
 def by_component(matrix: sp.csr_array, d: int) -> Reading | None:
     """Nodes and directions of rows that stand direction by direction; None where no such order shows.
@@ -60,7 +62,7 @@ def _cuts(matrix: sp.csr_array, d: int) -> NDArray[np.int64] | None:
     cuts: list[int] = []
     for _ in range(d - 1):
         votes = np.cumsum(np.bincount(first, minlength=order + 2) - np.bincount(last, minlength=order + 2))
-        if votes.max() <= 0:
+        if votes.max() <= _VOTES * whole.sum():
             return None
         best = np.flatnonzero(votes == votes.max())
         run = best[: int(np.argmax(np.append(np.diff(best) > 1, True))) + 1]

@@ -79,6 +79,10 @@ class Entries:
         """Some of them."""
         return replace(self, key=self.key[place], value=self.value[place], told=self.told[place], size=self.size[place])
 
+    def over(self, unit: float) -> Entries:
+        """The same in another unit."""
+        return replace(self, value=self.value / unit, size=self.size / unit)
+
     def shown(self, tolerance: float) -> NDArray[np.bool_]:
         """(n, d) unknowns whose rows have one of these entries that is not zero."""
         seen = np.zeros((self.n, self.value.shape[1]), dtype=bool)

@@ -136,10 +136,8 @@ class Identities:
     def normal_matrix(self) -> sp.bsr_array:
         """(n d, n d) the normal matrix in blocks of d; those of zeros are missing, except on the diagonal."""
         d = self.dim
-        gram = self._gram()
         q = self._boundary_part()
-        product = q.T.tobsr(blocksize=(d, 2 * d)) @ q
-        normal = (gram - product.tobsr(blocksize=(d, d))).tobsr((d, d))
+        normal = self._gram() - q.T @ q
         if (np.abs(normal.diagonal()).reshape(-1, d).max(axis=1) == 0).any():  # a node in no equation
             stored = sp.eye_array(normal.shape[0], format="csr") * np.finfo(float).tiny
             normal = sp.csr_array(normal.tocsr() + stored).tobsr((d, d))
@@ -149,8 +147,10 @@ class Identities:
     def _gram(self) -> sp.bsr_array:
         """The normal matrix with p and q set to zero."""
         d, stacked = self.dim, self._stacked
-        if self._even:
-            return sp.kron(stacked.T @ stacked, np.eye(d), format="bsr")
+        if self._even:  # the same for all coordinates
+            one = sp.csr_array(stacked.T @ stacked)
+            blocks = one.data[:, None, None] * np.eye(d)
+            return sp.bsr_array((blocks, one.indices, one.indptr), shape=(d * one.shape[0],) * 2)
         parts = []
         for a in range(d):
             part = sp.csr_array(sp.diags_array(self.valid[..., a].ravel().astype(float)) @ stacked)

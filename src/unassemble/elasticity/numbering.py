@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from .constants import annihilated_share, uncoupled_rows
 from .grouping import coupled_in_common
+from .orders import ORDERS
 from .traces import unaccounted
 
 _LIKELY = 0.6  # quality of nodes apart from the share of sums that vanish; made-up ones have half or less
 WHOLE = 0.5  # share of sums that vanish in most rows, supports apart
+_ALIKE = 0.9  # rows of one node couple to common nodes by so much, where unknowns stand by component
 ANNIHILATED = 0.02  # share of rows and directions below which an orderly numbering calls for a search
 
 
@@ -78,6 +80,12 @@ class Numbering:
             return 0.0
         filled = len(self.node_of_row) / (self.n_nodes * self.block_size)
         return self.share * self.common * filled * (1 - self.odd / self.n_nodes)
+
+    @property
+    def clear(self) -> bool:
+        """Whether the unknowns stand in one of the usual orders, with no gaps: nothing else need be tried."""
+        alike = self.kind != "by component" or self.common >= _ALIKE
+        return self.kind in ORDERS and self.share >= WHOLE and alike
 
     @property
     def sound(self) -> bool:

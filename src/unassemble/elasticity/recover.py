@@ -130,7 +130,8 @@ def place_nodes(
         ):
             raise GeometryError(
                 "no positions fit the matrix exactly; which rows belong to one node was inferred, where some nodes "
-                "lack rows, and is probably wrong: give the numbering if it is known"
+                "lack rows, and is probably wrong, unless constraints tie unknowns together: give the numbering if it "
+                "is known"
             )
         nodal, numbering, solution = _rejoined(nodal, numbering, solution, patch)
     return _describe(nodal, numbering, solution, clock, cells, rounding)

@@ -30,7 +30,9 @@ def rounding_of(values: NDArray[np.float64]) -> float:
     if not len(values):
         return 0.0
     some = values[:: max(1, len(values) // 2000)]
-    if np.array_equal(some, some.astype(np.float32)):
+    with np.errstate(over="ignore"):  # too large for single precision
+        single = some.astype(np.float32)
+    if np.array_equal(some, single):
         short = bool((some == np.round(some)).all())  # small whole numbers are exact
         return 0.0 if short else float(np.finfo(np.float32).eps) / 2
     for digits in _FEW:

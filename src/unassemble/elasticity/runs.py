@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from .constants import proven_directions
 from .directions import find_directions, reconsidered
+from .extension import extended_directions
 from .grouping import by_first_row, same_pattern
 from .likeness import alike, doubtful, likest, next_to_likest, reach
+from .numbering import WHOLE
 from .orders import Reading
 from .sums import names_of, set_right
 from .traces import shows_all, unaccounted
@@ -56,7 +58,29 @@ def _by_pattern(matrix: sp.csr_array, group: NDArray[np.int64], run: NDArray[np.
     single = [row[:, None], *[np.empty((0, k), np.int64) for k in range(2, d + 1)]]
     direction = set_right(matrix, row, single, ~nobody, direction, names_of(d))
     unnamed = ~proven_directions(matrix, direction, group, d)
+    if unnamed.any():
+        likelier = _in_equilibrium(matrix, group, run, direction, unnamed, d)
+        if likelier is not None:
+            direction, unnamed = likelier, ~proven_directions(matrix, likelier, group, d)
     return Reading(_cut_where(run, direction), direction, np.zeros(order, dtype=bool), unnamed)
+
+
+def _in_equilibrium(
+    matrix: sp.csr_array,
+    group: NDArray[np.int64],
+    run: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    unnamed: NDArray[np.bool_],
+    d: int,
+) -> NDArray[np.int64] | None:
+    """Directions with which translations are in equilibrium, likelier than those of least energy where no sum decides.
+
+    None if they contradict rows whose direction is proven, or the order of rows within a node.
+    """
+    other, share = extended_directions(matrix, group, np.ones(len(run), dtype=bool), d)
+    if share < WHOLE or (other != direction)[~unnamed].any():
+        return None
+    return other if _cut_where(run, other)[-1] <= _cut_where(run, direction)[-1] else None
 
 
 def _cut_where(run: NDArray[np.int64], direction: NDArray[np.int64]) -> NDArray[np.int64]:

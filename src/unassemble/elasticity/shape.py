@@ -14,7 +14,8 @@ from ..errors import GeometryError
 EXACT = 1e-9  # singular values below this are zero; matrices are rounded to 1e-16, gaps are 1e-4 and more
 _FEW = 0.25  # share of nodes that may be loose although rows of their own are valid
 _MOST = 0.75  # share of the nodes that no plane across an axis holds
-_LOOSE = 1e-7  # a field this small at a node leaves it alone
+_LOOSE = 1e-7  # a field this small at most nodes leaves these alone
+_STILL = 1e-9  # of loose nodes: where they die out coordinates, of norm one as they are, are wrong by that much
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +93,9 @@ def shape(
 def set_aside(null: NDArray, common: int) -> tuple[NDArray, NDArray[np.bool_]]:
     """Find nodes that carry fields of their own, and the fields, so many in number, that the other nodes share.
 
-    Loose nodes move more than others in the null fields, and their own fields vanish at the others exactly. So the
-    fields that the least mobile nodes share are the body's, and what vanishes at all of these is loose.
+    Loose nodes move more than others in the null fields, and their own fields vanish at the others, or die out over
+    some cells. So the fields that the least mobile nodes share are the body's, and what vanishes at all of these is
+    loose.
     """
     n, _d, k = null.shape
     calm = np.argsort((null**2).sum(axis=(1, 2)), kind="stable")
@@ -102,7 +104,7 @@ def set_aside(null: NDArray, common: int) -> tuple[NDArray, NDArray[np.bool_]]:
         _, s, v = scipy.linalg.svd(null[some].reshape(-1, k), full_matrices=False)
         if (s > _LOOSE * s[0]).sum() == common:
             own = np.einsum("nak,lk->nal", null, v[s <= _LOOSE * s[0]])
-            loose = np.abs(own).max(axis=(1, 2)) > 10 * _LOOSE
+            loose = np.abs(own).max(axis=(1, 2)) > _STILL
             return _orthonormal(np.einsum("nak,lk->nal", null, v[:common]), ~loose), loose
     return null, np.zeros(n, dtype=bool)
 

@@ -8,6 +8,7 @@ tried first, whole and then with gaps; only where they fail is searched for node
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import product
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,28 +16,32 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, RecoveryError
 from .constants import annihilated_share, uncoupled_rows
-from .directions import find_directions
 from .gaps import by_component_with_gaps, interleaved_with_gaps
 from .grouping import by_first_row, coupled_in_common, same_pattern
-from .numbering import WHOLE, Numbering, measured
+from .numbering import Numbering
 from .orders import ORDERS, regular
 from .sampling import promising
 from .scattered import scattered
 from .searching import searched
 
 __all__ = [
+    "MORE_THAN_STIFFNESS",
     "Numbering",
     "find_numbering",
     "given_numbering",
+    "nodes_of_pattern",
     "numbering_at_sight",
     "regular_numbering",
     "uncoupled_rows",
 ]
 
-_FEW = 4  # places to start from where a glance is all that a matrix gets
 _LARGE = 20_000  # rows beyond which a few places are looked at before every row is asked
-_ALIKE = 0.9  # rows of one node couple to common nodes by so much, where unknowns stand by component
 _ORDERLY = 0.8  # rows of made-up nodes couple to common nodes less than this
+
+
+MORE_THAN_STIFFNESS = (
+    "a mass matrix, a multiple of the identity or springs at all nodes were added, or unknowns are scaled one by one"
+)
 
 
 def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbering:
@@ -57,8 +62,8 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
         If no numbering makes rows annihilate constants.
     """
     sizes = _sizes(block_size)
-    best = _best(_regular(matrix, d, kind) for d in sizes for kind in ORDERS)
-    if best is None or best.share < WHOLE or (best.kind == "by component" and best.common < _ALIKE):
+    best = _in_order(matrix, sizes)
+    if best is None or not best.clear:
         best = _best([best, *by_component_with_gaps(matrix, sizes)])
         clear = best is not None and best.sound and best.common == 1
         apart = None if clear else scattered(matrix, sizes)
@@ -71,25 +76,44 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
     if best is None:
         raise RecoveryError(
             f"no numbering with {block_size or '2 or 3'} unknowns per node makes the rows annihilate translations: "
-            "this is no elasticity matrix, or its unknowns are scaled one by one"
+            f"this is no elasticity matrix, or {MORE_THAN_STIFFNESS}"
         )
     return best
 
 
 def numbering_at_sight(matrix: sp.csr_array) -> Numbering | None:
-    """The same where it shows at once: unknowns in order, or rows of the same pattern. None if neither is so."""
-    best = _best(_regular(matrix, d, kind) for d in (3, 2) for kind in ORDERS)
-    if best is not None and best.share > 0 and best.common > _ORDERLY:
+    """The same where a glance shows nodes: unknowns in order, or rows of the same pattern. None if neither is so.
+
+    The glance tells that there are nodes. Which rows are theirs next to supports takes the search, unless unknowns
+    stand in order and no row is missing.
+    """
+    best = _in_order(matrix, (3, 2))
+    if best is not None and best.clear:
         return best
-    identity = uncoupled_rows(matrix)
-    group = same_pattern(matrix, identity)
-    twins = [d for d in (3, 2) if 2 * np.count_nonzero(np.bincount(group)[group] == d) > len(group)]
-    found = []
-    for d in twins:
-        direction = find_directions(matrix, group, identity, d, starts=_FEW) if np.bincount(group).max() <= d else None
-        if direction is not None:
-            found.append(measured(matrix, group, direction, d))
-    return max(found, key=lambda one: one.quality, default=None)
+    if best is None or best.common <= _ORDERLY:
+        group = same_pattern(matrix, uncoupled_rows(matrix))
+        of_size = np.bincount(np.bincount(group)[group], minlength=4)
+        if 2 * of_size[2:4].max() <= len(group):
+            return None
+    try:
+        return find_numbering(matrix)
+    except RecoveryError:
+        return None
+
+
+def nodes_of_pattern(matrix: sp.csr_array) -> tuple[int, int] | None:
+    """How many nodes there are and their unknowns, by what rows couple to; None where none show.
+
+    Sums are not asked: this is for matrices whose rows do not annihilate translations.
+    """
+    order = matrix.shape[0]
+    for d, kind in product((3, 2), ORDERS):
+        if order % d == 0 and coupled_in_common(matrix, *regular(order, d, kind)) > _ORDERLY:
+            return order // d, d
+    group = same_pattern(matrix, uncoupled_rows(matrix))
+    of_size = np.bincount(np.bincount(group)[group], minlength=4)
+    d = 3 if of_size[3] > of_size[2] else 2
+    return (int(group.max()) + 1, d) if of_size[d] > _ORDERLY * order else None
 
 
 def regular_numbering(matrix: sp.csr_array, kind: str, block_size: int | None = None) -> Numbering:
@@ -129,6 +153,21 @@ def _best(readings: Iterable[Numbering | None]) -> Numbering | None:
     """The one that most speaks for; None if nothing does for any."""
     some = [one for one in readings if one is not None and one.quality > 0]
     return max(some, key=lambda one: one.quality, default=None)
+
+
+def _in_order(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
+    """The best of the numberings that need no search.
+
+    A clear one whose nodes each couple to common nodes is the only such one, unless nearly all couple to all: rows of
+    one node of two such numberings would couple to the same unknowns, and theirs, and so on.
+    """
+    found = []
+    for d, kind in product(sizes, ORDERS):
+        one = _regular(matrix, d, kind)
+        if one is not None and one.clear and one.common == 1 and 2 * matrix.nnz < matrix.shape[0] ** 2:
+            return one
+        found.append(one)
+    return _best(found)
 
 
 def _regular(matrix: sp.csr_array, d: int, kind: str, *, checked: bool = True) -> Numbering | None:

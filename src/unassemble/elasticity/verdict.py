@@ -62,8 +62,9 @@ def about_nodes(nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[
     rest = int((loose & ~withheld & ~unread).sum())
     if rest:
         told.append(
-            f"{count_of(rest, 'node is', 'nodes are')} not determined: the rows coupled to it lack entries, as next to "
-            "eliminated unknowns, and no equation that holds for every element and material is left of them"
+            f"{count_of(rest, 'node is', 'nodes are')} not determined: rows coupled to {'it' if rest == 1 else 'them'} "
+            "lack entries, as next to eliminated unknowns, or belong to other axes, as at inclined supports, and no "
+            "equation that holds for every element and material is left of these"
         )
     return told
 
@@ -106,6 +107,8 @@ def of_few_digits(rounding: float, error: float) -> str:
     )
 
 
+_MISREAD = ", or to other nodes and directions than was inferred; give the numbering if it is known"
+
 _FREEDOMS = {
     "axes": "each axis keeps a scale of its own",
     "affine": "an affine map stays free, since the material around every valid row is homogeneous",
@@ -143,18 +146,19 @@ def verdict(
         worst = max(solution.evidence, key=lambda one: one.residual)
         return "uncertified", (
             f"no exact null vector exists (singular value {worst.residual:.1e}, that of the next field "
-            f"{worst.gap:.1e}); the points are the best fit, as for materials that are not isotropic, or elements that "
-            "do not reproduce linear functions"
+            f"{worst.gap:.1e}); the points are the best fit, as for materials that are not isotropic, elements that do "
+            "not reproduce linear functions, or nodes that constraints tie together"
         )
     if not solution.strict:
         return "uncertified", (
             "supports leave too few rows that are surely whole; rows whose entries add up to zero were taken for "
             "whole, which they need not be"
         )
-    if numbering.kind != "given" and numbering.incomplete | (numbering.kind == "pattern") and _torn(nodal, solution):
+    if _torn(nodal, solution):
+        inferred = numbering.kind == "pattern" or (numbering.kind != "given" and numbering.incomplete)
         return "uncertified", (
-            "which direction each row belongs to was inferred from the entries, and not without contradiction: coupled "
-            "nodes came out as separate pieces; give the numbering if it is known"
+            "coupled nodes came out as separate pieces, and how these lie to each other is not known: rows between "
+            f"them lack entries, or belong to other axes, as at inclined supports{_MISREAD if inferred else ''}"
         )
     if found.certified and found.backward_error <= CERTIFIED:
         return "certified", f"the matrix re-assembled on the {count_of(found.n_cells, 'element')} is the given one"

@@ -13,6 +13,8 @@ from ..errors import GeometryError, SolverError
 from .factorisation import Factorisation, factorisation
 from .upper import UpperTriangle
 
+_NOTHING = float(np.finfo(float).eps) ** 2  # of the largest entry: unknowns in no equation are stored with less
+
 
 @contextmanager
 def nearly_singular(matrix: UpperTriangle, shifts: Sequence[float]) -> Iterator[Factorisation]:
@@ -23,7 +25,7 @@ def nearly_singular(matrix: UpperTriangle, shifts: Sequence[float]) -> Iterator[
     matrix : UpperTriangle
         Real; a normal matrix, for example.
     shifts : sequence of float
-        To be tried one after the other, in units of the median of the positive entries of the diagonal.
+        To be tried one after the other, in units of the median of the diagonal, without entries that are next to zero.
 
     Raises
     ------
@@ -34,7 +36,8 @@ def nearly_singular(matrix: UpperTriangle, shifts: Sequence[float]) -> Iterator[
     start = matrix.indptr[:-1]
     own = matrix.data[start].reshape(-1, block, block)
     diagonal = np.diagonal(own, axis1=1, axis2=2)
-    typical = float(np.median(diagonal[diagonal > 0])) if (diagonal > 0).any() else 1.0
+    there = diagonal > _NOTHING * diagonal.max(initial=0.0)
+    typical = float(np.median(diagonal[there])) if there.any() else 1.0
     for shift in shifts:
         data = matrix.data.copy()
         data[start] = (own + shift * typical * np.eye(block)).reshape(data[start].shape)
