@@ -149,7 +149,10 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
             return Begun(starts[-1:], settled=True)
     # Of a reading of triangles alone, all there are, this has been asked before.
     if starts and not _all_triangles(starts[0]) and (spoilt := without_wrong_entries(starts[0])) is not None:
-        return Begun([spoilt], settled=True)
+        nearest = starts[0]
+        if nearest.candidates.n_vertices <= SMALL_GRAPH:  # one wrong corner may look like a wrong entry
+            nearest = _descent(nearest, Effort(_BATCH, effort.known))
+        return Begun([nearest if nearest.fits else spoilt], settled=True)
     if starts and entries_are_to_blame(starts[0]):
         return Begun(starts[:1], settled=True)
     likeliest = next((start for start in starts if start.pieces), None)
