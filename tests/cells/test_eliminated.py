@@ -5,9 +5,12 @@ import pytest
 import scipy.sparse as sp
 from pyamg.gallery import poisson
 
+from families import FAMILIES
 from meshes import largest_error, random_mesh, specimen
 from unassemble import recover
 from vanishing import forgotten, holes, squares
+
+NOTE = "unknowns that were eliminated"
 
 
 @pytest.mark.parametrize("shape", [(5, 9), (10, 10), (40, 31)])
@@ -18,7 +21,7 @@ def test_finite_differences(shape):
     assert largest_error(found.points, points[order]) <= 1e-9
     assert len(found.polygons_offsets) - 1 == (shape[0] - 1) * (shape[1] - 1)
     assert not found.certified
-    assert "unknowns that were eliminated" in found.reason
+    assert NOTE in found.reason
     assert len(found.suspects) == 2 * (sum(shape) - 2)
 
 
@@ -28,16 +31,56 @@ def test_grid_with_holes():
     found = recover(known.matrix[inside][:, inside])
     assert largest_error(found.points, known.points[inside]) <= 1e-9
     assert found.n_holes == 2
-    assert "unknowns that were eliminated" in found.reason
+    assert NOTE in found.reason
 
 
-@pytest.mark.parametrize("make", [lambda: squares(np.ones((12, 9), bool)), lambda: random_mesh(150, seed=2)])
-def test_a_diagonal_on_the_boundary_is_no_elimination(make):
-    """As penalties and boundary terms add; here of the size of other entries."""
-    known = forgotten(specimen(*make(), c=1.0))
-    boundary = np.unique(recover(known.matrix).boundary)
+def with_diagonal(known):
+    """The matrix with numbers of the size of other entries on the diagonal of all boundary rows."""
+    sides = np.sort(known.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    sides, count = np.unique(sides, axis=0, return_counts=True)
+    boundary = np.unique(sides[count == 1])
     added = np.zeros(len(known.points))
     added[boundary] = np.random.default_rng(0).uniform(0.5, 2, len(boundary))
-    found = recover(known.matrix + sp.diags_array(added))
+    return sp.csr_array(known.matrix + sp.diags_array(added)), boundary
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: squares(np.ones((12, 9), bool)),
+        lambda: random_mesh(150, seed=2),
+        # The first reading of these is wrong, though its boundary is right.
+        lambda: FAMILIES["kites"](np.random.default_rng(0)),
+        lambda: FAMILIES["kites"](np.random.default_rng(6)),
+        lambda: FAMILIES["stairs"](np.random.default_rng(1)),
+    ],
+)
+def test_a_diagonal_on_the_boundary_is_no_elimination(make):
+    """As penalties and boundary terms add."""
+    known = forgotten(specimen(*make(), c=1.0))
+    found = recover(with_diagonal(known)[0])
     assert found.certified, found.reason
     assert largest_error(found.points, known.points) <= 1e-10
+
+
+def test_a_wrong_entry_beside_a_diagonal_on_the_boundary():
+    """It alone is named, not entries along the boundary as well."""
+    known = forgotten(specimen(*squares(np.ones((12, 9), bool)), c=1.0))
+    matrix, boundary = with_diagonal(known)
+    rows = sp.coo_array(sp.triu(matrix, 1))
+    on_side = boundary[np.diff(matrix.indptr)[boundary] == 4]  # the diagonal entry counted
+    i, j = next((i, j) for i, j in zip(rows.row.tolist(), rows.col.tolist(), strict=True) if {i, j} <= set(on_side))
+    wrong = sp.coo_array(([0.3, 0.3], ([i, j], [j, i])), shape=matrix.shape)
+    found = recover(matrix + wrong)
+    assert found.suspects.tolist() == [[i, j]]
+    assert NOTE not in found.reason
+
+
+def test_a_scale_that_does_not_fit():
+    """Nothing is said to fit the others then."""
+    order = np.random.default_rng(3).permutation(120)
+    matrix = sp.csr_array(poisson((12, 10), format="csr"))[order][:, order]
+    assert NOTE in recover(matrix, scale=1.0).reason
+    found = recover(matrix, scale=2.0)
+    assert not found.certified
+    assert "all others fit" not in " ".join([found.reason, *found.warnings])

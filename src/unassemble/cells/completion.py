@@ -124,7 +124,7 @@ def _read_again(
 ) -> _Part:
     """One component: the reading that fits, or the triangles that there were, or the best reading."""
     weights = -matrix.entries[numbering.edge_rows]
-    inside = without_boundary(len(numbering.vertices), numbering.edges, weights, incomplete)
+    inside = without_boundary(len(numbering.vertices), numbering.edges, weights, incomplete, scale)
     if inside is not None:
         return _part(matrix, numbering, inside)
     reading = read_cells(len(numbering.vertices), numbering.edges, weights, scale)

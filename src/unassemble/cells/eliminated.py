@@ -22,6 +22,7 @@ from ..planar.robust import ASIDE
 from ..topology import Piece
 from .reading import FITS, Reading
 from .search import first_reading
+from .spoilt import without_wrong_entries
 
 _SUM = 1e-10  # sum of a row, relative to its entries, that is rounding
 _MANY = 0.7  # share of rows; more would be a mass matrix that was added, or no Laplacian at all
@@ -43,7 +44,9 @@ def incomplete_rows(matrix: OperatorMatrix) -> NDArray[np.bool_]:
     return incomplete & (incomplete.sum() < _MANY * matrix.n)
 
 
-def without_boundary(n: int, edges: NDArray, weights: NDArray, incomplete: NDArray[np.bool_]) -> Reading | None:
+def without_boundary(
+    n: int, edges: NDArray, weights: NDArray, incomplete: NDArray[np.bool_], scale: float | None = None
+) -> Reading | None:
     """What angles suggest, where incomplete rows are just those of its boundary, and where it does not fit whole.
 
     Parameters
@@ -55,12 +58,14 @@ def without_boundary(n: int, edges: NDArray, weights: NDArray, incomplete: NDArr
         -A_ij of each edge.
     incomplete : (n,) bool
         See :func:`incomplete_rows`.
+    scale : float, optional
+        c, where it is known.
 
     Returns
     -------
     Reading or None
-        With entries set aside if these are all that does not fit. None if the boundary is another: it takes a search
-        to tell which.
+        With entries set aside if these are all that does not fit. None if the boundary is another, or if the mesh may
+        be whole, with a diagonal matrix added on its boundary: it takes a search to tell which.
     """
     if not incomplete.any():
         return None
@@ -72,17 +77,31 @@ def without_boundary(n: int, edges: NDArray, weights: NDArray, incomplete: NDArr
     whole = [Reading.of(replace(one.candidates, weights=weights), one.labels) for one in inside]
     if any(one.fits for one in whole):  # a diagonal matrix was added on the boundary
         return None
-    inner = _left_to_others(whole[-1], incomplete)
-    return inner if inner.fits_but_for_few else whole[0]
+    inner = _left_to_others(whole[-1], incomplete, scale)
+    if inner.fits_but_for_few and None not in inner.meshes and (not _has_corners(inner) or _redundancy(inner) > 0):
+        return inner
+    may_be_whole = any(_has_corners(one) or without_wrong_entries(one) is not None for one in whole)
+    return None if may_be_whole else whole[0]
 
 
-def _left_to_others(reading: Reading, incomplete: NDArray[np.bool_]) -> Reading:
+def _has_corners(reading: Reading) -> bool:
+    """Whether sides have been supposed to have vanished; then a first reading is easily wrong inside its boundary."""
+    return bool((reading.labels & reading.candidates.corner).any())
+
+
+def _redundancy(reading: Reading) -> int:
+    """Entries that are not set aside, vanished ones counted, less positions and c of each piece."""
+    aside = sum(len(mesh.aside) for mesh in reading.meshes if mesh is not None and mesh.aside is not None)
+    return sum(len(piece.edges) - 2 * piece.n_vertices + 3 for piece in reading.pieces) - aside
+
+
+def _left_to_others(reading: Reading, incomplete: NDArray[np.bool_], scale: float | None) -> Reading:
     """The same cells, placed without the entries on their boundary between incomplete rows."""
     between = np.asarray(incomplete[reading.edges].all(axis=1))
     meshes = []
     for piece in reading.pieces:
         aside = np.flatnonzero(~piece.inner & between[piece.edge_rows])
-        meshes.append(_without(piece, reading.weights[piece.edge_rows], aside))
+        meshes.append(_without(piece, reading.weights[piece.edge_rows], aside, scale))
     return reading.placed(tuple(meshes))
 
 
@@ -97,7 +116,7 @@ def _on_boundary(reading: Reading) -> NDArray[np.bool_]:
     return on_boundary
 
 
-def _without(piece: Piece, weights: NDArray, aside: NDArray[np.int64]) -> PieceMesh | None:
+def _without(piece: Piece, weights: NDArray, aside: NDArray[np.int64], scale: float | None) -> PieceMesh | None:
     """Positions that fit all weights but some, with half of which they begin; None where there are none."""
     weights = weights.copy()
     weights[aside] /= 2
@@ -105,7 +124,7 @@ def _without(piece: Piece, weights: NDArray, aside: NDArray[np.int64]) -> PieceM
         start = conformal_map(piece, weights, sharp=False)
         spread = np.ones(len(weights))
         spread[aside] = ASIDE
-        found = polish(piece, weights, start.z, spread=spread, options=_SHORT)
+        found = polish(piece, weights, start.z, scale=scale, spread=spread, options=_SHORT)
     except (GeometryError, SolverError):
         return None
     rest = np.ones(len(weights), dtype=bool)
