@@ -27,6 +27,7 @@ from .solving import solve
 from .topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
 from .verdict import all_alike, ambiguous, far_away, passes, unproved, verdict
 
+_SMALL = 1e-3
 _SIGMAS = 10.0  # noise by which numbers that a reading takes for equal may differ
 
 
@@ -119,7 +120,8 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     )
     if chi_square and evidence.noise is not None and evidence.noise < 0.5 * chi_square["sigma"]:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
-    if status == "uncertified" and not (others or chi_square or distant):
+    # What a misfit that small lacks is digits, and not triangles.
+    if status == "uncertified" and not (others or chi_square or distant or certificate.backward_error < _SMALL):
         notes += origin_notes(stored, evidence.suspects)
     polygons = Polygons.none() if options.triangulate else mesh.polygons
     return Recovery(
