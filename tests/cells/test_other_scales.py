@@ -6,7 +6,7 @@ import scipy.sparse as sp
 
 from meshes import specimen
 from unassemble import recover
-from vanishing import forgotten
+from vanishing import forgotten, squares
 
 
 def ring_of_right_triangles(count, seed, first=None):
@@ -67,3 +67,13 @@ def test_rhombi_are_pairs_of_right_triangles_as_well(count):
     found = recover(matrix)
     assert not found.certified
     assert any(not other.same_scale for other in found.alternatives)
+
+
+def test_many_separate_rectangles_are_all_tried():
+    rng = np.random.default_rng(0)
+    points, triangles = squares(np.ones((1, 1), bool))
+    parts = [(points * [1, rng.uniform(0.5, 2)] + [3 * k, 0], triangles + 4 * k) for k in range(110)]
+    known = forgotten(specimen(*map(np.concatenate, zip(*parts, strict=True)), c=-2.5))
+    found = recover(known.matrix)
+    assert found.certified, found.reason
+    assert len(found.polygons_offsets) - 1 == 110

@@ -21,6 +21,7 @@ from .rereading import cells_of
 
 _MOST_CELLS = 100
 _MOST_STEPS = 20_000  # of the search for sets of cells
+_STEP = 0.02  # cost of one, in solutions
 _MOST_READINGS = 400  # that are solved
 _WIDE = 20.0  # of log c about those of the entries
 _STRAIGHT = 1e-6  # radians by which angles around a vertex may exceed a full turn
@@ -32,7 +33,34 @@ class TooManyError(Exception):
     """Not all could be tried."""
 
 
-def all_readings(part: Numbering, weights: NDArray, agree: float) -> Iterator[tuple[set[Cell], float]]:
+class Budget:
+    """What trying everything may cost in all components together.
+
+    Parameters
+    ----------
+    solutions : float
+        About a millisecond each.
+    """
+
+    def __init__(self, solutions: float = 20_000.0):
+        self._left = solutions
+
+    def spend(self, solutions: float) -> None:
+        """Take so many of them.
+
+        Raises
+        ------
+        TooManyError
+            If that is more than there are.
+        """
+        self._left -= solutions
+        if self._left < 0:
+            raise TooManyError
+
+
+def all_readings(
+    part: Numbering, weights: NDArray, agree: float, budget: Budget | None = None
+) -> Iterator[tuple[set[Cell], float]]:
     """The cells, and the c, of every mesh that has these entries, or nearly.
 
     Parameters
@@ -43,15 +71,19 @@ def all_readings(part: Numbering, weights: NDArray, agree: float) -> Iterator[tu
         -A_ij of its edges.
     agree : float
         Relative difference of numbers that noise may cause.
+    budget : Budget, optional
+        Shared with other components.
 
     Raises
     ------
     TooManyError
         If there are too many sets of cells.
     """
+    budget = budget or Budget()
+    budget.spend(0)
     known: dict[bytes, PieceMesh | None] = {}
     n, solved = len(part.vertices), 0
-    choices = _Choices(n, part.edges)
+    choices = _Choices(n, part.edges, budget)
     alone = [_factor_alone(weights[sides], closed) for sides, closed in zip(choices.sides, choices.closed, strict=True)]
     for chosen in choices:
         count = np.bincount(np.concatenate([choices.sides[k] for k in chosen]))
@@ -59,6 +91,7 @@ def all_readings(part: Numbering, weights: NDArray, agree: float) -> Iterator[tu
         if lone and not np.ptp(lone) <= max(NEARLY, agree) * np.max(lone):  # nor if one is none
             continue
         solved += 1
+        budget.spend(1)
         if solved > _MOST_READINGS:
             raise TooManyError
         cells = [choices.cells[k] for k in chosen]
@@ -108,6 +141,7 @@ class _Choices:
     ----------
     n : int
     edges : (e, 2) int64
+    budget : Budget
 
     Attributes
     ----------
@@ -119,7 +153,7 @@ class _Choices:
         Whether it is a cycle.
     """
 
-    def __init__(self, n: int, edges: NDArray):
+    def __init__(self, n: int, edges: NDArray, budget: Budget):
         near: list[set[int]] = [set() for _ in range(n)]
         number = {}
         for k, (a, b) in enumerate(edges.tolist()):
@@ -142,7 +176,7 @@ class _Choices:
         for cell, sides in enumerate(self.sides):
             for side in sides:
                 self._at[side].append(cell)
-        self._steps = 0
+        self._steps, self._budget = 0, budget
 
     def __iter__(self) -> Iterator[list[int]]:
         return self._search([], [0] * len(self._at), set(), set())
@@ -150,6 +184,7 @@ class _Choices:
     def _search(self, chosen: list[int], count: list[int], taken: set[Cell], out: set[int]) -> Iterator[list[int]]:
         """Each set that has the chosen cells, and none of those that are out, once."""
         self._steps += 1
+        self._budget.spend(_STEP)
         if self._steps > _MOST_STEPS:
             raise TooManyError
         bare = next((edge for edge, times in enumerate(count) if not times), None)

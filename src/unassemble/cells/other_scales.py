@@ -18,7 +18,7 @@ from .by_component import with_pieces
 from .corners import Alternative, OrientedMesh
 from .covering import MOST_VERTICES
 from .crosses import Crosses
-from .exhaustion import TooManyError, all_readings
+from .exhaustion import Budget, TooManyError, all_readings
 from .loose import is_loose
 from .reading import NEARLY
 from .rereading import SAME_SCALE, cells_of, own_cells, with_another_scale
@@ -26,7 +26,6 @@ from .shapes import Shapes
 
 _MOST_SHAPES = 3000
 _MOST_SCALES = 6
-_MOST_ROWS = 400  # of all components in which everything is tried, together: each takes a second or two
 _AGREE = 1e-7
 
 Cells = set[tuple[int, ...]]
@@ -70,12 +69,13 @@ def other_scales(
         for part, pieces in with_pieces(stored.n, stored.edges, topology.pieces)
         if gone[part.vertices].any() and pieces and all(is_loose(piece, closed) for piece in pieces)
     ]
-    found, left_open, left = [], False, _MOST_ROWS
-    for (part, count), own in zip(loose, own_cells(stored.n, [part for part, _ in loose], mesh), strict=True):
+    found, left_open, budget = [], False, Budget()
+    own_of = own_cells(stored.n, [part for part, _ in loose], mesh)
+    for (part, count), own in zip(reversed(loose), reversed(own_of), strict=True):  # the smallest first
         weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
         try:
-            left -= len(part.vertices)
-            other = _other_of_all(part, weights, own, agree, enough=left >= 0)
+            readings = all_readings(part, weights, agree, budget)
+            other = next((reading for reading in readings if reading[0] != own), None)
         except TooManyError:
             left_open |= count == 1 or len(part.vertices) > MOST_VERTICES or agree > NEARLY
             other = _with_common_scale(part, weights, c)
@@ -84,22 +84,7 @@ def other_scales(
             gone_cells, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
             same = abs(factor / c - 1) < SAME_SCALE
             found.append(Alternative((), (), (), gone_cells, new, same_scale=same))
-    return found, left_open
-
-
-def _other_of_all(
-    part: Numbering, weights: NDArray, own: Cells, agree: float, *, enough: bool
-) -> tuple[Cells, float] | None:
-    """Any other mesh of a component.
-
-    Raises
-    ------
-    TooManyError
-        If not all can be tried.
-    """
-    if not enough:
-        raise TooManyError
-    return next((reading for reading in all_readings(part, weights, agree) if reading[0] != own), None)
+    return found[::-1], left_open
 
 
 def _with_common_scale(part: Numbering, weights: NDArray, c: float) -> tuple[Cells, float] | None:
