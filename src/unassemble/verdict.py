@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import Alternative
+from .cells.agreement import SAME_SCALE, SCALE_ERROR
 from .certify import CERTIFIED, CONFIDENCE, LARGEST_NOISE, Certificate
 from .evidence import Evidence
 from .matrix import OperatorMatrix
@@ -15,9 +16,7 @@ from .planar.hinges import groups
 from .topology import Topology
 from .words import count_of
 
-_SAME_SCALE = 1e-6
 _SURE = 1e-8  # of a piece's size: how far off certified positions may be
-_SCALE_ERROR = 1e5  # relative error of c in small pieces, over that of the entries, at most
 
 
 def passes(certificate: Certificate, chi_square: Mapping[str, float] | None, scale: NDArray) -> bool:
@@ -79,7 +78,7 @@ def _discord(topology: Topology, certificate: Certificate, scale: NDArray) -> st
     first = np.unique(label, return_index=True)[1][np.unique(label, return_inverse=True)[1]]
     difference = np.abs(scale / scale[first] - 1)
     worst = int(difference.argmax())
-    if difference[worst] <= max(_SAME_SCALE, _SCALE_ERROR * certificate.backward_error):
+    if difference[worst] <= max(SAME_SCALE, SCALE_ERROR * certificate.backward_error):
         return None
     a, b = int(first[worst]), worst
     return (

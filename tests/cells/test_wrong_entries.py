@@ -40,7 +40,7 @@ def no_repairs(monkeypatch):
     def refused(*_):
         raise AssertionError("labels are being tried")
 
-    for module, name in ((search, "_repaired"), (search, "mended"), (triangles_only, "mended")):
+    for module, name in ((search, "repaired"), (search, "mended"), (triangles_only, "mended")):
         monkeypatch.setattr(module, name, refused)
 
 

@@ -7,6 +7,12 @@ from numpy.typing import NDArray
 
 from ..topology.keys import distinct
 
+SAME_SCALE = 1e-6
+"""Relative difference of factors c that count as one."""
+
+SCALE_ERROR = 1e5
+"""Relative error of c in small pieces, over that of the entries, at most."""
+
 _LEAST = 2  # places that must agree
 
 

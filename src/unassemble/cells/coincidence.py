@@ -33,7 +33,7 @@ def coincident(stored: OperatorMatrix, topology: Topology) -> NDArray[np.bool_]:
     np.minimum.at(lowest, owner, stored.entries)
     np.maximum.at(highest, owner, stored.entries)
     part = np.array([label[piece.vertices[0]] for piece in topology.pieces], dtype=np.int64)
-    loose = np.array([len(piece.edges) <= 2 * piece.n_vertices - 3 for piece in topology.pieces], dtype=bool)
+    loose = np.array([piece.redundancy <= 0 for piece in topology.pieces], dtype=bool)
     alike = (highest - lowest)[part] <= _EQUAL * np.abs(highest[part])
     several = np.bincount(part, minlength=count) > 1
     all_loose = np.bincount(part, ~loose, count) == 0

@@ -14,13 +14,12 @@ from ..matrix import OperatorMatrix
 from ..planar.piece import PieceMesh
 from ..planar.polish import PolishOptions, polish
 from ..topology import Piece, Topology
+from .agreement import SAME_SCALE, SCALE_ERROR
 from .reading import FITS, even, misfits
 
 _WIDE = 200  # rows of a matrix on which the misfit of a wrong cell stays near it
 SURE = 1e-3
 """Misfit, even if spread evenly, that no wrong cell is known to leave."""
-
-_SAME_SCALE, _SCALE_ERROR = 1e-6, 1e5  # relative errors of c in small pieces: at least, and over those of the entries
 
 _SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 
@@ -66,10 +65,10 @@ def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None) -> 
         return np.zeros(matrix.n, dtype=bool)
     label = components_of(matrix)
     count = int(label.max()) + 1
-    bound = np.full(count, _SAME_SCALE)
-    np.maximum.at(bound, label[matrix.edges[:, 0]], _SCALE_ERROR * misfits_of(matrix, list(having)))
+    bound = np.full(count, SAME_SCALE)
+    np.maximum.at(bound, label[matrix.edges[:, 0]], SCALE_ERROR * misfits_of(matrix, list(having)))
     own = label[[piece.vertices[0] for piece, _ in having]]
-    loose = np.array([len(piece.edges) <= 2 * piece.n_vertices - 3 for piece, _ in having])
+    loose = np.array([piece.redundancy <= 0 for piece, _ in having])
     c = np.array([mesh.scale for _, mesh in having])
     right = np.full(count, scale or 0.0)
     if scale is None:  # the last one counts

@@ -92,7 +92,7 @@ def _has_corners(reading: Reading) -> bool:
 def _redundancy(reading: Reading) -> int:
     """Entries that are not set aside, vanished ones counted, less positions and c of each piece."""
     aside = sum(len(mesh.aside) for mesh in reading.meshes if mesh is not None and mesh.aside is not None)
-    return sum(len(piece.edges) - 2 * piece.n_vertices + 3 for piece in reading.pieces) - aside
+    return sum(piece.redundancy for piece in reading.pieces) - aside
 
 
 def _left_to_others(reading: Reading, incomplete: NDArray[np.bool_], scale: float | None) -> Reading:

@@ -66,7 +66,7 @@ class Linear:
 def explanations(reading: Reading) -> Iterator[Linear]:
     """One for each piece that does not fit and has more weights than coordinates."""
     for piece, mesh in zip(reading.pieces, reading.meshes, strict=True):
-        overdetermined = len(piece.edges) > 2 * piece.n_vertices - 3
+        overdetermined = piece.redundancy > 0
         if mesh and overdetermined and (reading.misfit[piece.edge_rows] > FITS).any():
             linear = _linear(reading, piece, mesh)
             if linear is not None:

@@ -107,7 +107,7 @@ def _holes(
 def _suspects(pieces: Sequence[Piece]) -> Iterator[tuple[int, ...]]:
     """Triangles of loose pieces with three inner sides."""
     for piece in pieces:
-        if len(piece.edges) <= 2 * piece.n_vertices - 3:
+        if piece.redundancy <= 0:
             inner = np.asarray((piece.facing[:, 1] >= 0)[piece.opposite].all(axis=1))
             for triangle in np.sort(piece.vertices[piece.triangles[inner]], axis=1).tolist():
                 yield tuple(triangle)

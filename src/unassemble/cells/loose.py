@@ -40,7 +40,7 @@ def is_loose(piece: Piece, closed: NDArray[np.int64]) -> bool:
 
     `closed`, (n,), is 1 for rows that four right angles surround.
     """
-    return len(piece.edges) - (2 * piece.n_vertices - 3) <= int(closed[piece.vertices].sum())
+    return piece.redundancy <= int(closed[piece.vertices].sum())
 
 
 def other_reading(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
 from ..topology import Numbering, Topology
-from .agreement import common_values
+from .agreement import SAME_SCALE, common_values
 from .by_component import with_pieces
 from .corners import Alternative, OrientedMesh
 from .covering import MOST_VERTICES
@@ -21,7 +21,7 @@ from .crosses import Crosses
 from .exhaustion import Budget, TooManyError, all_readings
 from .loose import is_loose
 from .reading import NEARLY
-from .rereading import SAME_SCALE, cells_of, own_cells, with_another_scale
+from .rereading import cells_of, own_cells, with_another_scale
 from .shapes import Shapes
 
 _MOST_SHAPES = 3000

@@ -14,14 +14,12 @@ from dataclasses import replace
 from itertools import combinations, islice
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from ..matrix import OperatorMatrix
 from ..planar.piece import PieceMesh
 from ..topology import Numbering, Polygons, components
-from ..topology.keys import with_sides
+from ..topology.pieces import edge_connected
 from .cell_set import CellSet
 from .corners import Alternative, Corners, OrientedMesh, cell
 from .reading import FITS, Reading
@@ -159,7 +157,7 @@ def _excluded(n: int, mesh: OrientedMesh, others: list[Alternative]) -> list[boo
         for row in rest[k].tolist():
             if row in at:
                 at[row].append(k)
-    surface = _edge_connected(n, rest).tolist()
+    surface = edge_connected(n, rest).tolist()
     excluded = []
     for other in others:
         (h,) = other.around
@@ -168,15 +166,6 @@ def _excluded(n: int, mesh: OrientedMesh, others: list[Alternative]) -> list[boo
         corners = [new for new in other.other_cells if h in new]
         excluded.append(fixed and not all(_has_room(mesh.z, h, new, rest[at[h]]) for new in corners))
     return excluded
-
-
-def _edge_connected(n: int, triangles: NDArray[np.int64]) -> NDArray[np.int32]:
-    """(m,) number of the piece of each triangle."""
-    edges, _, opposite = with_sides(n, np.empty((0, 2), np.int64), triangles)
-    m = len(triangles)
-    owner = np.repeat(np.arange(m), 3)
-    graph = sp.coo_array((np.ones(3 * m, np.int8), (owner, m + opposite.ravel())), shape=(m + len(edges),) * 2)
-    return np.asarray(csgraph.connected_components(graph, directed=False)[1][:m])
 
 
 def _has_room(z: NDArray[np.complex128], h: int, new: tuple[int, ...], around: NDArray[np.int64]) -> bool:

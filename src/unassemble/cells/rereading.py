@@ -13,6 +13,7 @@ from ..matrix import OperatorMatrix
 from ..topology import Numbering, components
 from ..topology.faces import joined
 from ..topology.keys import contains, pair_keys
+from .agreement import SAME_SCALE
 from .corners import Alternative, OrientedMesh
 from .reading import Reading
 from .search import fitting_starts, read_cells
@@ -21,8 +22,6 @@ from .undivided import undivided
 _MOST_VERTICES = 60
 _ORDERS = 5
 _WORK = 3000  # vertices times orders; every component is read once again at least
-SAME_SCALE = 1e-6
-"""Relative difference of factors c that count as one."""
 
 
 def other_readings(

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import heapq
-import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache, partial
-from itertools import islice
 
-import numpy as np
 from numpy.typing import NDArray
 
 from ..planar.piece import PieceMesh
@@ -19,20 +15,15 @@ from .cell_set import CellSet
 from .covering import read_by_cover
 from .crosses import Crosses
 from .effort import SMALL_GRAPH, Effort
-from .evidence import FEW, entries_are_to_blame, label_changes
+from .evidence import FEW, entries_are_to_blame
 from .mending import MOST_VERTICES, mended
-from .proposals import proposals
 from .reading import Reading
 from .relaxation import HopelessError
+from .repairs import BATCH, better, descent, repaired
 from .spoilt import without_wrong_entries
 from .triangles_only import read_triangles
 
-_log = logging.getLogger(__name__)
-
 _STARTS = 2  # readings to begin with that are worth repairing
-_PATIENCE = 6  # leaps without an improvement; fewer where they are long
-_BATCH, _IN_VAIN = 24, 100  # small changes of a reading that are tried at a time, and of all without an improvement
-_TRIED = 0.25  # a reading with a batch tried is put off behind those with so much more misfit
 _DRAWINGS = 3  # that a graph may have, about
 _LAST = 60  # solves for small changes of the best reading, when all others are spent
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
@@ -97,12 +88,12 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
             best, done = _carried_on(best, one, effort, cover)
             if done:
                 return best
-    return _descent(best, Effort(_LAST)) if best is not None and best.pieces else None
+    return descent(best, Effort(_LAST)) if best is not None and best.pieces else None
 
 
 def _settled(best: Reading | None, first: Reading) -> Reading:
     """The answer of a drawing whose first start settles it."""
-    return first if first.fits or first.fits_but_for_few else _better(best, first)
+    return first if first.fits or first.fits_but_for_few else better(best, first)
 
 
 def _carried_on(
@@ -116,11 +107,11 @@ def _carried_on(
     try:
         best = _finished(best, begun, effort)
     except HopelessError:
-        best, hopeless = _better(best, begun.starts[0]), True
+        best, hopeless = better(best, begun.starts[0]), True
     if best is not None and (best.fits or best.like_noise):
         return best, True
     if best is not None and best is not before and best.size < _CLOSE:  # covers take longer than a few small changes
-        best = _descent(best, Effort(_LAST))
+        best = descent(best, Effort(_LAST))
         if best.fits:
             return best, True
     covered = cover()
@@ -151,7 +142,7 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
     if starts and not _all_triangles(starts[0]) and (spoilt := without_wrong_entries(starts[0])) is not None:
         nearest = starts[0]
         if nearest.candidates.n_vertices <= SMALL_GRAPH:  # one wrong corner may look like a wrong entry
-            nearest = _descent(nearest, Effort(_BATCH, effort.known))
+            nearest = descent(nearest, Effort(BATCH, effort.known))
         return Begun([nearest if nearest.fits else spoilt], settled=True)
     if starts and entries_are_to_blame(starts[0]):
         return Begun(starts[:1], settled=True)
@@ -160,7 +151,7 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
     for start in starts:
         if start.size > _CLOSE:
             break
-        soon = _repaired(start, Effort(int(_SOON * effort.solves), effort.known))
+        soon = repaired(start, Effort(int(_SOON * effort.solves), effort.known))
         if soon.fits:
             return Begun([soon], settled=True)
     for k, start in enumerate(starts):
@@ -189,7 +180,7 @@ def _finished(best: Reading | None, begun: Begun, effort: Effort) -> Reading | N
     while starts:
         start = starts.pop(0)
         share = effort.share(_FIRST if number == 0 and starts else 1 / (len(starts) + 1))
-        best = _better(best, start if start.like_noise else _repaired(start, share))
+        best = better(best, start if start.like_noise else repaired(start, share))
         if best.fits or best.like_noise:
             return best
         effort.solves += max(share.solves, 0)
@@ -231,10 +222,6 @@ def first_reading(n: int, edges: NDArray, weights: NDArray) -> Reading | None:
     return None
 
 
-def _better(one: Reading | None, other: Reading) -> Reading:
-    return other if one is None or other.size < one.size else one
-
-
 def _turned_over(reading: Reading, effort: Effort, solves: int) -> Reading:
     """Parts of the drawing turned over, each because that lowers the misfit; at no more than so many solves."""
     least = effort.solves - solves
@@ -244,65 +231,3 @@ def _turned_over(reading: Reading, effort: Effort, solves: int) -> Reading:
         if trial.size < 0.999 * reading.size:
             reading, trials = trial, trial.candidates.turned(trial.labels)
     return reading
-
-
-def _repaired(reading: Reading, effort: Effort) -> Reading:
-    """Turn labels over as the misfit asks for it."""
-    best = _leaps(reading, effort)
-    return best if best.fits else _descent(best, effort)
-
-
-def _leaps(reading: Reading, effort: Effort) -> Reading:
-    """All clear changes at once, uphill too: with many wrong cells the misfit of the way is no guide."""
-    best, since_best, progress = reading, 0, effort.progress(reading, _PATIENCE)
-    patience = np.clip(3e4 / reading.candidates.n_vertices, 2, _PATIENCE)
-    seen = {reading.labels.tobytes()}
-    while reading.pieces and not reading.fits and since_best < patience and progress.suffices(best.size):
-        changes = np.nan_to_num(label_changes(reading))
-        labels = next((x for x in proposals(reading, changes) if x.tobytes() not in seen), None)
-        if labels is None:
-            break
-        seen.add(labels.tobytes())
-        reading = effort.reading(reading.candidates, labels)
-        since_best = 0 if reading.size < best.size else since_best + 1
-        best = _better(best, reading)
-        _log.debug("leap: misfit %.1e", reading.size)
-    return best
-
-
-def _descent(reading: Reading, effort: Effort) -> Reading:
-    """Small changes, the likeliest first, from the best of all readings that they have led to.
-
-    The last wrong labels may have to be put right together: a change for the better can raise the misfit a little. So
-    of the changes of each reading a few are tried, then a few of another that is about as good.
-    """
-    best, in_vain = reading, 0
-    seen = {reading.labels.tobytes()}
-    # Misfit, more where batches have been tried, a number that settles ties, the reading and its changes.
-    waiting = [(reading.size, 0, reading, _changed(reading))]
-    while waiting and best.pieces and not (best.fits or effort.spent) and in_vain < _IN_VAIN:
-        value, number, reading, changed = heapq.heappop(waiting)
-        asked = 0
-        for labels in islice(changed, _BATCH):
-            asked += 1
-            if labels.tobytes() in seen or effort.spent:
-                continue
-            seen.add(labels.tobytes())
-            trial = effort.reading(reading.candidates, labels)
-            in_vain = 0 if trial.size < best.size else in_vain + 1
-            best = _better(best, trial)
-            if trial.pieces:
-                heapq.heappush(waiting, (trial.size, len(seen), trial, _changed(trial)))
-            if trial.size < reading.size:
-                break
-        else:
-            value += _TRIED * reading.size
-        if asked:
-            heapq.heappush(waiting, (value, number, reading, changed))
-    _log.debug("descent: misfit %.1e", best.size)
-    return best
-
-
-def _changed(reading: Reading) -> Iterator[NDArray[np.bool_]]:
-    """Small changes of the labels of a reading; nothing is computed before the first is asked for."""
-    yield from proposals(reading, np.nan_to_num(label_changes(reading)))

@@ -16,12 +16,12 @@ from ..planar.piece import PieceMesh
 from ..planar.robust import RobustFit, robust_fit
 from ..topology import Piece, Topology
 from ..topology.keys import contains, pair_keys
+from .agreement import SAME_SCALE
 from .doubt import SURE, Attempt, components_of, misfits_of, unexplained
 from .reading import FITS, Reading, even
 
 _MOST_VERTICES = 200_000
 _CHANCE = np.log(1e-6)  # that the entries which fit do so by coincidence
-_SAME_SCALE = 1e-6
 
 
 def wrong_entries(
@@ -79,7 +79,7 @@ def _in_component(
         if not _apart(matrix.n, matrix.edges, matrix.edges[np.concatenate(aside)]):
             return None
     scales = np.array([mesh.scale for mesh in (meshes | found).values() if isinstance(mesh, PieceMesh)])
-    return found if np.abs(scales / scales[0] - 1).max() < _SAME_SCALE else None
+    return found if np.abs(scales / scales[0] - 1).max() < SAME_SCALE else None
 
 
 def without_wrong_entries(reading: Reading) -> Reading | None:

@@ -10,6 +10,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
+from ..topology.pieces import edge_connected
+
 if TYPE_CHECKING:
     from ..recovery import Recovery
 
@@ -68,7 +70,7 @@ def apart(recovery: Recovery, triangles: NDArray) -> Pieces:
     tail, head = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
     half_edges = tail * n + head
     order = np.argsort(half_edges)
-    owner = np.repeat(_edge_connected(n, tail, head), 3).astype(np.int64)
+    owner = np.repeat(edge_connected(n, triangles), 3)
 
     def piece_of(edges: NDArray) -> NDArray:
         """Piece of directed edges, -1 where there is none."""
@@ -89,16 +91,6 @@ def apart(recovery: Recovery, triangles: NDArray) -> Pieces:
         np.flatnonzero(np.isin(vertices, recovery.hinges)),
         np.searchsorted(keys, of_pairs[of_pairs >= 0, None] * n + pairs),
     )
-
-
-def _edge_connected(n: int, tail: NDArray, head: NDArray) -> NDArray:
-    """Label of the edge-connected piece of each triangle, from half-edges three by three."""
-    edge = np.unique(np.minimum(tail, head) * n + np.maximum(tail, head), return_inverse=True)[1]
-    m = len(tail) // 3
-    size = m + int(edge.max()) + 1
-    triangle = np.repeat(np.arange(m), 3)
-    graph = sp.csr_array((np.ones(3 * m, np.int8), (triangle, m + edge)), shape=(size, size))
-    return np.asarray(csgraph.connected_components(graph, directed=False)[1][:m])
 
 
 def _joined(n: int, vertices: NDArray, piece: NDArray) -> NDArray:

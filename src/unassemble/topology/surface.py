@@ -72,6 +72,11 @@ class Piece:
         return np.stack([tail, head, flat[left], flat[np.where(self.inner, self.facing[:, 1], left)]])
 
     @property
+    def redundancy(self) -> int:
+        """Entries, vanished ones counted, less unknowns: positions up to similarity, and c."""
+        return len(self.edges) - (2 * self.n_vertices - 3)
+
+    @property
     def n_loops(self) -> int:
         """Number of boundary loops, the outer one included; loops that touch in a vertex may count as one."""
         return len(self.loop_offsets) - 1
