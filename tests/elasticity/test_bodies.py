@@ -11,13 +11,13 @@ import unassemble
 from unassemble.errors import NotPlanarError
 
 
-def hollow_cylinder(kind, perturb=0.0):
+def hollow_cylinder(kind, perturb=0.0, counts=(5, 9, 9)):
     """An eighth of a thick pipe: its planes of symmetry are x = 0, y = 0 and z = 0."""
     mesh_type = ELEMENTS[kind][0]
-    mesh = mesh_type.init_tensor(np.linspace(0, 1, 5), np.linspace(0, 1, 9), np.linspace(0, 1, 9))
+    mesh = mesh_type.init_tensor(*(np.linspace(0, 1, k) for k in counts))
     p = mesh.p.copy()
     inner = np.all((p > 1e-9) & (p < 1 - 1e-9), axis=0)
-    p[:, inner] += perturb / 8 * np.random.default_rng(0).uniform(-1, 1, (3, inner.sum()))
+    p[:, inner] += perturb / (max(counts) - 1) * np.random.default_rng(0).uniform(-1, 1, (3, inner.sum()))
     radius, angle = 1 + p[0] / 2, np.pi / 2 * p[1]
     place = np.stack([radius * np.cos(angle), radius * np.sin(angle), 2 * p[2]])
     place[np.abs(place) < 1e-12] = 0
@@ -34,6 +34,21 @@ def test_symmetry_planes_of_a_pipe(kind, perturb, order):
     assert found.status == "certified"
     assert truth.error < 1e-11
     assert truth.missing == 0
+
+
+@pytest.mark.parametrize("numbered", ["by the mesh", "at random"])
+@pytest.mark.parametrize("mu", [1.0, lambda x: 1 + x[1] + x[0] * x[1]])
+def test_symmetry_planes_of_a_pipe_of_curved_hexahedra(mu, numbered):
+    """Of several nodes with the same neighbours, those that lack a direction lie in its plane of symmetry."""
+    case = stiffness("hex-s2", hollow_cylinder("hex-s2", counts=(3, 6, 5)), lam=1.5, mu=mu)
+    if numbered == "at random":
+        case = permuted_nodes(case)
+    case = given(case, "symmetry", "by component", "stored")
+    found = unassemble.recover(case.matrix)
+    truth = judged(found, case)
+    assert found.status == "certified"
+    assert truth.error < 1e-11
+    assert truth.missing == truth.split == 0
 
 
 def with_mass(kind, mesh, factor):

@@ -37,7 +37,7 @@ def by_component(matrix: sp.csr_array, d: int) -> Reading | None:
     group = same_pattern(matrix, ~everywhere)
     node, open_row = matched_by_pattern(group, direction, d)
     if open_row.any():
-        node, open_row = placed_together(matrix, everywhere, group, node, direction, d, open_row)
+        node, open_row = placed_together(matrix, everywhere, group, node, direction, d, open_row, ordered=True)
     found = Reading(node, direction, open_row)
     if 2 * np.count_nonzero(np.bincount(node)[node] == d) > len(node) and shows_all(matrix, found, d):
         return found

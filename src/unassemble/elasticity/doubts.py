@@ -38,7 +38,8 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     apart[i[alike]] = False
     doubtful = np.zeros(nodal.n, dtype=bool)
     doubtful[i[halves if apart.any() or numbering.common < 1 else alike]] = True
-    return replace(nodal, doubtful=doubtful)
+    around = np.asarray(nodal.graph @ doubtful.astype(float) > 0)  # even the directions of such rows were searched for
+    return replace(nodal, doubtful=doubtful, blurred=around if nodal.blurred is None else nodal.blurred | around)
 
 
 def unconfirmed(

@@ -32,7 +32,7 @@ class NodalMatrix:
     doubtful : (n,) bool, optional
         Nodes whose rows, or directions, may be others; see :mod:`.doubts`.
     blurred : (n,) bool, optional
-        Nodes coupled to rows that were left out.
+        Nodes coupled to rows that were left out, or whose directions may be others.
     """
 
     indptr: NDArray[np.int32]

@@ -19,7 +19,12 @@ from numpy.typing import NDArray
 from .nodal import NodalMatrix, eliminated, surrounded
 
 
-def with_planes(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NodalMatrix, NDArray[np.bool_]] | None:
+def with_planes(
+    nodal: NodalMatrix,
+    valid: NDArray[np.bool_],
+    gone: NDArray[np.bool_] | None = None,
+    whole: NDArray[np.bool_] | None = None,
+) -> tuple[NodalMatrix, NDArray[np.bool_]] | None:
     """Complete the rows next to rollers; None where there are none.
 
     Parameters
@@ -27,6 +32,10 @@ def with_planes(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NodalMatr
     nodal : NodalMatrix
     valid : (n, d, d) bool
         By the strict rule.
+    gone : (n, d) bool, optional
+        Nodes that surely lack the direction: those that do and are not doubtful, where not given.
+    whole : (n,) bool, optional
+        Nodes whose neighbours are all there, in some direction at least; see :func:`.nodal.surrounded`.
 
     Returns
     -------
@@ -38,15 +47,16 @@ def with_planes(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NodalMatr
     """
     d = nodal.dim
     present = nodal.row_of >= 0
-    gone = eliminated(nodal)
+    if gone is None:
+        gone = eliminated(nodal)
+        if nodal.doubtful is not None:  # the missing row may be another node's
+            gone = gone & ~nodal.doubtful[:, None]
+    whole = surrounded(nodal, valid) if whole is None else whole  # or more is missing than a roller takes
     graph = nodal.graph
     count = graph @ gone.astype(float)
     near = count > 0
-    if nodal.doubtful is not None:  # such a node may be no node of the plane
-        near &= (graph @ nodal.doubtful.astype(float) == 0)[:, None]
     if nodal.blurred is not None:  # what such rows miss is not in the plane alone
         near &= ~nodal.blurred[:, None]
-    whole = surrounded(nodal, valid)  # or more is missing than a roller takes
     held = (near & whole[:, None])[:, None, :] & present[:, :, None] & (nodal.size > 0)[:, None, None]
     held &= ~(nodal.penalised[:, None, :] & np.eye(d, dtype=bool))  # beside a penalty the sum does not show
     if not held.any():
@@ -54,10 +64,8 @@ def with_planes(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NodalMatr
     missing = -nodal.row_sums() / np.maximum(count, 1)[:, None, :]
     i, j = nodal.node, nodal.indices
     data = nodal.data + np.where(held, missing, 0)[i] * gone[j][:, None, :]
-    surely = gone if nodal.doubtful is None else gone & ~nodal.doubtful[:, None]
-    fellows = graph @ surely.astype(float)
-    flat = surely & (fellows > 1) & (nodal.size > 0)[:, None]
-    level = np.where(i == j, 1.0, 0.0)[:, None] - surely[j] / np.maximum(fellows, 1)[i]
+    flat = gone & (count > 1) & (nodal.size > 0)[:, None]
+    level = np.where(i == j, 1.0, 0.0)[:, None] - gone[j] / np.maximum(count, 1)[i]
     full: NDArray[np.bool_] = np.repeat(valid[..., None], d, axis=3)
     for b in range(d):
         data[:, b, b] += np.where(flat[i, b], nodal.size[i] * level[:, b], 0)

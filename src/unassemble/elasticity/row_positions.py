@@ -6,6 +6,9 @@ unknowns nothing else tells which of their rows belong together.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -18,6 +21,8 @@ from .nodal import NodalMatrix, determined, nodal_matrix
 from .numbering import Numbering
 from .patterns import by_direction, with_patterns
 from .placing import placed
+from .plane_rows import of_planes
+from .planes import with_planes
 
 _APART = 1e-6  # of the mean edge length, up to which two positions are one
 _ROUNDS = 4
@@ -38,6 +43,8 @@ def placed_together(
     direction: NDArray[np.int64],
     d: int,
     open_row: NDArray[np.bool_] | None = None,
+    *,
+    ordered: bool = False,
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Nodes after rows of the same pattern were joined whose positions coincide, and rows that are left in doubt.
 
@@ -54,6 +61,8 @@ def placed_together(
     d : int
     open_row : (N,) bool, optional
         Rows that may belong to one node with others; all where it is not given.
+    ordered : bool
+        Whether the rows of each direction stand in the order of nodes.
 
     Returns
     -------
@@ -62,13 +71,14 @@ def placed_together(
     """
     identity = ~live
     may = live if open_row is None else live & open_row
-    whole = _whole_rows(matrix, live, group, direction, d)
+    sums = _sums(matrix, live, group, direction, d)
     for _ in range(_ROUNDS):
         open_row = _open(group, node, direction, d) & may
         if not open_row.any():
             break
         nodal = nodal_matrix(matrix, Numbering(d, node, direction, identity, "pattern", 1.0, 1.0))
-        again = _joined(nodal, whole, group, node, direction, open_row)
+        again, settled = _joined(nodal, sums, group, node, direction, open_row, ordered=ordered)
+        may = may & ~settled
         again = _remaining(group, again, direction, d, may)
         if again.max() == node.max():
             break
@@ -84,54 +94,108 @@ def _open(group: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[
     return np.asarray((absent & on_offer[group]).any(axis=1))
 
 
-def _whole_rows(
-    matrix: sp.csr_array, live: NDArray[np.bool_], group: NDArray[np.int64], direction: NDArray[np.int64], d: int
-) -> NDArray[np.bool_]:
-    """(N, d) rows that hold every coefficient in the columns of a direction.
+class _Sums(NamedTuple):
+    """What sums over directions say of rows, whichever of them are one node's.
 
-    All rows of the same pattern annihilate constants there, and none of what they couple to is known to lack it.
+    Attributes
+    ----------
+    whole : (N, d) bool
+        Rows that hold every coefficient in the columns of a direction.
+    gone : (N, d) bool
+        Directions that were taken out of all nodes of the row's pattern.
+    surrounded : (N,) bool
+        Rows whose neighbours are all there, in some direction at least.
+    """
+
+    whole: NDArray[np.bool_]
+    gone: NDArray[np.bool_]
+    surrounded: NDArray[np.bool_]
+
+
+def _sums(
+    matrix: sp.csr_array, live: NDArray[np.bool_], group: NDArray[np.int64], direction: NDArray[np.int64], d: int
+) -> _Sums:
+    """Rows are whole where all of their pattern annihilate constants, and nothing near is known to lack the direction.
+
+    What was taken out leaves a trace: some row next to it does not add up to zero. Rows that touch nothing lacking some
+    direction show that no node near them is missing altogether.
     """
     label = np.eye(d)[direction] * live[:, None]
     size = row_sizes(matrix)
     least = least_sums(size)
     excused = (label > 0) & with_penalty(matrix, size)[:, None]
+    missing = (np.abs(matrix @ label) > least[:, None]) & ~excused
     failing = np.zeros((int(group.max()) + 1, d))
-    np.add.at(failing, group, (np.abs(matrix @ label) > least[:, None]) & ~excused)
+    np.add.at(failing, group, missing)
     count = by_direction(group, direction, d)
-    lacking = (count < count.max(axis=1, keepdims=True))[group] & live[:, None]
     pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
-    return np.asarray((failing[group] == 0) & ~excused & (pattern @ lacking.astype(float) == 0) & live[:, None])
+    lacking = pattern @ ((count < count.max(axis=1, keepdims=True))[group] & live[:, None]).astype(float) > 0
+    adding: NDArray[np.bool_] = failing[group] == 0
+    gone = (count[group] == 0) & (pattern @ missing.astype(float) > 0)
+    surrounded = (adding | lacking).all(axis=1) & (adding & ~lacking).any(axis=1)
+    return _Sums(adding & ~excused & ~lacking & live[:, None], gone & live[:, None], surrounded & live)
 
 
 def _joined(
     nodal: NodalMatrix,
-    whole: NDArray[np.bool_],
+    sums: _Sums,
     group: NDArray[np.int64],
     node: NDArray[np.int64],
     direction: NDArray[np.int64],
     open_row: NDArray[np.bool_],
-) -> NDArray[np.int64]:
-    """(N,) nodes after those in doubt were joined that have the same pattern and lie in one place."""
+    *,
+    ordered: bool,
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Nodes after those in doubt were joined that have the same pattern and lie in one place, and rows beyond doubt.
+
+    And rows of unknown place, to the nodes that do not lie in the plane of those that lack their direction.
+    """
     n, d = nodal.n, nodal.dim
-    valid: NDArray[np.bool_] = whole[nodal.row_of] & (nodal.row_of >= 0)[:, :, None]
+    nobody = np.zeros(len(node), dtype=bool)
+    valid: NDArray[np.bool_] = sums.whole[nodal.row_of] & (nodal.row_of >= 0)[:, :, None]
     try:
-        solution = placed(*with_patterns(nodal, valid, group, node, direction, whole), None)
+        solution = placed(*_equations(nodal, valid, sums, group, node, direction), None)
     except GeometryError:
-        return node
+        return node, nobody
     if not solution.exact or "hourglass" in solution.freedoms:
-        return node
+        return node, nobody
     kind = np.full(n, -1)
     kind[node[open_row]] = group[open_row]
     some = np.flatnonzero(determined(solution.points[:n]) & (kind >= 0))
     if len(some) < 2:
-        return node
+        return node, nobody
     pairs = some[cKDTree(solution.points[some]).query_pairs(_APART, output_type="ndarray")]
     alike = (kind[pairs[:, 0]] == kind[pairs[:, 1]]) & (np.ptp(solution.component[pairs], axis=1) == 0)
     first, second = pairs[alike].T
     link = sp.csr_array((np.ones(len(first), np.int8), (first, second)), shape=(n, n))
-    label = sp.csgraph.connected_components(link, directed=False)[1].astype(np.int64)[node]
+    count, place = sp.csgraph.connected_components(link, directed=False)
+    here = place[node].astype(np.int64)
+    points, gone = np.full((count, d), np.nan), np.zeros((count, d), dtype=bool)
+    known = determined(solution.points[:n])
+    points[place[known]] = solution.points[:n][known]
+    gone[here] = sums.gone
+    label, settled = of_planes(points, gone, group, here, direction, open_row, ordered=ordered)
     twice = np.asarray((by_direction(label, direction, d) > 1).any(axis=1))[label]
-    return by_first_row(np.where(twice, n + node, label))
+    return by_first_row(np.where(twice, n + node, label)), settled & ~twice
+
+
+def _equations(
+    nodal: NodalMatrix,
+    valid: NDArray[np.bool_],
+    sums: _Sums,
+    group: NDArray[np.int64],
+    node: NDArray[np.int64],
+    direction: NDArray[np.int64],
+) -> tuple[NodalMatrix, NDArray[np.bool_]]:
+    """Those of rows, of patterns, and of planes that rollers hold, whichever rows are one node's."""
+    extended, full = with_patterns(nodal, valid, group, node, direction, sums.whole)
+    row = np.zeros(nodal.n, dtype=np.int64)
+    row[node] = np.arange(len(node))  # any row of the node: all have the same pattern
+    completed = with_planes(nodal, valid, sums.gone[row], sums.surrounded[row])
+    if completed is not None:
+        extended = replace(extended, data=np.concatenate([completed[0].data, extended.data[len(nodal.data) :]]))
+        full[: nodal.n] |= completed[1]
+    return extended, full
 
 
 def _remaining(
