@@ -20,14 +20,30 @@ from .runs import node_by_node
 def by_component_with_gaps(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[Numbering]:
     """Numberings direction by direction for each block size for which they show."""
     live, inner = _live_part(matrix)
-    readings = [(d, by_component(inner, d)) for d in sizes]
-    return [_spread(matrix, live, one, d, "by component") for d, one in readings if one is not None]
+    found = []
+    for d in sizes:
+        one = by_component(inner, d)
+        if one is not None:
+            found.append(_spread(matrix, live, one, d, "by component"))
+            if _settled(found[-1]):
+                break
+    return found
 
 
 def interleaved_with_gaps(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[Numbering]:
     """Numberings node by node for each block size."""
     live, inner = _live_part(matrix)
-    return [_spread(matrix, live, one, d, "interleaved") for d in sizes for one in node_by_node(inner, d)]
+    found: list[Numbering] = []
+    for d in sizes:
+        found += [_spread(matrix, live, one, d, "interleaved") for one in node_by_node(inner, d)]
+        if any(_settled(one) for one in found):
+            break
+    return found
+
+
+def _settled(one: Numbering) -> bool:
+    """Whether nodes of so many directions show, and none lacks one without a trace: no other number need be tried."""
+    return one.sound and one.common == 1 and not one.odd
 
 
 def _live_part(matrix: sp.csr_array) -> tuple[NDArray[np.int64], sp.csr_array]:

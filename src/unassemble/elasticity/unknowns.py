@@ -92,8 +92,7 @@ def numbering_at_sight(matrix: sp.csr_array) -> Numbering | None:
         return best
     if best is None or best.common <= _ORDERLY:
         group = same_pattern(matrix, uncoupled_rows(matrix))
-        of_size = np.bincount(np.bincount(group)[group], minlength=4)
-        if 2 * of_size[2:4].max() <= len(group):
+        if 2 * np.count_nonzero(np.bincount(group)[group] > 1) <= len(group):  # several nodes may share a pattern
             return None
     try:
         return find_numbering(matrix)
