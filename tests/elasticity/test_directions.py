@@ -3,9 +3,44 @@
 import numpy as np
 import pytest
 from assembled import box, permuted_nodes, stiffness
-from supported import given
+from supported import given, judged
 
 from unassemble.elasticity import recover_elasticity
+from unassemble.elasticity.constants import proven_directions, uncoupled_rows
+from unassemble.elasticity.grouping import same_pattern
+from unassemble.elasticity.unknowns import find_numbering
+
+
+def near_incompressible(kind, nu):
+    mesh = box(kind, (5, 5, 6) if kind == "hex-q1" else (3, 4, 4))
+    return given(
+        permuted_nodes(stiffness(kind, mesh, lam=2 * nu / (1 - 2 * nu)), 1), "symmetry", "interleaved", "stored"
+    )
+
+
+@pytest.mark.parametrize("nu", [0.499, 0.4999])
+def test_symmetry_planes_of_near_incompressible_material(nu):
+    """Directions of least energy are wrong there: only those change no volume that move all neighbours together."""
+    case = near_incompressible("hex-q1", nu)
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert truth.error < 1e-10
+    assert truth.missing == truth.split == 0
+    assert found.poisson_ratio == pytest.approx(nu, abs=1e-9)
+
+
+def test_sums_that_vanish_by_mirror_symmetry_prove_nothing():
+    """Around a node in its own mirror image entries between two directions cancel, whatever is missing."""
+    case = near_incompressible("hex-s2", 0.499)
+    found = find_numbering(case.matrix)
+    wrong = found.direction_of_row != case.direction
+    assert not (wrong & ~found.unnamed).any()
+    group = same_pattern(case.matrix, uncoupled_rows(case.matrix))
+    on_axis = np.bincount(group)[group] == 1  # single rows of nodes where two planes meet
+    assert on_axis.any()
+    exchanged = np.where(on_axis, (case.direction + 1) % 3, case.direction)
+    assert not (proven_directions(case.matrix, exchanged, group, 3) & on_axis).any()
 
 
 @pytest.mark.parametrize(("support", "seed"), [("symmetry", 0), ("several", 1)])

@@ -74,10 +74,11 @@ def proven_directions(
 ) -> NDArray[np.bool_]:
     """(N,) rows whose direction sums that vanish prove: that of their own entries, or those of all other directions.
 
-    Sums over one direction count in rows whose whole group makes them vanish, rows that couple to the same unknowns. In
-    them a row of that direction cannot be missed, and one of another direction would not be borne. Where planes with
-    one direction taken out meet, no sum of two directions vanishes; that of the third does not tell which of the two
-    a row is.
+    Sums over one direction count in rows whose whole group makes them vanish, rows that couple to the same unknowns, if
+    it has rows of all directions: around a node in which the mesh is its own mirror image, entries between two
+    directions add up to zero whatever is missing. In such sums a row of that direction cannot be missed, and one of
+    another direction would not be borne. Where planes with one direction taken out meet, no sum of two directions
+    vanishes; that of the third does not tell which of the two a row is.
 
     Parameters
     ----------
@@ -95,6 +96,9 @@ def proven_directions(
     entry = matrix.tocoo()
     strong = np.abs(entry.data) > least[entry.row]
     pattern = sp.csr_array((strong.astype(float), (entry.row, entry.col)), shape=matrix.shape)
-    vanishing = (failing == 0)[group] & ~excused & (pattern @ own.astype(float) > 0)
+    count = np.zeros_like(failing)
+    np.add.at(count, group, own)
+    telling = (failing == 0) & (count > 0).all(axis=1, keepdims=True)
+    vanishing = telling[group] & ~excused & (pattern @ own.astype(float) > 0)
     seen = pattern.T @ vanishing.astype(float) > 0
     return np.asarray((seen & own).any(axis=1) | (seen | own).all(axis=1))

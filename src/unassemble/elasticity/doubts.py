@@ -73,14 +73,15 @@ def guessed_directions(numbering: Numbering, loose: NDArray[np.bool_]) -> NDArra
     """(N,) rows whose direction is the likeliest and no more: those of nodes without coordinates, `loose`, (n,).
 
     Where unknowns stand node by node and rows are missing, or at random, sums over directions tell which. On regular
-    meshes wrong ones vanish, too. Rows that fit the coordinates of their node are right; of others nothing shows it.
+    meshes wrong ones vanish, too. Rows that fit the coordinates of their node are right; of others nothing shows it. Not
+    even that there are as many as directions: where planes of rollers meet, they may be those of several nodes.
     """
     if numbering.unnamed is None:
         return np.zeros(len(numbering.node_of_row), dtype=bool)
     whole = np.bincount(numbering.node_of_row) == numbering.block_size
     if numbering.kind == "pattern":  # no order tells which row of a whole node is which
         whole[:] = False
-    return np.asarray((loose & ~whole)[numbering.node_of_row])
+    return np.asarray(loose[numbering.node_of_row] & (numbering.unnamed | ~whole[numbering.node_of_row]))
 
 
 def _neighbourhoods(nodal: NodalMatrix) -> NDArray[np.uint64]:

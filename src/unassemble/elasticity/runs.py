@@ -17,6 +17,7 @@ from .grouping import by_first_row, same_pattern
 from .likeness import alike, doubtful, likest, next_to_likest, reach
 from .numbering import WHOLE
 from .orders import Reading
+from .plane_names import named_by_sums
 from .sums import names_of, set_right
 from .traces import shows_all, unaccounted
 
@@ -58,6 +59,9 @@ def _by_pattern(matrix: sp.csr_array, group: NDArray[np.int64], run: NDArray[np.
     single = [row[:, None], *[np.empty((0, k), np.int64) for k in range(2, d + 1)]]
     direction = set_right(matrix, row, single, ~nobody, direction, names_of(d))
     unnamed = ~proven_directions(matrix, direction, group, d)
+    if unnamed.any():
+        direction = named_by_sums(matrix, run, direction, d)
+        unnamed = ~proven_directions(matrix, direction, group, d)
     if unnamed.any():
         likelier = _in_equilibrium(matrix, group, run, direction, unnamed, d)
         if likelier is not None:
