@@ -73,7 +73,8 @@ def guessed_directions(numbering: Numbering, loose: NDArray[np.bool_]) -> NDArra
     """(N,) rows whose direction is the likeliest and no more: those of nodes without coordinates, `loose`, (n,).
 
     Where unknowns stand node by node and rows are missing, or at random, sums over directions tell which. On regular
-    meshes wrong ones vanish, too. Rows that fit the coordinates of their node are right; of others nothing shows it. Not
+    meshes wrong ones vanish, too. Rows that fit the coordinates of their node are right; of others nothing shows it.
+    Not
     even that there are as many as directions: where planes of rollers meet, they may be those of several nodes.
     """
     if numbering.unnamed is None:
