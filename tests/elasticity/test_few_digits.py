@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from assembled import box, eliminated, error, on_plane, permuted_nodes, stiffness
+from supported import given, judged
 
 from unassemble import recover
 from unassemble.elasticity.rounded import rounding_of, with_exact_sums
@@ -31,24 +32,55 @@ def rounded(matrix, how):
 @pytest.mark.parametrize("how", ROUNDED)
 @pytest.mark.parametrize(("kind", "counts"), [("tri-p1", (12, 12)), ("hex-q1", (4, 4, 5)), ("tet-p1", (5, 5, 5))])
 def test_positions_are_as_good_as_the_entries(kind, counts, how):
-    given = permuted_nodes(stiffness(kind, box(kind, counts, perturb=0.2)))
-    matrix, nodes = eliminated(given, np.repeat(on_plane(given, 0)[:, None], given.dim, axis=1))
+    case = permuted_nodes(stiffness(kind, box(kind, counts, perturb=0.2)))
+    matrix, nodes = eliminated(case, np.repeat(on_plane(case, 0)[:, None], case.dim, axis=1))
     found = recover(rounded(matrix, how), operator="elasticity")
     assert found.status == "uncertified"
     assert f"rounded to {LEVEL[how]:.0e}" in found.reason
     assert not found.node_status.any()
-    assert error(found.points, given.points[nodes]) < LEVEL[how]
+    assert error(found.points, case.points[nodes]) < LEVEL[how]
+
+
+@pytest.mark.parametrize("order", ["interleaved", "by component"])
+@pytest.mark.parametrize("zeros", ["stored", "dropped"])
+@pytest.mark.parametrize(("kind", "counts"), [("tri-p1", (9, 10)), ("quad-q1", (9, 10))])
+def test_gaps_in_the_order_where_rollers_are(kind, counts, zeros, order):
+    """Which rows are whole is told from sums that vanish up to rounding only, and from directions alone."""
+    case = given(permuted_nodes(stiffness(kind, box(kind, counts, perturb=0.2), lam=1.5)), "symmetry", order, zeros)
+    found = recover(rounded(case.matrix, "6 digits"))
+    truth = judged(found, case)
+    assert found.status == "uncertified"
+    assert "rounded to 5e-06" in found.reason
+    assert truth.error < 4e-5
+    assert truth.missing < 0.25
+    assert truth.split == 0
+
+
+def test_the_given_matrix_stays_as_it_is():
+    case = given(permuted_nodes(stiffness("tri-p1", box("tri-p1", (6, 7)))), "roller", "by component", "stored")
+    matrix = rounded(case.matrix, "6 digits")
+    before = matrix.copy()
+    better, rounding = with_exact_sums(matrix)
+    assert rounding == LEVEL["6 digits"]
+    assert abs(matrix - before).max() == 0
+    assert 0 < abs(better - matrix).max() < 1e-4 * abs(matrix).max()
+
+
+def test_what_cancels_but_for_noise_hides_no_digits():
+    values = ROUNDED["6 digits"](np.random.default_rng(0).standard_normal(300))
+    noise = 1e-17 * np.random.default_rng(1).standard_normal(100)
+    assert rounding_of(np.concatenate([values, noise])) == LEVEL["6 digits"]
 
 
 @pytest.mark.parametrize("how", ROUNDED)
 @pytest.mark.parametrize("make", [frame, plane_frame])
 def test_structures_too(make, how):
-    given = make()
-    found = recover(rounded(given.matrix, how))
+    case = make()
+    found = recover(rounded(case.matrix, how))
     assert found.operator in ("frame or shell", "plane frame")
     assert found.status == "uncertified"
     assert "rounded to" in found.reason
-    assert size_and_error(found.points, given.points) < LEVEL[how]
+    assert size_and_error(found.points, case.points) < LEVEL[how]
 
 
 @pytest.mark.parametrize("how", ROUNDED)
@@ -60,7 +92,7 @@ def test_rounding_shows(how):
 
 
 def test_full_precision_is_left_alone():
-    given = stiffness("tri-p1", box("tri-p1", (5, 5), perturb=0.2)).matrix
-    same, rounding = with_exact_sums(given)
-    assert same is given
+    matrix = stiffness("tri-p1", box("tri-p1", (5, 5), perturb=0.2)).matrix
+    same, rounding = with_exact_sums(matrix)
+    assert same is matrix
     assert rounding == 0

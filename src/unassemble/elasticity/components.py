@@ -29,10 +29,9 @@ def by_component(matrix: sp.csr_array, d: int) -> Reading | None:
         Columns increasing in each row.
     d : int
     """
-    cuts = _cuts(matrix, d)
-    if cuts is None:
+    direction = directions_by_component(matrix, d)
+    if direction is None:
         return None
-    direction = np.searchsorted(cuts, np.arange(matrix.shape[0]), side="right")
     everywhere = np.ones(matrix.shape[0], dtype=bool)
     group = same_pattern(matrix, ~everywhere)
     node, open_row = matched_by_pattern(group, direction, d)
@@ -44,7 +43,13 @@ def by_component(matrix: sp.csr_array, d: int) -> Reading | None:
     return Reading(matched_by_likeness(matrix, direction, d), direction)
 
 
-def _cuts(matrix: sp.csr_array, d: int) -> NDArray[np.int64] | None:
+def directions_by_component(matrix: sp.csr_array, d: int, rounding: float = ROUNDING) -> NDArray[np.int64] | None:
+    """(N,) directions that increase; None where no cuts between them show, with sums relative to rows rounded so."""
+    cuts = _cuts(matrix, d, rounding)
+    return None if cuts is None else np.searchsorted(cuts, np.arange(matrix.shape[0]), side="right")
+
+
+def _cuts(matrix: sp.csr_array, d: int, rounding: float) -> NDArray[np.int64] | None:
     """(d - 1,) first rows of all directions but the first.
 
     A row that annihilates constants direction by direction does so up to each cut: sums over its first columns vanish
@@ -56,8 +61,8 @@ def _cuts(matrix: sp.csr_array, d: int) -> NDArray[np.int64] | None:
     partial = _running_sums(matrix)
     inner = np.ones(matrix.nnz, dtype=bool)
     inner[matrix.indptr[1:] - 1] = False
-    whole = np.abs(partial[matrix.indptr[1:] - 1]) <= ROUNDING * size
-    place = np.flatnonzero(inner & whole[row] & (np.abs(partial) <= ROUNDING * size[row]))
+    whole = np.abs(partial[matrix.indptr[1:] - 1]) <= rounding * size
+    place = np.flatnonzero(inner & whole[row] & (np.abs(partial) <= rounding * size[row]))
     first, last = matrix.indices[place] + 1, matrix.indices[place + 1] + 1
     cuts: list[int] = []
     for _ in range(d - 1):

@@ -24,9 +24,9 @@ def row_sizes(matrix: sp.csr_array) -> NDArray[np.float64]:
     return np.asarray(np.bincount(entry.row, off, matrix.shape[0]), dtype=np.float64)
 
 
-def least_sums(size: NDArray[np.float64]) -> NDArray[np.float64]:
+def least_sums(size: NDArray[np.float64], rounding: float = ROUNDING) -> NDArray[np.float64]:
     """(N,) sums that are not zero in rows of given sizes: infinite where a row has no size."""
-    return np.asarray(ROUNDING * np.where(size > 0, size, np.inf))
+    return np.asarray(rounding * np.where(size > 0, size, np.inf))
 
 
 def with_penalty(matrix: sp.csr_array, size: NDArray[np.float64]) -> NDArray[np.bool_]:

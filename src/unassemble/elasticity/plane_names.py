@@ -13,11 +13,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .constants import least_sums, row_sizes, with_penalty
+from .constants import ROUNDING, least_sums, row_sizes, with_penalty
 
 
 def named_by_sums(
-    matrix: sp.csr_array, run: NDArray[np.int64], direction: NDArray[np.int64], d: int
+    matrix: sp.csr_array, run: NDArray[np.int64], direction: NDArray[np.int64], d: int, rounding: float = ROUNDING
 ) -> NDArray[np.int64]:
     """Directions of rows that stand node by node, those that sums tell set right.
 
@@ -32,13 +32,15 @@ def named_by_sums(
     direction : (N,) int64
         The likeliest.
     d : int
+    rounding : float
+        Of its size: what entries of a row add up to that make up zero.
     """
     direction = direction.copy()
     length = np.bincount(run)[run]
     place = np.arange(len(run)) - np.searchsorted(run, run)
     named = length == d
     direction[named] = place[named]
-    sums = _Sums(matrix, run, length == d, d)
+    sums = _Sums(matrix, run, length == d, rounding)
     for count in range(d - 1, 0, -1):
         names = np.array(list(combinations(range(d), count)))
         lacking = length == count
@@ -55,10 +57,10 @@ def named_by_sums(
 class _Sums:
     """Which guesses make sums vanish in whole nodes."""
 
-    def __init__(self, matrix: sp.csr_array, run: NDArray[np.int64], whole: NDArray[np.bool_], d: int):
-        self._matrix, self._run, self._whole, self._d = matrix, run, whole, d
+    def __init__(self, matrix: sp.csr_array, run: NDArray[np.int64], whole: NDArray[np.bool_], rounding: float):
+        self._matrix, self._run, self._whole = matrix, run, whole
         size = row_sizes(matrix)
-        self._least, self._penalised = least_sums(size), with_penalty(matrix, size)
+        self._least, self._penalised = least_sums(size, rounding), with_penalty(matrix, size)
         entry = matrix.tocoo()
         strong = np.abs(entry.data) > self._least[entry.row]
         self._pattern = sp.csr_array((np.ones(strong.sum()), (entry.row[strong], entry.col[strong])), matrix.shape)

@@ -124,6 +124,7 @@ def place_nodes(
                 raise GeometryError(f"no positions were found: {why}")
         if (
             not solution.exact
+            and not rounding
             and numbering.kind != "given"
             and (numbering.odd or numbering.common < 1)
             and numbering.incomplete
@@ -202,8 +203,10 @@ def _describe(
             found = recognise_cells(nodal, points, None if ratio is None else 2 * ratio / (1 - 2 * ratio))
     backward = found.backward_error if found.certified else error
     status, reason = verdict(nodal, solution, error, found, numbering)
-    if rounding and near:
+    if rounding and near and not any(solution.freedoms):
         status, reason = "uncertified", of_few_digits(rounding, error)
+    elif rounding:
+        reason = f"{reason}; the entries are rounded to {rounding:.0e} of themselves, which may hide what rows lack"
     withheld = np.zeros(nodal.n, dtype=bool)
     if status == "certified" and (found.certified or numbering.open_row is not None):
         withheld = unconfirmed(nodal, numbering, points, found.shown)

@@ -39,6 +39,19 @@ def node_by_node(matrix: sp.csr_array, d: int) -> list[Reading]:
     return _by_likeness(matrix, d)
 
 
+def directions_node_by_node(matrix: sp.csr_array, d: int, rounding: float) -> NDArray[np.int64] | None:
+    """(N,) the likeliest directions of rows that stand node by node, their sums rounded; None where no nodes show."""
+    order = matrix.shape[0]
+    nobody = np.zeros(order, dtype=bool)
+    group = same_pattern(matrix, nobody)
+    run = np.concatenate([[0], np.cumsum(group[1:] != group[:-1])])
+    length = np.bincount(run)[run]
+    if 2 * np.count_nonzero(length == d) <= order:
+        return None
+    node = by_first_row(np.where(length <= d, run, order + np.arange(order)))
+    return named_by_sums(matrix, run, find_directions(matrix, node, nobody, d, ordered=True), d, rounding)
+
+
 def _by_pattern(matrix: sp.csr_array, group: NDArray[np.int64], run: NDArray[np.int64], d: int) -> Reading:
     """Nodes among runs of rows of the same pattern. Those of d rows are nodes, and tell directions of the others.
 
