@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from .components import by_component
 from .constants import uncoupled_rows
-from .grouping import by_first_row
+from .grouping import by_first_row, same_pattern
 from .numbering import Numbering, measured
 from .orders import Reading
-from .runs import node_by_node
+from .runs import node_by_node, run_lengths
 
 
 def by_component_with_gaps(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[Numbering]:
@@ -34,11 +34,17 @@ def interleaved_with_gaps(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[
     """Numberings node by node for each block size."""
     live, inner = _live_part(matrix)
     found: list[Numbering] = []
-    for d in sizes:
+    for d in _likeliest_first(inner, sizes):
         found += [_spread(matrix, live, one, d, "interleaved") for one in node_by_node(inner, d)]
         if any(_settled(one) for one in found):
             break
     return found
+
+
+def _likeliest_first(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[int]:
+    """Sizes of nodes, that first of which most neighbouring rows of one pattern are."""
+    length = run_lengths(same_pattern(matrix, np.zeros(matrix.shape[0], dtype=bool)))
+    return sorted(sizes, key=lambda d: -np.count_nonzero(length == d))
 
 
 def _settled(one: Numbering) -> bool:

@@ -31,7 +31,7 @@ def node_by_node(matrix: sp.csr_array, d: int) -> list[Reading]:
     if order < 2 * d:
         return []
     group = same_pattern(matrix, np.zeros(order, dtype=bool))
-    run = np.concatenate([[0], np.cumsum(group[1:] != group[:-1])])
+    run = _runs(group)
     if 2 * np.count_nonzero(np.bincount(run)[run] == d) > order:
         found = _by_pattern(matrix, group, run, d)
         if shows_all(matrix, found, d):
@@ -39,12 +39,23 @@ def node_by_node(matrix: sp.csr_array, d: int) -> list[Reading]:
     return _by_likeness(matrix, d)
 
 
+def run_lengths(group: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(N,) how many neighbouring rows of one group each row stands among."""
+    run = _runs(group)
+    return np.bincount(run)[run]
+
+
+def _runs(group: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(N,) runs of neighbouring rows of one group."""
+    return np.concatenate([[0], np.cumsum(group[1:] != group[:-1])])
+
+
 def directions_node_by_node(matrix: sp.csr_array, d: int, rounding: float) -> NDArray[np.int64] | None:
     """(N,) the likeliest directions of rows that stand node by node, their sums rounded; None where no nodes show."""
     order = matrix.shape[0]
     nobody = np.zeros(order, dtype=bool)
     group = same_pattern(matrix, nobody)
-    run = np.concatenate([[0], np.cumsum(group[1:] != group[:-1])])
+    run = _runs(group)
     length = np.bincount(run)[run]
     if 2 * np.count_nonzero(length == d) <= order:
         return None
