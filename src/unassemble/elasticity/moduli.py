@@ -8,11 +8,18 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..errors import SolverError
 from ..linalg import threads
+from ..linalg.factorisation import factorisation
+from ..linalg.upper import UpperTriangle
 from .entries import Entries, Pairs
 from .model import FITS, Fit, Model, assembled, largest, operator
 
 _FEW = 0.3  # of the candidates: how many may be no cells
+_DIRECT = 20_000  # coefficients: a factorisation costs half of the iterations here, and fills memory beyond
+_SHIFT = 1e-11  # of normal equations: rounding of their entries is 1e-16
+_STEPS = 20
+_STILL = 1e-15  # relative change of coefficients at which steps end
 
 
 def one_material(models: Sequence[Model], entries: Entries, ratio: float) -> Fit:
@@ -86,7 +93,36 @@ def _least_squares_solution(design: sp.csr_array, value: NDArray, entries: Entri
     scaled = design[:, np.flatnonzero(seen)] @ sp.diags_array(1 / weight[seen])
     target = (value / entries.size[:, None, None]).ravel()
     coefficients = np.zeros(design.shape[1])
-    with threads(1):  # its many short vectors are not worth waking threads for
-        coefficients[seen] = sp.linalg.lsmr(scaled, target, atol=1e-15, btol=1e-15, conlim=0, maxiter=600)[0]
+    with threads(1):  # many short vectors are not worth waking threads for
+        found = _refined(sp.csr_array(scaled), target) if scaled.shape[1] <= _DIRECT else None
+        if found is None:
+            found = sp.linalg.lsmr(scaled, target, atol=1e-15, btol=1e-15, conlim=0, maxiter=600)[0]
+    coefficients[seen] = found
     coefficients[seen] /= weight[seen]
     return coefficients
+
+
+def _refined(design: sp.csr_array, target: NDArray) -> NDArray[np.float64] | None:
+    """The least coefficients that fit best, by normal equations whose errors are taken off again and again.
+
+    Columns have length one. Each step divides what is left of a combination of squared singular value s by 1 + s /
+    `_SHIFT`; combinations that fit nothing stay zero. None where they have no factors.
+    """
+    if not (design.shape[1] and np.isfinite(design.data).all() and np.isfinite(target).all()):
+        return None
+    transposed = sp.csr_array(design.T)
+    normal = UpperTriangle.of(sp.csr_array(transposed @ design + _SHIFT * sp.eye_array(design.shape[1])))
+    solver = factorisation(normal, definite=True)
+    try:
+        solver.factorise(normal)
+    except SolverError:
+        solver.release()
+        return None
+    found = np.zeros(design.shape[1])
+    for _ in range(_STEPS):
+        step = solver.solve(transposed @ (target - design @ found))
+        found += step
+        if np.abs(step).max(initial=0) <= _STILL * np.abs(found).max(initial=0):
+            break
+    solver.release()
+    return found
