@@ -2,7 +2,8 @@
 
 A body n times as long as thick has fields that satisfy the identities up to 1 / n^2: it bends. What charts leave in
 these is taken off by one least-squares problem for the whole body. Its residual is summed from differences along edges,
-so that rounding is relative to these and not to the length of the body.
+so that rounding is relative to these and not to the length of the body. Normal equations do, if steps with them shrink;
+where the square of the condition is too large for that, partial pivoting.
 """
 
 from __future__ import annotations
@@ -14,10 +15,13 @@ from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..linalg.augmented import AugmentedSystem
+from ..linalg.normal import NormalEquations
 from .identities import Identities, boundary_basis, identities
 from .nodal import NodalMatrix, determined, linked
 
-_STEPS = 2
+_STEPS = 8
+_SHRINKING = 0.2  # a step over the one before; those of normal equations go like the square of the condition
+_STILL = 1e-11  # a step relative to the coordinates that rounding leaves: that of a residual, over the gap
 _WORK = 3e6  # nodes times the square of those across, up to which partial pivoting costs a few seconds
 _ROUNDING = 1e-15  # of an entry
 # How much softer, at most, a piece is whose first node is held, and not its centroid, is the root of its number of
@@ -65,21 +69,50 @@ def unbent(
     far = np.abs(x - x[0]).argmax()
     free[0] = False
     free.flat[far] = False
-    try:
-        system = AugmentedSystem(sp.csr_array(equations[:, np.flatnonzero(free.ravel())]))
-        if gap * _softness(system, equations.shape[0]) > _SOFTER * np.sqrt(len(x)):
-            return points, float("inf")
-        for _ in range(_STEPS):
-            x[free] -= system.solve(_residual(equations, x))
-    except SolverError:
+    columns = sp.csr_array(equations[:, np.flatnonzero(free.ravel())])
+    found, settled = None, False
+    for kind in (NormalEquations, AugmentedSystem):
+        try:
+            system = kind(columns)
+        except SolverError:
+            continue
+        try:
+            if gap * _softness(system, equations.shape[0]) > _SOFTER * np.sqrt(len(x)):
+                return points, float("inf")
+            found, settled = _stepped(system, equations, x, free)
+        except SolverError:
+            continue
+        finally:
+            system.release()
+        if settled:
+            break
+    if found is None:
         return points, float("inf")
+    x = found
     better = points.copy()
     better[local.columns] = x
     residual = np.linalg.norm(_residual(equations, x)) + _ROUNDING * np.sqrt(equations.shape[0])
     return better, float(residual / np.linalg.norm(x - x.mean(axis=0)))
 
 
-def _softness(system: AugmentedSystem, equations: int) -> float:
+def _stepped(
+    system: NormalEquations | AugmentedSystem, equations: sp.csr_array, x: NDArray[np.float64], free: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], bool]:
+    """Coordinates (n, d) after steps as long as they shrink, and whether no more than rounding was left then."""
+    x, before = x.copy(), np.inf
+    for _ in range(_STEPS):
+        step = system.solve(_residual(equations, x))
+        x[free] -= step
+        size = float(np.linalg.norm(step))
+        if size <= _STILL * np.linalg.norm(x):
+            return x, True
+        if not size <= _SHRINKING * before:
+            break
+        before = size
+    return x, False
+
+
+def _softness(system: NormalEquations | AugmentedSystem, equations: int) -> float:
     """About one over the least singular value: the norm of what solves for signs at random."""
     signs = np.random.default_rng(0).choice([-1.0, 1.0], equations)
     return float(np.linalg.norm(system.solve(signs)))

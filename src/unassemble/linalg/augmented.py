@@ -59,3 +59,7 @@ class AugmentedSystem:
             s, x = found[:rows], found[rows:]
             found = found + self._factor.solve(np.concatenate([right - _WEIGHT * s - b @ x, -(b.T @ s)]))
         return np.asarray(self._unit * found[rows:])
+
+    def release(self) -> None:
+        """Give the memory of the factor back."""
+        del self._factor
