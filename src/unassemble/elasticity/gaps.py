@@ -14,7 +14,7 @@ from .constants import uncoupled_rows
 from .grouping import by_first_row
 from .numbering import Numbering, measured
 from .orders import Reading
-from .runs import node_by_node
+from .runs import node_by_node, told_by_pattern
 
 
 def by_component_with_gaps(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[Numbering]:
@@ -27,7 +27,14 @@ def by_component_with_gaps(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list
 def interleaved_with_gaps(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[Numbering]:
     """Numberings node by node for each block size."""
     live, inner = _live_part(matrix)
-    return [_spread(matrix, live, one, d, "interleaved") for d in sizes for one in node_by_node(inner, d)]
+    return [_spread(matrix, live, one, d, "interleaved") for d, one in node_by_node(inner, sizes)]
+
+
+def interleaved_by_pattern(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
+    """The numbering node by node where patterns show every node; None where they do not."""
+    live, inner = _live_part(matrix)
+    told = told_by_pattern(inner, sizes)
+    return None if told is None else _spread(matrix, live, told[1], told[0], "interleaved")
 
 
 def _live_part(matrix: sp.csr_array) -> tuple[NDArray[np.int64], sp.csr_array]:

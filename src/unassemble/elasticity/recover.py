@@ -205,7 +205,7 @@ def _describe(
     if rounding and near:
         status, reason = "uncertified", of_few_digits(rounding, error)
     withheld = np.zeros(nodal.n, dtype=bool)
-    if status == "certified" and (found.certified or numbering.open_row is not None):
+    if status == "certified" and (found.certified or numbering.open_row is not None or not numbering.incomplete):
         withheld = unconfirmed(nodal, numbering, points, found.shown)
         points = np.where(withheld[:, None], np.nan, points)
         found = found.among(~withheld)

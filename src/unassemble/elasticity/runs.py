@@ -24,25 +24,36 @@ _ROUNDS = 3
 _IN_TURN = 0.12  # share of rows next to the one likest them below which nodes do not stand one after the other
 
 
-def node_by_node(matrix: sp.csr_array, d: int) -> list[Reading]:
-    """Nodes and directions of rows that stand node by node, each with at most d rows: one or two readings."""
+def node_by_node(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[tuple[int, Reading]]:
+    """Nodes and directions of rows that stand node by node, for each number of directions they may have.
+
+    Where equal patterns show every node, nothing else is tried.
+    """
+    told = told_by_pattern(matrix, sizes)
+    if told is not None:
+        return [told]
+    return [(d, one) for d in sizes if matrix.shape[0] >= 2 * d for one in _by_likeness(matrix, d)]
+
+
+def told_by_pattern(matrix: sp.csr_array, sizes: tuple[int, ...]) -> tuple[int, Reading] | None:
+    """How many directions there are, and nodes and directions, where runs of rows of equal patterns show every node."""
     order = matrix.shape[0]
-    if order < 2 * d:
-        return []
     group = same_pattern(matrix, np.zeros(order, dtype=bool))
     run = np.concatenate([[0], np.cumsum(group[1:] != group[:-1])])
-    if 2 * np.count_nonzero(np.bincount(run)[run] == d) > order:
-        found = _by_pattern(matrix, group, run, d)
-        if shows_all(matrix, found, d):
-            return [found]
-    return _by_likeness(matrix, d)
+    length = np.bincount(run)[run]
+    for d in sizes:
+        if order >= 2 * d and 2 * np.count_nonzero(length == d) > order:
+            found = _by_pattern(matrix, group, run, d)
+            if shows_all(matrix, found, d):
+                return d, found
+    return None
 
 
 def _by_pattern(matrix: sp.csr_array, group: NDArray[np.int64], run: NDArray[np.int64], d: int) -> Reading:
     """Nodes among runs of rows of the same pattern. Those of d rows are nodes, and tell directions of the others.
 
-    Rows of longer runs, which hold several nodes, are taken one by one until directions tell where nodes end. In the
-    end every row may choose for itself, as shorter runs may hold several nodes, too.
+    Rows of longer runs, which hold several nodes, are taken one by one until directions tell where nodes end. Where
+    sums do not prove all directions then, every row may choose for itself, as shorter runs may hold several nodes, too.
     """
     order = len(run)
     row = np.arange(order)
@@ -55,9 +66,13 @@ def _by_pattern(matrix: sp.csr_array, group: NDArray[np.int64], run: NDArray[np.
         if np.array_equal(again, node):
             break
         node = again
-    single = [row[:, None], *[np.empty((0, k), np.int64) for k in range(2, d + 1)]]
-    direction = set_right(matrix, row, single, ~nobody, direction, names_of(d))
     unnamed = ~proven_directions(matrix, direction, group, d)
+    if unnamed.any():
+        single = [row[:, None], *[np.empty((0, k), np.int64) for k in range(2, d + 1)]]
+        freely = set_right(matrix, row, single, ~nobody, direction, names_of(d))
+        other = ~proven_directions(matrix, freely, group, d)
+        if np.count_nonzero(other) < np.count_nonzero(unnamed):
+            direction, unnamed = freely, other
     if unnamed.any():
         likelier = _in_equilibrium(matrix, group, run, direction, unnamed, d)
         if likelier is not None:
