@@ -1,9 +1,11 @@
 """Unknowns in one of the usual orders of which supports took some: which rows belong together, and what stays open."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from assembled import box, heterogeneous, permuted_nodes, stiffness
 from supported import given, judged
 
@@ -131,3 +133,45 @@ def test_pairs_that_another_alignment_would_replace_are_left_out():
     """One of two rows as alike has no partner, and order does not tell which."""
     r, s = np.array([0, 1, 2, 3]), np.array([0, 1, 1, 2])
     assert aligned(r, s, np.array([1.0, 0.9, 0.9, 1.0])).tolist() == [0, 3]
+
+
+def boundary_first(kind: str, counts: tuple[int, int], order: str, zeros: str, perturb: float = 0.2):
+    """A body on two symmetry planes whose nodes there come first, as mesh generators number them; inner ones anyhow.
+
+    As many lie on one plane as on the other, so that single unknowns come in pairs.
+    """
+    body = stiffness(kind, box(kind, counts, perturb=perturb), lam=heterogeneous if perturb else 1.0)
+    x, y = body.points.T
+    rank = np.where(y == 0, 1.0, np.where(x == 0, 2.0, 3.0))
+    rank[(x == 0) & (y == 0)] = 0.0
+    chance = np.random.default_rng(5).permutation(len(x))
+    nodes = np.lexsort((chance, rank))
+    rows = (nodes[:, None] * 2 + np.arange(2)).ravel()
+    moved = replace(body, matrix=sp.csr_array(body.matrix[rows][:, rows]), points=body.points[nodes])
+    return given(moved, "symmetry", order, zeros)
+
+
+@pytest.mark.parametrize("order", ["interleaved", "by component"])
+@pytest.mark.parametrize(("kind", "counts"), [("quad-q1", (9, 9)), ("tri-p1", (9, 9)), ("tri-p2", (6, 6))])
+def test_single_unknowns_in_pairs_are_not_taken_for_nodes(kind, counts, order):
+    case = boundary_first(kind, counts, order, "stored")
+    numbering = find_numbering(case.matrix)
+    pairs = np.unique(np.column_stack([numbering.node_of_row, case.node]), axis=0)
+    assert len(pairs) == numbering.n_nodes == len(np.unique(case.node))
+    np.testing.assert_array_equal(numbering.direction_of_row, case.direction)
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert truth.error < 1e-8
+    assert truth.missing < 0.1
+
+
+@pytest.mark.parametrize("order", ["interleaved", "by component"])
+@pytest.mark.parametrize("kind", ["quad-q1", "tri-p1", "quad-s2"])
+def test_nor_are_they_where_zeros_are_not_stored(kind, order):
+    case = boundary_first(kind, (9, 9) if kind != "quad-s2" else (6, 6), order, "dropped", perturb=0.0)
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert truth.error < 1e-8
+    assert truth.missing < 0.2

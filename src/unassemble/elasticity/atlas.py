@@ -13,6 +13,7 @@ conditioning is behind us. Exact null fields of the body are exactly those of va
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,38 +104,43 @@ def _join(charts: list[Chart], n: int) -> tuple[NDArray[np.int64], NDArray[np.fl
     copies = np.zeros(n)
     for one in charts:
         copies[one.nodes] += 1
+    place = _places(charts)
+    form = np.diag(1 + np.concatenate([one.values**2 for one in charts]))
+    for k, m in _overlapping(charts, n):
+        product = _product(charts[k], charts[m], copies)
+        form[place[k], place[m]] -= product
+        if k != m:
+            form[place[m], place[k]] -= product.T
+    coefficients = _lowest(form, min(_MOST, len(form)))
+    fields = np.zeros((n, d, coefficients.shape[1]))
+    for one, here in zip(charts, place, strict=True):
+        fields[one.nodes] += one.fields @ coefficients[here]
     nodes = np.flatnonzero(copies)
-    average = _average(charts, copies, n)
-    form = -(average.T @ average).toarray()
-    offset = 0
-    for one in charts:
-        k = len(one.values)
-        here = slice(offset, offset + k)
-        form[here, here] += np.eye(k) + np.diag(one.values**2)
-        offset += k
-    coefficients = _lowest(form, min(_MOST, offset))
-    fields = (average @ coefficients).reshape(n, d, -1)[nodes] / np.sqrt(copies[nodes])[:, None, None]
-    flat = np.linalg.qr(fields.reshape(len(nodes) * d, -1))[0]
+    mean = fields[nodes] / copies[nodes, None, None]
+    flat = np.linalg.qr(mean.reshape(len(nodes) * d, -1))[0]
     return nodes, flat.reshape(len(nodes), d, -1)
 
 
-def _average(charts: list[Chart], copies: NDArray, n: int) -> sp.csr_array:
-    """(n d, coefficients) the sum of all copies of a node over the square root of their number."""
-    blocks, node, offset = [], [], 0
-    for one in charts:
-        blocks.append(one.fields / np.sqrt(copies[one.nodes])[:, None, None])
-        node.append(one.nodes)
-    d = charts[0].fields.shape[1]
-    entries, rows, columns = [], [], []
-    for block, where in zip(blocks, node, strict=True):
-        k = block.shape[2]
-        row = where[:, None, None] * d + np.arange(d)[None, :, None] + np.zeros(k, np.int64)
-        entries.append(block.ravel())
-        rows.append(row.ravel())
-        columns.append(np.broadcast_to(np.arange(offset, offset + k), block.shape).ravel())
-        offset += k
-    place = (np.concatenate(rows), np.concatenate(columns))
-    return sp.coo_array((np.concatenate(entries), place), shape=(n * d, offset)).tocsr()
+def _places(charts: list[Chart]) -> list[slice]:
+    """Which of all coefficients are each chart's."""
+    end = np.cumsum([len(one.values) for one in charts])
+    return [slice(int(last) - len(one.values), int(last)) for one, last in zip(charts, end, strict=True)]
+
+
+def _overlapping(charts: list[Chart], n: int) -> Iterator[tuple[int, int]]:
+    """Pairs of charts that share nodes, k <= m."""
+    nodes = np.concatenate([one.nodes for one in charts])
+    which = np.repeat(np.arange(len(charts)), [len(one.nodes) for one in charts])
+    shares = sp.csr_array((np.ones(len(nodes)), (which, nodes)), shape=(len(charts), n))
+    first, second = sp.triu(shares @ shares.T).nonzero()
+    return zip(first.tolist(), second.tolist(), strict=True)
+
+
+def _product(one: Chart, other: Chart, copies: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Products of the fields of two charts over the nodes that they share, each over the number of its copies."""
+    shared, mine, others = np.intersect1d(one.nodes, other.nodes, assume_unique=True, return_indices=True)
+    left = (one.fields[mine] / copies[shared, None, None]).reshape(-1, len(one.values))
+    return np.asarray(left.T @ other.fields[others].reshape(-1, len(other.values)))
 
 
 def _lowest(form: NDArray, count: int) -> NDArray:

@@ -68,6 +68,9 @@ def chart(
         Unknown boundary terms; see :func:`.identities.identities`.
     """
     local = identities(nodal, valid, rows, terms)
+    own = len(local.rows)
+    if own and not whole:
+        local = _supported(local, nodal, valid, terms)
     n, d = len(local.columns), local.dim
     if not n:
         return Chart(local.columns, np.empty((0, d, 0)), np.empty(0), 0)
@@ -82,7 +85,32 @@ def chart(
             keep = values < 1e3 * _STIFF
             fields, values = fields[..., keep], values[keep]
         fields, values = _refine(local, solver, fields, values)
-    return Chart(local.columns, fields, values, len(local.rows))
+    return Chart(local.columns, fields, values, own)
+
+
+def _supported(
+    local: Identities, nodal: NodalMatrix, valid: NDArray[np.bool_], terms: NDArray[np.float64] | None
+) -> Identities:
+    """The identities, and those of the neighbours of rows at the rim that have too few to place what they touch.
+
+    Each node takes d equations, which the rows that touch it share. A row with many neighbours that no other row of the
+    chart touches leaves most of these free to move, each by itself. Neighbours that are short of equations, too, would
+    only add to that.
+    """
+    short = _short(local)
+    if not short.any():
+        return local
+    near = np.unique(nodal.graph[local.rows[short]].indices)
+    more = identities(nodal, valid, np.union1d(local.rows, near), terms)
+    kept = ~_short(more) | np.isin(more.rows, local.rows)
+    return more if kept.all() else identities(nodal, valid, more.rows[kept], terms)
+
+
+def _short(local: Identities) -> NDArray[np.bool_]:
+    """(m,) rows with fewer equations than their share of what the nodes take that they touch."""
+    touching = np.bincount(local.indices, minlength=len(local.columns))
+    taken = np.add.reduceat(local.dim / touching[local.indices], local.indptr[:-1])
+    return np.asarray(taken > local.equations)
 
 
 def _least_fields(local: Identities, solver: Factorisation, count: int) -> tuple[NDArray, NDArray]:

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .nodal import NodalMatrix, determined, without_trace
+from .nodal import NodalMatrix, annihilating, determined, without_trace
 from .numbering import Numbering
+from .orders import ORDERS
 
 
 def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     """Mark nodes whose rows may be those of two halves of one: coupled, with no direction in common.
 
     Where all entries are stored the halves of a node couple to the same nodes; and where unknowns stand in order, it
-    tells which of them are in doubt.
+    tells which of them are in doubt. Where order alone joined rows that couple to different nodes, so are theirs.
     """
     if numbering.open_row is not None:
         unsure = numbering.open_row
@@ -24,6 +27,9 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
         doubtful = np.zeros(nodal.n, dtype=bool)
         doubtful[numbering.node_of_row[unsure]] = True
         doubtful &= (nodal.row_of < 0).any(axis=1)
+        return replace(nodal, doubtful=doubtful) if doubtful.any() else nodal
+    if numbering.kind in ORDERS and not numbering.incomplete:
+        doubtful = _mixed(nodal) if numbering.common < 1 else np.zeros(nodal.n, dtype=bool)
         return replace(nodal, doubtful=doubtful) if doubtful.any() else nodal
     ordered = numbering.kind != "pattern" and numbering.common == 1 and not numbering.odd
     if numbering.kind == "given" or not numbering.incomplete or ordered:
@@ -83,6 +89,30 @@ def guessed_directions(numbering: Numbering, loose: NDArray[np.bool_]) -> NDArra
     if numbering.kind == "pattern":  # no order tells which row of a whole node is which
         whole[:] = False
     return np.asarray(loose[numbering.node_of_row] & (numbering.unnamed | ~whole[numbering.node_of_row]))
+
+
+def _mixed(nodal: NodalMatrix) -> NDArray[np.bool_]:
+    """(n,) nodes whose rows couple to different nodes, and may be several nodes each of which lacks directions.
+
+    They are not, where rows of the same neighbours lack one without a trace: the others are theirs.
+    """
+    d, present = nodal.dim, nodal.row_of >= 0
+    coupled = nodal.data != 0
+    key = np.random.default_rng(0).integers(1, 2**62, nodal.n, dtype=np.uint64)
+    shape = (nodal.n, nodal.n)
+    code = np.column_stack([
+        sp.csr_array((coupled[:, c].any(axis=1).astype(np.uint64), nodal.indices, nodal.indptr), shape=shape) @ key
+        for c in range(d)
+    ])  # fmt: skip
+    alike = (code[:, :, None] == code[:, None, :]) & present[:, :, None] & present[:, None, :]
+    missing = (~annihilating(nodal) & present[:, :, None]).astype(float)
+    missed = np.zeros((nodal.n, d, d))
+    for c, e in product(range(d), repeat=2):
+        pairs = sp.csr_array((coupled[:, c, e].astype(float), nodal.indices, nodal.indptr), shape=shape)
+        missed[:, c] += pairs @ missing[:, e]
+    untold = np.einsum("nce,neb->ncb", alike.astype(float), missed) == 0
+    lacking = present[:, :, None] & present[:, None, :] & ~alike
+    return np.asarray(lacking.any(axis=(1, 2)) & ~(lacking & untold).any(axis=(1, 2)))
 
 
 def _neighbourhoods(nodal: NodalMatrix) -> NDArray[np.uint64]:

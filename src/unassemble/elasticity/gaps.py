@@ -14,7 +14,7 @@ from .constants import uncoupled_rows
 from .grouping import by_first_row, same_pattern
 from .numbering import Numbering, measured
 from .orders import Reading
-from .runs import node_by_node, run_lengths
+from .runs import run_lengths, told_by_likeness, told_by_pattern
 
 
 def by_component_with_gaps(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[Numbering]:
@@ -31,14 +31,24 @@ def by_component_with_gaps(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list
 
 
 def interleaved_with_gaps(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[Numbering]:
-    """Numberings node by node for each block size."""
+    """Numberings node by node for each block size; where equal patterns show every node, nothing else is tried."""
+    told = interleaved_by_pattern(matrix, sizes)
+    if told is not None:
+        return [told]
     live, inner = _live_part(matrix)
     found: list[Numbering] = []
     for d in _likeliest_first(inner, sizes):
-        found += [_spread(matrix, live, one, d, "interleaved") for one in node_by_node(inner, d)]
+        found += [_spread(matrix, live, one, d, "interleaved") for one in told_by_likeness(inner, d)]
         if any(_settled(one) for one in found):
             break
     return found
+
+
+def interleaved_by_pattern(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
+    """The numbering node by node where patterns show every node; None where they do not."""
+    live, inner = _live_part(matrix)
+    told = told_by_pattern(inner, sizes)
+    return None if told is None else _spread(matrix, live, told[1], told[0], "interleaved")
 
 
 def _likeliest_first(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[int]:

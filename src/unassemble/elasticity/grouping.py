@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -43,3 +45,20 @@ def coupled_in_common(matrix: sp.csr_array, node: NDArray, direction: NDArray) -
     rows = pattern @ onto
     union = (onto.T.tocsr() @ rows).tocsr()
     return rows.nnz / float(np.diff(union.indptr) @ np.bincount(node))
+
+
+def made_up(matrix: sp.csr_array, node: NDArray, direction: NDArray, d: int) -> NDArray[np.bool_]:
+    """(n,) nodes two rows of which couple to no other node in common: they cannot be one node's."""
+    n = int(node.max()) + 1
+    entry = matrix.tocoo()
+    row, other = node[entry.row], node[entry.col]
+    reached = []
+    for a in range(d):
+        off = (direction[entry.row] == a) & (row != other)
+        pairs = np.unique(row[off] * n + other[off])
+        reached.append(sp.csr_array((np.ones(len(pairs), np.int8), (pairs // n, pairs % n)), shape=(n, n)))
+    found = np.zeros(n, dtype=bool)
+    for one, two in combinations(reached, 2):
+        both = (np.diff(one.indptr) > 0) & (np.diff(two.indptr) > 0)
+        found |= both & (np.diff(sp.csr_array(one.multiply(two)).indptr) == 0)
+    return found

@@ -103,6 +103,14 @@ class Identities:
         return [(rows, boundary_basis(self.valid[rows[0]], self.terms)) for rows in kinds]
 
     @cached_property
+    def equations(self) -> NDArray[np.int64]:
+        """(m,) equations of each row once p and q are eliminated."""
+        count = self.valid.reshape(len(self.rows), -1).sum(axis=1)
+        for rows, basis in self._kinds:
+            count[rows] -= basis.shape[3]
+        return np.asarray(count)
+
+    @cached_property
     def _stacked(self) -> sp.csr_array:
         """(m d d, n): all blocks of the matrix, rows ordered by node, c, b."""
         d = self.dim

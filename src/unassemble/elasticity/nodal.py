@@ -139,7 +139,7 @@ def valid_pairs(nodal: NodalMatrix, *, strict: bool = True, inferred: bool = Fal
         Component c of the row, component b of the columns.
     """
     present: NDArray[np.bool_] = nodal.row_of >= 0
-    zero, penalty = _annihilating(nodal), _with_penalty(nodal)
+    zero, penalty = annihilating(nodal), _with_penalty(nodal)
     valid = np.asarray(zero & ~penalty & present[:, :, None] & present[:, None, :] & (nodal.size > 0)[:, None, None])
     if not strict:
         return valid
@@ -187,12 +187,12 @@ def without_trace(nodal: NodalMatrix) -> NDArray[np.bool_]:
     somewhere else: the node's rows were not recognised as those of one node.
     """
     present = nodal.row_of >= 0
-    missing = (~_annihilating(nodal) & present[:, :, None]).any(axis=1)
+    missing = (~annihilating(nodal) & present[:, :, None]).any(axis=1)
     some = np.asarray(present.any(axis=1))
     return ~present & (nodal.graph @ missing.astype(float) == 0) & some[:, None]
 
 
-def _annihilating(nodal: NodalMatrix) -> NDArray[np.bool_]:
+def annihilating(nodal: NodalMatrix) -> NDArray[np.bool_]:
     """(n, d, d) rows of blocks that annihilate constants."""
     size = np.where(nodal.size > 0, nodal.size, np.inf)[:, None, None]
     return np.asarray(np.abs(nodal.row_sums()) <= ROUNDING * size)

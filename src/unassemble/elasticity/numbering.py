@@ -39,7 +39,7 @@ class Numbering:
         How far the rows of a node couple to the same nodes: 1 if all do.
     odd : int
         Nodes that lack a direction without a trace, no row near them missing it: their rows belong together, and it
-        did not show.
+        did not show. In an order without gaps, those whose rows cannot be one node's.
     open_row : (N,) bool, optional
         Where the unknowns stand in order: rows that may belong to one node with others of them, which neither pattern
         nor order decides.
@@ -85,7 +85,8 @@ class Numbering:
     def clear(self) -> bool:
         """Whether the unknowns stand in one of the usual orders, with no gaps: nothing else need be tried."""
         alike = self.kind != "by component" or self.common >= _ALIKE
-        return self.kind in ORDERS and self.share >= WHOLE and alike
+        whole = self.incomplete or not self.odd
+        return self.kind in ORDERS and self.share >= WHOLE and alike and whole
 
     @property
     def sound(self) -> bool:

@@ -208,7 +208,7 @@ def _describe(
     elif rounding:
         reason = f"{reason}; the entries are rounded to {rounding:.0e} of themselves, which may hide what rows lack"
     withheld = np.zeros(nodal.n, dtype=bool)
-    if status == "certified" and (found.certified or numbering.open_row is not None):
+    if status == "certified" and (found.certified or numbering.open_row is not None or not numbering.incomplete):
         withheld = unconfirmed(nodal, numbering, points, found.shown)
         points = np.where(withheld[:, None], np.nan, points)
         found = found.among(~withheld)

@@ -18,25 +18,23 @@ from .likeness import alike, doubtful, likest, next_to_likest, reach
 from .numbering import WHOLE
 from .orders import Reading
 from .plane_names import named_by_sums
-from .sums import names_of, set_right
 from .traces import shows_all, unaccounted
 
 _ROUNDS = 3
 _IN_TURN = 0.12  # share of rows next to the one likest them below which nodes do not stand one after the other
 
 
-def node_by_node(matrix: sp.csr_array, d: int) -> list[Reading]:
-    """Nodes and directions of rows that stand node by node, each with at most d rows: one or two readings."""
+def told_by_pattern(matrix: sp.csr_array, sizes: tuple[int, ...]) -> tuple[int, Reading] | None:
+    """How many directions there are, and nodes and directions, where runs of rows of equal patterns show every node."""
     order = matrix.shape[0]
-    if order < 2 * d:
-        return []
     group = same_pattern(matrix, np.zeros(order, dtype=bool))
-    run = _runs(group)
-    if 2 * np.count_nonzero(np.bincount(run)[run] == d) > order:
-        found = _by_pattern(matrix, group, run, d)
-        if shows_all(matrix, found, d):
-            return [found]
-    return _by_likeness(matrix, d)
+    run, length = _runs(group), run_lengths(group)
+    for d in sizes:
+        if order >= 2 * d and 2 * np.count_nonzero(length == d) > order:
+            found = _by_pattern(matrix, group, run, d)
+            if shows_all(matrix, found, d):
+                return d, found
+    return None
 
 
 def run_lengths(group: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -66,8 +64,8 @@ def directions_node_by_node(matrix: sp.csr_array, d: int, rounding: float) -> ND
 def _by_pattern(matrix: sp.csr_array, group: NDArray[np.int64], run: NDArray[np.int64], d: int) -> Reading:
     """Nodes among runs of rows of the same pattern. Those of d rows are nodes, and tell directions of the others.
 
-    Rows of longer runs, which hold several nodes, are taken one by one until directions tell where nodes end. In the
-    end every row may choose for itself, as shorter runs may hold several nodes, too.
+    Rows of longer runs, which hold several nodes, are taken one by one until directions tell where nodes end. Where
+    sums do not prove all directions then, every row may choose for itself, as shorter runs may hold several nodes, too.
     """
     order = len(run)
     row = np.arange(order)
@@ -80,8 +78,6 @@ def _by_pattern(matrix: sp.csr_array, group: NDArray[np.int64], run: NDArray[np.
         if np.array_equal(again, node):
             break
         node = again
-    single = [row[:, None], *[np.empty((0, k), np.int64) for k in range(2, d + 1)]]
-    direction = set_right(matrix, row, single, ~nobody, direction, names_of(d))
     unnamed = ~proven_directions(matrix, direction, group, d)
     if unnamed.any():
         direction = named_by_sums(matrix, run, direction, d)
@@ -116,7 +112,7 @@ def _cut_where(run: NDArray[np.int64], direction: NDArray[np.int64]) -> NDArray[
     return np.concatenate([[0], np.cumsum((np.diff(run) > 0) | (np.diff(direction) <= 0))])
 
 
-def _by_likeness(matrix: sp.csr_array, d: int) -> list[Reading]:
+def told_by_likeness(matrix: sp.csr_array, d: int) -> list[Reading]:
     """Three readings where entries that vanished are not stored.
 
     Neighbouring rows that reach the same rows are taken for one node to find directions by; then a node ends where
@@ -125,6 +121,8 @@ def _by_likeness(matrix: sp.csr_array, d: int) -> list[Reading]:
     more, from those of whole nodes, which order leaves no choice: next to edges where symmetry planes meet, several
     nodes that lack a direction may agree on a wrong one.
     """
+    if matrix.shape[0] < 2 * d:
+        return []
     nobody = np.zeros(matrix.shape[0], dtype=bool)
     reached = reach(matrix)
     if next_to_likest(matrix, reached) < _IN_TURN:

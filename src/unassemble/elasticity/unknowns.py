@@ -8,6 +8,7 @@ tried first, whole and then with gaps; only where they fail is searched for node
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -16,8 +17,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, RecoveryError
 from .constants import annihilated_share, uncoupled_rows
-from .gaps import by_component_with_gaps, interleaved_with_gaps
-from .grouping import by_first_row, coupled_in_common, same_pattern
+from .gaps import by_component_with_gaps, interleaved_by_pattern, interleaved_with_gaps
+from .grouping import by_first_row, coupled_in_common, made_up, same_pattern
 from .numbering import Numbering
 from .orders import ORDERS, regular
 from .sampling import promising
@@ -155,7 +156,7 @@ def _best(readings: Iterable[Numbering | None]) -> Numbering | None:
 
 
 def _in_order(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
-    """The best of the numberings that need no search.
+    """The best of the numberings that need no search, or what patterns show in its place.
 
     A clear one whose nodes each couple to common nodes is the only such one, unless nearly all couple to all: rows of
     one node of two such numberings would couple to the same unknowns, and theirs, and so on.
@@ -166,7 +167,33 @@ def _in_order(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
         if one is not None and one.clear and one.common == 1 and 2 * matrix.nnz < matrix.shape[0] ** 2:
             return one
         found.append(one)
-    return _best(found)
+    best = _best(found)
+    return best if best is None or not best.clear or best.common == 1 else _with_gaps(matrix, best, sizes)
+
+
+def _with_gaps(matrix: sp.csr_array, regular: Numbering, sizes: tuple[int, ...]) -> Numbering:
+    """The numbering with gaps that patterns show in place of one without, where that one cannot be right.
+
+    Boundary nodes often come first, and rollers leave one unknown to each of many: taken in pairs, they fit in among
+    nodes that have all of theirs. Sums tell their directions, or they couple to no node in common. Where neither shows,
+    rows that couple to different nodes can be one node's all the same, as entries that vanished need not be stored.
+    """
+    if regular.kind == "interleaved":
+        told = interleaved_by_pattern(matrix, sizes)
+        found = [] if told is None else [told]
+    else:
+        found = by_component_with_gaps(matrix, sizes)
+    impossible = int(made_up(matrix, regular.node_of_row, regular.direction_of_row, regular.block_size).sum())
+    for one in found:
+        if one.common == 1 and not one.odd and (impossible or _contradicts(one, regular)):
+            return one
+    return replace(regular, odd=impossible)
+
+
+def _contradicts(one: Numbering, other: Numbering) -> bool:
+    """Whether a direction that sums prove is another one there."""
+    unlike = one.direction_of_row != other.direction_of_row
+    return bool((unlike if one.unnamed is None else unlike & ~one.unnamed).any())
 
 
 def _regular(matrix: sp.csr_array, d: int, kind: str, *, checked: bool = True) -> Numbering | None:
