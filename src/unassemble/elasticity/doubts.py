@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .grouping import by_first_row
 from .nodal import NodalMatrix, determined, without_trace
 from .numbering import Numbering
 
@@ -24,7 +25,7 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
         doubtful = np.zeros(nodal.n, dtype=bool)
         doubtful[numbering.node_of_row[unsure]] = True
         doubtful &= (nodal.row_of < 0).any(axis=1)
-        return replace(nodal, doubtful=doubtful) if doubtful.any() else nodal
+        return replace(nodal, doubtful=doubtful, fellows=_fellows(numbering, doubtful)) if doubtful.any() else nodal
     ordered = numbering.kind != "pattern" and numbering.common == 1 and not numbering.odd
     if numbering.kind == "given" or not numbering.incomplete or ordered:
         return nodal
@@ -41,6 +42,19 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     return replace(nodal, doubtful=doubtful)
 
 
+def _fellows(numbering: Numbering, doubtful: NDArray[np.bool_]) -> NDArray[np.int64] | None:
+    """(n,) labels of nodes that may belong together, doubtful ones of the same pattern; None where patterns do not tell.
+
+    Without them a half of a node would pass for one that lacks what its other half has.
+    """
+    if numbering.group is None:
+        return None
+    label = np.arange(len(doubtful))
+    rows = np.flatnonzero(doubtful[numbering.node_of_row])
+    label[numbering.node_of_row[rows]] = len(doubtful) + numbering.group[rows]
+    return by_first_row(label)
+
+
 def unconfirmed(
     nodal: NodalMatrix, numbering: Numbering, points: NDArray[np.float64], shown: NDArray[np.bool_] | None
 ) -> NDArray[np.bool_]:
@@ -51,6 +65,8 @@ def unconfirmed(
     together, all nodes are as good as doubtful.
     """
     if nodal.doubtful is None:
+        return np.zeros(nodal.n, dtype=bool)
+    if nodal.fellows is not None:  # halves were placed each by itself, and none was taken to lack what another has
         return np.zeros(nodal.n, dtype=bool)
     if numbering.open_row is not None:  # nothing was joined that order does not join
         return nodal.doubtful

@@ -72,7 +72,7 @@ def _with_nodes(
     if not shows_all(matrix, Reading(node, direction, open_row), d, ~identity):
         return None
     unnamed = ~proven_directions(matrix, direction, group, d) & ~identity
-    return replace(measured(matrix, node, direction, d), open_row=open_row, unnamed=unnamed)
+    return replace(measured(matrix, node, direction, d), open_row=open_row, unnamed=unnamed, group=group)
 
 
 def _set_right(
