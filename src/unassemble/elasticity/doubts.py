@@ -25,7 +25,10 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
         doubtful = np.zeros(nodal.n, dtype=bool)
         doubtful[numbering.node_of_row[unsure]] = True
         doubtful &= (nodal.row_of < 0).any(axis=1)
-        return replace(nodal, doubtful=doubtful, fellows=_fellows(numbering, doubtful)) if doubtful.any() else nodal
+        if doubtful.any():
+            nodal = replace(nodal, doubtful=doubtful, fellows=_fellows(numbering, doubtful))
+        if not _by_likeness(numbering):
+            return nodal
     ordered = numbering.kind != "pattern" and numbering.common == 1 and not numbering.odd
     if numbering.kind == "given" or not numbering.incomplete or ordered:
         return nodal
@@ -37,7 +40,7 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     alike = halves & (code[i] == code[j])
     apart = np.asarray(without_trace(nodal).any(axis=1))
     apart[i[alike]] = False
-    doubtful = np.zeros(nodal.n, dtype=bool)
+    doubtful = np.zeros(nodal.n, dtype=bool) if nodal.doubtful is None else nodal.doubtful.copy()
     doubtful[i[halves if apart.any() or numbering.common < 1 else alike]] = True
     return replace(nodal, doubtful=doubtful)
 
@@ -66,9 +69,11 @@ def unconfirmed(
     """
     if nodal.doubtful is None:
         return np.zeros(nodal.n, dtype=bool)
-    if nodal.fellows is not None:  # halves were placed each by itself, and none was taken to lack what another has
+    if nodal.fellows is not None and not _by_likeness(
+        numbering
+    ):  # halves were placed each by itself, and none was taken to lack what another has
         return np.zeros(nodal.n, dtype=bool)
-    if numbering.open_row is not None:  # nothing was joined that order does not join
+    if numbering.open_row is not None and not _by_likeness(numbering):  # nothing was joined that order does not join
         return nodal.doubtful
     outside = determined(points)
     if not _by_likeness(numbering):
