@@ -46,7 +46,7 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
 
 
 def _fellows(numbering: Numbering, doubtful: NDArray[np.bool_]) -> NDArray[np.int64] | None:
-    """(n,) labels of nodes that may belong together, doubtful ones of the same pattern; None where patterns do not tell.
+    """(n,) labels of nodes that may belong together: doubtful ones of one pattern. None where patterns do not tell.
 
     Without them a half of a node would pass for one that lacks what its other half has.
     """

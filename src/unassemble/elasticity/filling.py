@@ -55,7 +55,22 @@ def filled(matrix: sp.csr_array, label: NDArray[np.int64]) -> sp.csr_array:
         if more.nnz == matrix.nnz:
             break
         matrix, label = more, likest(more)
-    return matrix
+    return _shared(matrix, _with_the_same_others(matrix))
+
+
+def _with_the_same_others(matrix: sp.csr_array) -> NDArray[np.int64]:
+    """(N,) labels of rows that couple to the same unknowns but for their own.
+
+    Of two nodes whose directions change places when they do, x of one and y of the other are as like as can be, and
+    nothing may be stored between these two and the other two.
+    """
+    n = matrix.shape[0]
+    group = same_pattern(matrix, np.zeros(n, dtype=bool))
+    onto = sp.csr_array((np.ones(n, np.float32), (np.arange(n), group)), shape=(n, int(group.max()) + 1))
+    around = sp.csr_array(onto.T @ _pattern(matrix) @ onto)
+    around.setdiag(0)
+    around.eliminate_zeros()
+    return same_pattern(around, np.diff(around.indptr) == 0)[group]
 
 
 def filled_by_direction(
@@ -87,7 +102,8 @@ def filled_by_direction(
             if len(rows[c]) and len(rows[b]):
                 r, s, _ = partners(pattern, reached, rows[c], rows[b])
                 pairs.append(np.stack([rows[c][r], rows[b][s]]))
-        more = _shared(matrix, _linked(*np.hstack(pairs), label))
+        first, second = np.hstack(pairs)
+        more = _shared(matrix, _linked(first, second, label))
         if more.nnz == matrix.nnz:
             break
         matrix = more

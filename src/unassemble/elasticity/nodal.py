@@ -146,7 +146,7 @@ def valid_pairs(nodal: NodalMatrix, *, strict: bool = True, inferred: bool = Fal
     valid = np.asarray(zero & ~penalty & present[:, :, None] & present[:, None, :] & (nodal.size > 0)[:, None, None])
     if not strict:
         return valid
-    whole = _shared(nodal, (zero | ~present[:, :, None]).all(axis=1))
+    whole = _shared(nodal, np.asarray((zero | ~present[:, :, None]).all(axis=1)))
     lacking = nodal.graph @ eliminated(nodal).astype(float)
     if inferred:
         valid |= penalty & valid.any(axis=1, keepdims=True)
@@ -196,7 +196,7 @@ def surrounded(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_
     """
     present = nodal.row_of >= 0
     lacking = nodal.graph @ eliminated(nodal).astype(float) > 0
-    whole = _shared(nodal, (valid | ~present[:, :, None]).all(axis=1))
+    whole = _shared(nodal, np.asarray((valid | ~present[:, :, None]).all(axis=1)))
     return np.asarray((whole | lacking | ~present).all(axis=1) & (whole & present & ~lacking).any(axis=1))
 
 

@@ -16,11 +16,10 @@ from .extension import extended_directions
 from .filling import filled, filled_by_direction, likest
 from .grouping import possible_nodes, same_pattern
 from .numbering import Numbering, measured
-from .orders import Reading
 from .patterns import by_direction
 from .row_positions import placed_together, single_nodes
 from .sums import names_of, set_right
-from .traces import shows_all, unaccounted
+from .traces import unaccounted
 
 _ORDERED = 0.3  # share of neighbouring rows with the same pattern: 2/3 node by node, some more where nodes share one
 _SETTLED = 0.9  # share of whole rows that have to annihilate translations
@@ -50,8 +49,7 @@ def scattered(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
         direction, share = extended_directions(matrix, group, ~identity, d)
         if share > _SETTLED and _even_share(matrix, group, direction, ~identity, d) > _EVEN:
             direction = _set_right(matrix, group, direction, ~identity, d)
-            found = _with_nodes(matrix, matrix, group, direction, identity, d)
-            return found if shows_all(matrix, _reading(found), d, ~identity) else None
+            return _with_nodes(matrix, matrix, group, direction, identity, d)
     return None
 
 
@@ -70,18 +68,15 @@ def scattered_without_zeros(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Num
     identity = uncoupled_rows(matrix)
     start = likest(matrix)
     whole = filled(matrix, start)
-    single = np.arange(len(start))
     for d in sizes:
         direction, share = extended_directions(whole, start, ~identity, d, sure=False)
         if share <= _SETTLED:
             continue
-        direction = _set_right(whole, single, direction, ~identity, d)
         more = filled_by_direction(whole, direction, ~identity, d)
         group = same_pattern(more, identity)
+        direction = _set_right(more, group, direction, ~identity, d)
         if _even_share(more, group, direction, ~identity, d) > _EVEN:
-            found = _with_nodes(matrix, more, group, direction, identity, d)
-            lost = unaccounted(more, ~identity, found.node_of_row, direction, d).any(axis=1)
-            return replace(found, open_row=found.open_row | lost[found.node_of_row])
+            return _with_nodes(matrix, more, group, direction, identity, d)
     return None
 
 
@@ -106,16 +101,20 @@ def _with_nodes(
     direction: NDArray[np.int64],
     identity: NDArray[np.bool_],
     d: int,
-) -> Numbering:
-    """Nodes of rows whose directions are known; `whole` is the matrix with zeros, by which rows are grouped."""
+) -> Numbering | None:
+    """Nodes of rows whose directions are known; `whole` is the matrix with zeros, by which rows are grouped.
+
+    None where no zeros were put back, but some node lacks a direction without a trace that no other row offers.
+    """
     node = single_nodes(group, direction, d)
     node, open_row = placed_together(whole, ~identity, group, node, direction, d)
+    lost = np.asarray(unaccounted(whole, ~identity, node, direction, d).any(axis=1))[node]
+    if whole is not matrix:
+        open_row |= lost
+    elif (lost & (np.bincount(node, open_row)[node] == 0)).any():
+        return None
     unnamed = ~proven_directions(whole, direction, group, d) & ~identity
     return replace(measured(matrix, node, direction, d), open_row=open_row, unnamed=unnamed, group=group)
-
-
-def _reading(found: Numbering) -> Reading:
-    return Reading(found.node_of_row, found.direction_of_row, found.open_row)
 
 
 def _set_right(
