@@ -23,7 +23,7 @@ _GROWTH = 0.4  # share of rows to add at a time
 _CLEAR = 0.8  # how far apart the values of a row's two best directions are where there is no doubt
 _SEEDS = (0.5, 0.4, 0.6, 0.3, 0.7, 0.15, 0.85, 0.05, 0.95)  # nodes to start from, as parts of the way through a body
 _ROUNDS = 6
-_SETTLED = 0.98  # share of the whole rows whose sums vanish in all directions: single ones may add up by chance
+SETTLED = 0.98  # share of the whole rows whose sums vanish in all directions: single ones may add up by chance
 
 
 def extended_directions(
@@ -103,7 +103,7 @@ class _Body:
                 before, known = count, np.where(self._vouched(good), direction, -1)
             if not self._sure and most and _merged(best, self._d):
                 best, most = np.zeros(len(self._size), np.int64), 0
-            if most >= _SETTLED * hope:
+            if most >= SETTLED * hope:
                 break
         return best, most
 

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .constants import adding_up, proven_directions, row_sizes, uncoupled_rows, with_penalty
-from .extension import extended_directions
+from .extension import SETTLED, extended_directions
 from .filling import filled, filled_by_direction, likest
 from .grouping import possible_nodes, same_pattern
 from .numbering import Numbering, measured
@@ -70,6 +70,12 @@ def scattered_without_zeros(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Num
     whole = filled(matrix, start)
     for d in sizes:
         direction, share = extended_directions(whole, start, ~identity, d, sure=False)
+        if share < SETTLED:
+            direction, share = max(
+                (direction, share),
+                extended_directions(whole, same_pattern(whole, identity), ~identity, d),
+                key=lambda one: one[1],
+            )
         if share <= _SETTLED:
             continue
         more = filled_by_direction(whole, direction, ~identity, d)
