@@ -91,7 +91,8 @@ def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solu
     if "hourglass" in solution.freedoms and about_open_rows(numbering):
         return about_open_rows(numbering)
     odd = int(np.asarray(without_trace(nodal).any(axis=1)).sum()) if numbering.open_row is None else 0
-    if not odd and numbering.incomplete and numbering.open_row is None and "hourglass" in solution.freedoms:
+    inferred = numbering.kind == "pattern" and numbering.incomplete and numbering.open_row is None
+    if not odd and inferred and "hourglass" in solution.freedoms:
         return (
             "supports leave too few rows that are surely whole to tell which rows belong to one node, and to which "
             "direction, and fields are left that move rows of one direction only, as where rows of one node were not "
