@@ -94,9 +94,8 @@ def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solu
     inferred = numbering.kind == "pattern" and numbering.incomplete and numbering.open_row is None
     if not odd and inferred and "hourglass" in solution.freedoms:
         return (
-            "supports leave too few rows that are surely whole to tell which rows belong to one node, and to which "
-            "direction, and fields are left that move rows of one direction only, as where rows of one node were not "
-            "joined; give the numbering if it is known"
+            "which rows belong to one node, and to which direction, was inferred, and fields are left that move rows "
+            "of one direction only, as where rows of one node were not joined; give the numbering if it is known"
         )
     if not odd:
         return ""
