@@ -8,6 +8,7 @@ from assembled import box, heterogeneous, permuted_nodes, stiffness
 from supported import Given, given, judged
 
 from unassemble.elasticity import recover_elasticity
+from unassemble.elasticity.constants import uncoupled_rows
 from unassemble.elasticity.grouping import same_pattern
 from unassemble.elasticity.identities import identities
 from unassemble.elasticity.nodal import nodal_matrix
@@ -88,6 +89,41 @@ def test_as_many_rows_of_two_directions_need_not_be_those_of_the_same_nodes():
     left = equations_of_patterns(with_two_rows_gone(body("quad-q2", "free", perturb=0.2)), True)
     assert len(left) > 10
     assert np.abs(left).max() < 1e-12
+
+
+def exchanged(case, place, direction):
+    """Nodes of rows after the two of one pattern nearest to a place have exchanged their rows of a direction."""
+    node = np.unique(case.node, return_inverse=True)[1]
+    group = same_pattern(case.matrix, uncoupled_rows(case.matrix))
+    several = np.array([len(np.unique(node[group == one])) == 2 for one in range(group.max() + 1)])
+    away = np.where(several[group], np.linalg.norm(case.points[case.node] - place, axis=1), np.inf)
+    first, second = np.unique(node[group == group[np.argmin(away)]])
+    rows = np.flatnonzero(np.isin(node, (first, second)) & (case.direction == direction))
+    again = node.copy()
+    again[rows] = np.where(node[rows] == first, second, first)
+    return again, np.isin(node, (first, second))
+
+
+def test_rows_next_to_several_supports_can_change_places():
+    """The identities hold for these as well, with other positions: they do not tell which rows are one node's."""
+    case = body("quad-s2", "several")
+    with pytest.raises(GeometryError, match="neither order nor positions tell which of them belong together"):
+        recover_elasticity(case.matrix)
+    node = np.unique(case.node, return_inverse=True)[1]
+    other, moved = exchanged(case, (0.6, 0.94), 0)
+    found, rival = (
+        recover_elasticity(case.matrix, numbering=given_numbering(case.matrix, one, case.direction))
+        for one in (node, other)
+    )
+    assert found.certified
+    assert not rival.certified
+    assert rival.backward_error < 1e-9
+    first, second = (one.points[one.node_of_row] for one in (found, rival))
+    known = np.isfinite(first + second).all(axis=1)
+    assert known[moved].all()
+    design = np.column_stack([second[known].ravel(), np.tile(np.eye(2), (known.sum(), 1))])
+    fit = np.linalg.lstsq(design, first[known].ravel())[0]
+    assert np.abs(design @ fit - first[known].ravel()).max() > 0.01  # of the mean edge length
 
 
 def mistaken(case, first, second, left_over):

@@ -1,5 +1,7 @@
 """Rows in random order: directions spread by translations in equilibrium, nodes told by where their rows lie."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -10,8 +12,10 @@ from unassemble.elasticity import recover_elasticity
 from unassemble.elasticity.constants import uncoupled_rows
 from unassemble.elasticity.extension import extended_directions
 from unassemble.elasticity.grouping import same_pattern
+from unassemble.elasticity.nodal import eliminated, nodal_matrix
 from unassemble.elasticity.row_positions import placed_together, single_nodes
 from unassemble.elasticity.scattered import scattered
+from unassemble.elasticity.unknowns import find_numbering, given_numbering
 
 
 def quadratic(kind, support, order="at random", counts=(3, 3, 4)):
@@ -68,6 +72,34 @@ def test_quadratic_solids_come_back_with_rows_at_random(kind, support, missing):
     assert truth.error < 1e-10
     assert truth.missing <= missing
     assert truth.split == 0
+
+
+@pytest.mark.parametrize(
+    ("support", "perturb", "counts", "missing"),
+    [("roller", 0.2, (3, 3, 4), 0.0), ("symmetry", 0.0, (4, 4, 4), 0.03), ("symmetry", 0.2, (4, 4, 4), 0.2)],
+)
+def test_halves_do_not_pass_for_nodes_that_lack_a_direction(support, perturb, counts, missing):
+    """Most rows next to a support have no position of their own; what their fellows lack is counted by pattern."""
+    body = permuted_nodes(stiffness("hex-s2", box("hex-s2", counts, perturb=perturb), lam=1.5), seed=1)
+    case = given(body, support, "at random", "stored")
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert find_numbering(case.matrix).n_nodes > len(np.unique(case.node))
+    assert found.certified
+    assert truth.error < 1e-10
+    assert truth.missing <= missing
+    assert truth.split == 0
+
+
+def test_what_a_pattern_lacks_is_counted():
+    """Three rows each of y and z, two of x: one of the three nodes lacks x, so that all that touch them may miss it."""
+    direction = np.array([0, 0, 1, 1, 1, 2, 2, 2])
+    present = np.arange(8)[:, None] * (np.arange(3) == direction[:, None]) - (np.arange(3) != direction[:, None])
+    matrix = np.ones((8, 8))  # no row adds up to zero, so that no direction is missed without a trace
+    one = nodal_matrix(sp.csr_array(matrix), given_numbering(sp.csr_array(matrix), np.arange(8), direction))
+    assert (eliminated(one) == (present < 0)).all()
+    fellows = replace(one, fellows=np.zeros(8, np.int64))
+    assert (eliminated(fellows) == ((present < 0) & (np.arange(3) == 0))).all()
 
 
 def test_rows_in_order_are_left_to_their_order():

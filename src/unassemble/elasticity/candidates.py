@@ -32,7 +32,9 @@ class Block:
     cells: NDArray[np.int64]
 
 
-def candidates(graph: Graph, points: NDArray[np.float64], complete: NDArray[np.bool_]) -> Iterator[tuple[Block, ...]]:
+def candidates(
+    graph: Graph, points: NDArray[np.float64], complete: NDArray[np.bool_], *, linear_simplices: bool = True
+) -> Iterator[tuple[Block, ...]]:
     """What could be the cells, those kinds first that have most nodes: of one kind, then simplices beside boxes.
 
     Parameters
@@ -43,10 +45,13 @@ def candidates(graph: Graph, points: NDArray[np.float64], complete: NDArray[np.b
         NaN where not determined; such nodes are in no cell.
     complete : (n,) bool
         Nodes all of whose cells are there.
+    linear_simplices : bool
+        Whether to look for these, too; of some graphs there are many.
     """
     d, known = points.shape[1], int(determined(points).sum())
     boxes, simplex = None, None
-    for kind in sorted((kind for kind in KINDS.values() if kind.dim == d), key=lambda kind: -kind.nodes):
+    kinds = [kind for kind in KINDS.values() if kind.dim == d and (linear_simplices or not kind.linear_simplex)]
+    for kind in sorted(kinds, key=lambda kind: -kind.nodes):
         if kind.linear_simplex:
             simplex = kind
             if len(graph.row) + graph.n <= graph.n * _LINEAR[d]:

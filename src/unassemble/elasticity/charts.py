@@ -78,7 +78,7 @@ def chart(
     with nearly_singular(UpperTriangle.of(local.normal_matrix()), _SHIFTS) as solver:
         while True:
             fields, values = _least_fields(local, solver, count)
-            if count == n * d or count >= 256 or values[-1] > (1e-7 if whole else _STIFF):
+            if count == n * d or count >= 256 or values[-1] > (1e-6 if whole else _STIFF):
                 break
             count = min(2 * count, n * d)
         if not whole:

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .grouping import by_first_row
 from .nodal import NodalMatrix, annihilating, determined, without_trace
 from .numbering import Numbering
 from .orders import ORDERS
@@ -27,7 +28,10 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
         doubtful = np.zeros(nodal.n, dtype=bool)
         doubtful[numbering.node_of_row[unsure]] = True
         doubtful &= (nodal.row_of < 0).any(axis=1)
-        return replace(nodal, doubtful=doubtful) if doubtful.any() else nodal
+        if doubtful.any():
+            nodal = replace(nodal, doubtful=doubtful, fellows=_fellows(numbering, doubtful))
+        if not _by_likeness(numbering):
+            return nodal
     if numbering.kind in ORDERS and not numbering.incomplete:
         doubtful = _mixed(nodal) if numbering.common < 1 else np.zeros(nodal.n, dtype=bool)
         return replace(nodal, doubtful=doubtful) if doubtful.any() else nodal
@@ -42,10 +46,23 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     alike = halves & (code[i] == code[j])
     apart = np.asarray(without_trace(nodal).any(axis=1))
     apart[i[alike]] = False
-    doubtful = np.zeros(nodal.n, dtype=bool)
+    doubtful = np.zeros(nodal.n, dtype=bool) if nodal.doubtful is None else nodal.doubtful.copy()
     doubtful[i[halves if apart.any() or numbering.common < 1 else alike]] = True
     around = np.asarray(nodal.graph @ doubtful.astype(float) > 0)  # even the directions of such rows were searched for
     return replace(nodal, doubtful=doubtful, blurred=around if nodal.blurred is None else nodal.blurred | around)
+
+
+def _fellows(numbering: Numbering, doubtful: NDArray[np.bool_]) -> NDArray[np.int64] | None:
+    """(n,) labels of nodes that may belong together: doubtful ones of one pattern. None where patterns do not tell.
+
+    Without them a half of a node would pass for one that lacks what its other half has.
+    """
+    if numbering.group is None:
+        return None
+    label = np.arange(len(doubtful))
+    rows = np.flatnonzero(doubtful[numbering.node_of_row])
+    label[numbering.node_of_row[rows]] = len(doubtful) + numbering.group[rows]
+    return by_first_row(label)
 
 
 def unconfirmed(
@@ -59,7 +76,11 @@ def unconfirmed(
     """
     if nodal.doubtful is None:
         return np.zeros(nodal.n, dtype=bool)
-    if numbering.open_row is not None:  # nothing was joined that order does not join
+    if nodal.fellows is not None and not _by_likeness(
+        numbering
+    ):  # halves were placed each by itself, and none was taken to lack what another has
+        return np.zeros(nodal.n, dtype=bool)
+    if numbering.open_row is not None and not _by_likeness(numbering):  # nothing was joined that order does not join
         return nodal.doubtful
     outside = determined(points)
     if not _by_likeness(numbering):

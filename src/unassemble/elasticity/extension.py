@@ -23,11 +23,11 @@ _GROWTH = 0.4  # share of rows to add at a time
 _CLEAR = 0.8  # how far apart the values of a row's two best directions are where there is no doubt
 _SEEDS = (0.5, 0.4, 0.6, 0.3, 0.7, 0.15, 0.85, 0.05, 0.95)  # nodes to start from, as parts of the way through a body
 _ROUNDS = 6
-_SETTLED = 0.98  # share of the whole rows whose sums vanish in all directions: single ones may add up by chance
+SETTLED = 0.98  # share of the whole rows whose sums vanish in all directions: single ones may add up by chance
 
 
 def extended_directions(
-    matrix: sp.csr_array, group: NDArray[np.int64], live: NDArray[np.bool_], d: int
+    matrix: sp.csr_array, group: NDArray[np.int64], live: NDArray[np.bool_], d: int, *, sure: bool = True
 ) -> tuple[NDArray[np.int64], float]:
     """Directions of all rows, and the share of the whole rows that annihilate translations with them.
 
@@ -36,10 +36,12 @@ def extended_directions(
     matrix : (N, N) sparse
         Symmetric.
     group : (N,) int64
-        Rows that couple to the same unknowns. Those of d whole rows are nodes.
+        Rows that couple to the same unknowns. Those of d whole rows are nodes; if that is not `sure`, they are places
+        to start from and no more.
     live : (N,) bool
         Rows that count; those of the identity do not.
     d : int
+    sure : bool
     """
     direction = np.zeros(len(group), np.int64)
     rows = np.flatnonzero(live)
@@ -49,7 +51,7 @@ def extended_directions(
     right = total = 0
     for piece in range(int(label.max(initial=-1)) + 1):
         part = np.flatnonzero(label == piece)
-        body = _Body(inner[part][:, part], np.unique(group[rows[part]], return_inverse=True)[1], d)
+        body = _Body(inner[part][:, part], np.unique(group[rows[part]], return_inverse=True)[1], d, sure)
         direction[rows[part]], count = body.directions()
         right, total = right + count, total + int(body.telling.sum())
     return direction, right / total if total else 0.0
@@ -58,7 +60,7 @@ def extended_directions(
 class _Body:
     """One piece: its matrix with the signs of a stiffness, penalties replaced by what makes their rows whole."""
 
-    def __init__(self, matrix: sp.csr_array, group: NDArray[np.int64], d: int):
+    def __init__(self, matrix: sp.csr_array, group: NDArray[np.int64], d: int, sure: bool):
         n, own = matrix.shape[0], matrix.diagonal()
         size = row_sizes(matrix)
         penalised = with_penalty(matrix, size)
@@ -78,8 +80,9 @@ class _Body:
         nodes = order[many[order] == d].reshape(-1, d)
         self._nodes = nodes[adds_up[nodes].all(axis=1)]
         alone = np.ones(n, dtype=bool)
-        alone[self._nodes] = False
-        self._members = [np.flatnonzero(alone)[:, None], self._nodes]
+        alone[self._nodes] = not sure
+        self._sure = sure
+        self._members = [np.flatnonzero(alone)[:, None], self._nodes[: len(self._nodes) if sure else 0]]
         self._names = [names_of(d)[0], names_of(d)[-1]]
 
     def directions(self) -> tuple[NDArray[np.int64], int]:
@@ -98,7 +101,9 @@ class _Body:
                 if count <= before or count == hope or not count:
                     break
                 before, known = count, np.where(self._vouched(good), direction, -1)
-            if most >= _SETTLED * hope:
+            if not self._sure and most and _merged(best, self._d):
+                best, most = np.zeros(len(self._size), np.int64), 0
+            if most >= SETTLED * hope:
                 break
         return best, most
 
@@ -156,3 +161,12 @@ class _Body:
         link = sp.csr_array((np.ones(told.sum(), np.int8), (entry.row[told] + n, entry.col[told])), shape=(2 * n,) * 2)
         label = sp.csgraph.connected_components(link, directed=False)[1][:n]
         return np.asarray(label == np.argmax(np.bincount(label)))
+
+
+def _merged(direction: NDArray[np.int64], d: int) -> bool:
+    """Whether there are far more rows of one direction than of another: two were taken for one, whose sums vanish too.
+
+    That is what comes of rows to start from that are not those of one node.
+    """
+    count = np.bincount(direction, minlength=d)
+    return bool(2 * count.min() < count.max())

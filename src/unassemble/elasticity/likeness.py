@@ -15,6 +15,8 @@ _AT_ONCE = 1 << 22  # entries of the reach to multiply at a time
 SAME = 1e-6  # single precision
 _SAMPLE = 100
 _FEW = 0.08  # share of pairs of rows whose likeness may be an exception
+_DENSE = 6000  # rows up to which all cosines fit in memory, 144 MB
+_CHEAP = 100  # how much cheaper a product of dense matrices is than one of as many entries of sparse ones
 _MOST = 60_000_000  # entries of a reach beyond which it is not taken a step further
 
 
@@ -37,6 +39,10 @@ def reach(matrix: sp.csr_array, steps: int = _STEPS) -> sp.csr_array:
 
 def alike(reached: sp.csr_array, r: NDArray, s: NDArray) -> NDArray[np.float64]:
     """(k,) cosines between the reaches of rows r and s."""
+    order = reached.shape[0]
+    if order <= _DENSE and order**3 < _CHEAP * len(r) * (reached.nnz / order):
+        whole = reached.toarray()
+        return np.asarray((whole @ whole.T)[r, s], dtype=np.float64)
     step = max(int(_AT_ONCE / max(reached.nnz / max(reached.shape[0], 1), 1)), 1)
     parts = [
         np.asarray(reached[r[k : k + step]].multiply(reached[s[k : k + step]]).sum(axis=1), dtype=np.float64).ravel()

@@ -45,6 +45,8 @@ class Numbering:
         nor order decides.
     unnamed : (N,) bool, optional
         Rows whose direction nothing proves.
+    group : (N,) int64, optional
+        Rows that couple to the same unknowns, among which open rows have their fellows.
     """
 
     block_size: int
@@ -57,6 +59,7 @@ class Numbering:
     odd: int = 0
     open_row: NDArray[np.bool_] | None = None
     unnamed: NDArray[np.bool_] | None = None
+    group: NDArray[np.int64] | None = None
 
     @property
     def incomplete(self) -> bool:

@@ -161,10 +161,8 @@ def _least(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np
 def _boxes(nodal: NodalMatrix, inside: NDArray[np.bool_], rough: NDArray[np.float64]) -> Block | None:
     """The cells that a picture shows, where they have more nodes than an affine map needs."""
     complete = np.asarray(inside.all(axis=(1, 2)))
-    for blocks in candidates(coupled(nodal, rough), rough, complete):
-        if len(blocks) == 1 and not blocks[0].kind.linear_simplex:
-            return blocks[0]
-    return None
+    found = candidates(coupled(nodal, rough), rough, complete, linear_simplices=False)
+    return next((blocks[0] for blocks in found), None)
 
 
 def _bending(block: Block, nodes: NDArray[np.int64], functions: NDArray[np.float64]) -> NDArray[np.float64]:

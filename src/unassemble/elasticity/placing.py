@@ -136,6 +136,6 @@ def pieces_of(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.
 
 def _evidence(found: NullFields, one: Shape) -> Evidence:
     d = found.fields.shape[1]
-    null = max(int((found.values <= EXACT).sum()), d + 1)
+    null = max(one.null, d + 1)
     gap = float(found.values[null]) if null < len(found.values) else float("inf")
     return Evidence(one.dimension, float(found.values[d]), gap, found.rows)

@@ -1,4 +1,7 @@
-"""Unknowns that stand in no order, in matrices that store entries even where they vanish."""
+"""Unknowns that stand in no order: directions spread from one node, and rows of one pattern make up nodes.
+
+Where entries that vanished are not stored they are put back first, as far as likeness tells.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +12,14 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .constants import adding_up, proven_directions, row_sizes, uncoupled_rows, with_penalty
-from .extension import extended_directions
+from .extension import SETTLED, extended_directions
+from .filling import filled, filled_by_direction, likest
 from .grouping import possible_nodes, same_pattern
 from .numbering import Numbering, measured
-from .orders import Reading
 from .patterns import by_direction
 from .row_positions import placed_together, single_nodes
 from .sums import names_of, set_right
-from .traces import shows_all
+from .traces import unaccounted
 
 _ORDERED = 0.3  # share of neighbouring rows with the same pattern: 2/3 node by node, some more where nodes share one
 _SETTLED = 0.9  # share of whole rows that have to annihilate translations
@@ -45,7 +48,41 @@ def scattered(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
             continue  # rows of one node do not show by their pattern
         direction, share = extended_directions(matrix, group, ~identity, d)
         if share > _SETTLED and _even_share(matrix, group, direction, ~identity, d) > _EVEN:
-            return _with_nodes(matrix, group, direction, identity, d)
+            direction = _set_right(matrix, group, direction, ~identity, d)
+            return _with_nodes(matrix, matrix, group, direction, identity, d)
+    return None
+
+
+def scattered_without_zeros(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
+    """The same where entries that vanished are not stored, and put back; None where it does not settle directions.
+
+    Nothing but likeness says then which rows belong together. Rows of nodes that lack a direction without a trace are
+    left open.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+    sizes : tuple of int
+        Block sizes to try.
+    """
+    identity = uncoupled_rows(matrix)
+    start = likest(matrix)
+    whole = filled(matrix, start)
+    for d in sizes:
+        direction, share = extended_directions(whole, start, ~identity, d, sure=False)
+        if share < SETTLED:
+            direction, share = max(
+                (direction, share),
+                extended_directions(whole, same_pattern(whole, identity), ~identity, d),
+                key=lambda one: one[1],
+            )
+        if share <= _SETTLED:
+            continue
+        more = filled_by_direction(whole, direction, ~identity, d)
+        group = same_pattern(more, identity)
+        direction = _set_right(more, group, direction, ~identity, d)
+        if _even_share(more, group, direction, ~identity, d) > _EVEN:
+            return _with_nodes(matrix, more, group, direction, identity, d)
     return None
 
 
@@ -64,15 +101,26 @@ def _even_share(
 
 
 def _with_nodes(
-    matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], identity: NDArray[np.bool_], d: int
+    matrix: sp.csr_array,
+    whole: sp.csr_array,
+    group: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    identity: NDArray[np.bool_],
+    d: int,
 ) -> Numbering | None:
-    direction = _set_right(matrix, group, direction, ~identity, d)
+    """Nodes of rows whose directions are known; `whole` is the matrix with zeros, by which rows are grouped.
+
+    None where no zeros were put back, but some node lacks a direction without a trace that no other row offers.
+    """
     node = single_nodes(group, direction, d)
-    node, open_row = placed_together(matrix, ~identity, group, node, direction, d)
-    if not shows_all(matrix, Reading(node, direction, open_row), d, ~identity):
+    node, open_row = placed_together(whole, ~identity, group, node, direction, d)
+    lost = np.asarray(unaccounted(whole, ~identity, node, direction, d).any(axis=1))[node]
+    if whole is not matrix:
+        open_row |= lost
+    elif (lost & (np.bincount(node, open_row)[node] == 0)).any():
         return None
-    unnamed = ~proven_directions(matrix, direction, group, d) & ~identity
-    return replace(measured(matrix, node, direction, d), open_row=open_row, unnamed=unnamed)
+    unnamed = ~proven_directions(whole, direction, group, d) & ~identity
+    return replace(measured(matrix, node, direction, d), open_row=open_row, unnamed=unnamed, group=group)
 
 
 def _set_right(

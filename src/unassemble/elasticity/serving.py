@@ -108,7 +108,7 @@ def _flat(found: ElasticityRecovery) -> bool:
     for piece in range(len(found.evidence)):
         x = found.points[found.component == piece]
         spread = np.linalg.eigvalsh(np.cov(x.T, bias=True)) if len(x) > d else np.zeros(d)
-        if spread[0] <= _THIN * spread[-1]:
+        if spread[0] <= _THIN * max(spread[-1], 1.0):  # mean edges have length one: in a single point all is rounding
             return True
     return False
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..errors import GeometryError
 
 EXACT = 1e-9  # singular values below this are zero; matrices are rounded to 1e-16, gaps are 1e-4 and more
+SOFT = 2e-7  # singular values at which entries rounded to 1e-15 still give coordinates to 1e-8
 _FEW = 0.25  # share of nodes that may be loose although rows of their own are valid
 _MOST = 0.75  # share of the nodes that no plane across an axis holds
 _LOOSE = 1e-7  # a field this small at most nodes leaves these alone
@@ -34,6 +35,8 @@ class Shape:
         What remains beyond translation and scale.
     exact : bool
         Whether the field is a null field, not only the best one.
+    null : int
+        Fields that count as null fields, those of loose nodes among them.
     """
 
     points: NDArray[np.float64]
@@ -41,6 +44,7 @@ class Shape:
     dimension: int
     freedom: str
     exact: bool
+    null: int
 
 
 def shape(
@@ -75,19 +79,23 @@ def shape(
         raise GeometryError(f"{n} nodes with valid rows are too few to tell their positions")
     common = d + 1 if common is None else common
     exact = values[d] <= EXACT
-    null = fields[..., values <= EXACT] if exact else fields[..., : d + 1]
-    loose = np.zeros(n, dtype=bool)
-    if null.shape[2] > common:
-        shared, apart = set_aside(null, common)
+    count = int((values <= EXACT).sum()) if exact else d + 1
+    null, loose = fields[..., :count], np.zeros(n, dtype=bool)
+    soft = int((values <= SOFT).sum()) if exact else count
+    for some in dict.fromkeys((soft, count)):  # nodes that alone can move almost freely are as good as loose
+        if some <= common:
+            continue
+        shared, apart = set_aside(fields[..., :some], common)
         few = _FEW * n >= np.count_nonzero(apart)  # the others are determined, whatever these do
-        if few or 2 * np.count_nonzero(told & apart) <= np.count_nonzero(apart):
-            null, loose = shared, apart
+        if apart.any() and (few or 2 * np.count_nonzero(told & apart) <= np.count_nonzero(apart)):
+            null, loose, count = shared, apart, some
+            break
     kept = null[~loose]
     moving = _without_translations(kept)
     dimension = d + moving.shape[2] if exact else d
     points = np.full((n, d), np.nan)
     points[~loose], freedom = _choose(moving, graph[~loose][:, ~loose], exact=bool(exact))
-    return Shape(points, loose, dimension, freedom, bool(exact))
+    return Shape(points, loose, dimension, freedom, bool(exact), count)
 
 
 def set_aside(null: NDArray, common: int) -> tuple[NDArray, NDArray[np.bool_]]:

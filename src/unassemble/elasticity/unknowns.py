@@ -22,7 +22,7 @@ from .grouping import by_first_row, coupled_in_common, made_up, same_pattern
 from .numbering import Numbering
 from .orders import ORDERS, regular
 from .sampling import promising
-from .scattered import scattered
+from .scattered import scattered, scattered_without_zeros
 from .searching import searched
 
 __all__ = [
@@ -73,7 +73,8 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
         if not clear and (matrix.shape[0] <= _LARGE or promising(matrix, sizes)):
             best = _best([best, *interleaved_with_gaps(matrix, sizes)])
             if best is None or not best.sound:
-                best = _best([best, *searched(matrix, sizes)])
+                apart = scattered_without_zeros(matrix, sizes)
+                best = _best([best, *searched(matrix, sizes)]) if apart is None else apart
     if best is None:
         raise RecoveryError(
             f"no numbering with {block_size or '2 or 3'} unknowns per node makes the rows annihilate translations: "

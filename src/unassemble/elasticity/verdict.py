@@ -10,10 +10,10 @@ from ..words import count_of
 from .cells import Cells
 from .nodal import NodalMatrix, without_trace
 from .numbering import Numbering
+from .shape import SOFT
 from .solution import Solution
 
 CERTIFIED = 1e-9
-_NEARLY = 2e-7  # gap at which entries rounded to 1e-15 still give coordinates to 1e-8
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
 
 
@@ -91,6 +91,12 @@ def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solu
     if "hourglass" in solution.freedoms and about_open_rows(numbering):
         return about_open_rows(numbering)
     odd = int(np.asarray(without_trace(nodal).any(axis=1)).sum()) if numbering.open_row is None else 0
+    inferred = numbering.kind == "pattern" and numbering.incomplete and numbering.open_row is None
+    if not odd and inferred and "hourglass" in solution.freedoms:
+        return (
+            "which rows belong to one node, and to which direction, was inferred, and fields are left that move rows "
+            "of one direction only, as where rows of one node were not joined; give the numbering if it is known"
+        )
     if not odd:
         return ""
     return (
@@ -136,7 +142,7 @@ def verdict(
     if remaining:
         return "uncertified", f"the null space is larger than it should be: {remaining[0]}{_unless(nodal, numbering)}"
     nearly = min((one.gap for one in solution.evidence if one.gap > 0 and not one.settled), default=1.0)
-    if solution.exact and nearly < _NEARLY:
+    if solution.exact and nearly < SOFT:
         return "uncertified", (
             f"a field that is no translation or scale satisfies the identities up to {nearly:.1e}: nodes that it moves "
             "feel the rounding of entries, magnified by as much, and may be wrong by more than 1e-8: nodes that few "
