@@ -145,8 +145,9 @@ def ambiguous(others: list[Alternative], certificate: Certificate) -> tuple[str,
 def all_alike(certificate: Certificate) -> tuple[str, str]:
     """The status and reason of pieces that fit, as others would."""
     return "uncertified", (
-        f"the mesh gives the matrix back to {certificate.backward_error:.1e}, but where all entries are equal small "
-        "pieces that hang together at vertices may as well be others, with another factor c: known, it decides"
+        f"the mesh gives the matrix back to {certificate.backward_error:.1e}, but where all entries have one or two "
+        "sizes, or twice that, small pieces that hang together at vertices may as well be others, with another factor "
+        "c: known, it decides"
     )
 
 

@@ -145,7 +145,11 @@ def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> 
         if drawing is not None:
             yield Candidates.of(drawing, weights, scale, crosses)
     for drawing in face_complexes(n, edges):
-        yield Candidates.of(drawing, weights, scale)
+        candidates = Candidates.of(drawing, weights, scale)
+        yield candidates
+        guess = None if scale is not None else candidates.other_scale()
+        if guess is not None:
+            yield Candidates.of(drawing, weights, guess=guess)
 
 
 def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
