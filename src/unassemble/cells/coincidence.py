@@ -10,16 +10,14 @@ from ..topology import Topology
 from .doubt import components_of
 
 _EQUAL = 1e-9
-_FEW = 2  # sizes of entries: those of congruent cells, right triangles for one, on sides of two lengths
 
 
 def coincident(stored: OperatorMatrix, topology: Topology) -> NDArray[np.bool_]:
-    """(pieces,) pieces whose cells other cells may replace, since entries have few sizes.
+    """(pieces,) pieces whose cells other cells may replace, since all entries are equal.
 
     A piece with no more entries, vanished ones counted, than coordinates and c fits by itself. That several hang
-    together and have one c is evidence, but not where they have it because they are alike. Congruent cells give an
-    edge one of few numbers, or twice that if it lies between two of them: squares, and halves of squares, have the
-    same c wherever they are put, and so have right triangles cut from the sides of a tiling by octagons.
+    together and have one c is evidence, but not where all entries of the component are equal: squares, and halves of
+    squares, have the same c wherever they are put.
 
     Parameters
     ----------
@@ -28,28 +26,15 @@ def coincident(stored: OperatorMatrix, topology: Topology) -> NDArray[np.bool_]:
     topology : Topology
         Of the mesh that was found.
     """
-    part_of = components_of(stored)
-    count = int(part_of.max()) + 1
-    part = np.array([part_of[piece.vertices[0]] for piece in topology.pieces], dtype=np.int64)
+    label = components_of(stored)
+    count = int(label.max()) + 1
+    lowest, highest = np.full(count, np.inf), np.full(count, -np.inf)
+    owner = label[stored.edges[:, 0]]
+    np.minimum.at(lowest, owner, stored.entries)
+    np.maximum.at(highest, owner, stored.entries)
+    part = np.array([label[piece.vertices[0]] for piece in topology.pieces], dtype=np.int64)
     loose = np.array([piece.redundancy <= 0 for piece in topology.pieces], dtype=bool)
+    alike = (highest - lowest)[part] <= _EQUAL * np.abs(highest[part])
     several = np.bincount(part, minlength=count) > 1
     all_loose = np.bincount(part, ~loose, count) == 0
-    few = _sizes(np.abs(stored.entries), part_of[stored.edges[:, 0]], count) <= _FEW
-    return np.asarray(several[part] & all_loose[part] & few[part])
-
-
-def _sizes(entries: NDArray, owner: NDArray, count: int) -> NDArray[np.int64]:
-    """(count,) different entries of each owner, one and its double counted once."""
-    with np.errstate(divide="ignore"):
-        log = np.log2(np.where(entries > 0, entries, np.nan))
-    turn = log - np.floor(log)
-    order = np.lexsort((turn, owner))
-    turn, owner = turn[order], owner[order]
-    first = np.diff(owner, prepend=-1) != 0
-    new = first | (np.diff(turn, prepend=0.0) > _EQUAL)
-    sizes = np.bincount(owner[new], minlength=count)
-    # The largest part of a turn may be the smallest once more.
-    last = np.append(first[1:], True)
-    around = np.zeros(count, dtype=bool)
-    around[owner[last]] = (turn[first] + 1 - turn[last] <= _EQUAL) & (turn[last] - turn[first] > 0.5)
-    return np.asarray(sizes - around)
+    return np.asarray(alike & several[part] & all_loose[part])

@@ -125,8 +125,10 @@ def _carried_on(
         best = _finished(best, begun, effort)
     except HopelessError:
         best, hopeless = better(best, begun.starts[0]), True
-    if best is not None and (best.fits or best.like_noise):
+    if best is not None and best.fits:
         return best, True
+    if best is not None and best.like_noise:  # or wrong in cells that leave little
+        return cover() or best, True
     if best is not None and best is not before and best.size < _CLOSE:  # covers take longer than a few small changes
         best = descent(best, Effort(_LAST))
         if best.fits:
