@@ -203,7 +203,8 @@ def _unexplained(certificate: Certificate) -> str:
     if certificate.backward_error <= FITS:
         return ""
     squares = certificate.misfits**2
-    left, rows = squares.copy(), []
+    left = squares.copy()
+    rows: list[int] = []
     while len(rows) < _ROWS and left.sum() > (1 - _MOST) * squares.sum():
         at_row = np.bincount(certificate.pairs.ravel(), np.repeat(left, 2))
         rows.append(int(at_row.argmax()))

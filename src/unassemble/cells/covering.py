@@ -56,9 +56,7 @@ def read_by_cover(n: int, edges: NDArray, weights: NDArray, scale: float | None 
     return None
 
 
-def _covered(
-    cells: Numbered, weights: NDArray, scale: float | None, left: int
-) -> tuple[Reading[CellSet] | None, int]:
+def _covered(cells: Numbered, weights: NDArray, scale: float | None, left: int) -> tuple[Reading[CellSet] | None, int]:
     """A reading that fits of numbered cells, or none; and how many may still be solved for of those `left`."""
     program, assembly = Program(cells), Assembly(cells)
     while left > 0:
