@@ -170,8 +170,7 @@ class Candidates(CellSet):
         """Readings to begin with, the likeliest first."""
         by_angles = ~self.corner & ~self.half & (self.belief > 2 - _FULL / np.pi) & (self.size > 3)
         corners = [self.corner & (self.belief > 0.5 + excess / np.pi) for excess in _INNER]
-        triangles = self.first & (self.size == 3)
-        faces = (self.first, triangles | (by_angles & ~self.outer), *self._by_rims(triangles))
+        faces = (self.first, (self.first & (self.size == 3)) | (by_angles & ~self.outer))
         none = np.zeros_like(self.corner)
         corners += [chosen & ~self.strip for chosen in (*corners, self.corner & (self.belief == 1.0))]
         corners += [chosen | self.half for chosen in (*corners, none)] if self.half.any() else []
@@ -183,24 +182,23 @@ class Candidates(CellSet):
                 seen.add(labels.tobytes())
                 yield labels
 
-    def _by_rims(self, triangles: NDArray[np.bool_]) -> Iterator[NDArray[np.bool_]]:
-        """Faces by their angles if no others are cells, so that sides between both have all of their weight.
+    def tilings(self) -> Iterator[NDArray[np.bool_]]:
+        """Faces by their angles where no others are cells, so that sides between both have all of their weight.
 
         All faces but the outer ones, then the longer ones only where these border every edge: in tilings all that lie
         between them may be holes.
         """
         inner = ~self.corner & ~self.half & ~self.outer
-        lengths = np.unique(self.size[inner & (self.size > 3)])
-        for length in lengths:
-            longer = inner & (self.size >= length) if length > lengths[0] else inner
+        for least in (0, *np.unique(self.size[inner])[1:].tolist()):
+            longer = inner & (self.size >= least)
             cell, half = self.sides[longer[self.sides[:, 0]]].T
             used = np.zeros(2 * len(self.edges), dtype=bool)
             used[half] = True
-            if length > lengths[0] and not used.reshape(-1, 2).any(axis=1).all():
+            if least and not used.reshape(-1, 2).any(axis=1).all():
                 break
             angle = facing_angles(self.relative[half >> 1] * np.where(used[half ^ 1], 1, 2))
-            chosen = longer & (self.size > 3) & (np.bincount(cell, angle, self.count) < _FULL)
-            yield chosen | triangles if length == lengths[0] else chosen
+            chosen = longer & ((self.size == 3) | (np.bincount(cell, angle, self.count) < _FULL))
+            yield self.covering(self.compatible(np.where(chosen, 1.0, -np.inf)), self.belief)
 
     def _strain(self, labels: NDArray[np.bool_]) -> float:
         """How far the angles of some cells are from adding up to pi, edges between two of them shared equally.

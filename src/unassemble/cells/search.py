@@ -147,11 +147,7 @@ def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> 
         if drawing is not None:
             yield Candidates.of(drawing, weights, scale, crosses)
     for drawing in face_complexes(n, edges):
-        candidates = Candidates.of(drawing, weights, scale)
-        yield candidates
-        guess = None if scale is not None else candidates.other_scale()
-        if guess is not None:
-            yield Candidates.of(drawing, weights, guess=guess)
+        yield Candidates.of(drawing, weights, scale)
 
 
 def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
@@ -161,6 +157,8 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
         starts.append(effort.reading(candidates, labels))
         if starts[-1].fits:
             return Begun(starts[-1:], settled=True)
+    if starts and candidates.n_vertices <= MOST_VERTICES and (tiling := _tiling(candidates, effort)) is not None:
+        return Begun([tiling], settled=True)
     # Of a reading of triangles alone, all there are, this has been asked before.
     spoilt = without_wrong_entries(starts[0]) if starts and not _all_triangles(starts[0]) else None
     if spoilt is not None:
@@ -184,6 +182,20 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
         if starts[k].fits:
             return Begun([starts[k]], settled=True)
     return Begun(starts, likeliest, spoilt=spoilt)
+
+
+def _tiling(candidates: Candidates, effort: Effort) -> Reading | None:
+    """A reading that fits as it is, with sides along holes or another c supposed; these solves are not counted."""
+    either = [candidates]
+    guess = candidates.other_scale() if candidates.scale is None else None
+    if guess is not None:
+        either.append(Candidates.of(candidates.drawing, candidates.weights, guess=guess))
+    for one in either:
+        for labels in one.tilings():
+            reading = Reading.of(one, labels, effort.known)
+            if reading.fits:
+                return reading
+    return None
 
 
 def _all_triangles(reading: Reading) -> bool:
