@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -61,8 +63,8 @@ def polar(rings: int, sectors: int, inner: float, *, whole: bool = True) -> Mesh
 def octagons(mask: NDArray, *, squares: bool = True) -> Mesh:
     """Regular octagons, those of a grid where `mask` (k, m) is true, and the squares between four of them, or not."""
     cut, width = np.sqrt(0.5), 1 + np.sqrt(2)
-    x, y = np.array([0, 1, 1 + cut, 1 + cut, 1, 0, -cut, -cut]), np.array([0, 0, cut, 1 + cut, width, width, 1 + cut, cut])
-    octagon, diamond = x + 1j * y, cut * np.array([-1, -1j, 1, 1j]) - cut
+    x = np.array([0, 1, 1 + cut, 1 + cut, 1, 0, -cut, -cut])
+    octagon, diamond = x + 1j * np.roll(x, 2), cut * (np.array([-1, -1j, 1, 1j]) - 1 - 1j)
     place = width * (np.arange(mask.shape[0])[:, None] + 1j * np.arange(mask.shape[1]))
     cells = [octagon + z for z in place[mask]]
     if squares:
@@ -71,7 +73,7 @@ def octagons(mask: NDArray, *, squares: bool = True) -> Mesh:
     corners = np.concatenate(cells)
     _, first, number = np.unique(np.round(corners, 6), return_index=True, return_inverse=True)
     own = np.split(number, np.cumsum([len(cell) for cell in cells])[:-1])
-    triangles = [(cell[0], *pair) for cell in own for pair in zip(cell[1:], cell[2:], strict=False)]
+    triangles = [(cell[0], *pair) for cell in own for pair in pairwise(cell[1:])]
     return corners[first].view(np.float64).reshape(-1, 2), np.array(triangles)
 
 
