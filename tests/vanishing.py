@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -56,6 +58,23 @@ def polar(rings: int, sectors: int, inner: float, *, whole: bool = True) -> Mesh
         number = np.column_stack([number, number[:, 0]])
     a, b, c, d = (q.ravel() for q in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
     return points, np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+
+
+def octagons(mask: NDArray, *, squares: bool = True) -> Mesh:
+    """Regular octagons, those of a grid where `mask` (k, m) is true, and the squares between four of them, or not."""
+    cut, width = np.sqrt(0.5), 1 + np.sqrt(2)
+    x = np.array([0, 1, 1 + cut, 1 + cut, 1, 0, -cut, -cut])
+    octagon, diamond = x + 1j * np.roll(x, 2), cut * (np.array([-1, -1j, 1, 1j]) - 1 - 1j)
+    place = width * (np.arange(mask.shape[0])[:, None] + 1j * np.arange(mask.shape[1]))
+    cells = [octagon + z for z in place[mask]]
+    if squares:
+        four = mask[:-1, :-1] & mask[1:, :-1] & mask[:-1, 1:] & mask[1:, 1:]
+        cells += [diamond + z for z in place[1:, 1:][four]]
+    corners = np.concatenate(cells)
+    _, first, number = np.unique(np.round(corners, 6), return_index=True, return_inverse=True)
+    own = np.split(number, np.cumsum([len(cell) for cell in cells])[:-1])
+    triangles = [(cell[0], *pair) for cell in own for pair in pairwise(cell[1:])]
+    return corners[first].view(np.float64).reshape(-1, 2), np.array(triangles)
 
 
 def refined(rounds: int, seed: int) -> Mesh:

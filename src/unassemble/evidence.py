@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .cells import settled
 from .certify import Certificate
 from .errors import SolverError
 from .matrix import OperatorMatrix
 from .planar.cotangent import edge_weights, weight_roundings
 from .planar.piece import PieceMesh
+from .planar.robust import differences_without
 from .planar.suspects import find_suspects
 from .topology import Topology
 
@@ -20,6 +23,9 @@ _SUSPECT_LIMIT = 200_000
 _CERTAIN = np.log(1e-6)
 _ROUNDING = 1e-11
 """Misfits up to this, where errors are as large as rounding makes them, prove nothing."""
+_NEARLY_ALL = 0.01  # of the squared misfit
+_LESS = 0.1  # of the squared misfit that entries may leave which are blamed; derivatives promised less
+_NOISY = 2.0  # root mean square of a misfit, over the noise, that noise explains
 _SAMPLE = 2000
 
 
@@ -37,9 +43,9 @@ class Evidence:
     rounding : float
         Standard deviation of the rounding errors of the largest entries at that precision.
     suspects : (k, 2) int64
-        Entries without which the mesh would fit the others far better.
+        Entries without which a mesh fits all others, as well as right entries are fitted.
     certain : bool
-        Whether the suspects cannot be chance.
+        Whether that few entries explain nearly all of the misfit cannot be chance.
     """
 
     noise: float | None
@@ -61,16 +67,16 @@ def weigh(
     *,
     free_scale: bool,
     search: bool,
-    rounding: bool,
+    known_noise: float | None,
 ) -> Evidence:
     """Evidence on a finished mesh; wrong entries are looked for if `search`.
 
-    With `rounding`, errors of the size that rounding has where there are slivers do not stand out.
+    Unless there is `known_noise`, errors of the size that rounding has where there are slivers do not stand out.
     """
     noise = _norm(certificate.differences) / float(np.sqrt(freedom)) if freedom > 0 else None
     suspects, certain = NONE, False
     if search and freedom > 1:
-        suspects, certain = _suspects(topology, matrix, meshes, free_scale=free_scale, rounding=rounding)
+        suspects, certain = _suspects(topology, matrix, meshes, free_scale=free_scale, noise=known_noise)
     digits, size = _digits(matrix, certificate) if search else (None, 0.0)
     return Evidence(noise, digits, size, suspects, certain)
 
@@ -91,26 +97,39 @@ def _norm(values: NDArray) -> float:
 
 
 def _suspects(
-    topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], *, free_scale: bool, rounding: bool
+    topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], *, free_scale: bool, noise: float | None
 ) -> tuple[NDArray[np.int64], bool]:
-    pairs, certain = [], False
+    """Entries to blame: those without which all others fit, in all pieces; and whether few explain the misfit."""
+    pairs, certain, explained = [], False, True
     for piece, mesh in zip(topology.pieces, meshes, strict=True):
         if mesh.aside is not None:  # and all others fit
             pairs.append(matrix.edges[piece.edge_rows[mesh.aside]])
             certain = True
             continue
-        if piece.n_vertices > _SUSPECT_LIMIT:
-            continue
         weights = -matrix.entries[piece.edge_rows]
-        spread = weight_roundings(piece, mesh.z) if rounding else mesh.spread
-        try:
-            found = find_suspects(piece, weights, mesh.z, mesh.scale, spread, free_scale=free_scale)
-        except SolverError:  # flat triangles: nothing can be told apart there
+        before = np.nan_to_num(weights - mesh.scale * edge_weights(piece, mesh.z), nan=np.inf)
+        found = None
+        if piece.n_vertices <= _SUSPECT_LIMIT:
+            spread = weight_roundings(piece, mesh.z) if noise is None else mesh.spread
+            with suppress(SolverError):  # flat triangles: nothing can be told apart there
+                found = find_suspects(piece, weights, mesh.z, mesh.scale, spread, free_scale=free_scale)
+        if found is None or found.log_p >= _CERTAIN:
+            explained = explained and _fitted(weights, before, noise)
             continue
-        if found.log_p < _CERTAIN:
-            pairs.append(matrix.edges[piece.edge_rows[found.edges]])
-            certain = certain or (found.left < 0.01 and found.size > _ROUNDING)
-    return (np.concatenate(pairs) if pairs else NONE), certain
+        certain = certain or (found.left < _NEARLY_ALL and found.size > _ROUNDING)
+        explained = explained and not np.isin(piece.edge_rows[found.edges], topology.vanished).any()  # these are exact
+        left = differences_without(piece, weights, mesh.z, mesh.scale, found.edges, free_scale=free_scale)
+        explained = explained and _fitted(weights, left, noise) and bool(_norm(left) ** 2 < _LESS * _norm(before) ** 2)
+        pairs.append(matrix.edges[piece.edge_rows[found.edges]])
+    return (np.concatenate(pairs) if pairs and explained else NONE), certain
+
+
+def _fitted(weights: NDArray, differences: NDArray, noise: float | None) -> bool:
+    """Whether differences are those of right cells: below what any wrong one leaves, or noise, known or not."""
+    if noise is not None:
+        return bool(_norm(differences) <= _NOISY * noise * np.sqrt(len(differences)))
+    misfit = np.abs(differences) / (np.abs(weights) + np.median(np.abs(weights)))
+    return settled(misfit)
 
 
 def _digits(matrix: OperatorMatrix, certificate: Certificate) -> tuple[str | None, float]:

@@ -90,7 +90,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
             freedom,
             free_scale=scale is None,
             search=search,
-            rounding=noise is None,
+            known_noise=noise,
         )
     deviations = None
     if options.standard_deviations:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .cells import Alternative
 from .cells.agreement import SAME_SCALE, SCALE_ERROR
+from .cells.reading import FITS
 from .certify import CERTIFIED, CONFIDENCE, LARGEST_NOISE, Certificate
 from .evidence import Evidence
 from .matrix import OperatorMatrix
@@ -16,6 +17,7 @@ from .planar.hinges import groups
 from .topology import Topology
 from .words import count_of
 
+_MOST, _ROWS = 0.9, 6  # part of the squared misfit whose rows are named, and how many of them at most
 _SURE = 1e-8  # of a piece's size: how far off certified positions may be
 
 
@@ -116,7 +118,9 @@ def _misfit(
         f"the re-assembled matrix differs, most in the entry of rows {i} and {j} (by {misfit:.1e} of the row's "
         f"largest; {CERTIFIED:g} is allowed)"
     )
-    return _culprits(evidence) + differs + _like_noise(certificate, evidence) + _because(notes)
+    remark = _like_noise(certificate, evidence)
+    begun = _culprits(evidence) or ("" if remark else _unexplained(certificate))
+    return begun + differs + remark + _because(notes)
 
 
 def ambiguous(others: list[Alternative], certificate: Certificate) -> tuple[str, str]:
@@ -185,13 +189,33 @@ def _rounded(evidence: Evidence) -> str:
 
 
 def _culprits(evidence: Evidence) -> str:
-    """The beginning of a sentence where entries stand out."""
+    """The beginning of a sentence where entries are to blame."""
     if not len(evidence.suspects):
         return ""
     k, (i, j) = len(evidence.suspects), evidence.suspects[0]
     if k == 1:
-        return f"the entry of rows {i} and {j} stands out: the mesh would fit the others far better without it; "
-    return f"{k} entries stand out, first that of rows {i} and {j}: the mesh would fit the others far better without; "
+        return f"the entry of rows {i} and {j} stands out: without it a mesh fits all others; "
+    return f"{k} entries stand out, first that of rows {i} and {j}: without them a mesh fits all others; "
+
+
+def _unexplained(certificate: Certificate) -> str:
+    """The beginning of a sentence where no few entries are to blame: how much is left, and around which rows."""
+    if certificate.backward_error <= FITS:
+        return ""
+    squares = certificate.misfits**2
+    left = squares.copy()
+    rows: list[int] = []
+    while len(rows) < _ROWS and left.sum() > (1 - _MOST) * squares.sum():
+        at_row = np.bincount(certificate.pairs.ravel(), np.repeat(left, 2))
+        rows.append(int(at_row.argmax()))
+        left[(certificate.pairs == rows[-1]).any(axis=1)] = 0.0
+    share = 1 - left.sum() / squares.sum()
+    count = int((certificate.misfits > FITS).sum())
+    return (
+        f"no set of cells was found that fits: {count_of(count, 'entry', 'entries')} of {len(squares):,} "
+        f"{'is' if count == 1 else 'are'} left unexplained, with {share:.0%} of the squared misfit in "
+        f"{'row' if len(rows) == 1 else 'the rows'} {_words(tuple(sorted(rows)))}; "
+    )
 
 
 def _like_noise(certificate: Certificate, evidence: Evidence) -> str:

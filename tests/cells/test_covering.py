@@ -74,9 +74,13 @@ def test_a_lattice_without_another_mesh(seed):
     assert found.scale == pytest.approx(c, rel=1e-9)
 
 
-@pytest.mark.parametrize(("family", "seed"), [("lattice", 0), ("lattice", 70), ("lattice", 91), ("kites", 7)])
+# Half rectangles at the boundary of the last ones: most edges have a half of their weight on either side.
+@pytest.mark.parametrize(
+    ("family", "seed"),
+    [("lattice", 0), ("lattice", 70), ("lattice", 91), ("kites", 7), ("stairs", 1), ("stairs", 8), ("stairs", 11)],
+)
 def test_cover(family, seed):
-    """Equilateral triangles, right isosceles ones, and right angles of arbitrary legs about crosses."""
+    """Equilateral triangles, right isosceles ones, right angles of arbitrary legs about crosses, and rectangles."""
     known, c = member(family, seed)
     n, edges, weights = graph(known)
     shapes = Shapes.of(n, edges, 3000)

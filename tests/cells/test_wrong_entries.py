@@ -125,3 +125,19 @@ def test_sides_of_a_hole_are_no_wrong_entries():
     assert len(fit.aside) == 3
     assert np.isin(piece.opposite, fit.aside).all(axis=1).sum() == 1
     assert recover(known.matrix).certified
+
+
+def test_entries_are_not_blamed_where_others_do_not_fit_either():
+    """Eight entries about the middle of squares: whatever few are left out, the others do not fit."""
+    known = forgotten(specimen(*squares(holes(6, 5))))
+    upper = sp.triu(known.matrix, 1).tocoo()
+    centre = (known.points[upper.row] + known.points[upper.col]) / 2
+    near = np.argsort(np.linalg.norm(centre - known.points.mean(axis=0), axis=1))[:8]
+    factors = np.random.default_rng(0).uniform(1.2, 1.6, len(near))
+    matrix, pairs = changed(known.matrix, dict(zip(near.tolist(), factors.tolist(), strict=True)))
+    found = recover(matrix)
+    assert found.status == "uncertified"
+    assert not len(found.suspects)
+    assert found.reason.startswith("no set of cells was found that fits: ")
+    rows = found.reason.split("misfit in ")[1].split(";")[0].removeprefix("the rows ").removeprefix("row ")
+    assert {int(row) for row in rows.split(", ")} & set(np.ravel(pairs).tolist())

@@ -11,7 +11,7 @@ from .doubt import Attempt, Outcome, in_doubt
 from .eliminated import incomplete_rows
 from .filled import filled_holes
 from .search import read_cells
-from .spoilt import wrong_entries
+from .spoilt import settled, wrong_entries
 
 __all__ = [
     "AGREE",
@@ -27,6 +27,7 @@ __all__ = [
     "in_doubt",
     "incomplete_rows",
     "read_cells",
+    "settled",
     "touching",
     "wrong_entries",
 ]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..topology import Polygons
 from ..topology.faces import FaceComplex, joined
-from .angles import face_sums, facing_angles, likeliest_scale, vertex_excess
+from .angles import face_sums, facing_angles, likeliest_scale, overall_scale, vertex_excess
 from .cell_set import CellSet
 from .crosses import Crosses
 from .half_circles import half_circles
@@ -22,6 +22,7 @@ _SHORT = 4  # faces of so many edges are cells unless the numbers say otherwise
 _FULL = 1.3 * np.pi  # angle sum below which a face may be a cell
 _TURNED = 0.01  # belief that a corner loses by not being as drawn
 _LEFT_OUT = 0.05  # squared excess of an angle sum, in units of pi, above which a short face may be left out
+_APART = 0.2  # difference of logarithms of two likely c that is worth trying both
 _INNER = (-0.35 * np.pi, -0.55 * np.pi)  # angle excess above which a vertex may be an inner one
 
 
@@ -41,6 +42,8 @@ class Candidates(CellSet):
         Pairs (cell, half-edge) of what each cell takes up.
     belief : (cells,) float64
         From the angles: 1 for a certain cell, 0 for a certain hole, about.
+    rim_sum : (cells,) float64
+        Angle sums of faces whose sides along outer ones have all of their weight; 0 for others.
     first : (cells,) bool
         The faces that make the likeliest reading without vanished boundary edges.
     outer : (cells,) bool
@@ -57,6 +60,7 @@ class Candidates(CellSet):
     relative: NDArray[np.float64]
     sides: NDArray[np.int64]
     belief: NDArray[np.float64]
+    rim_sum: NDArray[np.float64]
     first: NDArray[np.bool_]
     outer: NDArray[np.bool_]
     strip: NDArray[np.bool_]
@@ -65,15 +69,25 @@ class Candidates(CellSet):
 
     @classmethod
     def of(
-        cls, drawing: FaceComplex, weights: NDArray, scale: float | None = None, crosses: Crosses | None = None
+        cls,
+        drawing: FaceComplex,
+        weights: NDArray,
+        scale: float | None = None,
+        crosses: Crosses | None = None,
+        guess: float | None = None,
     ) -> Candidates:
-        """All candidates of one drawing of the graph; the corners about some crosses are right angles."""
+        """All candidates of one drawing of the graph; the corners about some crosses are right angles.
+
+        `guess` is a c to judge angles by, where it is not known.
+        """
         blocks = drawing.split()
-        relative = weights / (scale or (crosses and crosses.scale) or likeliest_scale(blocks, weights))
+        relative = weights / (scale or (crosses and crosses.scale) or guess or likeliest_scale(blocks, weights))
         angles = np.repeat(facing_angles(relative), 2)
         sums = face_sums(blocks, angles)
         outer = _longest(blocks, sums)
         faces = np.flatnonzero(blocks.simple)
+        rim = outer[blocks.face[np.arange(len(angles)) ^ 1]]
+        rim_sums = face_sums(blocks, facing_angles(np.repeat(relative, 2) * np.where(rim, 2, 1)))
         outside = (blocks.size > _SHORT) | outer | ~blocks.simple
         # How parts hang together at crosses is known, and at other vertices a guess.
         whole = blocks.joined(outside) if crosses is None else drawing
@@ -112,6 +126,7 @@ class Candidates(CellSet):
                 ]
             ),
             belief=np.r_[1 - np.abs(sums[faces] / np.pi - 1), belief, np.full(len(paths), 0.5)],
+            rim_sum=np.r_[rim_sums[faces], np.zeros(open_ones)],
             first=np.r_[(blocks.size <= _SHORT)[faces] & ~outer[faces], none[:open_ones]],
             outer=np.r_[outer[faces], none[:open_ones]],
             corner=np.r_[none[: len(faces)], np.ones(len(corners), bool), none[: len(paths)]],
@@ -119,6 +134,14 @@ class Candidates(CellSet):
             half=np.arange(len(size)) >= len(size) - len(paths),
             turns=corners.turns,
         )
+
+    def other_scale(self) -> float | None:
+        """A likely c that differs much from the one that angles are judged by; None if there is none."""
+        blocks = self.drawing.split()
+        angles = np.repeat(facing_angles(self.relative), 2)
+        ratio = overall_scale(blocks, self.relative, _longest(blocks, face_sums(blocks, angles)))
+        given = np.flatnonzero(self.weights)[0]
+        return None if abs(np.log(ratio)) < _APART else ratio * float(self.weights[given] / self.relative[given])
 
     @cached_property
     def chorded(self) -> NDArray[np.bool_]:
@@ -158,6 +181,24 @@ class Candidates(CellSet):
             if labels.any() and labels.tobytes() not in seen:
                 seen.add(labels.tobytes())
                 yield labels
+
+    def tilings(self) -> Iterator[NDArray[np.bool_]]:
+        """Faces by their angles where no others are cells, so that sides between both have all of their weight.
+
+        All faces but the outer ones, then the longer ones only where these border every edge: in tilings all that lie
+        between them may be holes.
+        """
+        inner = ~self.corner & ~self.half & ~self.outer
+        for least in (0, *np.unique(self.size[inner])[1:].tolist()):
+            longer = inner & (self.size >= least)
+            cell, half = self.sides[longer[self.sides[:, 0]]].T
+            used = np.zeros(2 * len(self.edges), dtype=bool)
+            used[half] = True
+            if least and not used.reshape(-1, 2).any(axis=1).all():
+                break
+            angle = facing_angles(self.relative[half >> 1] * np.where(used[half ^ 1], 1, 2))
+            chosen = longer & ((self.size == 3) | (np.bincount(cell, angle, self.count) < _FULL))
+            yield self.covering(self.compatible(np.where(chosen, 1.0, -np.inf)), self.belief)
 
     def _strain(self, labels: NDArray[np.bool_]) -> float:
         """How far the angles of some cells are from adding up to pi, edges between two of them shared equally.

@@ -128,7 +128,7 @@ def _read_again(
     if inside is not None:
         return _part(matrix, numbering, inside)
     reading = read_cells(len(numbering.vertices), numbering.edges, weights, scale)
-    if reading is not None and (reading.fits or reading.fits_but_for_few):
+    if reading is not None and (reading.fits or reading.has_wrong_entries):
         return _part(matrix, numbering, reading)
     before = float(np.sqrt(np.mean(misfit_of_triangles()[numbering.edge_rows] ** 2)))
     if reading is not None and reading.size < _BETTER * before and reading.misfit.max() < 1:

@@ -45,25 +45,35 @@ def read_by_cover(n: int, edges: NDArray, weights: NDArray, scale: float | None 
         return None
     left = _WORK
     for c in [scale] if scale is not None else likely_scales(shapes, weights):
-        cells = next((found for found in _numberings(shapes, weights, c) if found is not None), None)
-        if cells is None or len(cells.cell) > _MOST_CELLS:
-            continue
-        program, assembly = Program(cells), Assembly(cells)
-        while left > 0:
-            left -= len(cells.cell)
-            chosen = program.solution(program.fans)
-            if chosen is None:
-                break
-            conflict = assembly.conflict(chosen)
-            _log.debug("c %.6g, %d cells, in conflict %d", c, len(chosen), 0 if conflict is None else len(conflict))
-            if conflict is None:
-                taken = as_set(shapes, cells.cell[chosen], weights, scale)
-                reading = Reading.of(taken, np.ones(taken.count, dtype=bool))
-                if reading.fits:
-                    return reading
-                conflict = chosen
-            program.exclude(conflict)
+        tried = 0
+        for cells in _numberings(shapes, weights, c):
+            if cells is None or len(cells.cell) > _MOST_CELLS or len(cells.cell) == tried:
+                continue
+            tried = len(cells.cell)
+            reading, left = _covered(cells, weights, scale, left)
+            if reading is not None or left <= 0:
+                return reading
     return None
+
+
+def _covered(cells: Numbered, weights: NDArray, scale: float | None, left: int) -> tuple[Reading[CellSet] | None, int]:
+    """A reading that fits of numbered cells, or none; and how many may still be solved for of those `left`."""
+    program, assembly = Program(cells), Assembly(cells)
+    while left > 0:
+        left -= len(cells.cell)
+        chosen = program.solution(program.fans)
+        if chosen is None:
+            break
+        conflict = assembly.conflict(chosen)
+        _log.debug("%d cells, in conflict %d", len(chosen), 0 if conflict is None else len(conflict))
+        if conflict is None:
+            taken = as_set(cells.shapes, cells.cell[chosen], weights, scale)
+            reading = Reading.of(taken, np.ones(taken.count, dtype=bool))
+            if reading.fits:
+                return reading, left
+            conflict = chosen
+        program.exclude(conflict)
+    return None, left
 
 
 def _numberings(shapes: Shapes, weights: NDArray, c: float) -> Iterator[Numbered | None]:

@@ -78,7 +78,7 @@ def without_boundary(
     if any(one.fits for one in whole):  # a diagonal matrix was added on the boundary
         return None
     inner = _left_to_others(whole[-1], incomplete, scale)
-    if inner.fits_but_for_few and None not in inner.meshes and (not _has_corners(inner) or _redundancy(inner) > 0):
+    if inner.has_wrong_entries and None not in inner.meshes and (not _has_corners(inner) or _redundancy(inner) > 0):
         return inner
     may_be_whole = any(_has_corners(one) or without_wrong_entries(one) is not None for one in whole)
     return None if may_be_whole else whole[0]

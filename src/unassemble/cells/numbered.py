@@ -129,8 +129,9 @@ def frequent_numbers(shapes: Shapes, cotangents: NDArray, most: int) -> NDArray[
     usable = shapes.stored & (rest > _AGREE) & (rest < np.pi - _AGREE)
     edge = shapes.sides[usable]
     near = 1 / np.tan(rest[usable])
-    value = np.concatenate([cotangents, near, cotangents[edge] - near])
-    edge = np.concatenate([np.arange(len(cotangents)), edge, edge])
+    every = np.arange(len(cotangents))
+    value = np.concatenate([cotangents, cotangents / 2, near, cotangents[edge] - near])
+    edge = np.concatenate([every, every, edge, edge])
     order = np.argsort(value)
     value, edge = value[order], edge[order]
     run = np.cumsum(np.diff(value, prepend=value[:1]) > _AGREE * (1 + np.abs(value)))

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
 from ..topology import Numbering, Topology
+from ..topology.embedding import face_complexes
 from .agreement import SAME_SCALE, common_values
+from .angles import scales_of_faces
 from .by_component import with_pieces
 from .corners import Alternative, OrientedMesh
 from .covering import MOST_VERTICES
@@ -26,6 +28,7 @@ from .shapes import Shapes
 
 _MOST_SHAPES = 3000
 _MOST_SCALES = 6
+_SHORT = 4  # cells of up to so many sides are right angles, triangles or parts of crosses
 _AGREE = 1e-7
 
 Cells = set[tuple[int, ...]]
@@ -110,4 +113,24 @@ def _of_lone_cells(shapes: Shapes, weights: NDArray) -> list[float]:
     places = np.append(shapes.vertices[right, 1], shapes.n_vertices + whole)
     crossed = Crosses.of(shapes.n_vertices, shapes.edges, weights).scale
     common = common_values(values, places, _AGREE)[:_MOST_SCALES]
-    return [sign * float(c) for c in common if c] + ([] if crossed is None else [crossed])
+    tiles = _of_tiles(shapes.n_vertices, shapes.edges, sign * weights)
+    return [sign * float(c) for c in (*common, *tiles) if c] + ([] if crossed is None else [crossed])
+
+
+def _of_tiles(n: int, edges: NDArray, weights: NDArray) -> list[float]:
+    """The c that several long faces of a drawing have as congruent cells.
+
+    Congruent cells give an edge between two of them twice what they give one at the boundary: a weight that is the
+    double of another one is shared equally. Right triangles cut from a tiling by octagons have a common c as well.
+    """
+    size = np.sort(weights)
+    near = size[np.minimum(np.searchsorted(size, weights / 2 * (1 - _AGREE)), len(size) - 1)]
+    share = np.where(np.abs(near / (weights / 2) - 1) < _AGREE, weights / 2, weights)
+    found = []
+    for drawing in face_complexes(n, edges):
+        blocks = drawing.split()
+        faces = np.flatnonzero(blocks.simple & (blocks.size > _SHORT))
+        if len(faces):
+            values = scales_of_faces(blocks, 2 * share, faces)
+            found += common_values(values, faces, _AGREE)[:_MOST_SCALES].tolist()
+    return found

@@ -17,7 +17,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 from ..linalg import quiet
 from .numbered import Numbered
 
-_ROUNDING = 1e-6  # of angle sums
+_ROUNDING = 1e-4  # of angle sums; far more than what HiGHS neglects, 1e-6 before it scales rows
 _NODES = 40  # of the search tree of one solution
 
 Rows = tuple[sp.csr_array, NDArray, NDArray]

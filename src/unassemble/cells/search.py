@@ -43,11 +43,14 @@ class Begun:
         What the angles suggest, where that makes planar surfaces.
     settled : bool
         Whether the first start is the answer: it fits, or none will.
+    spoilt : Reading or None
+        The answer if no reading fits: with entries set aside as wrong, others having small errors.
     """
 
     starts: list[Reading]
     likeliest: Reading | None = None
     settled: bool = False
+    spoilt: Reading | None = None
 
 
 def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = None) -> Reading | None:
@@ -72,7 +75,20 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
     triangles = read_triangles(n, edges, weights, scale, effort)
     if triangles is not None:
         return triangles
+    best, spoilt = _searched(n, edges, weights, scale, effort)
+    if best is None or not best.pieces:
+        return spoilt
+    if spoilt is None or best.fits or best.fits_but_for_few or best.like_noise:
+        return best
+    return spoilt
+
+
+def _searched(
+    n: int, edges: NDArray, weights: NDArray, scale: float | None, effort: Effort
+) -> tuple[Reading | None, Reading | None]:
+    """The best reading, and the one with entries set aside as wrong that stands where none fits."""
     best: Reading | None = None
+    spoilt: Reading | None = None
     together = n <= SMALL_GRAPH
     turning = _TURNING / (_DRAWINGS if together else 1)
     drawings = _drawings(n, edges, weights, scale)
@@ -83,12 +99,13 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
         for drawing in some:
             begun.append(_begun(drawing, effort, int(turning * effort.solves)))
             if begun[-1].settled:
-                return _settled(best, begun[-1].starts[0])
+                return _settled(best, begun[-1].starts[0]), spoilt
+            spoilt = spoilt or begun[-1].spoilt
         for one in begun:
             best, done = _carried_on(best, one, effort, cover)
             if done:
-                return best
-    return descent(best, Effort(_LAST)) if best is not None and best.pieces else None
+                return best, spoilt
+    return descent(best, Effort(_LAST)) if best is not None and best.pieces else None, spoilt
 
 
 def _settled(best: Reading | None, first: Reading) -> Reading:
@@ -108,8 +125,10 @@ def _carried_on(
         best = _finished(best, begun, effort)
     except HopelessError:
         best, hopeless = better(best, begun.starts[0]), True
-    if best is not None and (best.fits or best.like_noise):
+    if best is not None and best.fits:
         return best, True
+    if best is not None and best.like_noise:  # or wrong in cells that leave little
+        return cover() or best, True
     if best is not None and best is not before and best.size < _CLOSE:  # covers take longer than a few small changes
         best = descent(best, Effort(_LAST))
         if best.fits:
@@ -138,12 +157,16 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
         starts.append(effort.reading(candidates, labels))
         if starts[-1].fits:
             return Begun(starts[-1:], settled=True)
+    if starts and candidates.n_vertices <= MOST_VERTICES and (tiling := _tiling(candidates, effort)) is not None:
+        return Begun([tiling], settled=True)
     # Of a reading of triangles alone, all there are, this has been asked before.
-    if starts and not _all_triangles(starts[0]) and (spoilt := without_wrong_entries(starts[0])) is not None:
+    spoilt = without_wrong_entries(starts[0]) if starts and not _all_triangles(starts[0]) else None
+    if spoilt is not None:
         nearest = starts[0]
         if nearest.candidates.n_vertices <= SMALL_GRAPH:  # one wrong corner may look like a wrong entry
             nearest = descent(nearest, Effort(BATCH, effort.known))
-        return Begun([nearest if nearest.fits else spoilt], settled=True)
+        if nearest.fits or spoilt.fits_but_for_few:
+            return Begun([nearest if nearest.fits else spoilt], settled=True)
     if starts and entries_are_to_blame(starts[0]):
         return Begun(starts[:1], settled=True)
     likeliest = next((start for start in starts if start.pieces), None)
@@ -158,7 +181,21 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
         starts[k] = _turned_over(start, effort, turns // len(starts))
         if starts[k].fits:
             return Begun([starts[k]], settled=True)
-    return Begun(starts, likeliest)
+    return Begun(starts, likeliest, spoilt=spoilt)
+
+
+def _tiling(candidates: Candidates, effort: Effort) -> Reading | None:
+    """A reading that fits as it is, with sides along holes or another c supposed; these solves are not counted."""
+    either = [candidates]
+    guess = candidates.other_scale() if candidates.scale is None else None
+    if guess is not None:
+        either.append(Candidates.of(candidates.drawing, candidates.weights, guess=guess))
+    for one in either:
+        for labels in one.tilings():
+            reading = Reading.of(one, labels, effort.known)
+            if reading.fits:
+                return reading
+    return None
 
 
 def _all_triangles(reading: Reading) -> bool:

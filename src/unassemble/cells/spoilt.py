@@ -118,14 +118,14 @@ def _without_few(piece: Piece, weights: NDArray, z: NDArray | None, scale: float
     if piece.n_vertices > _MOST_VERTICES or not _provable(piece, 1, scale):
         return None
 
-    fit = robust_fit(piece, weights, z, _settled, scale=scale)
+    fit = robust_fit(piece, weights, z, settled, scale=scale)
     if fit is None or not _provable(piece, len(fit.aside), scale, _left(piece, weights, fit)):
         return None
     return PieceMesh(fit.z, fit.scale, aside=fit.aside if len(fit.aside) else None)
 
 
-def _settled(misfit: NDArray) -> bool:
-    """Whether a misfit is that of rounding, or of noise."""
+def settled(misfit: NDArray) -> bool:
+    """Whether a misfit, relative to the entry and a typical one, is that of rounding, or of noise."""
     return bool((misfit <= FITS).all()) or (even(misfit) and float(np.sqrt(np.mean(misfit**2))) < SURE)
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..errors import GeometryError, SolverError
 from ..topology import Piece
 from .conformal import conformal_map
+from .cotangent import edge_weights
 from .polish import PolishOptions, Problem, polish
 from .suspects import find_suspects
 
@@ -116,3 +117,36 @@ def _matched(
         aside = find_suspects(piece, weights, z, found.scale, size, free_scale=scale is None).edges
         if not len(aside) or (best is not None and len(aside) >= len(best.aside)):
             return best
+
+
+def differences_without(
+    piece: Piece, weights: NDArray, z: NDArray, scale: float, aside: NDArray[np.int64], *, free_scale: bool
+) -> NDArray[np.float64]:
+    """(e,) what the mesh that is fitted to all entries but a few leaves of each weight; 0 for these few.
+
+    Infinite where there is no such mesh.
+
+    Parameters
+    ----------
+    piece : Piece
+    weights : (e,) float64
+        -A_ij.
+    z : (n,) complex128
+        Start.
+    scale : float
+        c, or where to begin with it.
+    aside : (k,) int64
+        Edges of the piece.
+    free_scale : bool
+        Whether c is fitted.
+    """
+    spread = np.abs(weights) + np.median(np.abs(weights))
+    spread[aside] *= ASIDE
+    try:
+        with np.errstate(all="ignore"):
+            found = polish(piece, weights, z, scale=None if free_scale else scale, spread=spread, options=_SHORT)
+            left = weights - found.scale * edge_weights(piece, found.z)
+    except SolverError:
+        return np.full(len(weights), np.inf)
+    left[aside] = 0.0
+    return np.where(np.isfinite(left), left, np.inf)
