@@ -11,14 +11,15 @@ from ..errors import SolverError
 
 _DAMPING = 1e-6  # of the longest column: smaller singular values need many rounds
 _ROUNDS = 100
-_SLOW = 0.95  # residual, relative to the former one, that is the last
+_SLOW = 0.95  # length of a step, relative to the former one, that is the last
 
 
 def least_norm(matrix: sp.csr_array, right: NDArray) -> NDArray[np.complex128]:
     """Solve min |B x - r|, of all such x the shortest one, by proximal iteration.
 
     Steps minimise |B d - (r - B x)|^2 + w^2 |d|^2. From x = 0 all of them lie in the row space of B, in which they
-    converge by a factor w^2 / (w^2 + s^2) for each singular value s.
+    converge by a factor w^2 / (w^2 + s^2) for each singular value s. Rounding adds to the null space as what no x
+    explains is large: where B x = r has a solution, it adds next to nothing.
 
     Parameters
     ----------
@@ -42,11 +43,11 @@ def least_norm(matrix: sp.csr_array, right: NDArray) -> NDArray[np.complex128]:
     except RuntimeError as error:
         raise SolverError(f"SuperLU could not go on with a matrix of order {rows + columns}: {error}") from error
     found = np.zeros(columns, dtype=np.complex128)
-    left, before = right, np.inf
+    none, before = found, np.inf
     for _ in range(_ROUNDS):
-        if not float(np.abs(left).max(initial=0.0)) < _SLOW * before:
+        step = factor.solve(np.concatenate([right - matrix @ found, none]))[rows:]
+        length = float(np.linalg.norm(step))
+        if not length < _SLOW * before:
             break
-        before = float(np.abs(left).max(initial=0.0))
-        found = found + factor.solve(np.concatenate([left, np.zeros(columns)]))[rows:]
-        left = right - matrix @ found
+        found, before = found + step, length
     return found

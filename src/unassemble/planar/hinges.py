@@ -164,10 +164,7 @@ def _joined(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_
     extent = float(size.max())
     weight = np.r_[np.where(held, 0.0, 1.0), np.where(held, 0.0, 1e3 * extent)]
     system = coo_array((values * weight[columns], (rows, columns)), shape=(len(rhs), 2 * n)).tocsr()
-    if n <= _DENSE:
-        solution = np.linalg.lstsq(system.toarray(), rhs, rcond=1e-12)[0]
-    else:
-        solution = least_norm(system, rhs)
+    solution = np.linalg.lstsq(system.toarray(), rhs, rcond=1e-12)[0] if n <= _DENSE else least_norm(system, rhs)
     turn, shift = 1 + (weight * solution)[:n], (weight * solution)[n:]
     left = float(np.abs(system @ solution - rhs).max(initial=0.0) / extent)
     if (np.abs(turn) * size <= _CLOSED * extent).any():
