@@ -99,7 +99,7 @@ def own_cells(n: int, parts: list[Numbering], mesh: OrientedMesh) -> list[set[tu
 def with_another_scale(
     part: Numbering, weights: NDArray, c: float, others: list[float], *, searched: bool = True
 ) -> Reading | None:
-    """A reading that fits with the first of some factors that allows one, c left out; by a cover or by the whole search."""
+    """A reading that fits with the first of some factors that allows one, c left out; by a cover or a search."""
     for other in others:
         if abs(other / c - 1) > SAME_SCALE:
             graph = len(part.vertices), part.edges, weights, other
