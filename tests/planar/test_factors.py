@@ -1,5 +1,7 @@
 """Factors c of pieces that share vertices, with errors in the entries."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -23,7 +25,7 @@ def chain(count, seed, heights=(1.0,)):
             points.append(points[a] + [0.5, height] + rng.uniform(-0.2, 0.2, 2))
         points.append(points[a] + [1.0, 0.0] + rng.uniform(-0.2, 0.2, 2))
         ring = list(range(a, len(points)))
-        triangles += [(ring[0], ring[-1], ring[1])] + [(ring[-1], q, p) for p, q in zip(ring[1:-2], ring[2:-1])]
+        triangles += [(ring[0], ring[-1], ring[1])] + [(ring[-1], q, p) for p, q in pairwise(ring[1:-1])]
     return np.array(points), np.array(triangles)
 
 
@@ -57,9 +59,8 @@ def test_noise_that_is_not_given_is_named():
 def test_more_than_noise_is_none():
     """Half of the triangles have another factor."""
     points, triangles = chain(20, 5)
-    both = [
-        specimen(points, some, c=c, seed=3).matrix for some, c in ((triangles[:10], C), (triangles[10:], 1.001 * C))
-    ]
+    halves = (triangles[:10], C), (triangles[10:], 1.001 * C)
+    both = [specimen(points, some, c=c, seed=3).matrix for some, c in halves]
     found = recover(noisy(both[0] + both[1], 1e-6 * C, 1), noise=1e-6 * C)
     assert not found.certified
 
