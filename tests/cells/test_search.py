@@ -110,7 +110,7 @@ def test_grids_of_equal_entries_are_given_up_soon(monkeypatch):
         raise AssertionError("labels are being tried")
 
     monkeypatch.setattr(search, "mended", refused)
-    graph = networkx.convert_node_labels_to_integers(networkx.grid_2d_graph(14, 17))
+    graph = networkx.convert_node_labels_to_integers(networkx.grid_2d_graph(20, 21))
     order = np.random.default_rng(0).permutation(len(graph))
     matrix = sp.csr_array(networkx.laplacian_matrix(graph), dtype=float)[order][:, order]
     with pytest.raises(RecoveryError, match="network"):
