@@ -91,6 +91,16 @@ def separate_holes(rng: np.random.Generator) -> Mesh:
     return triangular_holes(n, int(n * rng.uniform(0, 0.12)), int(rng.integers(10**6)))
 
 
+def riddled(rng: np.random.Generator) -> Mesh:
+    """A third of all triangles removed, or as many as can be, no two of which share an edge."""
+    n = int(rng.integers(500, 1500))
+    if rng.random() < 0.5:
+        points, triangles = random_mesh(n, int(rng.integers(10**6)), holes=False)
+    else:
+        points, triangles = delaunay(rng.random((n, 2)), longest=4 / np.sqrt(n))
+    return with_many_holes(points, triangles, rng, rng.choice([1 / 3, 1 / 2]))
+
+
 def polygon(rng: np.random.Generator) -> Mesh:
     """A polygon divided at random."""
     n = int(rng.integers(3, 30))
@@ -135,6 +145,7 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Mesh]] = {
         grid,
         adaptive,
         separate_holes,
+        riddled,
         polygon,
         scattered,
         integer,
@@ -195,6 +206,19 @@ def without(points: NDArray, triangles: NDArray, rng: np.random.Generator, share
     """A mesh without a share of its triangles, one at least being left."""
     keep = rng.random(len(triangles)) >= share
     keep[0] |= not keep.any()
+    return used(points, triangles[keep])
+
+
+def with_many_holes(points: NDArray, triangles: NDArray, rng: np.random.Generator, share: float) -> Mesh:
+    """A mesh without a share of its triangles, or fewer, chosen at random among those whose sides are all inner yet."""
+    _, side = np.unique(np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]], axis=2) @ [len(points), 1], return_inverse=True)
+    side = side.reshape(-1, 3)
+    inner = np.bincount(side.ravel()) == 2
+    keep, left = np.ones(len(triangles), dtype=bool), round(share * len(triangles))
+    for k in rng.permutation(len(triangles)):
+        if left and inner[side[k]].all():
+            inner[side[k]] = keep[k] = False
+            left -= 1
     return used(points, triangles[keep])
 
 

@@ -13,6 +13,7 @@ from . import certify as certificates
 from .cells import AGREE, Alternative, OrientedMesh, alternatives, coincident, filled_holes, touching
 from .clock import Clock
 from .evidence import pooled_noise, weigh
+from .factors import discord
 from .joined import JoinedMesh
 from .linalg import AnalysisAhead, factorisation
 from .matrix import OperatorMatrix
@@ -66,7 +67,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
         method=options.method,
         scale=known,
         refine=options.refine,
-        rounding=noise is None,
+        noise=noise,
         analyse=analyse or factorisation,
     )
     with clock("place"):
@@ -99,7 +100,8 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
             deviations = _deviations(topology, placement, placed, meshes, sigma, scale is None)
     trouble = [note for m in meshes for note in m.notes]
     doubt = max(m.doubt for m in meshes)
-    status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble, doubt)
+    apart = discord(topology, meshes, certificate.backward_error, noise)
+    status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble, doubt, apart)
     others: list[Alternative] = []
     if status == "certified":
         with clock("ambiguity") if topology.method == "the numbers" else nullcontext():  # else next to nothing

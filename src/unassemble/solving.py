@@ -29,10 +29,12 @@ def solve(
     method: str,
     scale: float | None,
     refine: bool,
-    rounding: bool,
+    noise: float | None,
     analyse: Callable[[UpperTriangle], Factorisation] = factorisation,
 ) -> tuple[OperatorMatrix, Topology, list[PieceMesh]]:
     """Positions and scale of each piece, in no particular frame; `analyse` as for the conformal map.
+
+    Entries have errors of the standard deviation `noise`, or of rounding.
 
     Returns
     -------
@@ -60,7 +62,7 @@ def solve(
             return error
 
     with clock(method):
-        doubtful = in_doubt(matrix, topology, start, scale)
+        doubtful = in_doubt(matrix, topology, start, scale, noise)
         spoilt: dict[Piece, PieceMesh] = {}
         if doubtful.any():
             spoilt, doubtful = wrong_entries(matrix, topology, start, doubtful, scale)
@@ -82,7 +84,7 @@ def solve(
         vanished = np.zeros(len(matrix.edges), dtype=bool)
         vanished[topology.vanished] = True
         with clock("polish"):
-            errors = None if rounding else np.where(vanished, EXACT, 1.0)
+            errors = None if noise is None else np.where(vanished, EXACT, 1.0)
             exact = lone_triangles(topology.pieces, -matrix.entries, scale, errors)
             meshes = [
                 exact.get(piece)
@@ -91,7 +93,7 @@ def solve(
                     -matrix.entries[piece.edge_rows],
                     mesh,
                     scale=scale,
-                    rounding=rounding,
+                    rounding=noise is None,
                     exact=vanished[piece.edge_rows],
                 )
                 for piece, mesh in zip(topology.pieces, meshes, strict=True)

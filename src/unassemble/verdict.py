@@ -8,12 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import Alternative
-from .cells.agreement import SAME_SCALE, SCALE_ERROR
 from .cells.reading import FITS
 from .certify import CERTIFIED, CONFIDENCE, LARGEST_NOISE, Certificate
 from .evidence import Evidence
 from .matrix import OperatorMatrix
-from .planar.hinges import groups
 from .topology import Topology
 from .words import count_of
 
@@ -40,6 +38,7 @@ def verdict(
     scale: NDArray,
     notes: Sequence[str] = (),
     doubt: float = 0.0,
+    apart: str | None = None,
 ) -> tuple[str, str]:
     """``"certified"`` or ``"uncertified"``, and why.
 
@@ -52,10 +51,11 @@ def verdict(
         Stages that did not converge.
     doubt : float
         About the error of the positions, relative to the size of their piece, as far as a solver knows of one.
+    apart : str, optional
+        What is wrong with the factors, see :func:`unassemble.factors.discord`.
     """
     good = passes(certificate, chi_square, scale)
-    apart = _discord(topology, certificate, scale) if good else None
-    if apart:
+    if good and apart:
         return "uncertified", apart
     if chi_square and _tested(certificate, chi_square, scale):
         return ("certified" if good else "uncertified"), _with_noise(
@@ -70,24 +70,6 @@ def verdict(
     if good and not evidence.certain:
         return "certified", f"the operator re-assembled on this mesh gives the matrix back to {error:.1e}"
     return "uncertified", _misfit(topology, certificate, matrix, evidence, notes)
-
-
-def _discord(topology: Topology, certificate: Certificate, scale: NDArray) -> str | None:
-    """What is wrong where pieces share vertices but not c: each by itself, small ones fit nearly anything."""
-    if not len(topology.hinges):
-        return None
-    label = groups(topology)
-    first = np.unique(label, return_index=True)[1][np.unique(label, return_inverse=True)[1]]
-    difference = np.abs(scale / scale[first] - 1)
-    worst = int(difference.argmax())
-    if difference[worst] <= max(SAME_SCALE, SCALE_ERROR * certificate.backward_error):
-        return None
-    a, b = int(first[worst]), worst
-    return (
-        f"the matrix is given back to {certificate.backward_error:.1e}, but by pieces with different factors c that "
-        f"share vertices: {scale[a]:.6g} in piece {a}, of row {topology.pieces[a].vertices.min()}, and "
-        f"{scale[b]:.6g} in piece {b}, of row {topology.pieces[b].vertices.min()}"
-    )
 
 
 def _misfit(

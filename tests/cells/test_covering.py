@@ -1,5 +1,7 @@
 """Lattices that hang together by single vertices: cells by an exact cover, and other meshes with the same matrix."""
 
+from itertools import islice
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from unassemble.cells.consistent import Assembly
 from unassemble.cells.covering import likely_scales, read_by_cover
 from unassemble.cells.numbered import Numbered, frequent_numbers
 from unassemble.cells.program import Program
+from unassemble.cells.right_angles import RightAngle
 from unassemble.cells.shapes import Shapes
 from vanishing import forgotten, holes, squares
 
@@ -130,3 +133,27 @@ def test_cells_that_are_no_mesh_together():
     program = Program(cells)
     program.exclude(quads[:1])
     assert program.solution(program.fans) is None or quads[0] not in program.solution(program.fans)
+
+
+def test_right_angles_at_a_hub_are_listed_one_after_the_other():
+    """Of 300 squares that meet in one vertex there are 90,000 regroupings, of which the first is named."""
+    corners = 300
+    turn = np.exp(2j * np.pi * np.arange(corners) / corners)
+    z = np.concatenate([[0], np.column_stack([turn, turn * (1 + 1j), turn * 1j]).ravel()])
+    k = 1 + 3 * np.arange(corners)
+    triangles = np.concatenate([np.column_stack([0 * k, k, k + 1]), np.column_stack([0 * k, k + 1, k + 2])])
+    right = [RightAngle(0, int(a), int(a) + 2, 0.0, (0, int(a), int(a) + 1, int(a) + 2), ()) for a in k]
+    some = regrouped._regroupings([right], 1e-9)
+    assert len(list(islice(some, 10))) == 10
+    found = recover(forgotten(specimen(np.column_stack([z.real, z.imag]), triangles)).matrix)
+    assert not found.certified
+    assert len(found.alternatives) == 1
+
+
+def test_where_the_budget_for_regroupings_ends(monkeypatch):
+    """What has not been looked at is said."""
+    monkeypatch.setattr(regrouped, "_LISTED", 1e9)
+    mask = np.zeros((4, 4), bool)
+    mask[[0, 1, 2, 3], [0, 1, 2, 3]] = True
+    found = recover(forgotten(specimen(*squares(mask))).matrix)
+    assert not found.certified

@@ -13,7 +13,7 @@ from vanishing import forgotten, holes, squares
 NOTE = "unknowns that were eliminated"
 
 
-@pytest.mark.parametrize("shape", [(5, 9), (10, 10), (40, 31)])
+@pytest.mark.parametrize("shape", [(4, 4), (5, 9), (10, 10), (40, 31)])
 def test_finite_differences(shape):
     points = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).reshape(-1, 2).astype(float)
     order = np.random.default_rng(1).permutation(len(points))
@@ -23,6 +23,14 @@ def test_finite_differences(shape):
     assert not found.certified
     assert NOTE in found.reason
     assert len(found.suspects) == 2 * (sum(shape) - 2)
+
+
+def test_one_complete_row():
+    """All rows but that in the middle are next to the boundary."""
+    found = recover(poisson((3, 3), format="csr"))
+    points = np.stack(np.meshgrid(np.arange(3), np.arange(3), indexing="ij"), -1).reshape(-1, 2).astype(float)
+    assert largest_error(found.points, points) <= 1e-9
+    assert NOTE in found.reason
 
 
 def test_grid_with_holes():

@@ -6,6 +6,8 @@ import scipy.sparse as sp
 
 from meshes import specimen
 from unassemble import recover
+from unassemble.cells import other_scales
+from unassemble.cells.exhaustion import all_readings
 from vanishing import forgotten, squares
 
 
@@ -77,3 +79,20 @@ def test_many_separate_rectangles_are_all_tried():
     found = recover(known.matrix)
     assert found.certified, found.reason
     assert len(found.polygons_offsets) - 1 == 110
+
+
+def test_pieces_that_are_alike_are_read_once(monkeypatch):
+    """Twelve strips of three squares, which all fit in so many ways that not all can be tried."""
+    calls = []
+
+    def counted(part, *arguments):
+        calls.append(len(part.vertices))
+        return all_readings(part, *arguments)
+
+    monkeypatch.setattr(other_scales, "all_readings", counted)
+    points, triangles = squares(np.ones((1, 3), bool))
+    copies = [(points + [0, 10 * k], triangles + k * len(points)) for k in range(12)]
+    known = forgotten(specimen(*map(np.concatenate, zip(*copies, strict=True)), seed=4))
+    found = recover(known.matrix)
+    assert not found.certified
+    assert 1 <= len(calls) <= 3  # rounding may tell some apart

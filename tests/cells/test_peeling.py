@@ -34,7 +34,7 @@ def lattice(seed, c=1.0):
 def test_what_is_peeled_is_right(seed, c):
     sides, weights, true = cycles_of(lattice(seed, c))
     assert scales_of_lone_triangles(sides, weights) == [pytest.approx(c, rel=1e-9)]
-    state = peeled(sides, 2 * weights / c)
+    state = peeled(sides, 2 * weights / c).state
     assert true[state == 1].all()
     assert not true[state == -1].any()
     assert (state == 1).sum() > 0.6 * true.sum()
@@ -55,7 +55,7 @@ def test_random_weights_agree_in_no_scale():
 def test_a_right_angle_across_an_inner_edge():
     """Taken for a cell because of its other sides, a triangle may have no part in the weight of the third."""
     cotangents = np.array([1.0, 1.0, 2.0, 0.5, 0.0])
-    state = peeled(np.array([[0, 1, 4], [2, 3, 4]]), cotangents)
+    state = peeled(np.array([[0, 1, 4], [2, 3, 4]]), cotangents).state
     assert state.tolist() == [1, 1]
 
 

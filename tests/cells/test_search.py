@@ -1,11 +1,14 @@
 """Many wrong cells, many pieces, a known scale, and matrices of no mesh."""
 
+import networkx
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from families import FAMILIES, HOPELESS
 from meshes import largest_error, random_mesh, specimen, triangle_set
 from unassemble import RecoveryError, recover
+from unassemble.cells import search
 from unassemble.cells.reading import Reading
 from unassemble.cells.small import small_map
 from unassemble.planar.conformal import conformal_map
@@ -98,3 +101,17 @@ def test_small_pieces_have_the_same_conformal_map():
     points = small.z.view(np.float64).reshape(-1, 2)
     assert largest_error(points, known.points[piece.vertices]) <= 1e-9
     assert small_map(piece, np.zeros(len(piece.edges))) is None
+
+
+def test_grids_of_equal_entries_are_given_up_soon(monkeypatch):
+    """The Laplacian of a grid graph: a misfit would lead nowhere."""
+
+    def refused(*_):
+        raise AssertionError("labels are being tried")
+
+    monkeypatch.setattr(search, "mended", refused)
+    graph = networkx.convert_node_labels_to_integers(networkx.grid_2d_graph(20, 21))
+    order = np.random.default_rng(0).permutation(len(graph))
+    matrix = sp.csr_array(networkx.laplacian_matrix(graph), dtype=float)[order][:, order]
+    with pytest.raises(RecoveryError, match="network"):
+        recover(matrix)

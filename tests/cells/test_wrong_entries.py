@@ -6,7 +6,7 @@ import scipy.sparse as sp
 
 from meshes import largest_error, random_mesh, specimen
 from unassemble import recover
-from unassemble.cells import in_doubt, search, triangles_only, wrong_entries
+from unassemble.cells import clusters, in_doubt, search, wrong_entries
 from unassemble.matrix import check_matrix
 from unassemble.planar.conformal import conformal_map
 from unassemble.planar.piece import PieceMesh
@@ -40,7 +40,7 @@ def no_repairs(monkeypatch):
     def refused(*_):
         raise AssertionError("labels are being tried")
 
-    for module, name in ((search, "repaired"), (search, "mended"), (triangles_only, "mended")):
+    for module, name in ((search, "repaired"), (search, "mended"), (clusters, "mended"), (clusters, "repaired")):
         monkeypatch.setattr(module, name, refused)
 
 

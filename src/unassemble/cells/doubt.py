@@ -11,6 +11,7 @@ from scipy.sparse import csgraph
 
 from ..errors import RecoveryError, SolverError
 from ..matrix import OperatorMatrix
+from ..planar.deviations import factor_deviation
 from ..planar.piece import PieceMesh
 from ..planar.polish import PolishOptions, polish
 from ..topology import Piece, Topology
@@ -21,6 +22,7 @@ _WIDE = 200  # rows of a matrix on which the misfit of a wrong cell stays near i
 SURE = 1e-3
 """Misfit, even if spread evenly, that no wrong cell is known to leave."""
 
+_SIGMAS = 5.0  # errors of c by which pieces may differ: the last word on that is not spoken here
 _SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 
 Outcome = PieceMesh | RecoveryError
@@ -33,16 +35,21 @@ Solved = list[tuple[Piece, Outcome]]
 
 
 def in_doubt(
-    matrix: OperatorMatrix, topology: Topology, attempt: Attempt, scale: float | None = None
+    matrix: OperatorMatrix,
+    topology: Topology,
+    attempt: Attempt,
+    scale: float | None = None,
+    noise: float | None = None,
 ) -> NDArray[np.bool_]:
     """(n,) rows of components with nonzero entries on no triangle, entries that do not fit, or several factors c.
 
     A misfit that is small and spread evenly, at the latest after a short polish, is that of errors in the entries, and
-    raises no doubt. Pieces of components that are in doubt without it are not solved. `scale` is c, where it is known.
+    raises no doubt. Pieces of components that are in doubt without it are not solved. `scale` is c, where it is known,
+    and `noise` the standard deviation of the entries' errors.
     """
     doubtful = unexplained(matrix, topology)
     solved = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
-    doubtful |= _discordant(matrix, solved, scale)
+    doubtful |= _discordant(matrix, solved, scale, noise or 0.0)
     solved = [(piece, mesh) for piece, mesh in solved if not doubtful[piece.vertices[0]]]
     rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
     misfit = misfits_of(matrix, solved)[rest]
@@ -54,7 +61,7 @@ def in_doubt(
     return doubtful | _components_of(matrix, rest[wrong])
 
 
-def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None) -> NDArray[np.bool_]:
+def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None, noise: float) -> NDArray[np.bool_]:
     """(n,) rows of components whose pieces fit, but loose ones with another factor c than is known or others have.
 
     With a hole filled such a piece still fits, with another c. That of pieces with more entries than unknowns is right,
@@ -75,10 +82,24 @@ def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None) -> 
         order = np.lexsort((np.array([piece.n_vertices for piece, _ in having]), ~loose))
         right[own[order]] = c[order]
     apart = np.abs(c / right[own] - 1) > bound[own]
+    if noise and apart.any():
+        error = noise * np.array([_factor_deviation(piece, mesh) for piece, mesh in having])
+        told = np.zeros(count)
+        if scale is None:
+            told[own[order]] = error[order]
+        apart &= np.abs(c / right[own] - 1) > _SIGMAS * np.hypot(error, told[own])
     wrong, hopeless = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
     wrong[own[apart]] = True
     hopeless[own[apart & ~loose]] = True
     return np.asarray((wrong & ~hopeless)[label])
+
+
+def _factor_deviation(piece: Piece, mesh: PieceMesh) -> float:
+    """Relative standard deviation of c for noise 1 in the entries; infinite where they do not tell c."""
+    try:
+        return factor_deviation(piece, mesh.z) / abs(mesh.scale)
+    except SolverError:
+        return np.inf
 
 
 def _like_noise(misfit: NDArray, n: int) -> bool:

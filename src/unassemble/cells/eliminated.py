@@ -25,7 +25,6 @@ from .search import first_reading
 from .spoilt import without_wrong_entries
 
 _SUM = 1e-10  # sum of a row, relative to its entries, that is rounding
-_MANY = 0.7  # share of rows; more would be a mass matrix that was added, or no Laplacian at all
 _SHORT = PolishOptions(max_steps=20, max_factorisations=3)
 _NOTE = (
     "these are entries between rows that do not add up to zero, as next to unknowns that were eliminated, which still "
@@ -34,14 +33,18 @@ _NOTE = (
 
 
 def incomplete_rows(matrix: OperatorMatrix) -> NDArray[np.bool_]:
-    """(n,) rows that do not add up to zero, if most others do; none otherwise."""
+    """(n,) rows that do not add up to zero, if any others do; none otherwise.
+
+    A mass matrix that was added leaves none. How many there are is no matter: of small grids most rows are next to the
+    boundary, and whether they are just those on the boundary of what is left is asked in any case.
+    """
     size = np.abs(matrix.diagonal)
     sums = matrix.diagonal.copy()
     for end in matrix.edges.T:
         sums += np.bincount(end, matrix.entries, matrix.n)
         size += np.bincount(end, np.abs(matrix.entries), matrix.n)
     incomplete = np.abs(sums) > _SUM * size
-    return incomplete & (incomplete.sum() < _MANY * matrix.n)
+    return incomplete & ~incomplete.all()
 
 
 def without_boundary(

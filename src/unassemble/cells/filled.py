@@ -2,20 +2,21 @@
 
 Where a piece has no more entries than coordinates and c, every choice of its triangles fits, with a c of its own. A
 triangle whose sides are all inner may be a hole; then the three parts that it holds together fit by themselves, and
-with one c. Each is tried alone; where several are holes, parts beyond them agree in another c, with which the whole is
-read again.
+with one c, that of all other pieces. Each is tried alone, in its piece; where several are holes, parts beyond them
+agree in another c, with which the whole is read again, unless a piece with entries to spare tells that c is right.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
 from ..topology import Numbering, Piece, Polygons, Topology
-from .agreement import common_values
+from ..topology.keys import contains, pair_keys
+from .agreement import SAME_SCALE, common_values
 from .by_component import with_pieces
 from .cell_set import CellSet
 from .corners import Alternative
@@ -23,15 +24,15 @@ from .covering import MOST_VERTICES
 from .reading import FITS, NEARLY, Reading
 from .rereading import cells_of, with_another_scale
 
-_MOST_TRIALS = 60
+_WORK = 1e5  # triangles times trials in all components together: a few seconds
 _MOST_SCALES = 8
 
 
 def filled_holes(stored: OperatorMatrix, topology: Topology, factors: NDArray, agree: float) -> list[Alternative]:
     """Triangles of loose pieces without which the matrix is given back, too; c is not known.
 
-    Of components that are too large, and where there are too many triangles to try, one that is not tried stands for
-    all of them.
+    Where there are too many triangles to try, and where one of a large component might be, one that is not tried stands
+    for all of them.
 
     Parameters
     ----------
@@ -43,25 +44,16 @@ def filled_holes(stored: OperatorMatrix, topology: Topology, factors: NDArray, a
     agree : float
         Relative difference of numbers that noise may cause.
     """
-    if not any(_suspects(topology.pieces)):
+    if not any(_suspects(piece) for piece in topology.pieces):
         return []
-    found = []
-    local = np.zeros(stored.n, dtype=np.int64)
+    found, work = [], _WORK
     for part, pieces in with_pieces(stored.n, stored.edges, topology.pieces):
-        suspects = list(_suspects(pieces))
-        if not suspects:
-            continue
-        if len(part.vertices) > MOST_VERTICES:
-            found.append(_without(suspects[:1], tested=False))
-            continue
-        local[part.vertices] = np.arange(len(part.vertices))
-        triangles = np.concatenate([local[piece.vertices[piece.triangles]] for piece in pieces])
-        weights = -stored.entries[part.edge_rows]
-        holes = _holes(part, weights, triangles, suspects, local, float(factors[part.vertices[0]]), agree)
-        if holes:
-            found.append(_without(holes))
-        elif len(suspects) > _MOST_TRIALS:
-            found.append(_without(suspects[_MOST_TRIALS:][:1], tested=False))
+        suspects = [(piece, triangle) for piece in pieces for triangle in _suspects(piece)]
+        work -= sum(len(piece.triangles) for piece, _ in suspects)
+        if suspects and work < 0:
+            found.append(_without([suspects[0][1]], tested=False))
+        elif suspects:
+            found += _holes(stored, part, pieces, suspects, float(factors[part.vertices[0]]), agree)
     return found
 
 
@@ -70,44 +62,59 @@ def _without(triangles: list[tuple[int, ...]], *, tested: bool = True) -> Altern
 
 
 def _holes(
+    stored: OperatorMatrix,
     part: Numbering,
-    weights: NDArray,
-    triangles: NDArray[np.int64],
-    suspects: list[tuple[int, ...]],
-    local: NDArray[np.int64],
+    pieces: list[Piece],
+    suspects: list[tuple[Piece, tuple[int, ...]]],
     c: float,
     agree: float,
-) -> list[tuple[int, ...]]:
-    """Triangles of a component that may be holes together; none if all must be cells.
-
-    `triangles` are all of it, in its numbering, which `local`, (n,), gives for each row.
-    """
-    n = len(part.vertices)
+) -> list[Alternative]:
+    """Triangles of a component that may be holes together; none if all must be cells."""
+    weights = -stored.entries[part.edge_rows]
     sign = float(np.sign(weights.sum()))
+    same = max(SAME_SCALE, agree)
     scales, places = [], []
-    for triangle in suspects[:_MOST_TRIALS]:
-        rest = triangles[(np.sort(triangles, axis=1) != np.sort(local[list(triangle)])).any(axis=1)]
-        cells = Polygons(np.arange(0, 3 * len(rest) + 1, 3), rest.ravel())
-        some = CellSet(n, part.edges, weights, None, cells, np.zeros(len(rest), dtype=bool))
-        reading = Reading.of(some, np.ones(len(rest), dtype=bool))
-        if reading.nearly_fits(agree):
-            return [triangle]
-        for piece, mesh in zip(reading.pieces, reading.meshes, strict=True):
-            if mesh and sign * mesh.scale > 0:
-                scales.append(sign * mesh.scale)
-                places.append(piece.edge_rows.min())
+    for piece, triangle in suspects:
+        reading = _without_one(stored, piece, triangle)
+        parts = [(rest, mesh.scale) for rest, mesh in zip(reading.pieces, reading.meshes, strict=True) if mesh]
+        if reading.nearly_fits(agree) and (len(pieces) == 1 or abs(parts[0][1] / c - 1) < same):
+            return [_without([triangle])]
+        for rest, scale in parts:
+            if sign * scale > 0:
+                scales.append(sign * scale)
+                places.append(int(piece.edge_rows[rest.edge_rows].min()))
+    if any(piece.redundancy > 0 for piece in pieces):
+        return []
     common = common_values(np.array(scales), np.array(places, dtype=np.int64), max(FITS, agree))[:_MOST_SCALES]
-    whole = with_another_scale(part, weights, c, [sign * float(other) for other in common])
+    others = [sign * float(other) for other in common if abs(sign * other / c - 1) > same]
+    first = suspects[0][1]
+    if len(part.vertices) > MOST_VERTICES:
+        return [_without([first], tested=False)] if others else []
+    whole = with_another_scale(part, weights, c, others)
     if whole is None:  # with noise no reading fits as it is
-        return suspects[:1] if len(common) and agree > NEARLY else []
+        return [_without([first])] if len(common) and agree > NEARLY else []
     kept = cells_of(whole, part)
-    return [triangle for triangle in suspects if triangle not in kept] or suspects[:1]
+    return [_without([triangle for _, triangle in suspects if triangle not in kept] or [first])]
 
 
-def _suspects(pieces: Sequence[Piece]) -> Iterator[tuple[int, ...]]:
-    """Triangles of loose pieces with three inner sides."""
-    for piece in pieces:
-        if piece.redundancy <= 0:
-            inner = np.asarray((piece.facing[:, 1] >= 0)[piece.opposite].all(axis=1))
-            for triangle in np.sort(piece.vertices[piece.triangles[inner]], axis=1).tolist():
-                yield tuple(triangle)
+def _without_one(stored: OperatorMatrix, piece: Piece, triangle: tuple[int, ...]) -> Reading:
+    """The rest of a piece, which may be several."""
+    corners = np.sort(piece.vertices[piece.triangles], axis=1)
+    rest = piece.triangles[(corners != triangle).any(axis=1)]
+    known, own = pair_keys(stored.n, *stored.edges.T), pair_keys(stored.n, *piece.vertices[piece.edges].T)
+    weights = np.zeros(len(own))
+    there = contains(known, own)
+    weights[there] = -stored.entries[np.searchsorted(known, own[there])]
+    order = np.argsort(pair_keys(piece.n_vertices, *piece.edges.T))
+    cells = Polygons(np.arange(0, 3 * len(rest) + 1, 3), rest.ravel())
+    none = np.zeros(len(rest), dtype=bool)
+    some = CellSet(piece.n_vertices, np.sort(piece.edges, axis=1)[order], weights[order], None, cells, none)
+    return Reading.of(some, ~none)
+
+
+def _suspects(piece: Piece) -> Iterator[tuple[int, ...]]:
+    """Triangles with three inner sides, if the piece is loose."""
+    if piece.redundancy <= 0:
+        inner = np.asarray((piece.facing[:, 1] >= 0)[piece.opposite].all(axis=1))
+        for triangle in np.sort(piece.vertices[piece.triangles[inner]], axis=1).tolist():
+            yield tuple(triangle)

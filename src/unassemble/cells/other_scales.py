@@ -8,6 +8,8 @@ instance, are pairs of right triangles as well, all of them with one other c.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +17,7 @@ from ..matrix import OperatorMatrix
 from ..topology import Numbering, Topology
 from ..topology.embedding import face_complexes
 from .agreement import SAME_SCALE, common_values
+from .alike import Answers, Cells, Found
 from .angles import scales_of_faces
 from .by_component import with_pieces
 from .corners import Alternative, OrientedMesh
@@ -30,8 +33,6 @@ _MOST_SHAPES = 3000
 _MOST_SCALES = 6
 _SHORT = 4  # cells of up to so many sides are right angles, triangles or parts of crosses
 _AGREE = 1e-7
-
-Cells = set[tuple[int, ...]]
 
 
 def other_scales(
@@ -74,29 +75,41 @@ def other_scales(
     ]
     found, left_open, budget = [], False, Budget()
     own_of = own_cells(stored.n, [part for part, _ in loose], mesh)
+    answers = Answers()
     for (part, count), own in zip(reversed(loose), reversed(own_of), strict=True):  # the smallest first
         weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
-        try:
-            readings = all_readings(part, weights, agree, budget)
-            other = next((reading for reading in readings if reading[0] != own), None)
-        except TooManyError:
-            left_open |= count == 1 or len(part.vertices) > MOST_VERTICES or agree > NEARLY
-            other = _with_common_scale(part, weights, c)
-        if other is not None:
-            cells, factor = other
+        ask = partial(_other, part, weights, c, own, agree, budget, single=count == 1)
+        cells, factor, unknown = answers.of(part, weights, own, ask)
+        left_open |= unknown
+        if cells is not None:
             gone_cells, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
             same = abs(factor / c - 1) < SAME_SCALE
             found.append(Alternative((), (), (), gone_cells, new, same_scale=same))
     return found[::-1], left_open
 
 
-def _with_common_scale(part: Numbering, weights: NDArray, c: float) -> tuple[Cells, float] | None:
-    """A mesh with another c in which several cells agree that border no other."""
+def _other(
+    part: Numbering, weights: NDArray, c: float, own: Cells, agree: float, budget: Budget, *, single: bool
+) -> Found:
+    """Other cells of one component, all readings tried; where there are too many, a few factors, of several pieces."""
+    try:
+        readings = all_readings(part, weights, agree, budget)
+        cells, factor = next((reading for reading in readings if reading[0] != own), (None, c))
+        return cells, factor, False
+    except TooManyError:
+        pass
+    # No search would settle these: what a cover finds names an example.
+    left_open = single or len(part.vertices) > MOST_VERTICES or agree > NEARLY
+    return *(_with_common_scale(part, weights, c, searched=not left_open) or (None, c)), left_open
+
+
+def _with_common_scale(part: Numbering, weights: NDArray, c: float, *, searched: bool) -> tuple[Cells, float] | None:
+    """A mesh with another c in which several cells agree that border no other; by a cover, or `searched` for."""
     n = len(part.vertices)
     shapes = Shapes.of(n, part.edges, _MOST_SHAPES) if n <= MOST_VERTICES else None
     if shapes is None or not len(shapes):
         return None
-    reading = with_another_scale(part, weights, c, _of_lone_cells(shapes, weights))
+    reading = with_another_scale(part, weights, c, _of_lone_cells(shapes, weights), searched=searched)
     if reading is None:
         return None
     return cells_of(reading, part), next(mesh.scale for mesh in reading.meshes if mesh)

@@ -8,14 +8,19 @@ two sides whose weights may be shared. A wrong c soon leads to a contradiction.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .agreement import common_values
+from .patches import patches
 
 _AGREE = 1e-9  # relative difference of the c of two lone triangles
 _MOST_SCALES = 8  # that are tried: inner triangles of a lattice agree as well, in a wrong one
-_NOTHING = 1e-6  # what may be left of a weight, relative to it or to 1, by rounding
+
+NOTHING = 1e-6
+"""What rounding may leave of a weight, relative to it or to 1."""
 
 
 class ContradictionError(Exception):
@@ -41,8 +46,27 @@ def scales_of_lone_triangles(sides: NDArray[np.int64], weights: NDArray[np.float
     return [float(c) for c in np.sign(weights.sum()) * scales if c]
 
 
-def peeled(sides: NDArray[np.int64], cotangents: NDArray[np.float64]) -> NDArray[np.int8]:
-    """(m,) 1 for a cell, -1 for a hole, 0 where that is not settled.
+@dataclass(frozen=True, eq=False)
+class Peeled:
+    """What is known of triangles that may be cells.
+
+    Attributes
+    ----------
+    state : (m,) int8
+        1 for a cell, -1 for a hole, 0 where that is not settled.
+    whole : (m,) bool
+        Cells all of whose cotangents are known, and holes.
+    left : (e,) float64
+        What such cells leave of the weights of the edges, as sums of cotangents.
+    """
+
+    state: NDArray[np.int8]
+    whole: NDArray[np.bool_]
+    left: NDArray[np.float64]
+
+
+def peeled(sides: NDArray[np.int64], cotangents: NDArray[np.float64]) -> Peeled:
+    """What follows from the boundary and from patches that holes cut off.
 
     Parameters
     ----------
@@ -58,7 +82,17 @@ def peeled(sides: NDArray[np.int64], cotangents: NDArray[np.float64]) -> NDArray
     """
     peeling = _Peeling(sides, cotangents)
     peeling.run()
-    return np.array(peeling.state, dtype=np.int8)
+    known = alone = peeling.result()
+    try:
+        while len(rest := np.flatnonzero(~known.whole)):
+            cells, holes = patches(sides[rest], known.left, np.abs(cotangents), known.state[rest])
+            if not peeling.assume(rest[cells], rest[holes]):
+                break
+            peeling.run()
+            known = peeling.result()
+    except ContradictionError:  # on lattices numbers coincide by chance
+        return alone
+    return known
 
 
 class _Peeling:
@@ -69,7 +103,7 @@ class _Peeling:
         self._sides: list[list[int]] = sides.tolist()
         self._cotangents: list[dict[int, float]] = [{} for _ in self._sides]
         self._left: list[float] = cotangents.tolist()
-        self._nothing: list[float] = (_NOTHING * (np.abs(cotangents) + 1)).tolist()
+        self._nothing: list[float] = (NOTHING * (np.abs(cotangents) + 1)).tolist()
         self._nonzero: list[bool] = (cotangents != 0).tolist()
         self._at: list[list[int]] = [[] for _ in self._left]
         for triangle, edges in enumerate(self._sides):
@@ -78,6 +112,25 @@ class _Peeling:
         self._waiting: list[int] = []
         for edge in range(len(self._left)):
             self._need(edge)
+
+    def result(self) -> Peeled:
+        """What is known now."""
+        whole = [state < 0 or len(known) == 3 for state, known in zip(self.state, self._cotangents, strict=True)]
+        left = self._left.copy()
+        for known, all_of_them in zip(self._cotangents, whole, strict=True):
+            for edge, cotangent in () if all_of_them else known.items():
+                left[edge] += cotangent
+        return Peeled(np.array(self.state, np.int8), np.array(whole, dtype=bool), np.array(left))
+
+    def assume(self, cells: NDArray[np.int64], holes: NDArray[np.int64]) -> bool:
+        """Take triangles that are not settled for cells and for holes; whether there are any."""
+        settled = np.array(self.state, dtype=bool)
+        cells, holes = cells[~settled[cells]], holes[~settled[holes]]
+        for triangle in cells.tolist():
+            self._take(triangle)
+        for triangle in holes.tolist():
+            self._leave_out(triangle)
+        return bool(len(cells) + len(holes))
 
     def run(self) -> None:
         """Until nothing more follows."""

@@ -9,9 +9,9 @@ has the same entries, so that what it holds without these right angles stays whe
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import combinations, islice
+from itertools import chain, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +22,14 @@ from ..topology import Numbering, Polygons, components
 from ..topology.pieces import edge_connected
 from .cell_set import CellSet
 from .corners import Alternative, Corners, OrientedMesh, cell
+from .exhaustion import Budget, TooManyError
 from .reading import FITS, Reading
-from .right_angles import right_angles
+from .right_angles import RightAngle, right_angles
 
 _MOST_VERTICES = 400
 _MOST_TRIALS = 60
+_AT_ONCE = 1000  # of which it is asked together whether the rest excludes them
+_LISTED, _SLOW = 0.1, 50  # solutions that listing one costs, and rows of a component that cost as much as one more
 _AS_WELL = 10.0  # times the misfit of the mesh that was found
 _RIGHT = 1e-6  # cosine of an angle that may be a right one
 
@@ -41,44 +44,60 @@ def regrouped(
     corners : Corners
         All corners of the mesh that was found.
     """
-    return fitting(stored, mesh, factors, list(_regroupings(stored, mesh, corners, agree)), first=True)
+    groups = right_angles(stored.n, stored.edges, mesh, corners)
+    return fitting(stored, mesh, factors, _regroupings(groups, agree), first=True)
 
 
 def fitting(
-    stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, others: list[Alternative], *, first: bool = False
+    stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, others: Iterable[Alternative], *, first: bool = False
 ) -> list[Alternative]:
     """Those about one vertex that fit, as their solution shows; of large graphs, those that the rest does not exclude.
 
+    Where there are too many, one that was not tried stands for the others.
+
     Parameters are those of :func:`unassemble.cells.ambiguity.alternatives`, and
 
-    others : list of Alternative
+    others : iterable of Alternative
     first : bool
         Only the first for each component.
     """
-    if not others:
+    others = iter(others)
+    some = list(islice(others, _AT_ONCE))
+    if not some:
         return []
     parts = components(stored.n, stored.edges)
     label, number = np.full(stored.n, -1), np.zeros(stored.n, dtype=np.int64)
     for k, part in enumerate(parts):
         label[part.vertices], number[part.vertices] = k, np.arange(len(part.vertices))
-    own: dict[int, list[Alternative]] = {}
-    for other in others:
-        own.setdefault(int(label[other.around[0]]), []).append(other)
-    found = []
-    for k, some in own.items():
-        trials = _MOST_TRIALS if len(parts[k].vertices) <= _MOST_VERTICES else 0
-        fits: list[Alternative] = []
-        if trials:
-            cells = mesh.chosen(label == k, number)
-            weights, scale = -stored.entries[parts[k].edge_rows], float(factors[parts[k].vertices[0]])
-            solved = _solved(parts[k], weights, scale, cells, number, some[:trials])
-            fits = list(islice(solved, 1 if first else None))
-        if not (first and fits) and len(some) > trials:
-            untried = some[trials:]
-            excluded = _excluded(stored.n, mesh, untried)
-            fits += [replace(other, tested=False) for other, out in zip(untried, excluded, strict=True) if not out]
-        found += fits[:1] if first else fits
-    return found
+    left = {k: _MOST_TRIALS if len(part.vertices) <= _MOST_VERTICES else 0 for k, part in enumerate(parts)}
+    found: dict[int, list[Alternative]] = {}
+    budget = Budget()
+    while some and not (first and len(found) == len(parts)):
+        own: dict[int, list[Alternative]] = {}
+        for other in some:
+            own.setdefault(int(label[other.around[0]]), []).append(other)
+        for k, mine in own.items():
+            if first and k in found:
+                continue
+            trials, left[k] = left[k], max(left[k] - len(mine), 0)
+            fits: list[Alternative] = []
+            try:
+                budget.spend(_LISTED * len(mine))
+                if trials:
+                    cells = mesh.chosen(label == k, number)
+                    weights, scale = -stored.entries[parts[k].edge_rows], float(factors[parts[k].vertices[0]])
+                    solved = _solved(parts[k], weights, scale, cells, number, mine[:trials], budget)
+                    fits = list(islice(solved, 1 if first else None))
+            except TooManyError:
+                return [*chain(*found.values()), replace(mine[0], tested=False)]
+            if not (first and fits) and len(mine) > trials:
+                untried = mine[trials:]
+                excluded = _excluded(stored.n, mesh, untried)
+                fits += [replace(other, tested=False) for other, out in zip(untried, excluded, strict=True) if not out]
+            if fits:
+                found.setdefault(k, []).extend(fits[:1] if first else fits)
+        some = list(islice(others, _AT_ONCE))
+    return list(chain(*found.values()))
 
 
 def _solved(
@@ -88,6 +107,7 @@ def _solved(
     cells: OrientedMesh,
     number: NDArray[np.int64],
     others: list[Alternative],
+    budget: Budget,
 ) -> Iterator[Alternative]:
     """Those that fit as well as the mesh that was found; `cells` are its own, in the numbering of the part."""
     known: dict[bytes, PieceMesh | None] = {}
@@ -99,20 +119,30 @@ def _solved(
     none = Alternative((), (), (), (), ())
     as_found = reading(*_cells(cells, number, none)).misfit.max()
     for other in others:
+        budget.spend(1 + len(part.vertices) / _SLOW)
         if reading(*_cells(cells, number, other)).misfit.max() <= max(FITS, _AS_WELL * as_found):
             yield other
 
 
-def _regroupings(stored: OperatorMatrix, mesh: OrientedMesh, corners: Corners, agree: float) -> Iterator[Alternative]:
-    for group in right_angles(stored.n, stored.edges, mesh, corners):
-        for one, two in combinations(group, 2):
-            a, b, h = one.first, one.second, one.apex
-            for d, f, gets in ((two.first, two.second, two.gets), (two.second, two.first, -two.gets)):
-                apart = not {a, b} & {d, f}  # with an edge in common they would come out as they are
-                if apart and one.cell != two.cell and abs(one.gets + gets) <= agree:  # h-d has the inverse of h-a
-                    new = cell(h, frozenset((a, d))), cell(h, frozenset((b, f)))
-                    added = (*new, *one.rest, *two.rest)
-                    yield Alternative((h,), (a, b, d, f), (a, d, b, f), (one.cell, two.cell), added)
+def _regroupings(groups: list[list[RightAngle]], agree: float) -> Iterator[Alternative]:
+    """One after the other: there are about as many as pairs of right angles at a vertex where all cells are alike."""
+    for group in groups:
+        order = sorted(group, key=lambda one: abs(one.gets))
+        for k, one in enumerate(order):
+            for two in order[k + 1 :]:
+                if abs(two.gets) - abs(one.gets) > agree:
+                    break
+                yield from _of_pair(one, two, agree)
+
+
+def _of_pair(one: RightAngle, two: RightAngle, agree: float) -> Iterator[Alternative]:
+    a, b, h = one.first, one.second, one.apex
+    for d, f, gets in ((two.first, two.second, two.gets), (two.second, two.first, -two.gets)):
+        apart = not {a, b} & {d, f}  # with an edge in common they would come out as they are
+        if apart and one.cell != two.cell and abs(one.gets + gets) <= agree:  # h-d has the inverse of h-a
+            new = cell(h, frozenset((a, d))), cell(h, frozenset((b, f)))
+            added = (*new, *one.rest, *two.rest)
+            yield Alternative((h,), (a, b, d, f), (a, d, b, f), (one.cell, two.cell), added)
 
 
 def _cells(mesh: OrientedMesh, number: NDArray[np.int64], other: Alternative) -> tuple[Polygons, NDArray[np.bool_]]:

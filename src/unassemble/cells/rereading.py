@@ -6,6 +6,9 @@ symmetric graphs whose cells and holes may change places, small pieces that hang
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +17,9 @@ from ..topology import Numbering, components
 from ..topology.faces import joined
 from ..topology.keys import contains, pair_keys
 from .agreement import SAME_SCALE
+from .alike import Answers, Cells, Found
 from .corners import Alternative, OrientedMesh
+from .covering import read_by_cover
 from .reading import Reading
 from .search import fitting_starts, read_cells
 from .undivided import undivided
@@ -36,17 +41,16 @@ def other_readings(
     small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= _MOST_VERTICES]
     n_orders = int(np.clip(_WORK // max(sum(len(part.vertices) for part in small), 1), 1, _ORDERS))
     half = _with_vanished_sides(stored, mesh)
+    answers = Answers()
     for part, own in zip(small, own_cells(stored.n, small, mesh), strict=True):
         supposed = bool(half[part.vertices].any())
-        for _ in range(n_orders):
-            shuffled = part.then(_shuffled(part, rng))
-            other = _other_reading(shuffled, -stored.entries[shuffled.edge_rows], own, scale, supposed=supposed)
-            if other is not None:
-                cells, c = other
-                gone, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
-                same = abs(c / factors[part.vertices[0]] - 1) < SAME_SCALE
-                others.append(Alternative((), (), (), gone, new, same_scale=same))
-                break
+        weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
+        shuffled = (part.then(_shuffled(part, rng)) for _ in range(n_orders))
+        ask = partial(_other_reading, shuffled, stored, own, scale, c, supposed=supposed)
+        cells, factor, _ = answers.of(part, weights, own, ask)
+        if cells is not None:
+            gone, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
+            others.append(Alternative((), (), (), gone, new, same_scale=abs(factor / c - 1) < SAME_SCALE))
     return others
 
 
@@ -60,21 +64,22 @@ def _with_vanished_sides(stored: OperatorMatrix, mesh: OrientedMesh) -> NDArray[
 
 
 def _other_reading(
-    part: Numbering, weights: NDArray, own: set[tuple[int, ...]], scale: float | None, *, supposed: bool
-) -> tuple[set[tuple[int, ...]], float] | None:
-    """Other cells that fit, and their c.
+    orders: Iterable[Numbering], stored: OperatorMatrix, own: Cells, scale: float | None, c: float, *, supposed: bool
+) -> Found:
+    """Other cells that fit in some order of the vertices, and their c.
 
     Among all starts if vanished sides have been `supposed` in these cells, as they are not where something fits without
     them; else, or where no start fits, by the search.
     """
-    graph = len(part.vertices), part.edges, weights, scale
-    found = list(fitting_starts(*graph)) if supposed else []
-    if not found and (reading := read_cells(*graph)) is not None and reading.fits:
-        found = [reading]
-    for reading in found:
-        if (cells := cells_of(reading, part)) != own:
-            return cells, next(solved.scale for solved in reading.meshes if solved)
-    return None
+    for part in orders:
+        graph = len(part.vertices), part.edges, -stored.entries[part.edge_rows], scale
+        found = list(fitting_starts(*graph)) if supposed else []
+        if not found and (reading := read_cells(*graph)) is not None and reading.fits:
+            found = [reading]
+        for reading in found:
+            if (cells := cells_of(reading, part)) != own:
+                return cells, next(solved.scale for solved in reading.meshes if solved), False
+    return None, c, False
 
 
 def own_cells(n: int, parts: list[Numbering], mesh: OrientedMesh) -> list[set[tuple[int, ...]]]:
@@ -91,11 +96,14 @@ def own_cells(n: int, parts: list[Numbering], mesh: OrientedMesh) -> list[set[tu
     return own
 
 
-def with_another_scale(part: Numbering, weights: NDArray, c: float, others: list[float]) -> Reading | None:
-    """A reading that fits with the first of some factors that allows one, c left out."""
+def with_another_scale(
+    part: Numbering, weights: NDArray, c: float, others: list[float], *, searched: bool = True
+) -> Reading | None:
+    """A reading that fits with the first of some factors that allows one, c left out; by a cover or a search."""
     for other in others:
         if abs(other / c - 1) > SAME_SCALE:
-            reading = read_cells(len(part.vertices), part.edges, weights, other)
+            graph = len(part.vertices), part.edges, weights, other
+            reading = read_cells(*graph) if searched else read_by_cover(*graph)
             if reading is not None and reading.fits:
                 return reading
     return None

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache, partial
 
+import numpy as np
 from numpy.typing import NDArray
 
 from ..planar.piece import PieceMesh
@@ -28,6 +29,8 @@ _DRAWINGS = 3  # that a graph may have, about
 _LAST = 60  # solves for small changes of the best reading, when all others are spent
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
+_EQUAL = 1e-9  # relative difference of weights that are all the same
+_FEW_TURNS = 8  # solves for turning parts over in each drawing of such a graph
 _CLOSE, _SOON = 0.15, 0.3  # misfit of starts with few wrong labels, and what part of them a first repair may take more
 
 
@@ -71,6 +74,8 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
     Reading or None
         None if no reading makes a planar surface.
     """
+    if np.ptp(weights) <= _EQUAL * np.abs(weights).max():
+        return _of_equal_weights(n, edges, weights, scale)
     effort = Effort.for_graph(n)
     triangles = read_triangles(n, edges, weights, scale, effort)
     if triangles is not None:
@@ -106,6 +111,24 @@ def _searched(
             if done:
                 return best, spoilt
     return descent(best, Effort(_LAST)) if best is not None and best.pieces else None, spoilt
+
+
+def _of_equal_weights(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Reading | None:
+    """A reading that fits of a graph whose weights are all the same, or the best of those to begin with.
+
+    They give the misfit no place to lead to: what is not read at once, or by a cover, most likely is a graph's
+    Laplacian, and belongs to no mesh.
+    """
+    effort, best = Effort.for_graph(n), None
+    for drawing in _drawings(n, edges, weights, scale):
+        begun = _begun(drawing, effort, _FEW_TURNS)
+        for start in begun.starts:
+            best = better(best, start)
+        if best is not None and best.fits:
+            return best
+    return read_by_cover(n, edges, weights, scale) or (
+        descent(best, Effort(BATCH, effort.known)) if best is not None and best.pieces else None
+    )
 
 
 def _settled(best: Reading | None, first: Reading) -> Reading:

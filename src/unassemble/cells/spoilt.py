@@ -14,10 +14,11 @@ from ..matrix import OperatorMatrix
 from ..planar.cotangent import edge_weights
 from ..planar.piece import PieceMesh
 from ..planar.robust import RobustFit, robust_fit
-from ..topology import Piece, Topology
+from ..topology import Numbering, Piece, Topology
 from ..topology.keys import contains, pair_keys
 from .agreement import SAME_SCALE
-from .doubt import SURE, Attempt, components_of, misfits_of, unexplained
+from .by_component import with_pieces
+from .doubt import SURE, Attempt, Outcome, misfits_of, unexplained
 from .reading import FITS, Reading, even
 
 _MOST_VERTICES = 200_000
@@ -42,28 +43,25 @@ def wrong_entries(
         Without the components that these settle.
     """
     own = doubtful & ~unexplained(matrix, topology)
-    components: dict[int, list[Piece]] = {}
-    label = components_of(matrix)
-    for piece in topology.pieces:
-        if own[piece.vertices[0]]:
-            components.setdefault(int(label[piece.vertices[0]]), []).append(piece)
+    pieces = [piece for piece in topology.pieces if own[piece.vertices[0]]]
+    meshes = {piece: attempt(piece) for piece in pieces}
+    misfit = misfits_of(matrix, list(meshes.items()))
     found: dict[Piece, PieceMesh] = {}
-    for number, pieces in components.items():
-        meshes = _in_component(matrix, pieces, attempt, scale)
-        if meshes:
-            found |= meshes
-            doubtful = doubtful & (label != number)
+    doubtful = doubtful.copy()
+    for part, inside in with_pieces(matrix.n, matrix.edges, pieces) if pieces else ():
+        other = _in_component(matrix, part, {piece: meshes[piece] for piece in inside}, misfit, scale)
+        if other:
+            found |= other
+            doubtful[part.vertices] = False
     return found, doubtful
 
 
 def _in_component(
-    matrix: OperatorMatrix, pieces: list[Piece], attempt: Attempt, scale: float | None
+    matrix: OperatorMatrix, part: Numbering, meshes: dict[Piece, Outcome], misfit: NDArray, scale: float | None
 ) -> dict[Piece, PieceMesh] | None:
     """Meshes of the pieces that do not fit, or None."""
-    meshes = {piece: attempt(piece) for piece in pieces}
-    misfit = misfits_of(matrix, list(meshes.items()))
     wrong = sorted(
-        (piece for piece in pieces if (misfit[piece.edge_rows] > FITS).any()), key=lambda piece: piece.n_vertices
+        (piece for piece in meshes if (misfit[piece.edge_rows] > FITS).any()), key=lambda piece: piece.n_vertices
     )
     found: dict[Piece, PieceMesh] = {}
     aside = [np.empty(0, dtype=np.int64)]
@@ -76,10 +74,11 @@ def _in_component(
         found[piece] = mesh
         aside += [] if mesh.aside is None else [piece.edge_rows[mesh.aside]]
         # Of all pieces together: the sides of a cell that is missing where two of them meet belong to both.
-        if not _apart(matrix.n, matrix.edges, matrix.edges[np.concatenate(aside)]):
+        rows = np.searchsorted(part.edge_rows, np.concatenate(aside))
+        if not _apart(len(part.vertices), part.edges, part.edges[rows]):
             return None
     scales = np.array([mesh.scale for mesh in (meshes | found).values() if isinstance(mesh, PieceMesh)])
-    return found if np.abs(scales / scales[0] - 1).max() < SAME_SCALE else None
+    return found if len(scales) and np.abs(scales / scales[0] - 1).max() < SAME_SCALE else None
 
 
 def without_wrong_entries(reading: Reading) -> Reading | None:

@@ -6,20 +6,20 @@ others by holes, or hang on them by vertices, their numbers tell c, and by that 
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 import numpy as np
 from numpy.typing import NDArray
 
+from ..topology import Polygons
 from ..topology.cycles import three_cycles
 from ..topology.embedding import face_complexes
 from .candidates import Candidates
+from .cell_set import CellSet
+from .clusters import with_clusters
 from .effort import Effort
 from .evidence import entries_are_to_blame
-from .mending import MOST_VERTICES, mended
+from .mending import MOST_VERTICES
 from .peeling import ContradictionError, peeled, scales_of_lone_triangles
 from .reading import Reading
-from .relaxation import HopelessError
 
 
 def read_triangles(n: int, edges: NDArray, weights: NDArray, scale: float | None, effort: Effort) -> Reading | None:
@@ -43,22 +43,27 @@ def read_triangles(n: int, edges: NDArray, weights: NDArray, scale: float | None
         return None
     for c in scales:
         try:
-            state = peeled(sides, 2 * weights / c)
+            known = peeled(sides, 2 * weights / c)
+            break
         except ContradictionError:
             continue
-        # With another scale there are other candidates; but faces come first, and in the same order.
-        kept = np.flatnonzero(labels)[state >= 0]
-        candidates = Candidates.of(drawing, weights, c)
-        labels = np.zeros(candidates.count, dtype=bool)
-        labels[kept] = True
-        break
     else:
         return None
-    reading = effort.reading(candidates, labels)
+    start = candidates.cells.offsets[:-1][labels]
+    triangles = candidates.cells.vertices[start[:, None] + np.arange(3)]
+    reading = effort.reading(*_alone(n, edges, weights, c, triangles[known.state >= 0]))
     if not (reading.fits or reading.like_noise or entries_are_to_blame(reading)):
-        with suppress(HopelessError):  # c may be wrong
-            reading = mended(reading, effort) or reading
+        cells = with_clusters(triangles, sides, edges, weights, c, known)
+        if cells is not None:
+            reading = effort.reading(*_alone(n, edges, weights, c, cells))
     return reading if reading.fits else None
+
+
+def _alone(n: int, edges: NDArray, weights: NDArray, c: float, triangles: NDArray) -> tuple[CellSet, NDArray[np.bool_]]:
+    """Some triangles, and that all are cells."""
+    none = np.zeros(len(triangles), dtype=bool)
+    cells = Polygons(np.arange(0, 3 * len(triangles) + 1, 3), triangles.ravel())
+    return CellSet(n, edges, weights, c, cells, none), ~none
 
 
 def _covered(sides: NDArray[np.int64], weights: NDArray[np.float64]) -> bool:

@@ -4,6 +4,7 @@ from .ahead import AnalysisAhead
 from .augmented import AugmentedSystem
 from .definite import nearly_singular, solved
 from .factorisation import Factorisation, backend, factorisation
+from .least_norm import least_norm
 from .quiet import quiet
 from .threads import blas_threads, threads
 from .upper import UpperTriangle, upper_from_edges
@@ -16,6 +17,7 @@ __all__ = [
     "backend",
     "blas_threads",
     "factorisation",
+    "least_norm",
     "nearly_singular",
     "quiet",
     "solved",

@@ -1,4 +1,4 @@
-"""Standard deviations of recovered coordinates: the diagonal of sigma^2 (J'J)^+."""
+"""Standard deviations of recovered coordinates, the diagonal of sigma^2 (J'J)^+, and of the factor c."""
 
 from __future__ import annotations
 
@@ -70,6 +70,33 @@ def coordinate_covariances(
         total += moved @ moved.transpose(0, 2, 1)
     equations.release()
     return sigma**2 * total
+
+
+def factor_deviation(piece: Piece, z: NDArray, spread: NDArray | None = None) -> float:
+    """Standard deviation of log c for independent noise in the weights, positions being fitted as well.
+
+    1 / |w - J (J'J)^+ J'w|: what of the weights no displacement explains tells c.
+
+    Parameters
+    ----------
+    piece : Piece
+    z : (n,) complex128
+        The Laplacian's frame.
+    spread : (e,) float64, optional
+        Standard deviations of the weights, in units of c; 1 by default.
+
+    Returns
+    -------
+    float
+        Infinite where the weights do not tell c.
+    """
+    jacobian = WeightJacobian(piece, z, spread)
+    equations = NormalEquations(jacobian, distant_pair(z))
+    weights = edge_weights(piece, z) / jacobian.spread
+    slope = jacobian.transpose(weights)
+    complement = float(weights @ weights) - float(np.vdot(slope, equations.solve(slope)).real)
+    equations.release()
+    return 1 / float(np.sqrt(complement)) if complement > 0 else np.inf
 
 
 def _gauge(z: NDArray) -> NDArray:

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
-from scipy.sparse.linalg import lsqr
 
+from ..linalg import least_norm
 from ..topology import Topology
 from .images import growing_images
 
 _CLOSED = 1e-6  # distance at shared vertices, relative to the largest piece, below which rings count as closed
-_MOST_IMAGES = 100  # pieces; above, mirror images are left as they are
+_MOST_IMAGES = 100  # pieces; above, those images are taken in which all have the orientation that they were drawn in
 _FEW, _SOME = 9, 24  # pieces of which several, or two, are turned over at once
 _MOST_TOGETHER = 4
 _TRIED = 4  # choices of images
-_DENSE = 500  # pieces; above, an iterative least-squares solution
+_DENSE = 100  # pieces; above, sparse linear algebra is faster
 
 
 def join(topology: Topology, positions: list[NDArray], known: NDArray | None = None) -> list[NDArray]:
@@ -87,11 +88,14 @@ def _matching_images(topology: Topology, positions: list[NDArray], held: NDArray
     Where they are not found piece by piece, one after the other is turned over as long as that lowers the gap, then two
     at once are tried, and of few pieces more.
     """
-    if _rings(topology) <= 0 or len(positions) > _MOST_IMAGES:
+    if _rings(topology) <= 0:
         return positions
     best = _joined(topology, positions, held)[1]
-    if best > _CLOSED:
-        positions, best = _grown(topology, positions, held, best)
+    for images in (_as_drawn, _grown):
+        if best > _CLOSED:
+            positions, best = _closed_by(images(topology, positions), topology, positions, held, best)
+    if len(positions) > _MOST_IMAGES:
+        return positions
     free = np.flatnonzero(~held).tolist()
     most = _MOST_TOGETHER if len(free) <= _FEW else 2 if len(free) <= _SOME else 1
     together = 1
@@ -108,13 +112,15 @@ def _matching_images(topology: Topology, positions: list[NDArray], held: NDArray
     return positions
 
 
-def _grown(
-    topology: Topology, positions: list[NDArray], held: NDArray[np.bool_], gap: float
+def _closed_by(
+    images: Iterable[NDArray[np.bool_]],
+    topology: Topology,
+    positions: list[NDArray],
+    held: NDArray[np.bool_],
+    gap: float,
 ) -> tuple[list[NDArray], float]:
-    """Images that close all rings, and what gap they leave; the same positions if there are none."""
-    shared = [np.flatnonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces]
-    vertices = [piece.vertices[s] for piece, s in zip(topology.pieces, shared, strict=True)]
-    for turned in growing_images(vertices, [z[s] for z, s in zip(positions, shared, strict=True)], _CLOSED)[:_TRIED]:
+    """Positions with the first of some images that close all rings, and what gap they leave; else those given."""
+    for turned in images:
         # Held pieces stay: what is turned over is the other pieces of their group.
         group = groups(topology)
         away = np.isin(group, group[held & turned]) ^ turned
@@ -123,6 +129,21 @@ def _grown(
         if left <= _CLOSED:
             return trial, left
     return positions, gap
+
+
+def _as_drawn(topology: Topology, positions: list[NDArray]) -> Iterator[NDArray[np.bool_]]:
+    """Pieces that lie with their triangles the other way round: those of one drawing are all alike."""
+    corners = (z[piece.triangles].T for piece, z in zip(topology.pieces, positions, strict=True))
+    yield np.array([float((np.conj(b - a) * (c - a)).imag.sum()) < 0 for a, b, c in corners])
+
+
+def _grown(topology: Topology, positions: list[NDArray]) -> Iterator[NDArray[np.bool_]]:
+    """Images that close all rings, piece by piece."""
+    if len(positions) > _MOST_IMAGES:
+        return
+    shared = [np.flatnonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces]
+    vertices = [piece.vertices[s] for piece, s in zip(topology.pieces, shared, strict=True)]
+    yield from growing_images(vertices, [z[s] for z, s in zip(positions, shared, strict=True)], _CLOSED)[:_TRIED]
 
 
 def _rings(topology: Topology) -> int:
@@ -143,10 +164,7 @@ def _joined(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_
     extent = float(size.max())
     weight = np.r_[np.where(held, 0.0, 1.0), np.where(held, 0.0, 1e3 * extent)]
     system = coo_array((values * weight[columns], (rows, columns)), shape=(len(rhs), 2 * n)).tocsr()
-    if n <= _DENSE:
-        solution = np.linalg.lstsq(system.toarray(), rhs, rcond=1e-12)[0]
-    else:
-        solution = lsqr(system, rhs, atol=1e-15, btol=1e-15, iter_lim=20 * n + 1000)[0]
+    solution = np.linalg.lstsq(system.toarray(), rhs, rcond=1e-12)[0] if n <= _DENSE else least_norm(system, rhs)
     turn, shift = 1 + (weight * solution)[:n], (weight * solution)[n:]
     left = float(np.abs(system @ solution - rhs).max(initial=0.0) / extent)
     if (np.abs(turn) * size <= _CLOSED * extent).any():

@@ -1,0 +1,53 @@
+"""Of all least-squares solutions of a sparse system that of least norm."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
+
+from ..errors import SolverError
+
+_DAMPING = 1e-6  # of the longest column: smaller singular values need many rounds
+_ROUNDS = 100
+_SLOW = 0.95  # length of a step, relative to the former one, that is the last
+
+
+def least_norm(matrix: sp.csr_array, right: NDArray) -> NDArray[np.complex128]:
+    """Solve min |B x - r|, of all such x the shortest one, by proximal iteration.
+
+    Steps minimise |B d - (r - B x)|^2 + w^2 |d|^2. From x = 0 all of them lie in the row space of B, in which they
+    converge by a factor w^2 / (w^2 + s^2) for each singular value s. Rounding adds to the null space as what no x
+    explains is large: where B x = r has a solution, it adds next to nothing.
+
+    Parameters
+    ----------
+    matrix : (m, k) sparse, complex128
+        B.
+    right : (m,) complex128
+        r.
+
+    Raises
+    ------
+    SolverError
+        If the factorisation breaks down.
+    """
+    rows, columns = matrix.shape
+    size = np.sqrt(np.asarray(abs(matrix).power(2).sum(axis=0)).ravel())
+    damping = (_DAMPING * float(size.max(initial=0.0))) ** 2 or 1.0
+    adjoint = matrix.conj().T.tocsr()
+    blocks = [[sp.eye_array(rows), matrix], [adjoint, -damping * sp.eye_array(columns)]]
+    try:
+        factor = splu(sp.block_array(blocks, format="csc"), diag_pivot_thresh=1.0)
+    except RuntimeError as error:
+        raise SolverError(f"SuperLU could not go on with a matrix of order {rows + columns}: {error}") from error
+    found = np.zeros(columns, dtype=np.complex128)
+    none, before = found, np.inf
+    for _ in range(_ROUNDS):
+        step = factor.solve(np.concatenate([right - matrix @ found, none]))[rows:]
+        length = float(np.linalg.norm(step))
+        if not length < _SLOW * before:
+            break
+        found, before = found + step, length
+    return found

@@ -1,0 +1,81 @@
+"""Factors c of pieces that share vertices, with errors in the entries."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from meshes import specimen, triangle_set
+from unassemble import recover
+from unassemble.planar.cotangent import edge_weights
+from unassemble.planar.deviations import factor_deviation
+from unassemble.topology import recognise
+
+C = 1.7
+
+
+def chain(count, seed, heights=(1.0,)):
+    """Triangles, or pairs of them, each of which meets the next in one vertex."""
+    rng = np.random.default_rng(seed)
+    points, triangles = [np.zeros(2)], []
+    for _ in range(count):
+        a = len(points) - 1
+        for height in heights:
+            points.append(points[a] + [0.5, height] + rng.uniform(-0.2, 0.2, 2))
+        points.append(points[a] + [1.0, 0.0] + rng.uniform(-0.2, 0.2, 2))
+        ring = list(range(a, len(points)))
+        triangles += [(ring[0], ring[-1], ring[1])] + [(ring[-1], q, p) for p, q in pairwise(ring[1:-1])]
+    return np.array(points), np.array(triangles)
+
+
+def noisy(matrix, sigma, seed):
+    """Independent errors in the upper triangle, and the same in the lower one."""
+    upper = sp.triu(matrix, 1).tocoo()
+    value = upper.data + sigma * np.random.default_rng(seed).standard_normal(upper.nnz)
+    ends = np.r_[upper.row, upper.col], np.r_[upper.col, upper.row]
+    return sp.coo_array((np.r_[value, value], ends), shape=matrix.shape)
+
+
+@pytest.mark.parametrize("sigma", [1e-6, 1e-4])
+@pytest.mark.parametrize("heights", [(1.0,), (0.8, 1.5)])
+@pytest.mark.parametrize("count", [4, 20])
+def test_noise_explains_that_factors_differ(count, heights, sigma):
+    known = specimen(*chain(count, count, heights), c=C, seed=3)
+    found = recover(noisy(known.matrix, sigma * C, 1), noise=sigma * C)
+    assert found.certified, found.reason
+    assert triangle_set(found.triangles) == triangle_set(known.triangles)
+    assert np.ptp(found.scale) > 1e-7 * C
+
+
+def test_noise_that_is_not_given_is_named():
+    known = specimen(*chain(20, 5), c=C, seed=3)
+    found = recover(noisy(known.matrix, 1e-6 * C, 1))
+    assert not found.certified
+    named = float(found.reason.split("standard deviation ")[1].split()[0])
+    assert 0.5e-6 * C < named < 2e-6 * C
+
+
+def test_more_than_noise_is_none():
+    """Half of the triangles have another factor."""
+    points, triangles = chain(20, 5)
+    halves = (triangles[:10], C), (triangles[10:], 1.001 * C)
+    both = [specimen(points, some, c=c, seed=3).matrix for some, c in halves]
+    found = recover(noisy(both[0] + both[1], 1e-6 * C, 1), noise=1e-6 * C)
+    assert not found.certified
+
+
+def test_two_triangles_agree_too_roughly():
+    known = specimen(*chain(2, 1), c=C, seed=3)
+    found = recover(noisy(known.matrix, 1e-3 * C, 1), noise=1e-3 * C)
+    assert not found.certified
+
+
+def test_deviation_of_a_factor():
+    """That of log c over many draws, for a lone triangle."""
+    piece = recognise(3, np.array([(0, 1), (0, 2), (1, 2)])).pieces[0]
+    z = np.array([0, 1 + 0.1j, 0.4 + 0.8j])
+    z = z if edge_weights(piece, z).sum() > 0 else np.conj(z)
+    a, b, c = (edge_weights(piece, z) + 1e-6 * np.random.default_rng(0).standard_normal((4000, 3))).T
+    expected = np.log(2 * np.sqrt(a * b + b * c + c * a)).std() / 1e-6
+    assert factor_deviation(piece, z) == pytest.approx(expected, rel=0.1)
