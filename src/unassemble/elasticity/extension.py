@@ -27,7 +27,13 @@ SETTLED = 0.98  # share of the whole rows whose sums vanish in all directions: s
 
 
 def extended_directions(
-    matrix: sp.csr_array, group: NDArray[np.int64], live: NDArray[np.bool_], d: int, *, sure: bool = True
+    matrix: sp.csr_array,
+    group: NDArray[np.int64],
+    live: NDArray[np.bool_],
+    d: int,
+    *,
+    sure: bool = True,
+    known: NDArray[np.int64] | None = None,
 ) -> tuple[NDArray[np.int64], float]:
     """Directions of all rows, and the share of the whole rows that annihilate translations with them.
 
@@ -42,7 +48,10 @@ def extended_directions(
         Rows that count; those of the identity do not.
     d : int
     sure : bool
+    known : (N,) int64, optional
+        Directions to start from, -1 where they are not known.
     """
+    known = np.full(len(group), -1) if known is None else known
     direction = np.zeros(len(group), np.int64)
     rows = np.flatnonzero(live)
     inner = sp.csr_array(matrix[rows][:, rows])
@@ -52,7 +61,7 @@ def extended_directions(
     for piece in range(int(label.max(initial=-1)) + 1):
         part = np.flatnonzero(label == piece)
         body = _Body(inner[part][:, part], np.unique(group[rows[part]], return_inverse=True)[1], d, sure)
-        direction[rows[part]], count = body.directions()
+        direction[rows[part]], count = body.directions(known[rows[part]])
         right, total = right + count, total + int(body.telling.sum())
     return direction, right / total if total else 0.0
 
@@ -85,13 +94,15 @@ class _Body:
         self._members = [np.flatnonzero(alone)[:, None], self._nodes[: len(self._nodes) if sure else 0]]
         self._names = [names_of(d)[0], names_of(d)[-1]]
 
-    def directions(self) -> tuple[NDArray[np.int64], int]:
-        """Directions with which most rows annihilate translations, and how many do."""
+    def directions(self, given: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
+        """Directions with which most rows annihilate translations, and how many do.
+
+        First are tried those around what is given, unless that is nothing.
+        """
         best, most = np.zeros(len(self._size), np.int64), 0
         hope = int(self.telling.sum())
-        for seed in self._seeds():
-            known, before = np.full(len(self._size), -1), -1
-            known[seed] = np.arange(self._d)
+        for start in self._starts(given):
+            known, before = start, -1
             for _ in range(_ROUNDS):
                 direction = self._extended(known)
                 good = self._good(direction)
@@ -106,6 +117,15 @@ class _Body:
             if most >= SETTLED * hope:
                 break
         return best, most
+
+    def _starts(self, given: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+        """Directions to start from: those given, and then those of one node each."""
+        if (given >= 0).any():
+            yield given
+        for seed in self._seeds():
+            known = np.full(len(given), -1)
+            known[seed] = np.arange(self._d)
+            yield known
 
     def _seeds(self) -> Iterator[NDArray[np.int64]]:
         """Nodes to start from, those in the middle of the piece first."""

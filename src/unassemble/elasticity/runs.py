@@ -101,7 +101,8 @@ def _in_equilibrium(
 
     None if they contradict rows whose direction is proven, or the order of rows within a node.
     """
-    other, share = extended_directions(matrix, group, np.ones(len(run), dtype=bool), d)
+    proven = np.where(unnamed, -1, direction)
+    other, share = extended_directions(matrix, group, np.ones(len(run), dtype=bool), d, known=proven)
     if share < WHOLE or (other != direction)[~unnamed].any():
         return None
     return other if _cut_where(run, other)[-1] <= _cut_where(run, direction)[-1] else None
