@@ -2,11 +2,12 @@
 
 Run ``python benchmarks/elasticity.py``; options ``--sizes 10 15 31`` (vertices per edge of the cube), ``--kinds
 tet-p1 hex-q1``, ``--peers cells plain block true recovered``, ``--folder F`` (keeps the matrices there for the next
-run), ``--materials one cells`` (homogeneous; both Lame coefficients of each cell at random between 1 and 5). Each
-case is a cube clamped and eliminated on one face, inner vertices moved at random, assembled by scikit-fem with as many
-quadrature points as the element needs. The peer is PyAMG's smoothed aggregation with conjugate gradients to 1e-8 on the
-same matrix: with its defaults on the scalar matrix, with the block size, and with true and recovered rigid-body modes.
-``cells`` is the recovery once more, with elements.
+run), ``--materials one cells`` (homogeneous; both Lame coefficients of each cell at random between 1 and 5),
+``--supports clamp symmetry``. Each case is a cube assembled by scikit-fem with as many quadrature points as the element
+needs, inner vertices moved at random. All unknowns of one face are eliminated, or one direction on each of three faces,
+where nodes are no blocks any more and only ``cells`` and ``plain`` run. The peer is PyAMG's smoothed aggregation with
+conjugate gradients to 1e-8 on the same matrix: with its defaults on the scalar matrix, with the block size, and with
+true and recovered rigid-body modes. ``cells`` is the recovery once more, with elements.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ import numpy as np
 import scipy.sparse as sp
 
 
-def assemble(kind: str, size: int, material: str, path: Path) -> None:
-    """Write matrix and true points of a clamped cube."""
+def assemble(kind: str, size: int, material: str, support: str, path: Path) -> None:
+    """Write matrix and true points of a cube that is held."""
     sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "elasticity"))
     from assembled import box, eliminated, on_plane, stiffness
 
@@ -33,7 +34,11 @@ def assemble(kind: str, size: int, material: str, path: Path) -> None:
     cells = mesh.t.shape[1]
     lam, mu = np.random.default_rng(1).uniform(1, 5, (2, cells, 1)) if material == "cells" else (1.0, 1.0)
     case = stiffness(kind, mesh, lam=lam, mu=mu, intorder={"tet-p1": 1, "hex-q1": 3}.get(kind))
-    matrix, nodes = eliminated(case, np.repeat(on_plane(case, 0)[:, None], 3, axis=1))
+    if support == "clamp":
+        gone = np.repeat(on_plane(case, 0)[:, None], 3, axis=1)
+    else:
+        gone = np.column_stack([on_plane(case, axis) for axis in range(3)])
+    matrix, nodes = eliminated(case, gone)
     np.savez(path, data=matrix.data, indices=matrix.indices, indptr=matrix.indptr, points=case.points[nodes])
 
 
@@ -99,6 +104,7 @@ def main() -> None:
     parser.add_argument("--kinds", nargs="+", default=["tet-p1", "hex-q1"])
     parser.add_argument("--peers", nargs="+", default=["cells", "plain", "block", "true", "recovered"])
     parser.add_argument("--materials", nargs="+", default=["one"], choices=["one", "cells"])
+    parser.add_argument("--supports", nargs="+", default=["clamp"], choices=["clamp", "symmetry"])
     parser.add_argument("--folder", type=Path)
     parser.add_argument("--assemble", action="store_true", help="only fill the folder")
     parser.add_argument("--one", nargs="+")
@@ -111,12 +117,13 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         folder = chosen.folder or Path(temporary)
         folder.mkdir(exist_ok=True)
-        for kind, size, material in product(chosen.kinds, chosen.sizes, chosen.materials):
-            path = folder / f"{kind}-{size}{'' if material == 'one' else '-' + material}.npz"
+        for kind, size, material, support in product(chosen.kinds, chosen.sizes, chosen.materials, chosen.supports):
+            path = folder / f"{kind}-{size}-{material}-{support}.npz"
+            peers = [one for one in chosen.peers if support == "clamp" or one in ("cells", "plain")]
             if not path.exists():
-                assemble(kind, size, material, path)
+                assemble(kind, size, material, support, path)
             if not chosen.assemble:
-                print(line(f"{kind} {material}", path, chosen.peers), flush=True)
+                print(line(f"{kind} {material} {support}", path, peers), flush=True)
 
 
 def line(kind: str, path: Path, peers: list[str]) -> str:
