@@ -116,7 +116,6 @@ def test_rows_next_to_several_supports_can_change_places():
         for one in (node, other)
     )
     assert found.certified
-    assert not rival.certified
     assert rival.backward_error < 1e-9
     first, second = (one.points[one.node_of_row] for one in (found, rival))
     known = np.isfinite(first + second).all(axis=1)
