@@ -40,7 +40,8 @@ def discord(
     first = one[group]
     difference = np.abs(scale / scale[first] - 1)
     worst = int(difference.argmax())
-    if difference[worst] <= max(SAME_SCALE, SCALE_ERROR * backward_error):
+    # With noise its size tells how far factors may differ: a misfit of a hundred thousandth would excuse anything.
+    if difference[worst] <= max(SAME_SCALE, 0.0 if noise else SCALE_ERROR * backward_error):
         return None
     a, b = int(first[worst]), worst
     differ = (
@@ -64,9 +65,31 @@ def discord(
         return f"{differ}, more than noise of standard deviation {noise:.3g} explains"
     # The first piece of each group tells c, and every other one confirms it to within its error.
     others = several & (np.arange(len(scale)) != first)
-    if np.log(np.minimum(noise * deviation[others], 1.0)).sum() > np.log(_CHANCE):
+    unproved = others & _to_be_confirmed(topology, group)
+    if unproved.any() and np.log(np.minimum(noise * deviation[others], 1.0)).sum() > np.log(_CHANCE):
         return f"{differ}, as much as noise of standard deviation {noise:.3g} explains, but too few for a certificate"
     return None
+
+
+def _to_be_confirmed(topology: Topology, group: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(pieces,) those that may be something else, as far as the entries of each by itself go.
+
+    A piece with entries to spare tells c. One that hangs by a single vertex on pieces of which one does so can only be
+    read in itself, and no other way if nothing has vanished and no triangle may be a hole.
+    """
+    rows = np.zeros(len(topology.edges), dtype=bool)
+    rows[topology.vanished] = True
+    spare = np.array([piece.redundancy > 0 for piece in topology.pieces])
+    loose = np.array(
+        [
+            rows[piece.edge_rows].any()
+            or bool(piece.enclosed.any())
+            or np.count_nonzero(topology.multiplicity[piece.vertices] > 1) > 1
+            for piece in topology.pieces
+        ]
+    )
+    told = np.bincount(group, spare) > 0
+    return np.asarray(~told[group] | (loose & ~spare))
 
 
 def _mean(values: NDArray, deviation: NDArray, group: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from meshes import specimen, triangle_set
+from meshes import random_mesh, specimen, triangle_set
 from unassemble import recover
 from unassemble.planar.cotangent import edge_weights
 from unassemble.planar.deviations import factor_deviation
@@ -69,6 +69,37 @@ def test_two_triangles_agree_too_roughly():
     known = specimen(*chain(2, 1), c=C, seed=3)
     found = recover(noisy(known.matrix, 1e-3 * C, 1), noise=1e-3 * C)
     assert not found.certified
+
+
+def with_rings(count, seed, hole=True):
+    """A random mesh, and rings of three triangles about a hole that hang on it, or single triangles, by a vertex."""
+    points, triangles = random_mesh(16, seed, holes=False)
+    ring = np.array([[0, 0], [1, 0], [0.5, 0.8], [0.5, -0.8], [1.4, 0.7], [-0.4, 0.7]])
+    cells = np.array([(0, 3, 1), (1, 4, 2), (2, 5, 0)])
+    if not hole:
+        ring, cells = ring[:3], np.array([(0, 1, 2)])
+    rng = np.random.default_rng(seed)
+    for at in range(count):
+        placed = ring + rng.uniform(-0.1, 0.1, ring.shape)
+        placed += points[at] - placed[-1]
+        number = np.r_[len(points) + np.arange(len(ring) - 1), at]
+        points, triangles = np.concatenate([points, placed[:-1]]), np.concatenate([triangles, number[cells]])
+    return points, triangles
+
+
+@pytest.mark.parametrize("sigma", [1e-6, 1e-5, 1e-4])
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_excuses_no_filled_hole(seed, sigma):
+    """Filled, a hole leaves a piece that fits with another factor; how large a misfit is elsewhere is no excuse."""
+    known = specimen(*with_rings(2, seed), c=C, seed=seed)
+    found = recover(noisy(known.matrix, sigma * C, 1), noise=sigma * C)
+    assert not found.certified or triangle_set(found.triangles) == triangle_set(known.triangles)
+
+
+def test_single_triangles_on_a_mesh_that_tells_the_factor():
+    known = specimen(*with_rings(2, 0, hole=False), c=C, seed=3)
+    found = recover(noisy(known.matrix, 1e-4 * C, 1), noise=1e-4 * C)
+    assert found.certified, found.reason
 
 
 def test_deviation_of_a_factor():

@@ -12,6 +12,9 @@ from ..topology.canonical import LARGEST, settled_numbering
 
 _DIGITS = 9  # of the weights, to which those of components that are alike agree
 
+ALIKE = 10.0**-_DIGITS
+"""Relative difference of what is the same in components that are alike."""
+
 Cells = set[tuple[int, ...]]
 Found = tuple[Cells | None, float, bool]
 """Cells of a component, by rows; their c; and whether the search was left open."""

@@ -73,7 +73,8 @@ def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None, noi
     label = components_of(matrix)
     count = int(label.max()) + 1
     bound = np.full(count, SAME_SCALE)
-    np.maximum.at(bound, label[matrix.edges[:, 0]], SCALE_ERROR * misfits_of(matrix, list(having)))
+    if not noise:
+        np.maximum.at(bound, label[matrix.edges[:, 0]], SCALE_ERROR * misfits_of(matrix, list(having)))
     own = label[[piece.vertices[0] for piece, _ in having]]
     loose = np.array([piece.redundancy <= 0 for piece, _ in having])
     c = np.array([mesh.scale for _, mesh in having])

@@ -44,7 +44,7 @@ def filled_holes(stored: OperatorMatrix, topology: Topology, factors: NDArray, a
     agree : float
         Relative difference of numbers that noise may cause.
     """
-    if not any(_suspects(piece) for piece in topology.pieces):
+    if not any(piece.redundancy <= 0 for piece in topology.pieces):
         return []
     found, work = [], _WORK
     for part, pieces in with_pieces(stored.n, stored.edges, topology.pieces):
@@ -115,6 +115,5 @@ def _without_one(stored: OperatorMatrix, piece: Piece, triangle: tuple[int, ...]
 def _suspects(piece: Piece) -> Iterator[tuple[int, ...]]:
     """Triangles with three inner sides, if the piece is loose."""
     if piece.redundancy <= 0:
-        inner = np.asarray((piece.facing[:, 1] >= 0)[piece.opposite].all(axis=1))
-        for triangle in np.sort(piece.vertices[piece.triangles[inner]], axis=1).tolist():
+        for triangle in np.sort(piece.vertices[piece.triangles[piece.enclosed]], axis=1).tolist():
             yield tuple(triangle)

@@ -17,7 +17,7 @@ from ..topology import Numbering, components
 from ..topology.faces import joined
 from ..topology.keys import contains, pair_keys
 from .agreement import SAME_SCALE
-from .alike import Answers, Cells, Found
+from .alike import ALIKE, Answers, Cells, Found
 from .corners import Alternative, OrientedMesh
 from .covering import read_by_cover
 from .reading import Reading
@@ -26,7 +26,7 @@ from .undivided import undivided
 
 _MOST_VERTICES = 60
 _ORDERS = 5
-_WORK = 3000  # vertices times orders; every component is read once again at least
+_WORK = 3000  # vertices, those of components that are alike once, times orders; each is read once again at least
 
 
 def other_readings(
@@ -39,7 +39,7 @@ def other_readings(
     rng = np.random.default_rng(0)
     others = []
     small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= _MOST_VERTICES]
-    n_orders = int(np.clip(_WORK // max(sum(len(part.vertices) for part in small), 1), 1, _ORDERS))
+    n_orders = int(np.clip(_WORK // max(_distinct_vertices(stored, small), 1), 1, _ORDERS))
     half = _with_vanished_sides(stored, mesh)
     answers = Answers()
     for part, own in zip(small, own_cells(stored.n, small, mesh), strict=True):
@@ -52,6 +52,19 @@ def other_readings(
             gone, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
             others.append(Alternative((), (), (), gone, new, same_scale=abs(factor / c - 1) < SAME_SCALE))
     return others
+
+
+def _distinct_vertices(stored: OperatorMatrix, parts: list[Numbering]) -> int:
+    """How many vertices components have that are not alike, told by the numbers of their vertices and by their sums.
+
+    What is found out about one holds for all that are alike: with fewer orders for each they would all share its luck.
+    """
+    size = np.array([len(part.vertices) for part in parts], dtype=np.int64)
+    total = np.array([np.abs(stored.entries[part.edge_rows]).sum() for part in parts])
+    order = np.lexsort((total, size))
+    new = np.ones(len(parts), dtype=bool)
+    new[1:] = (np.diff(size[order]) > 0) | (np.diff(total[order]) > ALIKE * total[order][1:])
+    return int(size[order][new].sum())
 
 
 def _with_vanished_sides(stored: OperatorMatrix, mesh: OrientedMesh) -> NDArray[np.bool_]:
