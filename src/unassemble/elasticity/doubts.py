@@ -40,9 +40,7 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
         return nodal
     present = nodal.row_of >= 0
     some = np.asarray(present.any(axis=1) & ~present.all(axis=1))
-    i, j = nodal.node, nodal.indices
-    if numbering.common < 1:
-        i, j = _near(nodal, some)
+    i, j = _near(nodal, some) if numbering.common < 1 else (nodal.node, nodal.indices)
     halves = some[i] & some[j] & (i != j) & ~(present[i] & present[j]).any(axis=1)
     code = _neighbourhoods(nodal)
     alike = halves & (code[i] == code[j])
