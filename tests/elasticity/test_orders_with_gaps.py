@@ -12,8 +12,11 @@ from supported import given, judged
 from unassemble.elasticity import recover_elasticity
 from unassemble.elasticity.alignment import aligned
 from unassemble.elasticity.constants import proven_directions, uncoupled_rows
+from unassemble.elasticity.doubts import with_doubts
 from unassemble.elasticity.grouping import same_pattern
 from unassemble.elasticity.matching import matched_by_pattern
+from unassemble.elasticity.nodal import nodal_matrix
+from unassemble.elasticity.numbering import measured
 from unassemble.elasticity.unknowns import find_numbering
 
 
@@ -175,3 +178,16 @@ def test_nor_are_they_where_zeros_are_not_stored(kind, order):
     assert found.certified
     assert truth.error < 1e-8
     assert truth.missing < 0.2
+
+
+def test_halves_of_a_node_need_not_be_coupled():
+    """On a straight side the entry between two directions of a node vanishes: nothing but neighbours ties its rows."""
+    body = stiffness("quad-q1", box("quad-q1", (6, 6)))
+    case = given(body, "clamp", "interleaved", "dropped")
+    node = np.unique(case.node, return_inverse=True)[1]
+    rows = np.flatnonzero(case.node == np.linalg.norm(body.points - (0.6, 0.0), axis=1).argmin())
+    assert case.matrix[rows[0], rows[1]] == 0
+    node[rows[1]] = node.max() + 1
+    numbering = measured(case.matrix, node, case.direction, 2, "interleaved")
+    nodal = with_doubts(nodal_matrix(case.matrix, numbering), numbering)
+    assert set(np.flatnonzero(nodal.doubtful)) == set(node[rows])

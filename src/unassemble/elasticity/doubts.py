@@ -16,7 +16,7 @@ from .orders import ORDERS
 
 
 def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
-    """Mark nodes whose rows may be those of two halves of one: coupled, with no direction in common.
+    """Mark nodes whose rows may be those of two halves of one: near, with no direction in common.
 
     Where all entries are stored the halves of a node couple to the same nodes; and where unknowns stand in order, it
     tells which of them are in doubt. Where order alone joined rows that couple to different nodes, so are theirs.
@@ -40,7 +40,7 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
         return nodal
     present = nodal.row_of >= 0
     some = np.asarray(present.any(axis=1) & ~present.all(axis=1))
-    i, j = nodal.node, nodal.indices
+    i, j = _near(nodal, some) if numbering.common < 1 else (nodal.node, nodal.indices)
     halves = some[i] & some[j] & (i != j) & ~(present[i] & present[j]).any(axis=1)
     code = _neighbourhoods(nodal)
     alike = halves & (code[i] == code[j])
@@ -50,6 +50,21 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     doubtful[i[halves if apart.any() or numbering.common < 1 else alike]] = True
     around = np.asarray(nodal.graph @ doubtful.astype(float) > 0)  # even the directions of such rows were searched for
     return replace(nodal, doubtful=doubtful, blurred=around if nodal.blurred is None else nodal.blurred | around)
+
+
+def _near(nodal: NodalMatrix, some: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of some nodes, both ways, that are coupled or have half of the neighbours of one of them in common.
+
+    On straight sides of regular meshes the entry between two directions of a node vanishes, and need not be stored.
+    """
+    rows = np.flatnonzero(some)
+    if not len(rows):
+        return rows, rows
+    around = nodal.graph[rows]
+    common = sp.coo_array(around @ around.T + nodal.n * around[:, rows])  # more than any node has neighbours
+    degree = np.diff(around.indptr) - 1
+    near = 2 * common.data >= np.minimum(degree[common.row], degree[common.col])
+    return rows[common.row[near]], rows[common.col[near]]
 
 
 def _fellows(numbering: Numbering, doubtful: NDArray[np.bool_]) -> NDArray[np.int64] | None:
@@ -76,12 +91,9 @@ def unconfirmed(
     """
     if nodal.doubtful is None:
         return np.zeros(nodal.n, dtype=bool)
-    if nodal.fellows is not None and not _by_likeness(
-        numbering
-    ):  # halves were placed each by itself, and none was taken to lack what another has
-        return np.zeros(nodal.n, dtype=bool)
     if numbering.open_row is not None and not _by_likeness(numbering):  # nothing was joined that order does not join
-        return nodal.doubtful
+        # Of fellows each was placed by itself, and none was taken to lack what another has.
+        return nodal.doubtful if nodal.fellows is None else np.zeros(nodal.n, dtype=bool)
     outside = determined(points)
     if not _by_likeness(numbering):
         doubtful = nodal.doubtful | without_trace(nodal).any(axis=1)
@@ -101,8 +113,7 @@ def guessed_directions(numbering: Numbering, loose: NDArray[np.bool_]) -> NDArra
 
     Where unknowns stand node by node and rows are missing, or at random, sums over directions tell which. On regular
     meshes wrong ones vanish, too. Rows that fit the coordinates of their node are right; of others nothing shows it.
-    Not
-    even that there are as many as directions: where planes of rollers meet, they may be those of several nodes.
+    Not even that there are as many as directions: where planes of rollers meet, they may be those of several nodes.
     """
     if numbering.unnamed is None:
         return np.zeros(len(numbering.node_of_row), dtype=bool)

@@ -130,8 +130,9 @@ def valid_pairs(nodal: NodalMatrix, *, strict: bool = True, inferred: bool = Fal
     Row i of A^{cb} annihilates constants, unless a coupled unknown of component b was taken away or the
     diagonal was changed. The converse fails on regular meshes, where what is missing can add up to zero (two
     eliminated nodes opposite each other). So the strict rule asks it of all rows of a node at once: they couple to
-    the same unknowns, and a neighbour that is known to lack the direction spoils it. A penalty on the diagonal explains
-    itself and spoils its own row only.
+    the same unknowns, and a neighbour that is known to lack the direction spoils it. So does what they miss of another
+    direction, if no neighbour is known to lack that: a whole node was taken away, whose entries add up to zero in
+    meshes that are the same all along an axis. A penalty on the diagonal explains itself and spoils its own row only.
 
     Not even that if diagonals may be `inferred`: what makes the row annihilate constants is what assembly put there,
     if the row is whole. Only the others of the node can tell whether it is, which is less than is asked elsewhere.
@@ -150,7 +151,8 @@ def valid_pairs(nodal: NodalMatrix, *, strict: bool = True, inferred: bool = Fal
     lacking = nodal.graph @ eliminated(nodal).astype(float)
     if inferred:
         valid |= penalty & valid.any(axis=1, keepdims=True)
-    sure: NDArray[np.bool_] = whole & (lacking == 0)
+    lost = (~whole & (lacking == 0)).any(axis=1, keepdims=True)
+    sure: NDArray[np.bool_] = whole & (lacking == 0) & ~lost
     return np.asarray(valid & sure[:, None, :])
 
 

@@ -192,8 +192,8 @@ def _with_gaps(matrix: sp.csr_array, regular: Numbering, sizes: tuple[int, ...])
 
 
 def _contradicts(one: Numbering, other: Numbering) -> bool:
-    """Whether a direction that sums prove is another one there; rows of the identity have none."""
-    unlike = (one.direction_of_row != other.direction_of_row) & ~one.identity_row
+    """Whether a direction that sums prove is another one there; rows of the identity have any."""
+    unlike = (one.direction_of_row != other.direction_of_row) & ~other.identity_row
     return bool((unlike if one.unnamed is None else unlike & ~one.unnamed).any())
 
 
