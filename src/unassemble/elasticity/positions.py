@@ -16,6 +16,10 @@ from .planes import with_planes
 from .solution import Solution
 from .straight import straightened
 
+# Nodes beyond which planes are asked at once where there are rollers: without them rows next to rollers leave hundreds
+# of fields free, all of which charts would look for.
+_LARGE = 2000
+
 
 def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
     """Place all nodes: read validity strictly, and only where that determines nothing leniently."""
@@ -25,16 +29,19 @@ def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
         valid = valid_pairs(nodal, strict=strict)
         if best is not None and np.array_equal(valid, best.valid):
             break
-        found, rows = None, valid
-        try:
-            found = placed(nodal, valid, patch)
-        except GeometryError as error:
-            failure = failure or error
-        if strict and not (found is not None and found.whole):
-            found, rows = _with_diagonals(nodal, found, valid, patch)
-        completed = with_planes(nodal, rows) if strict and not (found is not None and found.whole) else None
-        if completed is not None:
-            found = _with_planes(*completed, found, rows, patch)
+        found, rows, completed = None, valid, None
+        if strict and nodal.n > _LARGE and not nodal.penalised.any():
+            found, completed = _planes_at_once(nodal, valid, patch)
+        if found is None:
+            try:
+                found = placed(nodal, valid, patch)
+            except GeometryError as error:
+                failure = failure or error
+            if strict and not (found is not None and found.whole):
+                found, rows = _with_diagonals(nodal, found, valid, patch)
+            completed = with_planes(nodal, rows) if strict and not (found is not None and found.whole) else None
+            if completed is not None:
+                found = _with_planes(*completed, found, rows, patch)
         if strict and not (found is not None and found.unique):
             found = straightened(nodal, found, valid, completed, patch)
         if found is None:
@@ -60,6 +67,15 @@ def _with_diagonals(
     except GeometryError:
         return found, valid
     return (other, more) if other.exact and (found is None or other.rank > found.rank) else (found, valid)
+
+
+def _planes_at_once(
+    nodal: NodalMatrix, valid: NDArray[np.bool_], patch: int | None
+) -> tuple[Solution | None, tuple[NodalMatrix, NDArray[np.bool_]] | None]:
+    """Positions with what rows next to rollers say, and these rows; None if there are none, or much stays free."""
+    completed = with_planes(nodal, valid)
+    found = None if completed is None else _with_planes(*completed, None, valid, patch)
+    return (found, completed) if found is not None and found.unique else (None, None)
 
 
 def _with_planes(
