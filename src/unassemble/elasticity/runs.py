@@ -48,16 +48,21 @@ def _runs(group: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.concatenate([[0], np.cumsum(group[1:] != group[:-1])])
 
 
+def _likely_nodes(run: NDArray[np.int64], d: int) -> NDArray[np.int64]:
+    """(N,) runs of at most d rows, and rows of longer runs by themselves."""
+    order = len(run)
+    return by_first_row(np.where(np.bincount(run)[run] <= d, run, order + np.arange(order)))
+
+
 def directions_node_by_node(matrix: sp.csr_array, d: int, rounding: float) -> NDArray[np.int64] | None:
     """(N,) the likeliest directions of rows that stand node by node, their sums rounded; None where no nodes show."""
     order = matrix.shape[0]
     nobody = np.zeros(order, dtype=bool)
     group = same_pattern(matrix, nobody)
     run = _runs(group)
-    length = np.bincount(run)[run]
-    if 2 * np.count_nonzero(length == d) <= order:
+    if 2 * np.count_nonzero(run_lengths(group) == d) <= order:
         return None
-    node = by_first_row(np.where(length <= d, run, order + np.arange(order)))
+    node = _likely_nodes(run, d)
     return named_by_sums(matrix, run, find_directions(matrix, node, nobody, d, ordered=True), d, rounding)
 
 
@@ -65,13 +70,11 @@ def _by_pattern(matrix: sp.csr_array, group: NDArray[np.int64], run: NDArray[np.
     """Nodes among runs of rows of the same pattern. Those of d rows are nodes, and tell directions of the others.
 
     Rows of longer runs, which hold several nodes, are taken one by one until directions tell where nodes end. Where
-    sums do not prove all directions then, every row may choose for itself, as shorter runs may hold several nodes, too.
+    sums do not prove all directions then, those of planes of rollers, and then equilibrium, name the rest.
     """
     order = len(run)
-    row = np.arange(order)
     nobody = np.zeros(order, dtype=bool)
-    length = np.bincount(run)[run]
-    node = by_first_row(np.where(length <= d, run, order + row))
+    node = _likely_nodes(run, d)
     for _ in range(_ROUNDS):
         direction = find_directions(matrix, node, nobody, d, ordered=True)
         again = _cut_where(run, direction)

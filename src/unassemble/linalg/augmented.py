@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from ..errors import SolverError
+from .columns import with_unit_columns
 
 _WEIGHT = 2.0**-20
 """Factor of the residual, when columns have length 1. The best is the least singular value, but partial pivoting serves
@@ -39,11 +40,7 @@ class AugmentedSystem:
     """
 
     def __init__(self, matrix: sp.csr_array):
-        size = np.sqrt(np.asarray(matrix.multiply(matrix).sum(axis=0)).ravel())
-        if not (np.isfinite(size).all() and size.all()):
-            raise SolverError("a least-squares problem has columns that are zero or not finite")
-        self._unit = 1 / size
-        self._matrix = sp.csr_array(matrix @ sp.diags_array(self._unit))
+        self._matrix, self._unit = with_unit_columns(matrix)
         rows = matrix.shape[0]
         system = sp.block_array([[_WEIGHT * sp.eye_array(rows), self._matrix], [self._matrix.T, None]], format="csc")
         try:

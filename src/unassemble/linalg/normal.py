@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import SolverError
+from .columns import with_unit_columns
 from .factorisation import factorisation
 from .upper import UpperTriangle
 
@@ -32,11 +33,8 @@ class NormalEquations:
     """
 
     def __init__(self, matrix: sp.csr_array):
-        size = np.sqrt(np.asarray(matrix.multiply(matrix).sum(axis=0)).ravel())
-        if not (np.isfinite(size).all() and size.all()):
-            raise SolverError("a least-squares problem has columns that are zero or not finite")
-        self._unit = 1 / size
-        self._transposed = sp.csr_array((matrix @ sp.diags_array(self._unit)).T)
+        scaled, self._unit = with_unit_columns(matrix)
+        self._transposed = sp.csr_array(scaled.T)
         normal = UpperTriangle.of(sp.csr_array(self._transposed @ self._transposed.T))
         self._factor = factorisation(normal, definite=True)
         try:
