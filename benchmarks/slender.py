@@ -23,7 +23,7 @@ def line(kind: str, length: int) -> str:
     """Recover one strip, with and without the step, and put the errors into words."""
     case = stiffness(kind, box(kind, (length, 3), stretch=(0.53 * length, 1)), lam=1.5)
     found = recover_elasticity(case.matrix, cells=False)
-    with patch("unassemble.elasticity.placing.affordable", return_value=False):
+    with patch("unassemble.elasticity.nullspace.placing.affordable", return_value=False):
         charts = recover_elasticity(case.matrix, cells=False)
     before, after = error(charts.points, case.points), error(found.points, case.points)
     taken = "not taken" if (found.points == charts.points).all() else f"{after:.0e}"

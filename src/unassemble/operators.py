@@ -57,7 +57,7 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
     RecoveryError
         If no numbering makes rows annihilate translations.
     """
-    from .elasticity.orders import ORDERS
+    from .elasticity.rows.orders import ORDERS
     from .elasticity.unknowns import find_numbering, given_numbering, regular_numbering
     from .structures import find_structure, given_structure, truss_numbering
 
@@ -116,7 +116,7 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
 
 def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     """Read a matrix as vector-valued after it turned out not to be a planar mesh; None where little speaks for it."""
-    from .elasticity.sampling import promising
+    from .elasticity.ordered.sampling import promising
     from .elasticity.unknowns import find_numbering
     from .structures import find_structure
 
@@ -137,7 +137,7 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
 
 def about_translations(matrix: OperatorMatrix) -> str:
     """Why a matrix that is no planar mesh is no stiffness matrix either though its rows form nodes; empty if not so."""
-    from .elasticity.rounded import rounding_of
+    from .elasticity.ordered.rounded import rounding_of
     from .elasticity.unknowns import MORE_THAN_STIFFNESS, nodes_of_pattern
 
     nodes, rounding = nodes_of_pattern(matrix.csr()), rounding_of(matrix.csr().data)
@@ -152,7 +152,7 @@ def about_translations(matrix: OperatorMatrix) -> str:
 
 def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, tuple[sp.csr_array, float] | None]:
     """The matrix to look at, and of entries with few digits what a reading keeps of it."""
-    from .elasticity.rounded import with_exact_sums
+    from .elasticity.ordered.rounded import with_exact_sums
 
     whole, rounding = with_exact_sums(matrix.csr())
     return whole, (whole, rounding) if rounding else None

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import meshio
     from matplotlib.figure import Figure
 
-    from .cells.corners import Alternative
+    from .cells.alternatives.corners import Alternative
     from .elasticity.results import Evidence
 
 

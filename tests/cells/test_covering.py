@@ -9,13 +9,13 @@ from families import FAMILIES
 from meshes import specimen
 from named_meshes import cells_of, explains
 from unassemble import recover
-from unassemble.cells import regrouped
-from unassemble.cells.consistent import Assembly
-from unassemble.cells.covering import likely_scales, read_by_cover
-from unassemble.cells.numbered import Numbered, frequent_numbers
-from unassemble.cells.program import Program
-from unassemble.cells.right_angles import RightAngle
-from unassemble.cells.shapes import Shapes
+from unassemble.cells.alternatives import regrouped
+from unassemble.cells.alternatives.right_angles import RightAngle
+from unassemble.cells.covers.consistent import Assembly
+from unassemble.cells.covers.covering import likely_scales, read_by_cover
+from unassemble.cells.covers.numbered import Numbered, frequent_numbers
+from unassemble.cells.covers.program import Program
+from unassemble.cells.covers.shapes import Shapes
 from vanishing import forgotten, holes, squares
 
 

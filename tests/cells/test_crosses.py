@@ -6,7 +6,7 @@ import pytest
 from families import kites
 from meshes import specimen
 from unassemble import recover
-from unassemble.cells.crosses import Crosses
+from unassemble.cells.candidates.crosses import Crosses
 from unassemble.topology.embedding import drawing_with_corners
 from vanishing import forgotten, holes, squares, used
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from families import FAMILIES
 from meshes import largest_error, random_mesh, specimen
 from unassemble import recover
-from unassemble.cells.cell_set import CellSet
-from unassemble.cells.left_out import left_out
+from unassemble.cells.candidates.cell_set import CellSet
+from unassemble.cells.labels.left_out import left_out
 from unassemble.cells.reading import Reading
 from unassemble.cells.search import read_cells
 from unassemble.matrix import check_matrix

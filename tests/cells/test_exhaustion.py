@@ -7,8 +7,8 @@ import pytest
 from exhaustive import all_meshes, matrix_of, named
 from meshes import delaunay, edge_list, specimen
 from unassemble import recover
+from unassemble.cells.alternatives.exhaustion import TooManyError, all_readings
 from unassemble.cells.by_component import with_pieces
-from unassemble.cells.exhaustion import TooManyError, all_readings
 from unassemble.topology import components, recognise
 from vanishing import holes, squares, used, without_zeros
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from meshes import random_mesh, specimen
-from unassemble.cells.left_out import left_out
+from unassemble.cells.labels.left_out import left_out
 from unassemble.cells.reading import Reading
 from unassemble.cells.search import read_cells
 from unassemble.matrix import check_matrix

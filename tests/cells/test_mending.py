@@ -6,10 +6,10 @@ import pytest
 from families import FAMILIES
 from meshes import specimen, triangle_set
 from unassemble import recover
-from unassemble.cells.candidates import Candidates
-from unassemble.cells.fitting import fitted
-from unassemble.cells.neighbourhood import Neighbourhoods
-from unassemble.cells.sheet import Placed, Sheet
+from unassemble.cells.candidates.candidates import Candidates
+from unassemble.cells.labels.fitting import fitted
+from unassemble.cells.labels.neighbourhood import Neighbourhoods
+from unassemble.cells.labels.sheet import Placed, Sheet
 from unassemble.topology.embedding import face_complexes
 from vanishing import forgotten
 

@@ -6,8 +6,8 @@ import scipy.sparse as sp
 
 from meshes import specimen
 from unassemble import recover
-from unassemble.cells import other_scales
-from unassemble.cells.exhaustion import all_readings
+from unassemble.cells.alternatives import other_scales
+from unassemble.cells.alternatives.exhaustion import all_readings
 from vanishing import forgotten, squares
 
 

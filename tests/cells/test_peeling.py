@@ -6,7 +6,7 @@ import pytest
 from families import FAMILIES
 from meshes import specimen
 from unassemble import recover
-from unassemble.cells.peeling import ContradictionError, peeled, scales_of_lone_triangles
+from unassemble.cells.triangles.peeling import ContradictionError, peeled, scales_of_lone_triangles
 from unassemble.topology.cycles import three_cycles
 from vanishing import forgotten
 

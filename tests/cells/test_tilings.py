@@ -6,7 +6,7 @@ import pytest
 from meshes import largest_error, specimen
 from unassemble import recover
 from unassemble.cells import completion
-from unassemble.cells.candidates import Candidates
+from unassemble.cells.candidates.candidates import Candidates
 from vanishing import forgotten, octagons
 
 

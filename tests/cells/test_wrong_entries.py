@@ -6,7 +6,8 @@ import scipy.sparse as sp
 
 from meshes import largest_error, random_mesh, specimen
 from unassemble import recover
-from unassemble.cells import clusters, in_doubt, search, wrong_entries
+from unassemble.cells import in_doubt, search, wrong_entries
+from unassemble.cells.triangles import clusters
 from unassemble.matrix import check_matrix
 from unassemble.planar.conformal import conformal_map
 from unassemble.planar.piece import PieceMesh

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from unassemble.elasticity.shape import SOFT, shape
+from unassemble.elasticity.nullspace.shape import SOFT, shape
 
 N, LOOSE = 200, 6
 

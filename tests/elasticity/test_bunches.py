@@ -6,10 +6,10 @@ from assembled import box, heterogeneous, permuted_nodes, stiffness
 from supported import given, judged
 
 from unassemble.elasticity import recover_elasticity
-from unassemble.elasticity.bunches import bunched
-from unassemble.elasticity.constants import uncoupled_rows, whole_share
-from unassemble.elasticity.likeness import next_to_likest, reach
-from unassemble.elasticity.searching import searched
+from unassemble.elasticity.rows.constants import uncoupled_rows, whole_share
+from unassemble.elasticity.rows.likeness import next_to_likest, reach
+from unassemble.elasticity.scattered.bunches import bunched
+from unassemble.elasticity.scattered.searching import searched
 
 COUNTS = {"tri-p1": (8, 9), "quad-q1": (8, 9), "tet-p1": (4, 5, 5), "hex-q1": (5, 6, 5)}
 

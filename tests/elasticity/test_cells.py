@@ -8,8 +8,8 @@ from scipy.spatial import Delaunay, cKDTree
 
 from unassemble import recover
 from unassemble.elasticity import recover_elasticity
-from unassemble.elasticity.kinds import KINDS
-from unassemble.elasticity.ordering import ordered_boxes
+from unassemble.elasticity.elements.kinds import KINDS
+from unassemble.elasticity.elements.ordering import ordered_boxes
 
 KIND = {
     "tri-p1": "triangle", "tri-p2": "triangle6", "quad-q1": "quad", "quad-s2": "quad8", "quad-q2": "quad9",

@@ -6,8 +6,8 @@ from assembled import box, permuted_nodes, stiffness
 from supported import given, judged
 
 from unassemble.elasticity import recover_elasticity
-from unassemble.elasticity.constants import proven_directions, uncoupled_rows
-from unassemble.elasticity.grouping import same_pattern
+from unassemble.elasticity.rows.constants import proven_directions, uncoupled_rows
+from unassemble.elasticity.rows.grouping import same_pattern
 from unassemble.elasticity.unknowns import find_numbering
 
 

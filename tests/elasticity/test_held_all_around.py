@@ -10,7 +10,7 @@ from supported import given, judged
 from unassemble import recover
 from unassemble.elasticity import recover_elasticity
 from unassemble.elasticity.nodal import nodal_matrix
-from unassemble.elasticity.pictures import picture
+from unassemble.elasticity.straight.pictures import picture
 from unassemble.elasticity.unknowns import given_numbering
 
 COUNTS = {"tet-p1": (8, 7, 8), "tet-p2": (6, 6, 6), "hex-q1": (7, 7, 7), "hex-s2": (6, 6, 6), "hex-q2": (5, 6, 5)}

@@ -9,7 +9,7 @@ from supported import given, judged
 
 from unassemble import recover
 from unassemble.elasticity import recover_elasticity
-from unassemble.elasticity.surface import outer_facets, outer_nodes
+from unassemble.elasticity.elements.surface import outer_facets, outer_nodes
 
 COUNTS = {2: (9, 8), 3: (5, 5, 4)}
 

@@ -10,13 +10,13 @@ from assembled import box, heterogeneous, permuted_nodes, stiffness
 from supported import given, judged
 
 from unassemble.elasticity import recover_elasticity
-from unassemble.elasticity.alignment import aligned
-from unassemble.elasticity.constants import proven_directions, uncoupled_rows
 from unassemble.elasticity.doubts import with_doubts
-from unassemble.elasticity.grouping import same_pattern
-from unassemble.elasticity.matching import matched_by_pattern
 from unassemble.elasticity.nodal import nodal_matrix
-from unassemble.elasticity.numbering import measured
+from unassemble.elasticity.ordered.alignment import aligned
+from unassemble.elasticity.ordered.matching import matched_by_pattern
+from unassemble.elasticity.rows.constants import proven_directions, uncoupled_rows
+from unassemble.elasticity.rows.grouping import same_pattern
+from unassemble.elasticity.rows.numbering import measured
 from unassemble.elasticity.unknowns import find_numbering
 
 

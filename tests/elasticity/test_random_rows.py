@@ -8,7 +8,7 @@ from assembled import box, heterogeneous, permuted_nodes, stiffness
 from supported import given, judged
 
 from unassemble.elasticity import recover_elasticity
-from unassemble.elasticity.sums import names_of, set_right
+from unassemble.elasticity.directions.sums import names_of, set_right
 from unassemble.elasticity.unknowns import find_numbering
 
 COUNTS = {"tri-p1": (8, 9), "tri-p2": (6, 7), "tet-p1": (4, 5, 5)}

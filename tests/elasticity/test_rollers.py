@@ -7,7 +7,7 @@ from assembled import box, error, heterogeneous, on_plane, permuted_nodes, stiff
 from supported import given, judged
 
 from unassemble.elasticity import positions, recover_elasticity
-from unassemble.elasticity.searching import searched
+from unassemble.elasticity.scattered.searching import searched
 from unassemble.elasticity.unknowns import find_numbering
 from unassemble.errors import RecoveryError
 

@@ -8,11 +8,11 @@ from assembled import box, heterogeneous, permuted_nodes, stiffness
 from supported import Given, given, judged
 
 from unassemble.elasticity import recover_elasticity
-from unassemble.elasticity.constants import uncoupled_rows
-from unassemble.elasticity.grouping import same_pattern
-from unassemble.elasticity.identities import identities
 from unassemble.elasticity.nodal import nodal_matrix
-from unassemble.elasticity.patterns import with_patterns
+from unassemble.elasticity.nullspace.identities import identities
+from unassemble.elasticity.rows.constants import uncoupled_rows
+from unassemble.elasticity.rows.grouping import same_pattern
+from unassemble.elasticity.scattered.patterns import with_patterns
 from unassemble.elasticity.unknowns import given_numbering
 from unassemble.errors import GeometryError
 

@@ -9,12 +9,12 @@ from assembled import box, heterogeneous, permuted_nodes, stiffness
 from supported import given, judged
 
 from unassemble.elasticity import recover_elasticity
-from unassemble.elasticity.constants import uncoupled_rows
-from unassemble.elasticity.extension import extended_directions
-from unassemble.elasticity.grouping import same_pattern
+from unassemble.elasticity.directions.extension import extended_directions
 from unassemble.elasticity.nodal import eliminated, nodal_matrix
-from unassemble.elasticity.row_positions import placed_together, single_nodes
-from unassemble.elasticity.scattered import scattered
+from unassemble.elasticity.rows.constants import uncoupled_rows
+from unassemble.elasticity.rows.grouping import same_pattern
+from unassemble.elasticity.scattered.row_positions import placed_together, single_nodes
+from unassemble.elasticity.scattered.scattered import scattered
 from unassemble.elasticity.unknowns import given_numbering
 
 

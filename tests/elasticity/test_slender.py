@@ -6,7 +6,7 @@ from assembled import box, eliminated, error, on_plane, stiffness
 
 from unassemble.elasticity import recover_elasticity
 from unassemble.elasticity.nodal import nodal_matrix, valid_pairs
-from unassemble.elasticity.slender import unbent
+from unassemble.elasticity.nullspace.slender import unbent
 from unassemble.elasticity.unknowns import given_numbering
 
 
@@ -44,7 +44,7 @@ def test_beams_whose_gap_normal_equations_bear_take_no_pivoting(monkeypatch):
     def refuse(matrix):
         raise AssertionError("pivoting costs ten times as much")
 
-    monkeypatch.setattr("unassemble.elasticity.slender.AugmentedSystem", refuse)
+    monkeypatch.setattr("unassemble.elasticity.nullspace.slender.AugmentedSystem", refuse)
     case = stiffness("hex-q1", box("hex-q1", (241, 2, 2), stretch=(1800, 3, 2)), lam=1.5)
     found = recover_elasticity(case.matrix, cells=False)
     assert found.certified

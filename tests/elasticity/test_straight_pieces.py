@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from unassemble.elasticity.nullspace.solution import Solution
 from unassemble.elasticity.results import Evidence
-from unassemble.elasticity.solution import Solution
-from unassemble.elasticity.straight import Straight, in_place
+from unassemble.elasticity.straight.straight import Straight, in_place
 
 
 @pytest.mark.parametrize("loose", [0, 3])

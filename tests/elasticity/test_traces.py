@@ -7,12 +7,12 @@ import pytest
 from assembled import box, permuted_nodes, stiffness
 from supported import given
 
-from unassemble.elasticity.cells import recognise_cells
 from unassemble.elasticity.doubts import unconfirmed
-from unassemble.elasticity.grouping import by_first_row
-from unassemble.elasticity.leftover import leftover_joined
+from unassemble.elasticity.elements.cells import recognise_cells
 from unassemble.elasticity.nodal import nodal_matrix
-from unassemble.elasticity.traces import unaccounted
+from unassemble.elasticity.rows.grouping import by_first_row
+from unassemble.elasticity.rows.traces import unaccounted
+from unassemble.elasticity.scattered.leftover import leftover_joined
 from unassemble.elasticity.unknowns import given_numbering
 
 

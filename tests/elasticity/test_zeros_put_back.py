@@ -7,9 +7,9 @@ from assembled import box, heterogeneous, permuted_nodes, stiffness
 from supported import given, judged
 
 from unassemble.elasticity import recover_elasticity
-from unassemble.elasticity.extension import SETTLED, extended_directions
-from unassemble.elasticity.filling import filled, filled_by_direction, likest
-from unassemble.elasticity.grouping import same_pattern
+from unassemble.elasticity.directions.extension import SETTLED, extended_directions
+from unassemble.elasticity.rows.grouping import same_pattern
+from unassemble.elasticity.scattered.filling import filled, filled_by_direction, likest
 
 MATERIALS = {"one": {"lam": 1.5}, "varying": {"lam": heterogeneous, "mu": lambda x: 1 + x[1] + x[0] * x[1]}}
 COUNTS = {"quad-s2": (6, 7), "quad-q2": (6, 7), "tet-p2": (3, 3, 4), "hex-s2": (4, 4, 4)}

@@ -3,15 +3,15 @@
 Where entries vanish the graph alone does not tell: see the page on theory in the documentation.
 """
 
-from .ambiguity import AGREE, alternatives, touching
-from .coincidence import coincident
+from .alternatives.ambiguity import AGREE, alternatives, touching
+from .alternatives.corners import Alternative, OrientedMesh
+from .alternatives.filled import filled_holes
 from .completion import completed, guessed
-from .corners import Alternative, OrientedMesh
-from .doubt import Attempt, Outcome, in_doubt
 from .eliminated import incomplete_rows
-from .filled import filled_holes
+from .misfits.coincidence import coincident
+from .misfits.doubt import Attempt, Outcome, in_doubt
+from .misfits.spoilt import settled, wrong_entries
 from .search import read_cells
-from .spoilt import settled, wrong_entries
 
 __all__ = [
     "AGREE",

@@ -14,8 +14,8 @@ from ..matrix import OperatorMatrix
 from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar, settled_numbering
 from ..topology.keys import contains, distinct, pair_keys
 from .by_component import with_pieces
-from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained
 from .eliminated import incomplete_rows, without_boundary
+from .misfits.doubt import Attempt, Outcome, Solved, misfits_of, unexplained
 from .reading import Reading
 from .search import first_reading, read_cells
 from .undivided import undivided

@@ -20,9 +20,9 @@ from ..planar.piece import PieceMesh
 from ..planar.polish import PolishOptions, polish
 from ..planar.robust import ASIDE
 from ..topology import Piece
+from .misfits.spoilt import without_wrong_entries
 from .reading import FITS, Reading
 from .search import first_reading
-from .spoilt import without_wrong_entries
 
 _SUM = 1e-10  # sum of a row, relative to its entries, that is rounding
 _SHORT = PolishOptions(max_steps=20, max_factorisations=3)

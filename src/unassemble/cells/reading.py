@@ -19,7 +19,7 @@ from ..planar.triangles import lone_triangles
 from ..topology import Piece, Topology
 from ..topology.keys import contains, pair_keys, with_sides
 from ..topology.pieces import planar_pieces
-from .cell_set import CellSet
+from .candidates.cell_set import CellSet
 from .small import SMALL, small_map
 
 FITS = 1e-6

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 from ..planar.piece import PieceMesh
 from ..topology.embedding import drawing_with_corners, face_complexes
-from .candidates import Candidates
-from .cell_set import CellSet
-from .covering import read_by_cover
-from .crosses import Crosses
-from .effort import SMALL_GRAPH, Effort
-from .evidence import FEW, entries_are_to_blame
-from .mending import MOST_VERTICES, mended
+from .candidates.candidates import Candidates
+from .candidates.cell_set import CellSet
+from .candidates.crosses import Crosses
+from .covers.covering import read_by_cover
+from .labels.effort import SMALL_GRAPH, Effort
+from .labels.evidence import FEW, entries_are_to_blame
+from .labels.mending import MOST_VERTICES, mended
+from .labels.relaxation import HopelessError
+from .labels.repairs import BATCH, better, descent, repaired
+from .misfits.spoilt import without_wrong_entries
 from .reading import Reading
-from .relaxation import HopelessError
-from .repairs import BATCH, better, descent, repaired
-from .spoilt import without_wrong_entries
-from .triangles_only import read_triangles
+from .triangles.triangles_only import read_triangles
 
 _STARTS = 2  # readings to begin with that are worth repairing
 _DRAWINGS = 3  # that a graph may have, about

@@ -1,9 +1,9 @@
 """Vector-valued matrices: node positions from the linear identities of isotropic elasticity."""
 
 from .modes import rigid_body_modes, save_amgcl_coordinates, save_petsc_vec
-from .numbering import Numbering
 from .recover import recover_elasticity, scalar_parts
 from .results import ElasticityRecovery, Evidence, ScalarParts
+from .rows.numbering import Numbering
 from .unknowns import given_numbering
 
 __all__ = [

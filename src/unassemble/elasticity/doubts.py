@@ -9,10 +9,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .grouping import by_first_row
 from .nodal import NodalMatrix, annihilating, determined, without_trace
-from .numbering import Numbering
-from .orders import ORDERS
+from .rows.grouping import by_first_row
+from .rows.numbering import Numbering
+from .rows.orders import ORDERS
 
 
 def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:

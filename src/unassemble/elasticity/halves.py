@@ -9,9 +9,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from .grouping import by_first_row
 from .nodal import NodalMatrix, determined, without_trace
-from .numbering import Numbering
+from .rows.grouping import by_first_row
+from .rows.numbering import Numbering
 
 _APART = 1e-7  # of the mean edge length, up to which two positions are one
 _MOST = 0.5  # share of nodes to take apart: single rows have fewer equations, and leave more fields to look for

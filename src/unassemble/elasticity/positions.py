@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from .identities import boundary_terms
-from .material import poisson_ratio
 from .nodal import NodalMatrix, valid_pairs
-from .placing import placed
-from .planes import with_planes
-from .solution import Solution
-from .straight import straightened
+from .nullspace.identities import boundary_terms
+from .nullspace.material import poisson_ratio
+from .nullspace.placing import placed
+from .nullspace.planes import with_planes
+from .nullspace.solution import Solution
+from .straight.straight import straightened
 
 # Nodes beyond which planes are asked at once where there are rollers: without them rows next to rollers leave hundreds
 # of fields free, all of which charts would look for.

@@ -11,17 +11,17 @@ from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..matrix import check_matrix
 from ..words import count_of
-from .cells import no_cells, recognise_cells
-from .certificate import largest_residual
 from .doubts import guessed_directions, unconfirmed, with_doubts
+from .elements.cells import no_cells, recognise_cells
 from .halves import joined, taken_apart
-from .material import poisson_ratio
 from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled
-from .numbering import Numbering
+from .nullspace.certificate import largest_residual
+from .nullspace.material import poisson_ratio
+from .nullspace.solution import Solution
+from .ordered.rounded import SPREADS, with_exact_sums
 from .positions import solve
 from .results import ElasticityRecovery, ScalarParts
-from .rounded import SPREADS, with_exact_sums
-from .solution import Solution
+from .rows.numbering import Numbering
 from .unknowns import find_numbering
 from .verdict import about_cells, about_made_up_nodes, about_nodes, about_open_rows, of_few_digits, verdict
 

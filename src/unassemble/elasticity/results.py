@@ -9,9 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .cells import Cells
+from .elements.cells import Cells
 from .modes import rigid_body_modes
-from .numbering import Numbering
+from .rows.numbering import Numbering
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,13 @@ from ..recovery import Recovery
 from ..structures.bars import bars_of
 from ..structures.trusses import serve_truss
 from .anchoring import anchored, checked_anchors, digits_lost, near_enough
-from .cells import Cells
-from .kinds import KINDS
+from .elements.cells import Cells
+from .elements.kinds import KINDS
+from .elements.surface import boundary_loops
 from .nodal import nodal_matrix, uncoupled
-from .numbering import Numbering
 from .recover import parts_of, place_nodes
 from .results import ElasticityRecovery, ScalarParts
-from .surface import boundary_loops
+from .rows.numbering import Numbering
 
 if TYPE_CHECKING:
     from ..operators import VectorReading

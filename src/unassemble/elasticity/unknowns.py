@@ -16,14 +16,14 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError, RecoveryError
-from .constants import annihilated_share, uncoupled_rows
-from .gaps import by_component_with_gaps, interleaved_by_pattern, interleaved_with_gaps
-from .grouping import by_first_row, coupled_in_common, made_up, same_pattern
-from .numbering import Numbering
-from .orders import ORDERS, regular
-from .sampling import promising
-from .scattered import scattered, scattered_without_zeros
-from .searching import searched
+from .ordered.gaps import by_component_with_gaps, interleaved_by_pattern, interleaved_with_gaps
+from .ordered.sampling import promising
+from .rows.constants import annihilated_share, uncoupled_rows
+from .rows.grouping import by_first_row, coupled_in_common, made_up, same_pattern
+from .rows.numbering import Numbering
+from .rows.orders import ORDERS, regular
+from .scattered.scattered import scattered, scattered_without_zeros
+from .scattered.searching import searched
 
 __all__ = [
     "MORE_THAN_STIFFNESS",

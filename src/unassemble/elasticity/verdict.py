@@ -7,11 +7,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..words import count_of
-from .cells import Cells
+from .elements.cells import Cells
 from .nodal import NodalMatrix, without_trace
-from .numbering import Numbering
-from .shape import SOFT
-from .solution import Solution
+from .nullspace.shape import SOFT
+from .nullspace.solution import Solution
+from .rows.numbering import Numbering
 
 CERTIFIED = 1e-9
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most

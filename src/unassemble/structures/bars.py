@@ -8,10 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.constants import uncoupled_rows
 from ..elasticity.nodal import NodalMatrix, nodal_matrix
-from ..elasticity.numbering import Numbering
-from ..elasticity.orders import ORDERS, regular
+from ..elasticity.rows.constants import uncoupled_rows
+from ..elasticity.rows.numbering import Numbering
+from ..elasticity.rows.orders import ORDERS, regular
 
 _RANK_ONE = 1e-9  # how much of a bar's block may be left, relative to the bar
 _SAMPLE = 64  # nodes, or blocks, to look at before all are

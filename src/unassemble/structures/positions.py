@@ -10,7 +10,7 @@ import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.shape import EXACT, set_aside
+from ..elasticity.nullspace.shape import EXACT, set_aside
 from ..errors import GeometryError
 from ..linalg import Factorisation, UpperTriangle, nearly_singular
 from .equations import Equations

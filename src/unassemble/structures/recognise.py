@@ -12,8 +12,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.grouping import by_first_row
-from ..elasticity.orders import ORDERS, regular
+from ..elasticity.rows.grouping import by_first_row
+from ..elasticity.rows.orders import ORDERS, regular
 from ..errors import InputError
 from .gaps import with_gaps
 from .layouts import LAYOUTS, SPACE, Layout

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from ..clock import Clock
 from ..elasticity.anchoring import anchored, checked_anchors, digits_lost, near_enough
 from ..elasticity.nodal import NodalMatrix, determined
-from ..elasticity.numbering import Numbering
+from ..elasticity.nullspace.shape import EXACT, in_gauge, shape
 from ..elasticity.results import Evidence
-from ..elasticity.shape import EXACT, in_gauge, shape
+from ..elasticity.rows.numbering import Numbering
 from ..errors import GeometryError
 from ..matrix import OperatorMatrix
 from ..recovery import Recovery

@@ -1,0 +1,1 @@
+"""Other meshes that the same matrix fits."""

@@ -1,0 +1,123 @@
+"""Meshes that the matrix cannot tell apart.
+
+See the page on theory in the documentation: what can be read in two ways hangs together by right-angled cells whose
+far sides have vanished from the boundary.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...matrix import OperatorMatrix
+from ...topology import Topology
+from ...topology.keys import Grouped
+from .corners import Alternative, Corners, OrientedMesh
+from .flips import turned_over
+from .hinged import as_one_piece
+from .hubs import Hub, closed_at, hubs, rearranged
+from .loose import is_loose, other_reading
+from .other_scales import other_scales
+from .regrouped import fitting, regrouped
+from .rereading import other_readings
+from .twins import twins
+
+AGREE = 1e-9
+"""Relative difference of numbers that count as equal."""
+
+
+def alternatives(
+    stored: OperatorMatrix,
+    topology: Topology,
+    mesh: OrientedMesh,
+    factors: NDArray,
+    *,
+    scale: float | None,
+    agree: float = AGREE,
+) -> tuple[list[Alternative], bool]:
+    """Other meshes that fit as well as the one found: the places where they differ, each by itself.
+
+    Where the rules find none, loose pieces are read with other factors, and small graphs again in other orders.
+
+    Parameters
+    ----------
+    stored : OperatorMatrix
+        Without the vanished entries.
+    topology : Topology
+        Of the mesh that was found.
+    mesh : OrientedMesh
+    factors : (n,) float64
+        c of the piece of each row.
+    scale : float, optional
+        c, where it is known; otherwise a mesh with another c is as good.
+    agree : float
+
+    Returns
+    -------
+    alternatives : list of Alternative
+    open : bool
+        Whether there may be others that could not be looked for.
+    """
+    found: list[Alternative] = []
+    corners = Corners.of(stored.n, stored.edges, mesh)
+    around = list(hubs(corners, mesh.z))
+    closed = closed_at(stored.n, around)
+    left_open = False
+    if len(topology.vanished) > (topology.polygons.size - 3).sum():  # not on diagonals only
+        found = twins(stored, mesh, agree)
+        orders = [other for hub in around if (other := rearranged(hub, agree)) is not None]
+        # Parts that hang together at a hub only may yet be joined by other pieces.
+        found += fitting(stored, mesh, factors, orders) if len(topology.hinges) else orders
+        found += turned_over(corners, mesh.z, agree)
+        if scale is None:
+            found += _loose_pieces(stored, topology, corners, around, closed)
+            found += as_one_piece(stored, topology, corners, closed)
+    found = found or regrouped(stored, mesh, corners, factors, agree)
+    if not found and scale is None:
+        found, left_open = other_scales(stored, topology, mesh, factors, closed, agree)
+    return _each_once(found) or other_readings(stored, mesh, factors, scale), left_open
+
+
+def touching(stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, agree: float) -> list[Alternative]:
+    """Other meshes in which right angles of cells that touch in a vertex are regrouped, as where none need be supposed.
+
+    Parameters are those of :func:`alternatives`.
+    """
+    if (np.bincount(mesh.boundary[:, 0], minlength=stored.n) < 2).all():
+        return []
+    return regrouped(stored, mesh, Corners.of(stored.n, stored.edges, mesh), factors, agree)
+
+
+def _loose_pieces(
+    stored: OperatorMatrix, topology: Topology, corners: Corners, around: list[Hub], closed: NDArray[np.int64]
+) -> list[Alternative]:
+    """Pieces that no other shares a vertex with: what hangs on another has its c."""
+    single = [
+        piece
+        for piece in topology.pieces
+        if is_loose(piece, closed) and not (topology.multiplicity[piece.vertices] > 1).any()
+    ]
+    owner = np.full(stored.n, -1)
+    for k, piece in enumerate(single):
+        owner[piece.vertices] = k
+    corners_of = Grouped(owner[corners.apex], len(single))
+    hubs_of: list[list[Hub]] = [[] for _ in single]
+    for hub in around:
+        if owner[hub.row] >= 0:
+            hubs_of[owner[hub.row]].append(hub)
+    found = []
+    for k, piece in enumerate(single):
+        own = corners.chosen(corners_of.order[corners_of.start[k] : corners_of.start[k + 1]])
+        other = other_reading(stored, piece.vertices[piece.triangles], own, hubs_of[k])
+        found += [other] if other is not None else []
+    return found
+
+
+def _each_once(found: list[Alternative]) -> list[Alternative]:
+    seen, kept = set(), []
+    for one in found:
+        key = (frozenset(one.cells), frozenset(one.other_cells))
+        if key not in seen:
+            seen.add(key)
+            kept.append(one)
+    return kept

@@ -1,0 +1,156 @@
+"""Right-angled cells whose longest side has vanished from the boundary: where a mesh may be read in two ways."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...topology import Polygons
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """Another mesh that fits as well as the one found, in the place where they differ.
+
+    Attributes
+    ----------
+    around : tuple of int
+        The rows that stay.
+    found, other : tuple of int
+        Rows about them, in the order of the mesh that was found and in that of the other.
+    cells, other_cells : tuple of tuple of int
+        Cells that only the one or the other has.
+    same_scale : bool
+        Whether both have the same factor c; otherwise a known c decides.
+    tested : bool
+        Whether the other was solved and fits; otherwise it was not tried, and might.
+    """
+
+    around: tuple[int, ...]
+    found: tuple[int, ...]
+    other: tuple[int, ...]
+    cells: tuple[tuple[int, ...], ...]
+    other_cells: tuple[tuple[int, ...], ...]
+    same_scale: bool = True
+    tested: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class OrientedMesh:
+    """What the search for other readings needs of a mesh.
+
+    Attributes
+    ----------
+    triangles : (m, 3) int64
+        Counter-clockwise; not those of divided polygons.
+    polygons : Polygons
+    boundary : (b, 2) int64
+        Directed edges with the mesh on their left.
+    boundary_offsets : (loops + 1,) int64
+    z : (n,) complex128
+        Positions in the frame in which the operator is the Laplacian.
+    """
+
+    triangles: NDArray[np.int64]
+    polygons: Polygons
+    boundary: NDArray[np.int64]
+    boundary_offsets: NDArray[np.int64]
+    z: NDArray[np.complex128]
+
+    def chosen(self, rows: NDArray[np.bool_], number: NDArray[np.int64]) -> OrientedMesh:
+        """The cells of whole pieces by their rows (n,), row v called ``number[v]``; the rest is left as it is."""
+        first = self.polygons.vertices[self.polygons.offsets[:-1]]
+        triangles = number[self.triangles[rows[self.triangles[:, 0]]]]
+        return replace(self, triangles=triangles, polygons=self.polygons.chosen(rows[first], number))
+
+
+@dataclass(frozen=True, eq=False)
+class Corners:
+    """Triangles with a right angle whose facing side, on the boundary, has no entry.
+
+    Attributes
+    ----------
+    apex, first, second : (k,) int64
+        The vertex of the right angle and the others, counter-clockwise.
+    loop : (k,) int64
+        Boundary loop of the vanished side.
+    next_at, previous_at : dict of (vertex, loop) to vertex
+        The far ends of the stored edges at an apex next to where a loop leaves it, and to where it arrives.
+    """
+
+    apex: NDArray[np.int64]
+    first: NDArray[np.int64]
+    second: NDArray[np.int64]
+    loop: NDArray[np.int64]
+    next_at: dict[tuple[int, int], int]
+    previous_at: dict[tuple[int, int], int]
+
+    @classmethod
+    def of(cls, n: int, edges: NDArray, mesh: OrientedMesh) -> Corners:
+        """Find them all.
+
+        Parameters
+        ----------
+        n : int
+        edges : (e, 2) int64
+            Stored ones, i < j.
+        mesh : OrientedMesh
+        """
+        tail, head = mesh.boundary.T
+        loop = np.repeat(np.arange(len(mesh.boundary_offsets) - 1), np.diff(mesh.boundary_offsets))
+        stored = np.isin(mesh.boundary.min(axis=1) * n + mesh.boundary.max(axis=1), edges[:, 0] * n + edges[:, 1])
+        third = _third_vertices(n, mesh)
+        gone = ~stored & (third >= 0)
+        apex = third[gone]
+        hub = np.zeros(n, dtype=bool)
+        hub[apex] = True
+        # Where the boundary runs along a vanished side the last stored edge is that to its apex.
+        after, before = np.where(gone, third, head), np.where(gone, third, tail)
+        leaving, arriving = hub[tail], hub[head]
+        return cls(
+            apex,
+            tail[gone],
+            head[gone],
+            loop[gone],
+            _table(tail[leaving], loop[leaving], after[leaving]),
+            _table(head[arriving], loop[arriving], before[arriving]),
+        )
+
+    def __len__(self) -> int:
+        return len(self.apex)
+
+    def chosen(self, which: NDArray) -> Corners:
+        """Some of them, by a mask or by their numbers."""
+        return replace(
+            self,
+            apex=self.apex[which],
+            first=self.first[which],
+            second=self.second[which],
+            loop=self.loop[which],
+        )
+
+
+def _third_vertices(n: int, mesh: OrientedMesh) -> NDArray[np.int64]:
+    """(b,) the vertex that faces each boundary edge; -1 in polygons."""
+    sides = (mesh.triangles * n + np.roll(mesh.triangles, -1, axis=1)).ravel()
+    order = np.argsort(sides)
+    wanted = mesh.boundary @ [n, 1]
+    third = np.full(len(wanted), -1)
+    spot = np.searchsorted(sides, wanted, sorter=order)
+    inside = np.flatnonzero(spot < len(sides))
+    side = order[spot[inside]]
+    known = sides[side] == wanted[inside]
+    triangle, position = np.divmod(side[known], 3)
+    third[inside[known]] = mesh.triangles[triangle, (position + 2) % 3]
+    return third
+
+
+def _table(vertex: NDArray, loop: NDArray, value: NDArray) -> dict[tuple[int, int], int]:
+    return dict(zip(zip(vertex.tolist(), loop.tolist(), strict=True), value.tolist(), strict=True))
+
+
+def cell(apex: int, pair: frozenset[int]) -> tuple[int, ...]:
+    """A corner as a sorted cell."""
+    return tuple(sorted((apex, *pair)))

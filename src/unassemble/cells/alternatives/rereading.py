@@ -1,0 +1,148 @@
+"""Small graphs read again with their vertices in another order.
+
+Which reading of several that fit is found first depends on the order. This finds by trying what no rule foresees:
+symmetric graphs whose cells and holes may change places, small pieces that hang together by vertices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...matrix import OperatorMatrix
+from ...topology import Numbering, components
+from ...topology.faces import joined
+from ...topology.keys import contains, pair_keys
+from ..agreement import SAME_SCALE
+from ..alike import ALIKE, Answers, Cells, Found
+from ..covers.covering import read_by_cover
+from ..reading import Reading
+from ..search import fitting_starts, read_cells
+from ..undivided import undivided
+from .corners import Alternative, OrientedMesh
+
+_MOST_VERTICES = 60
+_ORDERS = 5
+_WORK = 3000  # vertices, those of components that are alike once, times orders; each is read once again at least
+
+
+def other_readings(
+    stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, scale: float | None
+) -> list[Alternative]:
+    """Readings of small components that fit, but have other cells; at most one for each.
+
+    Parameters are those of :func:`unassemble.cells.alternatives.ambiguity.alternatives`.
+    """
+    rng = np.random.default_rng(0)
+    others = []
+    small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= _MOST_VERTICES]
+    n_orders = int(np.clip(_WORK // max(_distinct_vertices(stored, small), 1), 1, _ORDERS))
+    half = _with_vanished_sides(stored, mesh)
+    answers = Answers()
+    for part, own in zip(small, own_cells(stored.n, small, mesh), strict=True):
+        supposed = bool(half[part.vertices].any())
+        weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
+        shuffled = (part.then(_shuffled(part, rng)) for _ in range(n_orders))
+        ask = partial(_other_reading, shuffled, stored, own, scale, c, supposed=supposed)
+        cells, factor, _ = answers.of(part, weights, own, ask)
+        if cells is not None:
+            gone, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
+            others.append(Alternative((), (), (), gone, new, same_scale=abs(factor / c - 1) < SAME_SCALE))
+    return others
+
+
+def _distinct_vertices(stored: OperatorMatrix, parts: list[Numbering]) -> int:
+    """How many vertices components have that are not alike, told by the numbers of their vertices and by their sums.
+
+    What is found out about one holds for all that are alike: with fewer orders for each they would all share its luck.
+    """
+    size = np.array([len(part.vertices) for part in parts], dtype=np.int64)
+    total = np.array([np.abs(stored.entries[part.edge_rows]).sum() for part in parts])
+    order = np.lexsort((total, size))
+    new = np.ones(len(parts), dtype=bool)
+    new[1:] = (np.diff(size[order]) > 0) | (np.diff(total[order]) > ALIKE * total[order][1:])
+    return int(size[order][new].sum())
+
+
+def _with_vanished_sides(stored: OperatorMatrix, mesh: OrientedMesh) -> NDArray[np.bool_]:
+    """(n,) rows of triangles with a side that has no entry."""
+    rows = np.zeros(stored.n, dtype=bool)
+    for k in range(3):
+        one, two = mesh.triangles[:, k], mesh.triangles[:, (k + 1) % 3]
+        rows[mesh.triangles[~joined(stored.n, stored.edges, one, two)]] = True
+    return rows
+
+
+def _other_reading(
+    orders: Iterable[Numbering], stored: OperatorMatrix, own: Cells, scale: float | None, c: float, *, supposed: bool
+) -> Found:
+    """Other cells that fit in some order of the vertices, and their c.
+
+    Among all starts if vanished sides have been `supposed` in these cells, as they are not where something fits without
+    them; else, or where no start fits, by the search.
+    """
+    for part in orders:
+        graph = len(part.vertices), part.edges, -stored.entries[part.edge_rows], scale
+        found = list(fitting_starts(*graph)) if supposed else []
+        if not found and (reading := read_cells(*graph)) is not None and reading.fits:
+            found = [reading]
+        for reading in found:
+            if (cells := cells_of(reading, part)) != own:
+                return cells, next(solved.scale for solved in reading.meshes if solved), False
+    return None, c, False
+
+
+def own_cells(n: int, parts: list[Numbering], mesh: OrientedMesh) -> list[set[tuple[int, ...]]]:
+    """The cells of each part of the graph."""
+    label = np.full(n, -1)
+    for k, part in enumerate(parts):
+        label[part.vertices] = k
+    triangles = mesh.triangles[label[mesh.triangles[:, 0]] >= 0]
+    first = mesh.polygons.vertices[mesh.polygons.offsets[:-1]]
+    polygons = mesh.polygons.chosen(label[first] >= 0, np.arange(n))
+    own: list[set[tuple[int, ...]]] = [set() for _ in parts]
+    for cell in (*map(_cell, triangles.tolist()), *_polygons(polygons.offsets, polygons.vertices)):
+        own[label[cell[0]]].add(cell)
+    return own
+
+
+def with_another_scale(
+    part: Numbering, weights: NDArray, c: float, others: list[float], *, searched: bool = True
+) -> Reading | None:
+    """A reading that fits with the first of some factors that allows one, c left out; by a cover or a search."""
+    for other in others:
+        if abs(other / c - 1) > SAME_SCALE:
+            graph = len(part.vertices), part.edges, weights, other
+            reading = read_cells(*graph) if searched else read_by_cover(*graph)
+            if reading is not None and reading.fits:
+                return reading
+    return None
+
+
+def _shuffled(part: Numbering, rng: np.random.Generator) -> Numbering:
+    """The same graph with its vertices in random order."""
+    order = rng.permutation(len(part.vertices))
+    number = np.argsort(order)
+    edges = np.sort(number[part.edges], axis=1)
+    rows = np.lexsort(edges.T[::-1])
+    return Numbering(order, rows, edges[rows])
+
+
+def cells_of(reading: Reading, numbering: Numbering) -> set[tuple[int, ...]]:
+    """However they were put together."""
+    n = reading.candidates.n_vertices
+    vanished = ~contains(pair_keys(n, *reading.candidates.edges.T), pair_keys(n, *reading.edges.T))
+    triangles, polygons = undivided(reading.pieces, vanished)
+    cells = _polygons(polygons.offsets, numbering.vertices[polygons.vertices])
+    return cells | set(map(_cell, numbering.vertices[triangles].tolist()))
+
+
+def _polygons(offsets: NDArray, vertices: NDArray) -> set[tuple[int, ...]]:
+    return {_cell(cell.tolist()) for cell in np.split(vertices, offsets[1:-1]) if len(cell)}
+
+
+def _cell(vertices: list[int]) -> tuple[int, ...]:
+    return tuple(sorted(vertices))

@@ -1,0 +1,1 @@
+"""What can be a cell in a drawing of the graph."""

@@ -1,0 +1,99 @@
+"""A first guess from angles alone.
+
+In a cell, the corners of a circle, all others see an edge e under the same angle theta_e, with w_e = (cot theta_e
++ cot theta'_e) / 2 over the cells on its two sides. The angles of one cell add up to pi, and its corner between
+edges d and e measures pi - theta_d - theta_e. With each weight shared equally between both sides the angles of a cell
+still add up to about pi; those of a hole are too large, since its weights are those of one side only. Likewise
+the corners at an interior vertex add up to about 2 pi.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...topology.faces import FaceComplex
+
+_SAMPLE = 2000
+_SHORT = 4
+
+
+def facing_angles(cotangents: NDArray) -> NDArray[np.float64]:
+    """Angles between 0 and pi of given cotangents."""
+    return np.asarray(np.pi / 2 - np.arctan(cotangents))
+
+
+def face_sums(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]:
+    """(faces,) sum of the angles of half-edges around each face, about pi for a cell."""
+    return np.asarray(np.bincount(complex_.face, angles), dtype=np.float64)
+
+
+def vertex_excess(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]:
+    """(n,) sum of the corners about each vertex less 2 pi: about 0 at interior vertices, negative on the boundary."""
+    corners = np.bincount(complex_.tail, minlength=complex_.n_vertices) * np.pi
+    turned = np.bincount(complex_.tail, angles, complex_.n_vertices)
+    return np.asarray(corners - 2 * turned - 2 * np.pi, dtype=np.float64)
+
+
+def likeliest_scale(complex_: FaceComplex, weights: NDArray) -> float:
+    """The c for which half of the short faces, or the shortest, have angle sums below pi, weights being shared equally.
+
+    Parameters
+    ----------
+    complex_ : FaceComplex
+    weights : (e,) float64
+        -A_ij = c w_ij.
+    """
+    unit = float(np.median(np.abs(weights[weights != 0]))) * np.sign(weights.sum())
+    if not unit:
+        return 1.0
+    length = complex_.size[complex_.simple]
+    if not len(length):
+        return unit
+    short = np.flatnonzero(complex_.simple & (complex_.size <= max(_SHORT, length.min())))
+    faces = short[np.linspace(0, len(short) - 1, min(len(short), _SAMPLE)).astype(int)]
+    return unit * float(np.exp(np.median(np.log(scales_of_faces(complex_, weights / unit, faces)))))
+
+
+def scales_of_faces(complex_: FaceComplex, cotangents: NDArray, faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(k,) the c for which angles facing the sides of some faces, of given cotangents over c, (e,), add up to pi."""
+    size = complex_.size[faces]
+    first = np.cumsum(size) - size
+    face = np.repeat(np.arange(len(faces)), size)
+    place = np.arange(len(face)) + (complex_.offsets[faces] - first)[face]
+    unit = float(np.median(np.abs(cotangents[cotangents != 0])))
+    share = (cotangents / unit)[complex_.order[place] >> 1]
+    low, high = np.full(len(faces), -8.0), np.full(len(faces), 8.0)
+    for _ in range(40):
+        middle = (low + high) / 2
+        angle = facing_angles(share / np.exp(middle)[face])
+        above = np.add.reduceat(angle, first) > np.pi  # angles grow with c
+        low, high = np.where(above, low, middle), np.where(above, middle, high)
+    return unit * np.asarray(np.exp((low + high) / 2))
+
+
+def overall_scale(complex_: FaceComplex, weights: NDArray, outer: NDArray[np.bool_]) -> float:
+    """The c for which the angles of all faces but the outer ones add up to pi on average.
+
+    Sides along an outer face have all of their weight on the other side, others are shared equally. Short faces and
+    long ones err in opposite directions where they border each other, as squares and octagons do.
+
+    Parameters
+    ----------
+    complex_ : FaceComplex
+    weights : (e,) float64
+        -A_ij = c w_ij.
+    outer : (faces,) bool
+    """
+    unit = float(np.median(np.abs(weights[weights != 0]))) * np.sign(weights.sum())
+    if not unit:
+        return 1.0
+    faces = complex_.simple & ~outer
+    half = np.flatnonzero(faces[complex_.face])
+    share = (weights / unit)[half >> 1] * np.where(outer[complex_.face[half ^ 1]], 2, 1)
+    low, high = -8.0, 8.0
+    for _ in range(40):
+        middle = (low + high) / 2
+        above = facing_angles(share / np.exp(middle)).sum() > np.pi * faces.sum()
+        low, high = (low, middle) if above else (middle, high)
+    return unit * float(np.exp((low + high) / 2))

@@ -1,0 +1,276 @@
+"""Everything that can be a cell: faces, and triangles whose third edge has vanished from the boundary."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...topology import Polygons
+from ...topology.faces import FaceComplex, joined
+from .angles import face_sums, facing_angles, likeliest_scale, overall_scale, vertex_excess
+from .cell_set import CellSet
+from .crosses import Crosses
+from .half_circles import half_circles
+from .open_corners import OpenCorners
+from .turning import Turns
+
+_SHORT = 4  # faces of so many edges are cells unless the numbers say otherwise
+_FULL = 1.3 * np.pi  # angle sum below which a face may be a cell
+_TURNED = 0.01  # belief that a corner loses by not being as drawn
+_LEFT_OUT = 0.05  # squared excess of an angle sum, in units of pi, above which a short face may be left out
+_APART = 0.2  # difference of logarithms of two likely c that is worth trying both
+_INNER = (-0.35 * np.pi, -0.55 * np.pi)  # angle excess above which a vertex may be an inner one
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates(CellSet):
+    """Cells that a graph may have; any set of them that shares no half-edge is a reading of the graph.
+
+    Corners are two consecutive edges of an empty face.
+
+    Attributes
+    ----------
+    drawing : FaceComplex
+        Of the graph.
+    relative : (e,) float64
+        The weights over c, or over the likeliest c, from the angles.
+    sides : (s, 2) int64
+        Pairs (cell, half-edge) of what each cell takes up.
+    belief : (cells,) float64
+        From the angles: 1 for a certain cell, 0 for a certain hole, about.
+    rim_sum : (cells,) float64
+        Angle sums of faces whose sides along outer ones have all of their weight; 0 for others.
+    first : (cells,) bool
+        The faces that make the likeliest reading without vanished boundary edges.
+    outer : (cells,) bool
+        The face of each block that bounds it from outside.
+    strip : (cells,) bool
+        Corners inside paths, all of them right angles if the path is a strip, none if pieces hang together there.
+    half : (cells,) bool
+        Cells on half circles, whose diameter has vanished from the boundary.
+    turns : Turns
+        Parts that can be turned over; its corners are numbered after the faces.
+    """
+
+    drawing: FaceComplex
+    relative: NDArray[np.float64]
+    sides: NDArray[np.int64]
+    belief: NDArray[np.float64]
+    rim_sum: NDArray[np.float64]
+    first: NDArray[np.bool_]
+    outer: NDArray[np.bool_]
+    strip: NDArray[np.bool_]
+    half: NDArray[np.bool_]
+    turns: Turns
+
+    @classmethod
+    def of(
+        cls,
+        drawing: FaceComplex,
+        weights: NDArray,
+        scale: float | None = None,
+        crosses: Crosses | None = None,
+        guess: float | None = None,
+    ) -> Candidates:
+        """All candidates of one drawing of the graph; the corners about some crosses are right angles.
+
+        `guess` is a c to judge angles by, where it is not known.
+        """
+        blocks = drawing.split()
+        relative = weights / (scale or (crosses and crosses.scale) or guess or likeliest_scale(blocks, weights))
+        angles = np.repeat(facing_angles(relative), 2)
+        sums = face_sums(blocks, angles)
+        outer = _longest(blocks, sums)
+        faces = np.flatnonzero(blocks.simple)
+        rim = outer[blocks.face[np.arange(len(angles)) ^ 1]]
+        rim_sums = face_sums(blocks, facing_angles(np.repeat(relative, 2) * np.where(rim, 2, 1)))
+        outside = (blocks.size > _SHORT) | outer | ~blocks.simple
+        # How parts hang together at crosses is known, and at other vertices a guess.
+        whole = blocks.joined(outside) if crosses is None else drawing
+        corners = OpenCorners.of(whole, outside[blocks.face])
+        about = vertex_excess(blocks, angles)
+        paths = half_circles(whole, outside[blocks.face], angles, about)
+        size = np.r_[blocks.size[faces], np.full(len(corners), 3), np.full(len(paths), 4)]
+        open_ones, none = len(corners) + len(paths), np.zeros(len(size), dtype=bool)
+        chosen = np.isin(blocks.face[blocks.order], faces)
+        number = np.full(len(blocks.size), -1)
+        number[faces] = np.arange(len(faces))
+        excess = about[corners.vertices[:, 1]]
+        belief = np.where(corners.in_strip, 1.0, 0.5 - np.abs(excess) / np.pi) - np.where(corners.turned, _TURNED, 0.0)
+        if crosses is not None:
+            belief[np.isin(corners.vertices[:, 1], crosses.hub) & ~corners.turned] = 1.0
+        return cls(
+            n_vertices=drawing.n_vertices,
+            edges=drawing.edges,
+            drawing=drawing,
+            weights=weights,
+            scale=scale,
+            relative=relative,
+            cells=Polygons(
+                np.append(0, np.cumsum(size)),
+                np.r_[
+                    blocks.tail[blocks.order[chosen]],
+                    corners.vertices.ravel(),
+                    np.column_stack([whole.tail[paths], whole.head[paths[:, -1]]]).ravel(),
+                ],
+            ),
+            sides=np.concatenate(
+                [
+                    np.column_stack([number[blocks.face[blocks.order[chosen]]], blocks.order[chosen]]),
+                    corners.sides + [len(faces), 0],
+                    np.column_stack([np.repeat(np.arange(len(size) - len(paths), len(size)), 3), paths.ravel()]),
+                ]
+            ),
+            belief=np.r_[1 - np.abs(sums[faces] / np.pi - 1), belief, np.full(len(paths), 0.5)],
+            rim_sum=np.r_[rim_sums[faces], np.zeros(open_ones)],
+            first=np.r_[(blocks.size <= _SHORT)[faces] & ~outer[faces], none[:open_ones]],
+            outer=np.r_[outer[faces], none[:open_ones]],
+            corner=np.r_[none[: len(faces)], np.ones(len(corners), bool), none[: len(paths)]],
+            strip=np.r_[none[: len(faces)], corners.in_strip, none[: len(paths)]],
+            half=np.arange(len(size)) >= len(size) - len(paths),
+            turns=corners.turns,
+        )
+
+    def other_scale(self) -> float | None:
+        """A likely c that differs much from the one that angles are judged by; None if there is none."""
+        blocks = self.drawing.split()
+        angles = np.repeat(facing_angles(self.relative), 2)
+        ratio = overall_scale(blocks, self.relative, _longest(blocks, face_sums(blocks, angles)))
+        given = np.flatnonzero(self.weights)[0]
+        return None if abs(np.log(ratio)) < _APART else ratio * float(self.weights[given] / self.relative[given])
+
+    @cached_property
+    def chorded(self) -> NDArray[np.bool_]:
+        """(cells,) faces of four edges with an edge between opposite vertices: parts of two cells, if any of one."""
+        chorded = np.zeros(self.count, dtype=bool)
+        quads = np.flatnonzero(self.size == 4)
+        a, b, c, d = (self.cells.vertices[self.cells.offsets[quads] + k] for k in range(4))
+        chorded[quads] = joined(self.n_vertices, self.edges, a, c) | joined(self.n_vertices, self.edges, b, d)
+        return chorded
+
+    @cached_property
+    def conflicts(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Half-edges that several candidates want: `sides` of these, sorted by half-edge, and where each run starts."""
+        order = np.argsort(self.sides[:, 1], kind="stable")
+        start = np.flatnonzero(np.diff(self.sides[order, 1], prepend=-1))
+        return self.sides[order], np.append(start, len(order))
+
+    def turned(self, labels: NDArray[np.bool_]) -> Iterator[NDArray[np.bool_]]:
+        """Labels with one part of the drawing turned over, where that changes any."""
+        for corners in self.turns.turned(labels[self.corner]):
+            turned = labels.copy()
+            turned[self.corner] = corners
+            yield turned
+
+    def starts(self) -> Iterator[NDArray[np.bool_]]:
+        """Readings to begin with, the likeliest first."""
+        by_angles = ~self.corner & ~self.half & (self.belief > 2 - _FULL / np.pi) & (self.size > 3)
+        corners = [self.corner & (self.belief > 0.5 + excess / np.pi) for excess in _INNER]
+        faces = (self.first, (self.first & (self.size == 3)) | (by_angles & ~self.outer))
+        none = np.zeros_like(self.corner)
+        corners += [chosen & ~self.strip for chosen in (*corners, self.corner & (self.belief == 1.0))]
+        corners += [chosen | self.half for chosen in (*corners, none)] if self.half.any() else []
+        tried = {(chosen | extra).tobytes(): chosen | extra for chosen in faces for extra in (*corners, none)}
+        seen = set()
+        for chosen in sorted(tried.values(), key=self._strain):
+            labels = self.covering(self.compatible(np.where(chosen, 1 + self.belief, -np.inf)), self.belief)
+            if labels.any() and labels.tobytes() not in seen:
+                seen.add(labels.tobytes())
+                yield labels
+
+    def tilings(self) -> Iterator[NDArray[np.bool_]]:
+        """Faces by their angles where no others are cells, so that sides between both have all of their weight.
+
+        All faces but the outer ones, then the longer ones only where these border every edge: in tilings all that lie
+        between them may be holes.
+        """
+        inner = ~self.corner & ~self.half & ~self.outer
+        for least in (0, *np.unique(self.size[inner])[1:].tolist()):
+            longer = inner & (self.size >= least)
+            cell, half = self.sides[longer[self.sides[:, 0]]].T
+            used = np.zeros(2 * len(self.edges), dtype=bool)
+            used[half] = True
+            if least and not used.reshape(-1, 2).any(axis=1).all():
+                break
+            angle = facing_angles(self.relative[half >> 1] * np.where(used[half ^ 1], 1, 2))
+            chosen = longer & ((self.size == 3) | (np.bincount(cell, angle, self.count) < _FULL))
+            yield self.covering(self.compatible(np.where(chosen, 1.0, -np.inf)), self.belief)
+
+    def _strain(self, labels: NDArray[np.bool_]) -> float:
+        """How far the angles of some cells are from adding up to pi, edges between two of them shared equally.
+
+        Short faces left out add a little, or no cells would be best.
+        """
+        cell, half = self.sides[labels[self.sides[:, 0]]].T
+        used = np.zeros(2 * len(self.edges), dtype=bool)
+        used[half] = True
+        angles = np.bincount(cell, facing_angles(self.relative[half >> 1] * np.where(used[half ^ 1], 1, 2)), self.count)
+        # A corner has a right angle, and two others, the mean of what its sides show; half circles see one as well.
+        sides = np.maximum(np.bincount(cell, minlength=self.count), 1)
+        sums = (np.where(self.corner, 2 * angles / sides, angles) + np.pi / 2 * (self.corner | self.half))[labels]
+        return float(((sums / np.pi - 1) ** 2).sum()) + _LEFT_OUT * float((self.first & ~labels).sum())
+
+    def compatible(self, value: NDArray) -> NDArray[np.bool_]:
+        """(cells,) candidates of finite value, none of which loses to a better one that wants the same half-edge.
+
+        Rounds of local maxima: a candidate is taken if it beats all rivals that are still in play.
+        """
+        if not self.count:
+            return np.zeros(0, dtype=bool)
+        cell, start = self.conflicts[0][:, 0], self.conflicts[1]
+        rank = np.empty(self.count, dtype=np.int64)
+        # Ties in random order: in the order of numbers they would be settled one by one along a boundary.
+        ties = np.random.default_rng(0).permutation(self.count)
+        rank[np.lexsort((ties, value))] = np.arange(self.count)
+        rank[~np.isfinite(value)] = -1
+        taken = np.zeros(self.count, dtype=bool)
+        run = np.repeat(np.arange(len(start) - 1), np.diff(start))
+        while (rank >= 0).any():
+            best = np.maximum.reduceat(rank[cell], start[:-1])
+            beaten = np.zeros(self.count, dtype=bool)
+            beaten[cell[rank[cell] < best[run]]] = True
+            winners = (rank >= 0) & ~beaten
+            taken |= winners
+            lost = np.zeros(len(start) - 1, dtype=bool)
+            lost[run[winners[cell]]] = True
+            rank[cell[lost[run]]] = -1
+        return taken
+
+    def covering(self, labels: NDArray[np.bool_], value: NDArray) -> NDArray[np.bool_]:
+        """The same labels with further candidates, the most valued ones, for edges that border no cell.
+
+        A nonzero weight is the cotangent of some angle: every edge borders a cell.
+        """
+        labels = labels.copy()
+        cell, half = self.sides.T
+        while True:
+            used = np.zeros(2 * len(self.edges), dtype=bool)
+            used[half[labels[cell]]] = True
+            bare = (self.weights != 0) & ~used.reshape(-1, 2).any(axis=1)
+            blocked = np.zeros(self.count, dtype=bool)
+            blocked[cell[used[half]]] = True
+            wanted = np.zeros(self.count, dtype=bool)
+            wanted[cell[bare[half >> 1]]] = True
+            wanted &= ~blocked & ~labels
+            if not wanted.any():
+                return labels
+            order = np.lexsort((-value[cell], half >> 1))
+            order = order[wanted[cell[order]] & bare[half[order] >> 1]]
+            best = order[np.flatnonzero(np.diff(half[order] >> 1, prepend=-1))]
+            chosen = np.zeros(self.count, dtype=bool)
+            chosen[cell[best]] = True
+            labels |= self.compatible(np.where(chosen, value, -np.inf))
+
+
+def _longest(blocks: FaceComplex, sums: NDArray) -> NDArray[np.bool_]:
+    """One face of each block: its longest, among equals that of the largest angle sum; it is never a cell."""
+    block = blocks.block[blocks.order[blocks.offsets[:-1]]]
+    order = np.lexsort((sums, blocks.size, block))
+    last = order[np.append(np.flatnonzero(np.diff(block[order])), len(order) - 1)]
+    longest = np.zeros(len(sums), dtype=bool)
+    longest[last] = True
+    return longest

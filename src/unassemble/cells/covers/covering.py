@@ -1,0 +1,117 @@
+"""Cells of few shapes, found by an exact cover of all edges in no drawing.
+
+Where most cells are alike, as in lattices with many holes, angles tell little, and a graph that hangs together by
+single vertices has too many drawings. But their cotangents are few numbers, which are soon guessed, and which cells
+have them is a problem of integers; see :mod:`unassemble.cells.covers.program`. Positions are not among its unknowns:
+where the cells of a solution cannot be put together, the few that are to blame are excluded, until one fits.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...topology import Polygons
+from ..agreement import common_values
+from ..candidates.cell_set import CellSet
+from ..candidates.crosses import Crosses
+from ..reading import Reading
+from .consistent import Assembly
+from .numbered import Numbered, frequent_numbers
+from .program import Program
+from .shapes import Shapes
+
+_log = logging.getLogger(__name__)
+
+MOST_VERTICES = 400
+_MOST_SHAPES = 3000
+_MOST_CELLS = 2500  # with their numbers
+_NUMBERS = 4  # that are tried at most
+_SCALES = 3  # of each kind that are tried
+_WORK = 12_000  # cells of all programs that are solved, together
+_AGREE = 1e-7
+
+
+def read_by_cover(n: int, edges: NDArray, weights: NDArray, scale: float | None = None) -> Reading[CellSet] | None:
+    """A reading that fits, of triangles, corners and undivided quadrilaterals of few shapes; None if none is found.
+
+    Parameters are those of :func:`unassemble.cells.search.read_cells`.
+    """
+    shapes = Shapes.of(n, edges, _MOST_SHAPES) if n <= MOST_VERTICES else None
+    if shapes is None or not len(shapes):
+        return None
+    left = _WORK
+    for c in [scale] if scale is not None else likely_scales(shapes, weights):
+        tried = 0
+        for cells in _numberings(shapes, weights, c):
+            if cells is None or len(cells.cell) > _MOST_CELLS or len(cells.cell) == tried:
+                continue
+            tried = len(cells.cell)
+            reading, left = _covered(cells, weights, scale, left)
+            if reading is not None or left <= 0:
+                return reading
+    return None
+
+
+def _covered(cells: Numbered, weights: NDArray, scale: float | None, left: int) -> tuple[Reading[CellSet] | None, int]:
+    """A reading that fits of numbered cells, or none; and how many may still be solved for of those `left`."""
+    program, assembly = Program(cells), Assembly(cells)
+    while left > 0:
+        left -= len(cells.cell)
+        chosen = program.solution(program.fans)
+        if chosen is None:
+            break
+        conflict = assembly.conflict(chosen)
+        _log.debug("%d cells, in conflict %d", len(chosen), 0 if conflict is None else len(conflict))
+        if conflict is None:
+            taken = as_set(cells.shapes, cells.cell[chosen], weights, scale)
+            reading = Reading.of(taken, np.ones(taken.count, dtype=bool))
+            if reading.fits:
+                return reading, left
+            conflict = chosen
+        program.exclude(conflict)
+    return None, left
+
+
+def _numberings(shapes: Shapes, weights: NDArray, c: float) -> Iterator[Numbered | None]:
+    """Cells with few frequent numbers, with more, and with the numbers of crosses."""
+    cotangents = 2 * weights / c
+    n, edges = shapes.n_vertices, shapes.edges
+    numbers = frequent_numbers(shapes, cotangents, _NUMBERS)
+    for count in range(1, len(numbers) + 1):
+        yield Numbered.of(shapes, cotangents, np.tile(numbers[:count], (len(edges), 1)))
+    known = Crosses.of(n, edges, weights, c).cotangents(n, edges, weights)
+    if np.isfinite(known).any():
+        yield Numbered.of(shapes, cotangents, known)
+
+
+def likely_scales(shapes: Shapes, weights: NDArray) -> list[float]:
+    """The c of several corners about vertices of two edges, of triangles, or of crosses, if they border no other cell.
+
+    The cotangents at the ends of a corner have the product 1; those of a triangle satisfy ab + bd + da = 1.
+    """
+    n, edges = shapes.n_vertices, shapes.edges
+    sign = float(np.sign(weights.sum()))
+    a, b, d = (sign * weights)[shapes.sides[:, :3]].T
+    two = np.bincount(edges.ravel(), minlength=n)[shapes.vertices[:, 1]] == 2
+    alone = (shapes.corner & two & (a > 0) & (b > 0), shapes.stored[:, 2] & (shapes.size == 3))
+    products = (a * b, a * b + b * d + d * a)
+    found = []
+    for usable, product in zip(alone, products, strict=True):
+        cell = np.flatnonzero(usable & (product > 0))
+        found.append(common_values(2 * np.sqrt(product[cell]), cell, _AGREE)[:_SCALES])
+    crossed = Crosses.of(n, edges, weights).scale
+    values = np.concatenate([*found, [] if crossed is None else [abs(crossed)]])
+    _, first = np.unique(np.round(values, 9), return_index=True)
+    return [sign * float(c) for c in values[np.sort(first)] if c]
+
+
+def as_set(shapes: Shapes, chosen: NDArray, weights: NDArray, scale: float | None) -> CellSet:
+    """Some cells by themselves."""
+    vertices = shapes.vertices[chosen]
+    offsets = np.append(0, np.cumsum(shapes.size[chosen]))
+    cells = Polygons(offsets, vertices[vertices >= 0])
+    return CellSet(shapes.n_vertices, shapes.edges, weights, scale, cells, shapes.corner[chosen])

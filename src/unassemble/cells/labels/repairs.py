@@ -1,0 +1,92 @@
+"""Labels turned over as the misfit asks for it: many at once, then few."""
+
+from __future__ import annotations
+
+import heapq
+import logging
+from collections.abc import Iterator
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..reading import Reading
+from .effort import Effort
+from .evidence import label_changes
+from .proposals import proposals
+
+_log = logging.getLogger(__name__)
+
+BATCH = 24
+"""Small changes of a reading that are tried at a time."""
+
+_IN_VAIN = 100  # small changes in all without an improvement
+_TRIED = 0.25  # a reading with a batch tried is put off behind those with so much more misfit
+_PATIENCE = 6  # leaps without an improvement; fewer where they are long
+
+
+def better(one: Reading | None, other: Reading) -> Reading:
+    """The one with less misfit."""
+    return other if one is None or other.size < one.size else one
+
+
+def repaired(reading: Reading, effort: Effort) -> Reading:
+    """Turn labels over as the misfit asks for it."""
+    best = _leaps(reading, effort)
+    return best if best.fits else descent(best, effort)
+
+
+def _leaps(reading: Reading, effort: Effort) -> Reading:
+    """All clear changes at once, uphill too: with many wrong cells the misfit of the way is no guide."""
+    best, since_best, progress = reading, 0, effort.progress(reading, _PATIENCE)
+    patience = np.clip(3e4 / reading.candidates.n_vertices, 2, _PATIENCE)
+    seen = {reading.labels.tobytes()}
+    while reading.pieces and not reading.fits and since_best < patience and progress.suffices(best.size):
+        changes = np.nan_to_num(label_changes(reading))
+        labels = next((x for x in proposals(reading, changes) if x.tobytes() not in seen), None)
+        if labels is None:
+            break
+        seen.add(labels.tobytes())
+        reading = effort.reading(reading.candidates, labels)
+        since_best = 0 if reading.size < best.size else since_best + 1
+        best = better(best, reading)
+        _log.debug("leap: misfit %.1e", reading.size)
+    return best
+
+
+def descent(reading: Reading, effort: Effort) -> Reading:
+    """Small changes, the likeliest first, from the best of all readings that they have led to.
+
+    The last wrong labels may have to be put right together: a change for the better can raise the misfit a little. So
+    of the changes of each reading a few are tried, then a few of another that is about as good.
+    """
+    best, in_vain = reading, 0
+    seen = {reading.labels.tobytes()}
+    # Misfit, more where batches have been tried, a number that settles ties, the reading and its changes.
+    waiting = [(reading.size, 0, reading, _changed(reading))]
+    while waiting and best.pieces and not (best.fits or effort.spent) and in_vain < _IN_VAIN:
+        value, number, reading, changed = heapq.heappop(waiting)
+        asked = 0
+        for labels in islice(changed, BATCH):
+            asked += 1
+            if labels.tobytes() in seen or effort.spent:
+                continue
+            seen.add(labels.tobytes())
+            trial = effort.reading(reading.candidates, labels)
+            in_vain = 0 if trial.size < best.size else in_vain + 1
+            best = better(best, trial)
+            if trial.pieces:
+                heapq.heappush(waiting, (trial.size, len(seen), trial, _changed(trial)))
+            if trial.size < reading.size:
+                break
+        else:
+            value += _TRIED * reading.size
+        if asked:
+            heapq.heappush(waiting, (value, number, reading, changed))
+    _log.debug("descent: misfit %.1e", best.size)
+    return best
+
+
+def _changed(reading: Reading) -> Iterator[NDArray[np.bool_]]:
+    """Small changes of the labels of a reading; nothing is computed before the first is asked for."""
+    yield from proposals(reading, np.nan_to_num(label_changes(reading)))

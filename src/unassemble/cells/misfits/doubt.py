@@ -1,0 +1,155 @@
+"""Which parts of a matrix their triangles do not explain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse import csgraph
+
+from ...errors import RecoveryError, SolverError
+from ...matrix import OperatorMatrix
+from ...planar.deviations import factor_deviation
+from ...planar.piece import PieceMesh
+from ...planar.polish import PolishOptions, polish
+from ...topology import Piece, Topology
+from ..agreement import SAME_SCALE, SCALE_ERROR
+from ..reading import FITS, even, misfits
+
+_WIDE = 200  # rows of a matrix on which the misfit of a wrong cell stays near it
+SURE = 1e-3
+"""Misfit, even if spread evenly, that no wrong cell is known to leave."""
+
+_SIGMAS = 5.0  # errors of c by which pieces may differ: the last word on that is not spoken here
+_SHORT = PolishOptions(max_steps=8, max_factorisations=3)
+
+Outcome = PieceMesh | RecoveryError
+"""Positions of a piece, or why there are none."""
+
+Attempt = Callable[[Piece], Outcome]
+"""Solves a piece, each only once."""
+
+Solved = list[tuple[Piece, Outcome]]
+
+
+def in_doubt(
+    matrix: OperatorMatrix,
+    topology: Topology,
+    attempt: Attempt,
+    scale: float | None = None,
+    noise: float | None = None,
+) -> NDArray[np.bool_]:
+    """(n,) rows of components with nonzero entries on no triangle, entries that do not fit, or several factors c.
+
+    A misfit that is small and spread evenly, at the latest after a short polish, is that of errors in the entries, and
+    raises no doubt. Pieces of components that are in doubt without it are not solved. `scale` is c, where it is known,
+    and `noise` the standard deviation of the entries' errors.
+    """
+    doubtful = unexplained(matrix, topology)
+    solved = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
+    doubtful |= _discordant(matrix, solved, scale, noise or 0.0)
+    solved = [(piece, mesh) for piece, mesh in solved if not doubtful[piece.vertices[0]]]
+    rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
+    misfit = misfits_of(matrix, solved)[rest]
+    wrong = misfit > FITS
+    if not wrong.any() or _like_noise(misfit, matrix.n):
+        return doubtful
+    if _like_noise(misfits_of(matrix, _shortly_polished(matrix, solved, scale))[rest], matrix.n):
+        return doubtful
+    return doubtful | _components_of(matrix, rest[wrong])
+
+
+def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None, noise: float) -> NDArray[np.bool_]:
+    """(n,) rows of components whose pieces fit, but loose ones with another factor c than is known or others have.
+
+    With a hole filled such a piece still fits, with another c. That of pieces with more entries than unknowns is right,
+    if any is: where these differ from each other, or from the known one, other cells are no help.
+    """
+    having = [(piece, mesh) for piece, mesh in solved if isinstance(mesh, PieceMesh)]
+    if not having:
+        return np.zeros(matrix.n, dtype=bool)
+    label = components_of(matrix)
+    count = int(label.max()) + 1
+    bound = np.full(count, SAME_SCALE)
+    if not noise:
+        np.maximum.at(bound, label[matrix.edges[:, 0]], SCALE_ERROR * misfits_of(matrix, list(having)))
+    own = label[[piece.vertices[0] for piece, _ in having]]
+    loose = np.array([piece.redundancy <= 0 for piece, _ in having])
+    c = np.array([mesh.scale for _, mesh in having])
+    right = np.full(count, scale or 0.0)
+    if scale is None:  # the last one counts
+        order = np.lexsort((np.array([piece.n_vertices for piece, _ in having]), ~loose))
+        right[own[order]] = c[order]
+    apart = np.abs(c / right[own] - 1) > bound[own]
+    if noise and apart.any():
+        error = noise * np.array([_factor_deviation(piece, mesh) for piece, mesh in having])
+        told = np.zeros(count)
+        if scale is None:
+            told[own[order]] = error[order]
+        apart &= np.abs(c / right[own] - 1) > _SIGMAS * np.hypot(error, told[own])
+    wrong, hopeless = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    wrong[own[apart]] = True
+    hopeless[own[apart & ~loose]] = True
+    return np.asarray((wrong & ~hopeless)[label])
+
+
+def _factor_deviation(piece: Piece, mesh: PieceMesh) -> float:
+    """Relative standard deviation of c for noise 1 in the entries; infinite where they do not tell c."""
+    try:
+        return factor_deviation(piece, mesh.z) / abs(mesh.scale)
+    except SolverError:
+        return np.inf
+
+
+def _like_noise(misfit: NDArray, n: int) -> bool:
+    """Whether a misfit is that of errors in the entries; small meshes spread that of a wrong cell as evenly."""
+    return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < SURE)
+
+
+def _shortly_polished(matrix: OperatorMatrix, solved: Solved, scale: float | None) -> Solved:
+    polished: Solved = []
+    for piece, mesh in solved:
+        if isinstance(mesh, PieceMesh):
+            try:
+                found = polish(piece, -matrix.entries[piece.edge_rows], mesh.z, scale=scale, options=_SHORT)
+            except SolverError as error:
+                polished.append((piece, error))
+                continue
+            polished.append((piece, PieceMesh(found.z, found.scale)))
+        else:
+            polished.append((piece, mesh))
+    return polished
+
+
+def misfits_of(matrix: OperatorMatrix, solved: Solved) -> NDArray[np.float64]:
+    """(e,) as :func:`unassemble.cells.reading.misfits`."""
+    return misfits(
+        matrix.n,
+        matrix.edges,
+        -matrix.entries,
+        [(piece, mesh) for piece, mesh in solved if isinstance(mesh, PieceMesh)],
+    )
+
+
+def unexplained(matrix: OperatorMatrix, topology: Topology) -> NDArray[np.bool_]:
+    """(n,) rows of components with nonzero entries on no triangle."""
+    bare = topology.bare_edges
+    return _components_of(matrix, bare[matrix.entries[bare] != 0])
+
+
+def _components_of(matrix: OperatorMatrix, rows: NDArray) -> NDArray[np.bool_]:
+    """(n,) rows of the connected components that have one of the given edges."""
+    chosen = np.zeros(matrix.n, dtype=bool)
+    if not len(rows):
+        return chosen
+    label = components_of(matrix)
+    chosen[label[matrix.edges[rows, 0]]] = True
+    return chosen[label]
+
+
+def components_of(matrix: OperatorMatrix) -> NDArray[np.int32]:
+    """(n,) number of the connected component of each row."""
+    graph = sp.coo_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
+    return np.asarray(csgraph.connected_components(graph, directed=False)[1])

@@ -1,0 +1,1 @@
+"""Graphs of triangles and holes only, where nothing need have vanished."""

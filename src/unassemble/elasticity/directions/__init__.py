@@ -1,0 +1,1 @@
+"""Which direction each row belongs to, from sums and from solving for translations."""

@@ -1,0 +1,97 @@
+"""Candidates for cells, of each kind: from the graph alone, put in order by where their nodes lie.
+
+Nothing here depends on more than an affine picture of the points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..nodal import NodalMatrix, determined
+from .boxes import contained, convex, without_insides
+from .cliques import Graph, shared_cliques, simplices, straight_simplices
+from .kinds import KINDS, Kind
+from .ordering import ordered
+from .piercing import unpierced
+from .surface import contested
+
+_COVERED = 0.5  # of the nodes: what cells have to touch before they are tried
+_LINEAR = {2: 8, 3: 20}  # blocks per row, at most, in meshes of linear simplices; others have too many cliques to try
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Cells of one kind, (m, k) in meshio's order, positively oriented."""
+
+    kind: Kind
+    cells: NDArray[np.int64]
+
+
+def candidates(
+    graph: Graph, points: NDArray[np.float64], complete: NDArray[np.bool_], *, linear_simplices: bool = True
+) -> Iterator[tuple[Block, ...]]:
+    """What could be the cells, those kinds first that have most nodes: of one kind, then simplices beside boxes.
+
+    Parameters
+    ----------
+    graph : Graph
+        See :func:`coupled`.
+    points : (n, d) float64
+        NaN where not determined; such nodes are in no cell.
+    complete : (n,) bool
+        Nodes all of whose cells are there.
+    linear_simplices : bool
+        Whether to look for these, too; of some graphs there are many.
+    """
+    d, known = points.shape[1], int(determined(points).sum())
+    boxes, simplex = None, None
+    kinds = [kind for kind in KINDS.values() if kind.dim == d and (linear_simplices or not kind.linear_simplex)]
+    for kind in sorted(kinds, key=lambda kind: -kind.nodes):
+        if kind.linear_simplex:
+            simplex = kind
+            if len(graph.row) + graph.n <= graph.n * _LINEAR[d]:
+                yield (_simplices(kind, graph, points, graph),)
+            continue
+        cells = ordered(_sets(kind, graph, points), points, kind)
+        if len(np.unique(cells)) > _COVERED * known:
+            yield (Block(kind, cells),)
+        if not kind.quadratic:
+            boxes = Block(kind, cells[convex(cells, points, kind)])
+    if boxes is not None and simplex is not None and len(boxes.cells):
+        beside = without_insides(graph, boxes.kind.base, boxes.cells, outer=True)
+        if len(beside.row) + graph.n <= graph.n * _LINEAR[d]:
+            edges = without_insides(graph, boxes.kind.base, boxes.cells, outer=False)
+            edges = edges.only(complete[edges.row] | complete[edges.col])  # others may belong to boxes that are gone
+            rest = _simplices(simplex, beside, points, edges)
+            rest = replace(rest, cells=rest.cells[~contained(rest.cells, boxes.cells)])
+            if len(rest.cells):
+                yield (rest, boxes)
+
+
+def _sets(kind: Kind, graph: Graph, points: NDArray) -> NDArray[np.int64]:
+    """Sets of nodes that could be the cells of a kind."""
+    sets = shared_cliques(graph, kind.nodes)
+    if kind.name == "triangle6":
+        sets = np.unique(np.vstack([sets, straight_simplices(graph, points, kind.dim)]), axis=0)
+    return sets
+
+
+def _simplices(kind: Kind, graph: Graph, points: NDArray, edges: Graph) -> Block:
+    """Cliques of a graph through whose inside no edge runs; only those that overlap need a look."""
+    cells = ordered(simplices(graph, kind.dim), points, kind)
+    doubtful = np.flatnonzero(contested(kind.base, cells))
+    return Block(kind, np.delete(cells, doubtful[~unpierced(cells[doubtful], points, edges)], axis=0))
+
+
+def coupled(nodal: NodalMatrix, points: NDArray) -> Graph:
+    """Pairs of determined nodes with an entry."""
+    known = determined(points)
+    i, j = nodal.node, nodal.indices
+    live = np.abs(nodal.data).max(axis=(1, 2)) > 1e-13 * np.minimum(nodal.size[i], nodal.size[j])  # symmetric
+    live &= known[i] & known[j]
+    return Graph(sp.csr_array((np.ones(live.sum()), (i[live], j[live])), shape=(nodal.n,) * 2))

@@ -1,0 +1,1 @@
+"""From rows with known nodes and directions to positions: the null space of the identities."""

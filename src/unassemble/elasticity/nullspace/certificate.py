@@ -1,0 +1,86 @@
+"""How well coordinates fit the matrix: the identities written out one by one.
+
+Nothing here is shared with the solver, which eliminates p and q by a projection; here they are eliminated by
+taking differences of equations that contain the same one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..nodal import NodalMatrix, determined
+
+
+def largest_residual(
+    nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64], ratio: float | None = None
+) -> float:
+    """Largest misfit of a valid identity among determined nodes.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    valid : (n, d, d) bool
+    points : (n, d) float64
+        NaN where not determined; identities that touch such a node are skipped.
+    ratio : float, optional
+        lambda / mu, where it was used to determine nodes.
+
+    Returns
+    -------
+    float
+        Relative to the size of a row, times the mean distance between coupled nodes.
+    """
+    d = nodal.dim
+    known = determined(points)
+    x = np.where(known[:, None], points, 0.0)
+    blind = sp.csr_array(
+        (np.abs(nodal.data).max(axis=(1, 2)), nodal.indices, nodal.indptr), shape=(nodal.n, nodal.n)
+    ) @ (~known).astype(float)
+    usable = valid & (blind == 0)[:, None, None]
+    if not usable.any():
+        return float("nan")
+    size = np.where(nodal.size > 0, nodal.size, 1.0) * _mean_distance(nodal, points)
+    value = np.empty((d, d, d, nodal.n))
+    for c, b in product(range(d), repeat=2):
+        entries = np.ascontiguousarray(nodal.data[:, c, b])
+        block = sp.csr_array((entries, nodal.indices, nodal.indptr), shape=(nodal.n, nodal.n))
+        value[c, b] = (block @ x).T / size
+    worst = 0.0
+    for misfit, needed in _differences(value, usable, d, ratio):
+        worst = max(worst, float(np.abs(misfit[needed]).max(initial=0)))
+    return worst
+
+
+def _mean_distance(nodal: NodalMatrix, points: NDArray) -> float:
+    off = nodal.node < nodal.indices
+    length = np.linalg.norm(points[nodal.node[off]] - points[nodal.indices[off]], axis=1)
+    return float(np.nanmean(length)) if np.isfinite(length).any() else 1.0
+
+
+def _differences(
+    value: NDArray, usable: NDArray[np.bool_], d: int, ratio: float | None
+) -> Iterator[tuple[NDArray, NDArray]]:
+    """Pairs of misfit and mask, (n,) each; value[c, b, a] is A^{cb} x_a."""
+    for c, b, a in product(range(d), repeat=3):
+        if len({a, b, c}) == 3:  # A^{cb} x_a = 0
+            yield value[c, b, a], usable[:, c, b]
+    for a, b, c in product(range(d), repeat=3):
+        if a != b and c != b:  # A^{ab} x_a = q_b = A^{cc} x_b
+            yield value[a, b, a] - value[c, c, b], usable[:, a, b] & usable[:, c, c]
+        if a != b and c not in (a, b):  # A^{ba} x_a = p_b = A^{bc} x_c
+            yield value[b, a, a] - value[b, c, c], usable[:, b, a] & usable[:, b, c]
+    for a, b in product(range(d), repeat=2):
+        if a != b:  # A^{bb} x_b = p_b + 2 q_b
+            misfit = value[b, b, b] - value[b, a, a] - 2 * value[a, b, a]
+            yield misfit, usable[:, b, b] & usable[:, b, a] & usable[:, a, b]
+    if ratio is None:
+        return
+    for a, b in product(range(d), repeat=2):
+        if a != b:  # p_b = ratio q_b
+            yield value[b, a, a] - ratio * value[a, b, a], usable[:, b, a] & usable[:, a, b]
+            yield value[b, b, b] - (ratio + 2) * value[a, a, b], usable[:, b, b] & usable[:, a, a]

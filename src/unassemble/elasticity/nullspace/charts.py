@@ -1,0 +1,178 @@
+"""Charts: the positions that the identities of a few neighbouring nodes allow.
+
+The identities behave like a differential operator of fourth order, so that one factorisation of the
+whole body is dear in space and ill-conditioned, while an iteration needs many steps. But they are local, and so is
+their
+answer: the rows of some two thousand neighbouring nodes determine the positions of all nodes they touch, up to few
+freedoms.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ...linalg import Factorisation, UpperTriangle, nearly_singular
+from ..nodal import NodalMatrix
+from .identities import Identities, identities
+
+_SHIFTS = (1e-12, 3e-11, 1e-9)  # above the rounding of the normal matrix, below every eigenvalue that is not zero
+_STEPS = 2  # each divides what is not wanted by its eigenvalue over the shift, 1e4 and more
+_STIFF = 1e-4  # fields whose singular value is larger need no place in a chart of several
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """Fields on some nodes that fit the identities of some rows best.
+
+    Attributes
+    ----------
+    nodes : (n,) int64
+    fields : (n, d, k) float64
+        Orthonormal.
+    values : (k,) float64
+        Singular values: the norm of each field's residual, increasing.
+    rows : int
+        Number of rows used.
+    """
+
+    nodes: NDArray[np.int64]
+    fields: NDArray[np.float64]
+    values: NDArray[np.float64]
+    rows: int
+
+
+def chart(
+    nodal: NodalMatrix,
+    valid: NDArray[np.bool_],
+    rows: NDArray[np.int64],
+    *,
+    whole: bool,
+    terms: NDArray[np.float64] | None = None,
+) -> Chart:
+    """Compute the least singular fields of the identities of some rows.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    valid : (n, d, d) bool
+    rows : (m,) int64
+    whole : bool
+        Whether these are all rows of the body. Otherwise fields are added until the rest is stiff, so that the
+        charts together hold every field of the body that fits.
+    terms : (d, d, d, t) float64, optional
+        Unknown boundary terms; see :func:`.identities.identities`.
+    """
+    local = identities(nodal, valid, rows, terms)
+    own = len(local.rows)
+    if own and not whole:
+        local = _supported(local, nodal, valid, terms)
+    n, d = len(local.columns), local.dim
+    if not n:
+        return Chart(local.columns, np.empty((0, d, 0)), np.empty(0), 0)
+    count = min(4 * d, n * d)
+    with nearly_singular(UpperTriangle.of(local.normal_matrix()), _SHIFTS) as solver:
+        while True:
+            fields, values = _least_fields(local, solver, count)
+            if count == n * d or count >= 256 or values[-1] > (1e-6 if whole else _STIFF):
+                break
+            count = min(2 * count, n * d)
+        if not whole:
+            keep = values < 1e3 * _STIFF
+            fields, values = fields[..., keep], values[keep]
+        fields, values = _refine(local, solver, fields, values)
+    return Chart(local.columns, fields, values, own)
+
+
+def _supported(
+    local: Identities, nodal: NodalMatrix, valid: NDArray[np.bool_], terms: NDArray[np.float64] | None
+) -> Identities:
+    """The identities, and those of the neighbours of rows at the rim that have too few to place what they touch.
+
+    Each node takes d equations, which the rows that touch it share. A row with many neighbours that no other row of the
+    chart touches leaves most of these free to move, each by itself. Neighbours that are short of equations, too, would
+    only add to that.
+    """
+    short = _short(local)
+    if not short.any():
+        return local
+    near = np.unique(nodal.graph[local.rows[short]].indices)
+    more = identities(nodal, valid, np.union1d(local.rows, near), terms)
+    kept = ~_short(more) | np.isin(more.rows, local.rows)
+    return more if kept.all() else identities(nodal, valid, more.rows[kept], terms)
+
+
+def _short(local: Identities) -> NDArray[np.bool_]:
+    """(m,) rows with fewer equations than their share of what the nodes take that they touch."""
+    touching = np.bincount(local.indices, minlength=len(local.columns))
+    taken = np.add.reduceat(local.dim / touching[local.indices], local.indptr[:-1])
+    return np.asarray(taken > local.equations)
+
+
+def _least_fields(local: Identities, solver: Factorisation, count: int) -> tuple[NDArray, NDArray]:
+    """Inverse iteration on a block of fields, then Rayleigh-Ritz on squares: values to half the digits."""
+    n, d = len(local.columns), local.dim
+    x = np.random.default_rng(0).standard_normal((n * d, count))
+    for _ in range(_STEPS):
+        x = np.linalg.qr(solver.solve(x))[0]
+    residual = local.residual(x.reshape(n, d, -1)).reshape(-1, count)
+    squares, v = scipy.linalg.eigh(residual.T @ residual)
+    return (x @ v).reshape(n, d, -1), np.sqrt(np.maximum(squares, 0))
+
+
+def _ritz(local: Identities, x: NDArray) -> tuple[NDArray, NDArray]:
+    """Rotate orthonormal fields to singular ones. Working with residuals, not with their squares, keeps all digits."""
+    n, d, k = x.shape
+    triangle = np.linalg.qr(local.residual(x).reshape(-1, k), mode="r")
+    _, values, v = scipy.linalg.svd(triangle)
+    values = np.concatenate([values, np.zeros(k - len(values))])
+    return (x.reshape(n * d, k) @ v[::-1].T).reshape(n, d, k), values[::-1]
+
+
+def _refine(local: Identities, solver: Factorisation, fields: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
+    """One step of inverse iteration in correction form: its error is that of the residual, not of the factor."""
+    n, d, k = fields.shape
+    null = values < 1e-6
+    if null.any():
+        gradient = local.gradient(local.residual(fields[..., null]))
+        step = solver.solve(gradient.reshape(n * d, -1)).reshape(n, d, -1)
+        fields = fields.copy()
+        fields[..., null] -= step
+        fields = np.linalg.qr(fields.reshape(n * d, k))[0].reshape(n, d, k)
+    return _ritz(local, fields)
+
+
+def patches(graph: sp.csr_array, size: int) -> list[NDArray[np.int64]]:
+    """Cut a graph into connected-looking halves, again and again, by breadth-first distance from one end.
+
+    Parameters
+    ----------
+    graph : (n, n) sparse
+    size : int
+        Most nodes of a patch.
+    """
+    done: list[NDArray[np.int64]] = []
+    open_: list[NDArray[np.int64]] = [np.arange(graph.shape[0])]
+    while open_:
+        nodes = open_.pop()
+        if len(nodes) <= size:
+            done.append(nodes)
+            continue
+        sub = graph[nodes][:, nodes]
+        order = _from_one_end(sub)
+        half = len(order) // 2
+        open_ += [nodes[np.sort(order[half:])], nodes[np.sort(order[:half])]]
+    return done
+
+
+def _from_one_end(graph: sp.csr_array) -> NDArray[np.int64]:
+    """All nodes by distance from a node far out; further components follow."""
+    breadth_first = sp.csgraph.breadth_first_order
+    order = breadth_first(graph, 0, directed=False, return_predecessors=False)
+    order = breadth_first(graph, order[-1], directed=False, return_predecessors=False)
+    rest = np.setdiff1d(np.arange(graph.shape[0]), order)
+    return np.concatenate([order, rest]).astype(np.int64)

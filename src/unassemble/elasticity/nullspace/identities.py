@@ -1,0 +1,244 @@
+"""The linear identities between an elasticity matrix and the coordinates of its nodes.
+
+With p_c = int lambda d_c phi_i and q_c = int mu d_c phi_i, row i of block (c, b) of the matrix, applied
+to the coordinate x_a, is
+
+    (A^{cb} x_a)_i = delta_ab p_c + delta_ac q_b + delta_cb q_a.
+
+At each node these d^3 numbers lie in a space of dimension 2 d, known beforehand; of dimension d, where lambda / mu is
+known; and where homogeneous material surrounds the node, they vanish. What sticks out of that space is
+linear in the coordinates and vanishes for the true ones. p and q never appear as unknowns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..nodal import NodalMatrix
+
+
+def boundary_terms(d: int, ratio: float | None = None) -> NDArray[np.float64]:
+    """(d, d, d, 2 d) what p_1 .. p_d, q_1 .. q_d put into the places c, b, a.
+
+    With p = ratio q known, (d, d, d, d) what q_1 .. q_d put there.
+    """
+    terms = np.zeros((d, d, d, 2 * d))
+    for k in range(d):
+        for m in range(d):
+            terms[k, m, m, k] += 1  # delta_ab p_c
+            terms[m, k, m, d + k] += 1  # delta_ac q_b
+            terms[m, m, k, d + k] += 1  # delta_cb q_a
+    return terms if ratio is None else ratio * terms[..., :d] + terms[..., d:]
+
+
+def no_terms(d: int) -> NDArray[np.float64]:
+    """(d, d, d, 0) boundary terms inside homogeneous material: none."""
+    return np.empty((d, d, d, 0))
+
+
+def seen_terms(valid: NDArray[np.bool_], terms: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(d, d, d, k) boundary terms in the valid places (d, d, d) of one node.
+
+    A node without a row of direction b may use its place (b, b, b) for an equation without boundary terms.
+    """
+    d = len(valid)
+    seen = terms * valid[..., None]
+    for b in range(d):
+        if valid[b].sum() == 1 and valid[b, b, b]:
+            seen[b, b, b] = 0
+    return seen
+
+
+def boundary_basis(valid: NDArray[np.bool_], terms: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Orthonormal basis of the boundary terms seen by the valid places (d, d, d) of one node: (d, d, d, k)."""
+    d = len(valid)
+    u, s, _ = np.linalg.svd(seen_terms(valid, terms).reshape(d**3, terms.shape[3]), full_matrices=False)
+    return u[:, s > 1e-10].reshape(d, d, d, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class Identities:
+    """The valid identities of some nodes, as an operator on the coordinates of the nodes they touch.
+
+    Attributes
+    ----------
+    rows : (m,) int64
+        Nodes whose rows are used.
+    columns : (n,) int64
+        Nodes that these rows touch, increasing.
+    indptr, indices : int32
+        Row k couples to ``columns[indices[indptr[k]:indptr[k + 1]]]``.
+    data : (nnz, d, d) float64
+        Blocks relative to the size of their row, zero where not valid.
+    valid : (m, d, d, d) bool
+        Places (c, b, a) that count.
+    terms : (d, d, d, t) float64
+        What unknown boundary terms may put into the places c, b, a; see :func:`boundary_terms` and :func:`no_terms`.
+    """
+
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    indptr: NDArray[np.int32]
+    indices: NDArray[np.int32]
+    data: NDArray[np.float64]
+    valid: NDArray[np.bool_]
+    terms: NDArray[np.float64]
+
+    @property
+    def dim(self) -> int:
+        """Dimension of space."""
+        return self.data.shape[1]
+
+    @cached_property
+    def _kinds(self) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]:
+        """Rows with the same valid pairs, and the basis of their boundary terms."""
+        d = self.dim
+        code = self.valid.reshape(-1, d**3) @ (1 << np.arange(d**3))
+        kinds = [np.flatnonzero(code == value) for value in np.unique(code)]
+        return [(rows, boundary_basis(self.valid[rows[0]], self.terms)) for rows in kinds]
+
+    @cached_property
+    def equations(self) -> NDArray[np.int64]:
+        """(m,) equations of each row once p and q are eliminated."""
+        count = self.valid.reshape(len(self.rows), -1).sum(axis=1)
+        for rows, basis in self._kinds:
+            count[rows] -= basis.shape[3]
+        return np.asarray(count)
+
+    @cached_property
+    def _stacked(self) -> sp.csr_array:
+        """(m d d, n): all blocks of the matrix, rows ordered by node, c, b."""
+        d = self.dim
+        shape = (len(self.rows) * d * d, len(self.columns))
+        return sp.bsr_array((self.data.reshape(-1, d * d, 1), self.indices, self.indptr), shape=shape).tocsr()
+
+    @cached_property
+    def _even(self) -> bool:
+        """Whether pairs (c, b) are valid for all coordinates or for none."""
+        return bool((self.valid == self.valid[..., :1]).all())
+
+    def apply(self, x: NDArray) -> NDArray[np.float64]:
+        """(m, d, d, d, k) products A^{cb} x_a, by node, c, b, a, for k fields x of shape (n, d, k)."""
+        n, d, k = x.shape
+        value = (self._stacked @ x.reshape(n, d * k)).reshape(-1, d, d, d, k)
+        return value if self._even else value * self.valid[..., None]
+
+    def residual(self, x: NDArray) -> NDArray[np.float64]:
+        """(m, d, d, d, k) what sticks out of the boundary terms; zero for the true coordinates."""
+        value = self.apply(x)
+        for rows, basis in self._kinds:
+            part = np.einsum("cbap,ncbak->npk", basis, value[rows], optimize=True)
+            value[rows] -= np.einsum("cbap,npk->ncbak", basis, part, optimize=True)
+        return value
+
+    def gradient(self, residual: NDArray) -> NDArray[np.float64]:
+        """(n, d, k) transpose of :meth:`residual`, for values in its range."""
+        d, k = self.dim, residual.shape[-1]
+        return (self._stacked.T @ residual.reshape(-1, d * k)).reshape(-1, d, k)
+
+    def normal_matrix(self) -> sp.bsr_array:
+        """(n d, n d) the normal matrix in blocks of d; those of zeros are missing, except on the diagonal."""
+        d = self.dim
+        q = self._boundary_part()
+        normal = self._gram() - q.T @ q
+        if (np.abs(normal.diagonal()).reshape(-1, d).max(axis=1) == 0).any():  # a node in no equation
+            stored = sp.eye_array(normal.shape[0], format="csr") * np.finfo(float).tiny
+            normal = sp.csr_array(normal.tocsr() + stored).tobsr((d, d))
+        normal.sort_indices()
+        return normal
+
+    def _gram(self) -> sp.bsr_array:
+        """The normal matrix with p and q set to zero."""
+        d, stacked = self.dim, self._stacked
+        if self._even:  # the same for all coordinates
+            one = sp.csr_array(stacked.T @ stacked)
+            blocks = one.data[:, None, None] * np.eye(d)
+            return sp.bsr_array((blocks, one.indices, one.indptr), shape=(d * one.shape[0],) * 2)
+        parts = []
+        for a in range(d):
+            part = sp.csr_array(sp.diags_array(self.valid[..., a].ravel().astype(float)) @ stacked)
+            parts.append(sp.kron(part.T @ part, np.diag(np.arange(d) == a).astype(float), format="csr"))
+        return sp.csr_array(sum(parts[1:], start=parts[0])).tobsr((d, d))
+
+    def _boundary_part(self) -> sp.bsr_array:
+        """Components of the products along the boundary terms: blocks of 2 d by d."""
+        d, m = self.dim, len(self.rows)
+        block_row = np.repeat(np.arange(m), np.diff(self.indptr))
+        kind = np.empty(m, dtype=np.int64)
+        blocks = np.zeros((len(self.indices), 2 * d, d))
+        for index, (rows, _) in enumerate(self._kinds):
+            kind[rows] = index
+        for index, (_, basis) in enumerate(self._kinds):
+            if not basis.shape[3]:
+                continue
+            here = kind[block_row] == index
+            weights = basis.transpose(0, 1, 3, 2).reshape(d * d, -1)
+            part = self.data[here].reshape(-1, d * d) @ weights
+            blocks[here, : basis.shape[3]] = part.reshape(-1, basis.shape[3], d)
+        return sp.bsr_array((blocks, self.indices, self.indptr), shape=(2 * d * m, d * len(self.columns)))
+
+    def boundary_values(self, x: NDArray) -> tuple[NDArray, NDArray]:
+        """Vectors p and q of each row, (m, d) each, that fit coordinates x of shape (n, d) best.
+
+        NaN where the valid pairs do not determine them. In units of the size of the row. Both have to be among the
+        terms.
+        """
+        d = self.dim
+        value = self.apply(x[:, :, None])[..., 0]
+        found = np.full((len(self.rows), 2 * d), np.nan)
+        for rows, basis in self._kinds:
+            if basis.shape[3] == 2 * d:
+                seen = seen_terms(self.valid[rows[0]], self.terms).reshape(d**3, 2 * d)
+                found[rows] = value[rows].reshape(len(rows), -1) @ np.linalg.pinv(seen).T
+        return found[:, :d], found[:, d:]
+
+
+def _telling(valid: NDArray[np.bool_], terms: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(m,) rows with an equation left once p and q are eliminated."""
+    d = valid.shape[1]
+    code = valid.reshape(-1, d**3) @ (1 << np.arange(d**3))
+    telling = np.zeros(len(valid), dtype=bool)
+    for value in np.unique(code):
+        here = np.flatnonzero(code == value)
+        one = valid[here[0]]
+        telling[here] = one.sum() > boundary_basis(one, terms).shape[3]
+    return telling
+
+
+def identities(
+    nodal: NodalMatrix, valid: NDArray[np.bool_], rows: NDArray[np.int64], terms: NDArray[np.float64] | None = None
+) -> Identities:
+    """Collect the valid identities of some nodes.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    valid : (n, d, d) or (n, d, d, d) bool
+        See :func:`~unassemble.elasticity.nodal.valid_pairs` and
+        :func:`~unassemble.elasticity.nullspace.planes.with_planes`.
+    rows : (m,) int64
+        Nodes whose rows to use; those that say nothing once p and q are eliminated are dropped.
+    terms : (d, d, d, t) float64, optional
+        Unknown boundary terms: the fewer there are, the more equations are left. Any p and q, where not given.
+    """
+    terms = boundary_terms(nodal.dim) if terms is None else terms
+    valid = valid if valid.ndim == 4 else np.repeat(valid[..., None], nodal.dim, axis=3)
+    rows = rows[_telling(valid[rows], terms)]
+    count = np.diff(nodal.indptr)[rows]
+    start = np.repeat(nodal.indptr[rows] - (np.cumsum(count) - count), count)
+    entry = (np.arange(count.sum()) + start).astype(np.int64)
+    row = np.repeat(np.arange(len(rows)), count)
+    data = nodal.data[entry] * (valid[rows].any(axis=3) / nodal.size[rows, None, None])[row]
+    live = (data != 0).any(axis=(1, 2))
+    neighbour = nodal.indices[entry[live]]
+    touched = np.zeros(nodal.n, dtype=bool)
+    touched[neighbour] = True
+    columns = np.flatnonzero(touched)
+    local = np.cumsum(touched) - 1
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(row[live], minlength=len(rows)))]).astype(np.int32)
+    return Identities(rows, columns, indptr, local[neighbour].astype(np.int32), data[live], valid[rows], terms)

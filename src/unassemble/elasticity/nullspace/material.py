@@ -1,0 +1,45 @@
+"""Poisson's ratio, read off the boundary terms p and q."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..nodal import NodalMatrix, determined
+from .identities import identities
+
+_CONSTANT = 1e-6  # spread of lambda / mu, relative to 1 + lambda / mu, up to which it counts as one number
+
+
+def poisson_ratio(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64]) -> float | None:
+    """Poisson's ratio of the body, in plane strain where d is 2; None where it varies or does not show.
+
+    p = int lambda grad phi_i and q = int mu grad phi_i are in the ratio lambda : mu at every node. They vanish at nodes
+    around which the material is homogeneous, so that nodes on free surfaces and material interfaces count.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    valid : (n, d, d) bool
+    points : (n, d) float64
+        NaN where not determined.
+    """
+    known = determined(points)
+    local = identities(nodal, valid, np.arange(nodal.n))
+    if not len(local.rows):
+        return None
+    x = np.where(known[:, None], points, 0.0)[local.columns]
+    p, q = local.boundary_values(x)
+    unknown = np.zeros(nodal.n)
+    unknown[nodal.node[~known[nodal.indices]]] = 1
+    good = np.isfinite(p).all(axis=1) & (unknown[local.rows] == 0)
+    p, q = p[good], q[good]
+    strength = np.linalg.norm(q, axis=1)
+    if not len(q) or strength.max() < 1e-8:
+        return None
+    p, q = p[strength > 1e-3 * strength.max()], q[strength > 1e-3 * strength.max()]
+    ratio = (p * q).sum() / (q * q).sum()
+    misfit = np.linalg.norm(p - ratio * q, axis=1) / np.linalg.norm(q, axis=1)
+    if np.max(misfit) > _CONSTANT * (1 + abs(ratio)):
+        return None
+    return float(ratio / (2 * (1 + ratio)))

@@ -1,0 +1,141 @@
+"""Positions piece by piece: the least singular fields of the identities, and the coordinates among them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ...errors import GeometryError
+from ..nodal import NodalMatrix, determined, linked
+from ..results import Evidence
+from .atlas import NullFields, null_fields
+from .shape import EXACT, Shape, in_gauge, shape
+from .slender import affordable, unbent
+from .solution import Solution
+
+# Gaps of thin pieces that as a whole cost no more than in charts, and lose no digits where these meet. The square of a
+# smaller one is too near to the shift with which normal matrices are factorised.
+_BENDING = 1e-5, 1e-3
+_SLENDER = {2: 1e-4, 3: 1e-5}  # gap below which a step on the whole piece is worth its cost, far more in space
+_SETTLED = 1e-8  # residual over gap: what coordinates may be wrong by
+# Nodes of a body whose best fit, where none is exact, one factorisation finds. Charts are no help there: each fits in
+# its own way, and where two of them meet the joined field has a kink that costs far more than the misfit itself.
+_WHOLE = {2: 250_000, 3: 30_000}
+
+
+def placed(
+    nodal: NodalMatrix,
+    valid: NDArray[np.bool_],
+    patch: int | None,
+    terms: NDArray[np.float64] | None = None,
+    *,
+    common: int | None = None,
+) -> Solution:
+    """Positions piece by piece.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    valid : (n, d, d) or (n, d, d, d) bool
+    patch : int, optional
+        Most nodes per chart.
+    terms : (d, d, d, t) float64, optional
+        Unknown boundary terms; see :func:`.identities.identities`.
+    common : int, optional
+        Fields that all nodes of a piece share; see :func:`.shape.shape`.
+
+    Raises
+    ------
+    GeometryError
+        If no piece has positions.
+    """
+    component, n_pieces = pieces_of(nodal, valid)
+    graph = nodal.graph
+    points = np.full((nodal.n, nodal.dim), np.nan)
+    evidence, freedoms, exact, warnings = [], [], [], []
+    failure: GeometryError | None = None
+    for piece in range(n_pieces):
+        body = np.flatnonzero(component == piece)
+        found = null_fields(nodal, valid, body, patch=patch, terms=terms)
+        if found.charts > 1 and not _settled(found):
+            if len(body) <= _WHOLE[nodal.dim]:
+                found = null_fields(nodal, valid, body, patch=len(body), terms=terms)
+            else:
+                warnings.append(
+                    f"piece {piece} with node {body[0]} is too large for the best fit by one factorisation; the "
+                    "points are those of smaller parts, joined, whose distances may be far from right"
+                )
+        told = np.asarray(valid.reshape(nodal.n, -1).any(axis=1))
+        try:
+            one = _shape(found, graph, told, common)
+            if found.charts > 1 and _thin(found, one, graph):
+                found = null_fields(nodal, valid, body, patch=len(body), terms=terms)
+                one = _shape(found, graph, told, common)
+        except GeometryError as error:
+            failure = failure or error
+            warnings.append(f"piece {piece} with node {body[0]}: {error}")
+            evidence.append(Evidence(int((found.values < EXACT).sum()), float("nan"), float("nan"), found.rows))
+            freedoms.append("")
+            continue
+        points[found.nodes] = one.points
+        points[body] = in_gauge(points[body], graph[body][:, body])
+        evidence.append(_evidence(found, one))
+        if one.exact and not one.freedom and evidence[-1].gap < _SLENDER[nodal.dim] and affordable(points[body]):
+            whole = np.full_like(points, np.nan)
+            whole[body] = points[body]
+            better, residual = unbent(nodal, valid, whole, evidence[-1].gap, terms)
+            if residual < evidence[-1].residual:
+                points[body] = in_gauge(better[body], graph[body][:, body])
+                settled = residual <= _SETTLED * evidence[-1].gap
+                evidence[-1] = replace(evidence[-1], residual=residual, settled=settled)
+        freedoms.append(one.freedom)
+        exact.append(one.exact)
+    if not exact:
+        raise failure or GeometryError("no row annihilates constants: no node has a valid equation")
+    component = np.where(determined(points), component, -1)
+    return Solution(valid, component, points, tuple(evidence), tuple(freedoms), all(exact), tuple(warnings))
+
+
+def _shape(found: NullFields, graph: sp.csr_array, told: NDArray[np.bool_], common: int | None) -> Shape:
+    return shape(found.fields, found.values, graph[found.nodes][:, found.nodes], told[found.nodes], common)
+
+
+def _thin(found: NullFields, one: Shape, graph: sp.csr_array) -> bool:
+    """Whether one factorisation of the whole piece is cheap, and gains digits."""
+    least, most = _BENDING
+    if not (one.exact and least < _evidence(found, one).gap < most):
+        return False
+    points = in_gauge(one.points, graph[found.nodes][:, found.nodes])
+    return affordable(points[determined(points)])
+
+
+def _settled(found: NullFields) -> bool:
+    """Whether more than translations satisfies the identities exactly, and not all fields that were looked for."""
+    d = found.fields.shape[1]
+    return len(found.values) > d and bool(found.values[d] <= EXACT < found.values[-1])
+
+
+def pieces_of(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
+    """Pieces held together by valid identities; -1 for nodes that none of them touches.
+
+    That nodes lie in one plane is said in places of rows that they lack; nothing but that makes no piece.
+    """
+    live = linked(nodal, valid)
+    link = sp.csr_array((np.ones(live.sum()), (nodal.node[live], nodal.indices[live])), shape=(nodal.n, nodal.n))
+    _, label = sp.csgraph.connected_components(link, directed=False)
+    own = valid.reshape(nodal.n, nodal.dim, -1).any(axis=2) & (nodal.row_of >= 0)
+    told = np.bincount(label, own.any(axis=1)) > 0
+    kept = np.flatnonzero(told & (np.bincount(label) > 1))
+    order = np.full(len(told), -1)
+    order[kept] = np.arange(len(kept))
+    return order[label].astype(np.int64), len(kept)
+
+
+def _evidence(found: NullFields, one: Shape) -> Evidence:
+    d = found.fields.shape[1]
+    null = max(one.null, d + 1)
+    gap = float(found.values[null]) if null < len(found.values) else float("inf")
+    return Evidence(one.dimension, float(found.values[d]), gap, found.rows)

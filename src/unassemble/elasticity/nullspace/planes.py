@@ -1,0 +1,74 @@
+"""Rollers and symmetry planes: what the rows next to them still say.
+
+A row next to unknowns of direction b that were taken out lacks some coefficients of its blocks (c, b), of which it
+keeps one number: all of them together would add up to zero. If the nodes that lack direction b lie in a plane
+across b, as on rollers and symmetry planes they do, that number is enough for the coordinate x_b, the same in
+all of them: the missing coefficients may be thought of as any that have this sum. So A^{cb} x_b = p_c + 2 delta_cb q_b
+stays valid, though A^{cb} x_a for other a does not. And x_b is constant over such nodes, one more equation each.
+
+That they lie in a plane is an assumption. It is refused where no exact null field is left with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..nodal import NodalMatrix, eliminated, surrounded
+
+
+def with_planes(
+    nodal: NodalMatrix,
+    valid: NDArray[np.bool_],
+    gone: NDArray[np.bool_] | None = None,
+    whole: NDArray[np.bool_] | None = None,
+) -> tuple[NodalMatrix, NDArray[np.bool_]] | None:
+    """Complete the rows next to rollers; None where there are none.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    valid : (n, d, d) bool
+        By the strict rule.
+    gone : (n, d) bool, optional
+        Nodes that surely lack the direction: those that do and are not doubtful, where not given.
+    whole : (n,) bool, optional
+        Nodes whose neighbours are all there, in some direction at least; see :func:`.nodal.surrounded`.
+
+    Returns
+    -------
+    nodal : NodalMatrix
+        With the missing sums put to neighbours that lack the direction, and in places (b, b) of nodes that lack
+        b the differences of x_b to neighbours that do.
+    valid : (n, d, d, d) bool
+        By component c of the row, b of the columns, and a of the coordinate.
+    """
+    d = nodal.dim
+    present = nodal.row_of >= 0
+    if gone is None:
+        gone = eliminated(nodal)
+        if nodal.doubtful is not None:  # the missing row may be another node's
+            gone = gone & ~nodal.doubtful[:, None]
+    whole = surrounded(nodal, valid) if whole is None else whole  # or more is missing than a roller takes
+    graph = nodal.graph
+    count = graph @ gone.astype(float)
+    near = count > 0
+    if nodal.blurred is not None:  # what such rows miss is not in the plane alone
+        near &= ~nodal.blurred[:, None]
+    held = (near & whole[:, None])[:, None, :] & present[:, :, None] & (nodal.size > 0)[:, None, None]
+    held &= ~(nodal.penalised[:, None, :] & np.eye(d, dtype=bool))  # beside a penalty the sum does not show
+    if not held.any():
+        return None
+    missing = -nodal.row_sums() / np.maximum(count, 1)[:, None, :]
+    i, j = nodal.node, nodal.indices
+    data = nodal.data + np.where(held, missing, 0)[i] * gone[j][:, None, :]
+    flat = gone & (count > 1) & (nodal.size > 0)[:, None]
+    level = np.where(i == j, 1.0, 0.0)[:, None] - gone[j] / np.maximum(count, 1)[i]
+    full: NDArray[np.bool_] = np.repeat(valid[..., None], d, axis=3)
+    for b in range(d):
+        data[:, b, b] += np.where(flat[i, b], nodal.size[i] * level[:, b], 0)
+        full[:, :, b, b] |= held[:, :, b]
+        full[:, b, b, b] |= flat[:, b]
+    return replace(nodal, data=data), full

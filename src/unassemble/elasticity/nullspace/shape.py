@@ -1,0 +1,204 @@
+"""From null fields to coordinates: projecting translations out, setting aside what stays loose, choosing the gauge."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ...errors import GeometryError
+
+EXACT = 1e-9  # singular values below this are zero; matrices are rounded to 1e-16, gaps are 1e-4 and more
+SOFT = 2e-7  # singular values at which entries rounded to 1e-15 still give coordinates to 1e-8
+_FEW = 0.25  # share of nodes that may be loose although rows of their own are valid
+_MOST = 0.75  # share of the nodes that no plane across an axis holds
+_LOOSE = 1e-7  # a field this small at most nodes leaves these alone
+_STILL = 1e-9  # of loose nodes: where they die out coordinates, of norm one as they are, are wrong by that much
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Coordinates of one piece.
+
+    Attributes
+    ----------
+    points : (n, d) float64
+        Centred, of norm one; NaN where loose.
+    loose : (n,) bool
+        Nodes that can move while the others stay.
+    dimension : int
+        Of the null space, translations counted, loose nodes left out; that of the translations where no field is exact.
+    freedom : {"", "axes", "affine", "hourglass"}
+        What remains beyond translation and scale.
+    exact : bool
+        Whether the field is a null field, not only the best one.
+    null : int
+        Fields that count as null fields, those of loose nodes among them.
+    """
+
+    points: NDArray[np.float64]
+    loose: NDArray[np.bool_]
+    dimension: int
+    freedom: str
+    exact: bool
+    null: int
+
+
+def shape(
+    fields: NDArray[np.float64],
+    values: NDArray[np.float64],
+    graph: sp.csr_array,
+    told: NDArray[np.bool_],
+    common: int | None = None,
+) -> Shape:
+    """Find the coordinates among the least singular fields.
+
+    Parameters
+    ----------
+    fields : (n, d, k) float64
+        Orthonormal.
+    values : (k,) float64
+        Increasing singular values.
+    graph : (n, n) sparse
+        Which nodes are coupled.
+    told : (n,) bool
+        Nodes with a valid row of their own; supports do not leave these loose.
+    common : int, optional
+        Fields that the nodes share which are not loose: d + 1, translations and scale, where not given.
+
+    Raises
+    ------
+    GeometryError
+        If the null space leaves more than an affine map free, or there are too few nodes.
+    """
+    n, d, k = fields.shape
+    if k <= d:
+        raise GeometryError(f"{n} nodes with valid rows are too few to tell their positions")
+    common = d + 1 if common is None else common
+    exact = values[d] <= EXACT
+    count = int((values <= EXACT).sum()) if exact else d + 1
+    null, loose = fields[..., :count], np.zeros(n, dtype=bool)
+    soft = int((values <= SOFT).sum()) if exact else count
+    for some in dict.fromkeys((soft, count)):  # nodes that alone can move almost freely are as good as loose
+        if some <= common:
+            continue
+        shared, apart = set_aside(fields[..., :some], common)
+        few = _FEW * n >= np.count_nonzero(apart)  # the others are determined, whatever these do
+        if apart.any() and (few or 2 * np.count_nonzero(told & apart) <= np.count_nonzero(apart)):
+            null, loose, count = shared, apart, some
+            break
+    kept = null[~loose]
+    moving = _without_translations(kept)
+    dimension = d + moving.shape[2] if exact else d
+    points = np.full((n, d), np.nan)
+    points[~loose], freedom = _choose(moving, graph[~loose][:, ~loose], exact=bool(exact))
+    return Shape(points, loose, dimension, freedom, bool(exact), count)
+
+
+def set_aside(null: NDArray, common: int) -> tuple[NDArray, NDArray[np.bool_]]:
+    """Find nodes that carry fields of their own, and the fields, so many in number, that the other nodes share.
+
+    Loose nodes move more than others in the null fields, and their own fields vanish at the others, or die out over
+    some cells. So the fields that the least mobile nodes share are the body's, and what vanishes at all of these is
+    loose.
+    """
+    n, _d, k = null.shape
+    calm = np.argsort((null**2).sum(axis=(1, 2)), kind="stable")
+    for share in (0.75, 0.5, 0.25, 0.12):
+        some = calm[: max(int(share * n), min(n, common + 1))]
+        _, s, v = scipy.linalg.svd(null[some].reshape(-1, k), full_matrices=False)
+        if (s > _LOOSE * s[0]).sum() == common:
+            own = np.einsum("nak,lk->nal", null, v[s <= _LOOSE * s[0]])
+            loose = np.abs(own).max(axis=(1, 2)) > _STILL
+            return _orthonormal(np.einsum("nak,lk->nal", null, v[:common]), ~loose), loose
+    return null, np.zeros(n, dtype=bool)
+
+
+def _orthonormal(fields: NDArray, kept: NDArray[np.bool_]) -> NDArray:
+    """Fields orthonormal over the kept nodes, zero at the others."""
+    q = np.linalg.qr(fields[kept].reshape(-1, fields.shape[2]))[0]
+    full = np.zeros_like(fields)
+    full[kept] = q.reshape(-1, *fields.shape[1:])
+    return full
+
+
+def _without_translations(fields: NDArray) -> NDArray:
+    """Orthonormal basis of the centred fields, d fewer: in slender bodies rounding leaves more of the translations."""
+    n, d, k = fields.shape
+    centred = (fields - fields.mean(axis=0)).reshape(n * d, k)
+    u, s, _ = scipy.linalg.svd(centred, full_matrices=False)
+    return u[:, : k - d][:, s[: k - d] > 1e-6].reshape(n, d, -1)
+
+
+def _choose(moving: NDArray, graph: sp.csr_array, *, exact: bool) -> tuple[NDArray, str]:
+    """The coordinates, or a representative and the name of what remains free."""
+    _, d, k = moving.shape
+    if k == 1 and exact and _flat(moving[..., 0]):
+        raise GeometryError("the valid rows are satisfied with all nodes in one plane only: some of them are not whole")
+    if k == 1:
+        return moving[..., 0], ""
+    if k == 0:
+        raise GeometryError("no field but translations fits the valid rows; this is no isotropic elasticity matrix")
+    single = [scipy.linalg.svd(moving[:, a], full_matrices=False) for a in range(d)]
+    ranks = [int((s > 1e-6).sum()) for _, s, _ in single]
+    if k == d and ranks == [1] * d:
+        return np.stack([u[:, 0] for u, _, _ in single], axis=1) / np.sqrt(d), "axes"
+    if k == d * d and ranks == [d] * d:
+        return single[0][0][:, :d] / np.sqrt(d), "affine"
+    if _of_one_direction(moving):
+        return _smoothest(moving, graph), "hourglass"
+    raise GeometryError(
+        f"the valid rows leave a null space of dimension {d + k} where {d + 1} is expected: too many unknowns are "
+        "eliminated for the matrix to determine the nodes"
+    )
+
+
+def _flat(points: NDArray) -> bool:
+    """Whether most nodes lie in one plane across an axis, as no mesh does, whatever the others do."""
+    most = int(np.ceil(_MOST * len(points)))
+    ordered = np.sort(points, axis=0)
+    spread = (ordered[most - 1 :] - ordered[: len(points) - most + 1]).min(axis=0)
+    return bool((spread <= _LOOSE * np.abs(points).max()).any()) and most > 2 ** points.shape[1]
+
+
+def _of_one_direction(moving: NDArray) -> bool:
+    """Whether in each direction some of the fields move nodes in that direction only.
+
+    A scalar field h that every block of the matrix maps to zero gives such fields, one in each direction: where no
+    quadrature point sees its gradient, it is an hourglass mode.
+    """
+    _, d, k = moving.shape
+    for a in range(d):
+        others = np.delete(moving, a, axis=1).reshape(-1, k)
+        if scipy.linalg.svd(others, compute_uv=False)[-1] > _LOOSE:
+            return False
+    return True
+
+
+def _smoothest(moving: NDArray, graph: sp.csr_array) -> NDArray:
+    """Of the fields of norm one that whose differences along edges are least: hourglass modes alternate."""
+    pairs = sp.triu(graph, 1).tocoo()
+    steps = (moving[pairs.row] - moving[pairs.col]).reshape(-1, moving.shape[2])
+    return moving @ scipy.linalg.eigh(steps.T @ steps)[1][:, 0]
+
+
+def in_gauge(points: NDArray, graph: sp.csr_array) -> NDArray[np.float64]:
+    """Centroid at the origin, mean edge length 1, and of the two point reflections that with positive third moments.
+
+    Parameters
+    ----------
+    points : (n, d) float64
+        NaN rows are left out.
+    graph : (n, n) sparse
+    """
+    pairs = sp.triu(graph, 1).tocoo()
+    length = np.linalg.norm(points[pairs.row] - points[pairs.col], axis=1)
+    mean = np.nanmean(length) if np.isfinite(length).any() else 1.0
+    centred = (points - np.nanmean(points, axis=0)) / (mean if mean > 0 else 1.0)
+    moments = np.nansum(centred**3, axis=0)
+    spread = np.nansum(np.abs(centred) ** 3, axis=0)
+    decisive = np.flatnonzero(np.abs(moments) > 1e-6 * spread)
+    return -centred if len(decisive) and moments[decisive[0]] < 0 else centred

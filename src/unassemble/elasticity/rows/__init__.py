@@ -1,0 +1,1 @@
+"""Rows and what they couple to: what every search for nodes and directions starts from."""

@@ -1,0 +1,1 @@
+"""Nodes of rows that stand in no order."""

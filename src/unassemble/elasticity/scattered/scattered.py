@@ -1,0 +1,134 @@
+"""Unknowns that stand in no order: directions spread from one node, and rows of one pattern make up nodes.
+
+Where entries that vanished are not stored they are put back first, as far as likeness tells.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..directions.extension import SETTLED, extended_directions
+from ..directions.sums import names_of, set_right
+from ..rows.constants import adding_up, proven_directions, row_sizes, uncoupled_rows, with_penalty
+from ..rows.grouping import possible_nodes, same_pattern
+from ..rows.numbering import Numbering, measured
+from ..rows.traces import unaccounted
+from .filling import filled, filled_by_direction, likest
+from .patterns import by_direction
+from .row_positions import placed_together, single_nodes
+
+_ORDERED = 0.3  # share of neighbouring rows with the same pattern: 2/3 node by node, some more where nodes share one
+_SETTLED = 0.9  # share of whole rows that have to annihilate translations
+_EVEN = 0.6  # share of rows, far from supports, in patterns with as many rows in each direction
+
+
+def scattered(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
+    """The numbering with which all rows that can annihilate translations do; None where none is found.
+
+    None, too, where rows of one node do not couple to the same unknowns, since zeros were dropped.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+    sizes : tuple of int
+        Block sizes to try.
+    """
+    identity = uncoupled_rows(matrix)
+    live = np.flatnonzero(~identity)
+    group = same_pattern(matrix, identity)
+    inner = group[live]
+    if len(live) < 2 or np.mean(inner[1:] == inner[:-1]) > _ORDERED:
+        return None
+    for d in sizes:
+        if 2 * np.count_nonzero(np.bincount(inner)[inner] >= d) < len(live):
+            continue  # rows of one node do not show by their pattern
+        direction, share = extended_directions(matrix, group, ~identity, d)
+        if share > _SETTLED and _even_share(matrix, group, direction, ~identity, d) > _EVEN:
+            direction = _set_right(matrix, group, direction, ~identity, d)
+            return _with_nodes(matrix, matrix, group, direction, identity, d)
+    return None
+
+
+def scattered_without_zeros(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
+    """The same where entries that vanished are not stored, and put back; None where it does not settle directions.
+
+    Nothing but likeness says then which rows belong together. Rows of nodes that lack a direction without a trace are
+    left open.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+    sizes : tuple of int
+        Block sizes to try.
+    """
+    identity = uncoupled_rows(matrix)
+    start = likest(matrix)
+    whole = filled(matrix, start)
+    for d in sizes:
+        direction, share = extended_directions(whole, start, ~identity, d, sure=False)
+        if share < SETTLED:
+            direction, share = max(
+                (direction, share),
+                extended_directions(whole, same_pattern(whole, identity), ~identity, d),
+                key=lambda one: one[1],
+            )
+        if share <= _SETTLED:
+            continue
+        more = filled_by_direction(whole, direction, ~identity, d)
+        group = same_pattern(more, identity)
+        direction = _set_right(more, group, direction, ~identity, d)
+        if _even_share(more, group, direction, ~identity, d) > _EVEN:
+            return _with_nodes(matrix, more, group, direction, identity, d)
+    return None
+
+
+def _even_share(
+    matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], live: NDArray[np.bool_], d: int
+) -> float:
+    """Share of rows whose pattern has as many rows in each direction, where all of them add up to zero.
+
+    Two directions of three taken for one annihilate translations as well.
+    """
+    size = row_sizes(matrix)
+    adds_up = adding_up(matrix, size) | with_penalty(matrix, size)
+    count = by_direction(group, direction, d)
+    whole = live & (np.bincount(group, ~adds_up) == 0)[group]
+    return float((count == count[:, :1]).all(axis=1)[group[whole]].mean()) if whole.any() else 0.0
+
+
+def _with_nodes(
+    matrix: sp.csr_array,
+    whole: sp.csr_array,
+    group: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    identity: NDArray[np.bool_],
+    d: int,
+) -> Numbering | None:
+    """Nodes of rows whose directions are known; `whole` is the matrix with zeros, by which rows are grouped.
+
+    None where no zeros were put back, but some node lacks a direction without a trace that no other row offers.
+    """
+    node = single_nodes(group, direction, d)
+    node, open_row = placed_together(whole, ~identity, group, node, direction, d)
+    lost = np.asarray(unaccounted(whole, ~identity, node, direction, d).any(axis=1))[node]
+    if whole is not matrix:
+        open_row |= lost
+    elif (lost & (np.bincount(node, open_row)[node] == 0)).any():
+        return None
+    unnamed = ~proven_directions(whole, direction, group, d) & ~identity
+    return replace(measured(matrix, node, direction, d), open_row=open_row, unnamed=unnamed, group=group)
+
+
+def _set_right(
+    matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], live: NDArray[np.bool_], d: int
+) -> NDArray[np.int64]:
+    """Directions next to supports, where translations are in equilibrium no more, set right by the rows around."""
+    node = possible_nodes(group, d)[0]
+    order, size = np.argsort(node, kind="stable"), np.bincount(node)
+    many = size[node[order]]
+    members = [order[many == k].reshape(-1, k) for k in range(1, d + 1)]
+    return set_right(matrix, node, members, live, direction, names_of(d))

@@ -1,0 +1,160 @@
+"""The axes of a homogeneous body, from an affine picture of it and the entries of its matrix.
+
+Inside homogeneous material the linear identities hold for every affine picture y of the points x. But the matrix knows
+the metric. In the picture each element is what it is in the body, seen through the same map, so that its tables
+G^{ae}_ij = int d_a phi_i d_e phi_j are known; and with x = M y, W the inverse transpose of M, and w_c its rows,
+
+    A^{cb}_ij = |det M| (lambda w_c . G_ij w_b + mu w_b . G_ij w_c + mu delta_cb sum_k w_k . G_ij w_k).
+
+Each block is linear in the tables, with coefficients T^{cb} that least squares find. The tables of two nodes are
+symmetric where the cells around one of them are all there, so that only
+
+    T^{cb} = kappa (w_c w_b^T + w_b w_c^T) / 2 + mu delta_cb S,     kappa = lambda + mu,     S = W^T W,
+
+shows, up to a common factor. The sum of the T^{cc} is (kappa + d mu) S. In its metric the w_c are orthonormal, and
+T^{cc} is a multiple of the identity plus one of rank one, whose direction is w_c.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from ..elements.candidates import Block, candidates, coupled
+from ..elements.entries import Entries, Pairs, added, contributions
+from ..elements.model import FITS, Model
+from ..elements.reference import Rule, rules
+from ..elements.surface import contested
+from ..nodal import NodalMatrix, determined
+
+_ROWS = 2000  # nodes whose rows are fitted; re-assembly looks at all of them
+_INDEPENDENT = 1e-6  # least singular value of the tables, relative to the largest, with which they tell T
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The map from a picture to the body, up to its size and a point reflection, and the material.
+
+    Attributes
+    ----------
+    map : (d, d) float64
+        M in x = M y.
+    ratio : float
+        lambda / mu.
+    models : tuple of Model
+        The elements, at the points of the picture.
+    entries : Entries
+        Those that they explain.
+    """
+
+    map: NDArray[np.float64]
+    ratio: float
+    models: tuple[Model, ...]
+    entries: Entries
+
+
+def frame(nodal: NodalMatrix, picture: NDArray[np.float64]) -> Frame | None:
+    """Find the map for which one isotropic material explains the entries; None where no element does.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    picture : (n, d) float64
+        Of one piece, about as large in all directions; NaN elsewhere.
+    """
+    graph, entries = coupled(nodal, picture), Entries.of(nodal, determined(picture))
+    for blocks in candidates(graph, picture, entries.complete) if len(entries.key) else ():
+        told = entries.explained_by([Pairs.of(one.cells, entries) for one in blocks], graph, FITS)
+        if told is None or not len(told.key):
+            continue
+        for chosen, tables, values in _tables(blocks, picture, told):
+            tensors = _tensors(tables, values)
+            found = None if tensors is None else _isotropic(tensors)
+            if found is not None:
+                models = (Model(picture, one.cells, one.kind, rule) for one, rule in zip(blocks, chosen, strict=True))
+                return Frame(*found, tuple(models), told)
+    return None
+
+
+def _tables(
+    blocks: Sequence[Block], picture: NDArray[np.float64], entries: Entries
+) -> Iterator[tuple[tuple[Rule, ...], NDArray[np.float64], NDArray[np.float64]]]:
+    """Tables G and entries of pairs of nodes, (e, d, d) each and relative to their row, for one rule after the other.
+
+    Of the rows of some nodes; without the pairs of cells of which not all can be there.
+    """
+    some = entries.at(_sampled(entries))
+    blocks = [replace(one, cells=one.cells[Pairs.of(one.cells, some).seen]) for one in blocks]
+    sure = np.ones(len(some.key), dtype=bool)
+    for one in blocks:
+        pairs = Pairs.of(one.cells, some)
+        doubtful = contested(one.kind.base, one.cells[:, : one.kind.corners])
+        sure[pairs.place[doubtful][pairs.there[doubtful]]] = False
+    weight = 1 / some.size[sure, None, None]
+    for chosen in product(*(rules(one.kind) for one in blocks)):
+        parts = [_assembled(one, picture, rule, some) for one, rule in zip(blocks, chosen, strict=True)]
+        yield chosen, np.sum(parts, axis=0)[sure] * weight, some.value[sure] * weight
+
+
+def _sampled(entries: Entries) -> NDArray[np.int64]:
+    """Pairs in the rows of some nodes that lost no neighbour, from all over the body."""
+    i, j = np.divmod(entries.key, entries.n)
+    nodes = np.unique(np.concatenate([i, j]))
+    whole = nodes[entries.complete[nodes]]
+    chosen = np.zeros(entries.n, dtype=bool)
+    chosen[whole[np.unique(np.linspace(0, len(whole) - 1, _ROWS).astype(int))]] = True
+    return np.flatnonzero(chosen[i] | chosen[j])
+
+
+def _assembled(block: Block, points: NDArray, rule: Rule, entries: Entries) -> NDArray[np.float64]:
+    d, pairs = block.kind.dim, Pairs.of(block.cells, entries)
+    total = np.zeros(len(entries.key) * d * d)
+    for batch, (first, _) in contributions(points, block.cells, block.kind, rule, pairs.flip):
+        there = pairs.there[batch]
+        added(total, pairs.place[batch][there], first[there])
+    return total.reshape(-1, d, d)
+
+
+def _tensors(tables: NDArray, values: NDArray) -> NDArray[np.float64] | None:
+    """(d, d, d, d) symmetric T^{cb} by c, b, a, e; None where none fit, or the tables do not tell them."""
+    d = tables.shape[1]
+    design, right = tables.reshape(-1, d * d), values.reshape(-1, d * d)
+    if len(design) < d * d:
+        return None
+    solution, _, rank, size = scipy.linalg.lstsq(design, right, cond=_INDEPENDENT)
+    if rank < d * (d + 1) // 2 or size[0] == 0 or np.abs(design @ solution - right).max() > FITS:
+        return None
+    t = solution.T.reshape(d, d, d, d)
+    return np.asarray((t + t.swapaxes(2, 3)) / 2)
+
+
+def _isotropic(tensors: NDArray[np.float64]) -> tuple[NDArray[np.float64], float] | None:
+    """The map to the frame in which the tensors are those of an isotropic material, and its lambda / mu; None if none.
+
+    In the plane kappa < 0 would be the same matrix as kappa > 0 with the body turned by a right angle. Only the
+    latter has positive energy.
+    """
+    d = len(tensors)
+    tensors = tensors * np.sign(np.einsum("ccaa", tensors))
+    try:
+        lower = np.linalg.cholesky(np.einsum("ccae->ae", tensors))
+    except np.linalg.LinAlgError:
+        return None
+    inverse = np.linalg.inv(lower)
+    r = inverse @ tensors @ inverse.T
+    value, vector = np.linalg.eigh(r[range(d), range(d)])
+    mu = (1 - value[:, -1].mean()) / (d - 1)
+    kappa = 1 - d * mu
+    u = vector[:, :, -1]
+    u[1:] *= np.sign(np.einsum("a,bae,be->b", u[0], r[0, 1:], u[1:]))[:, None]
+    u = scipy.linalg.polar(u)[0]
+    model = kappa / 2 * (np.einsum("ca,be->cbae", u, u) + np.einsum("ba,ce->cbae", u, u))
+    model += mu * np.einsum("cb,ae->cbae", np.eye(d), np.eye(d))
+    if not (mu > 0 and np.abs(r - model).max() <= FITS * kappa):
+        return None
+    return u @ inverse, float(kappa / mu - 1)
