@@ -16,7 +16,7 @@ DOCS_INSTALLED := $(VENV)/.installed-docs
 help:
 	@echo 'make demo   recover two matrices and draw the meshes (into demo-output/)'
 	@echo 'make test   run the tests, also with the fallback solver'
-	@echo 'make lint   check style and types'
+	@echo 'make lint   check style, types, and which rooms use which'
 	@echo 'make bench  run the benchmarks'
 	@echo 'make docs   build the documentation (into docs/_build/html/)'
 	@echo 'make clean  remove everything that the other targets made'
@@ -55,6 +55,7 @@ lint: $(INSTALLED)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/lint-imports --no-cache --no-logo
 
 # For instance: make bench BENCH='--sizes 10000,100000'
 bench: $(INSTALLED)

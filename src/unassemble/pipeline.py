@@ -158,13 +158,10 @@ def recover(
         return recover_scalar(part, placement, clock, options)
 
     def vector(reading: VectorReading) -> Recovery:
-        from .elasticity.serving import serve
-        from .structures import StructuralNumbering, serve_structure
+        from .vector import recover_vector
 
         refuse(**scalar_only)
-        if isinstance(reading.numbering, StructuralNumbering):
-            return serve_structure(checked, reading.numbering, clock, anchors=anchors, choice=reading.why, cells=cells)
-        return serve(checked, reading, clock, anchors=anchors, cells=cells, scalar=scalar)
+        return recover_vector(checked, reading, clock, anchors=anchors, cells=cells, scalar=scalar)
 
     with thread_limit(threads):
         if operator == "elasticity" or block_size is not None or numbering is not None:

@@ -227,7 +227,7 @@ class Recovery:
         InputError
             If the matrix is scalar.
         """
-        from .elasticity.modes import modes_of
+        from .modes import modes_of
 
         return modes_of(self)
 

@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from os import PathLike, fspath
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.io
 from numpy.typing import NDArray
 
-from ..errors import FormatError, InputError, OutputError
+from ..errors import FormatError, OutputError
 from ..files import check_target, whole_file
 from ..words import count_of
 from .nodal import determined
-
-if TYPE_CHECKING:
-    from ..recovery import Recovery
-    from ..structures.layouts import Layout
 
 _VEC_CLASS_ID = 1211214
 
@@ -55,47 +50,6 @@ def rigid_body_modes(
     for k, (a, b) in enumerate(planes, start=d):
         modes[:, k] = np.where(direction_of_row == b, x[:, a], 0) - np.where(direction_of_row == a, x[:, b], 0)
     return modes
-
-
-def turning_modes(
-    layout: Layout, points: NDArray[np.float64], node_of_row: NDArray[np.int64], direction_of_row: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Near-null space of a structure whose nodes have rotations: translations, then rotations about the centroid.
-
-    Parameters
-    ----------
-    layout : Layout
-    points : (n, d) float64
-        NaN rows get what they have without moving: translations, and rotations of the node itself.
-    node_of_row, direction_of_row : (N,) int64
-        A direction of -1 is not known, and gets zeros.
-
-    Returns
-    -------
-    (N, 6) or (N, 3) float64
-        Rotations are divided by the radius of gyration, so that none swamps another.
-    """
-    known = determined(points)
-    x = points - points[known].mean(axis=0)
-    radius = float(np.sqrt((x[known] ** 2).sum(axis=1).mean())) or 1.0
-    motions = layout.rigid_motions(np.where(known[:, None], x, 0.0))
-    motions[:, :, len(layout.displacements) :] /= radius
-    return np.asarray(motions[node_of_row, direction_of_row] * (direction_of_row >= 0)[:, None])
-
-
-def modes_of(recovery: Recovery) -> NDArray[np.float64]:
-    """Near-null space of a recovered vector-valued matrix; see :meth:`unassemble.Recovery.rigid_body_modes`."""
-    node, direction = recovery.node_of_row, recovery.direction_of_row
-    if node is None or direction is None:
-        raise InputError("a scalar matrix has no rigid-body modes: its near-null space is that of the constants")
-    from ..structures.layouts import layout_named
-
-    layout = layout_named(recovery.operator)
-    if layout is not None:
-        return turning_modes(layout, recovery.points, node, direction)
-    if recovery.operator in ("elasticity", "truss"):
-        return rigid_body_modes(recovery.points, node, direction)
-    return (direction[:, None] == np.arange(direction.max() + 1)).astype(np.float64)
 
 
 def save_modes(path: str | PathLike[str], modes: NDArray[np.float64]) -> None:

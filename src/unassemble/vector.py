@@ -1,0 +1,68 @@
+"""The recovery of a vector-valued matrix on one page: a structure, single directions, a truss, or a solid body."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from .clock import Clock
+from .elasticity.nodal import nodal_matrix, uncoupled
+from .elasticity.recover import parts_of
+from .elasticity.serving import serve_body
+from .matrix import OperatorMatrix
+from .operators import VectorReading
+from .recovery import Recovery
+from .structures import StructuralNumbering, serve_structure
+from .structures.bars import bars_of
+from .structures.trusses import serve_truss
+from .vector_laplacian import Scalar, recover_directions
+
+
+def recover_vector(
+    matrix: OperatorMatrix,
+    reading: VectorReading,
+    clock: Clock,
+    *,
+    anchors: Sequence[Any] | None,
+    cells: bool,
+    scalar: Scalar,
+) -> Recovery:
+    """Recover a vector-valued matrix whose numbering is known.
+
+    Parameters
+    ----------
+    matrix : OperatorMatrix
+    reading : VectorReading
+    clock : Clock
+    anchors : sequence of (row, x, y) or (row, x, y, z), optional
+    cells : bool
+        Look for elements too.
+    scalar : callable
+        Recovers a scalar matrix with anchors, for directions that are not coupled.
+
+    Raises
+    ------
+    InputError
+        For anchors that do not fit.
+    RecoveryError
+        If no piece is determined.
+    """
+    numbering, choice = reading.numbering, reading.why
+    if isinstance(numbering, StructuralNumbering):
+        return serve_structure(matrix, numbering, clock, anchors=anchors, choice=choice, cells=cells)
+    with clock("numbering"):
+        whole, rounding = reading.exact or (matrix.csr(), 0.0)
+        nodal = nodal_matrix(whole, numbering)
+    if uncoupled(nodal):
+        found = recover_directions(parts_of(whole, nodal, numbering), matrix, anchors, scalar)
+        return replace(found, choice=choice, timings=clock.timings)
+    bars = bars_of(nodal)
+    if bars is not None:
+        return serve_truss(matrix, nodal, numbering, bars, clock, anchors=anchors, choice=choice)
+    unnamed = numbering.unnamed is not None and bool(numbering.unnamed.any())
+    kept = whole if unnamed else None
+    del whole  # of a large body, memory that the long work can use
+    return serve_body(
+        matrix, nodal, numbering, clock, rounding=rounding, whole=kept, anchors=anchors, cells=cells, choice=choice
+    )

@@ -1,0 +1,99 @@
+"""Vector Laplacians: directions that are not coupled, each a scalar matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .elasticity.anchoring import checked_anchors
+from .elasticity.results import ScalarParts
+from .errors import RecoveryError
+from .matrix import OperatorMatrix, check_matrix
+from .recovery import Recovery
+
+_SAME = 1e-12  # relative difference up to which the matrices of two directions are one
+
+Scalar = Callable[[OperatorMatrix, Sequence[Any]], Recovery]
+
+
+def recover_directions(
+    parts: ScalarParts, matrix: OperatorMatrix, anchors: Sequence[Any] | None, scalar: Scalar
+) -> Recovery:
+    """Recover each direction as the scalar matrix that it is; the mesh is that of the direction with most nodes.
+
+    Parameters
+    ----------
+    parts : ScalarParts
+    matrix : OperatorMatrix
+        The whole, for its warnings.
+    anchors : sequence of (row, x, y), optional
+    scalar : callable
+        Recovers a scalar matrix with anchors.
+
+    Raises
+    ------
+    RecoveryError
+        If a direction has no mesh.
+    """
+    numbering = parts.numbering
+    lead = int(np.argmax([len(nodes) for nodes in parts.nodes]))
+    nodes = parts.nodes[lead]
+    place = np.full(numbering.n_nodes, -1)
+    place[nodes] = np.arange(len(nodes))
+    anchor_nodes, where = checked_anchors(anchors, numbering.node_of_row, 2)
+    here = place[anchor_nodes] >= 0
+    known = [(int(k), *xy) for k, xy in zip(place[anchor_nodes[here]], where[here].tolist(), strict=True)]
+    try:
+        mesh = scalar(check_matrix(parts.matrices[lead]), known)
+        others = [
+            scalar(check_matrix(part), ())
+            for k, part in enumerate(parts.matrices)
+            if k != lead and not _same(part, parts.matrices[lead])
+        ]
+    except RecoveryError as error:
+        raise type(error)(f"the directions are not coupled (a vector Laplacian), and of one: {error}") from error
+    worst = max([mesh, *others], key=lambda one: (not one.certified, one.backward_error))
+    n = numbering.n_nodes
+    points, component = np.full((n, 2), np.nan), np.full(n, -1)
+    points[nodes], component[nodes] = mesh.points, mesh.component
+    status = np.ones(n, np.int8)
+    status[nodes] = mesh.node_status
+    notes = ["the directions are not coupled: each was treated as a scalar matrix"]
+    if others:
+        notes.append("the directions have different matrices; the mesh is that of the one with most nodes")
+    return replace(
+        mesh,
+        points=points,
+        triangles=nodes[mesh.triangles],
+        component=component,
+        hinges=nodes[mesh.hinges],
+        boundary=nodes[mesh.boundary],
+        node_status=status,
+        worst_entries=_rows_of(parts, lead)[mesh.worst_entries],
+        status=worst.status,
+        reason=worst.reason,
+        backward_error=worst.backward_error,
+        operator="vector laplacian",
+        warnings=(*matrix.warnings, *mesh.warnings, *notes),
+        node_of_row=numbering.node_of_row,
+        direction_of_row=numbering.direction_of_row,
+        numbering=numbering.kind,
+    )
+
+
+def _rows_of(parts: ScalarParts, direction: int) -> NDArray[np.int64]:
+    """Matrix row of each row of a direction's scalar matrix."""
+    numbering = parts.numbering
+    row_of = np.full(numbering.n_nodes, -1)
+    rows = np.flatnonzero((numbering.direction_of_row == direction) & ~numbering.identity_row)
+    row_of[numbering.node_of_row[rows]] = rows
+    return row_of[parts.nodes[direction]]
+
+
+def _same(one: sp.csr_array, other: sp.csr_array) -> bool:
+    return one.shape == other.shape and bool(abs(one - other).max() <= _SAME * abs(other).max())
