@@ -12,9 +12,9 @@ from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, read_matrix
 from .operators import VectorReading, about_translations, asked_for, refuse, second_reading, vector_valued
 from .options import check_options, listed_anchors
-from .placement import Direction, Placement
 from .recovery import Recovery
 from .scalar import ScalarOptions, recover_scalar
+from .scalar.placement import Direction, Placement
 
 
 def recover(

@@ -7,7 +7,7 @@ import numpy as np
 from meshes import specimen
 from unassemble import recover
 from unassemble.cells.undivided import undivided
-from unassemble.joined import JoinedMesh
+from unassemble.scalar.joined import JoinedMesh
 from unassemble.topology import recognise
 from vanishing import forgotten, squares
 

@@ -9,23 +9,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from . import certify as certificates
-from .cells import AGREE, Alternative, OrientedMesh, alternatives, coincident, filled_holes, touching
-from .clock import Clock
+from .. import certify as certificates
+from ..cells import AGREE, Alternative, OrientedMesh, alternatives, coincident, filled_holes, touching
+from ..clock import Clock
+from ..linalg import AnalysisAhead, factorisation
+from ..matrix import OperatorMatrix
+from ..planar.deviations import coordinate_covariances
+from ..planar.hinges import free_images, join
+from ..planar.pencil import pencil_pattern
+from ..planar.piece import PieceMesh
+from ..recovery import Recovery
+from ..topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
 from .evidence import pooled_noise, weigh
 from .factors import discord
 from .joined import JoinedMesh
-from .linalg import AnalysisAhead, factorisation
-from .matrix import OperatorMatrix
 from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
 from .placement import Placement
-from .planar.deviations import coordinate_covariances
-from .planar.hinges import free_images, join
-from .planar.pencil import pencil_pattern
-from .planar.piece import PieceMesh
-from .recovery import Recovery
 from .solving import solve
-from .topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
 from .verdict import all_alike, ambiguous, far_away, passes, unproved, verdict
 
 _SMALL = 1e-3

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import settled
-from .certify import Certificate
-from .errors import SolverError
-from .matrix import OperatorMatrix
-from .planar.cotangent import edge_weights, weight_roundings
-from .planar.piece import PieceMesh
-from .planar.robust import differences_without
-from .planar.suspects import find_suspects
-from .topology import Topology
+from ..cells import settled
+from ..certify import Certificate
+from ..errors import SolverError
+from ..matrix import OperatorMatrix
+from ..planar.cotangent import edge_weights, weight_roundings
+from ..planar.piece import PieceMesh
+from ..planar.robust import differences_without
+from ..planar.suspects import find_suspects
+from ..topology import Topology
 
 _SUSPECT_LIMIT = 200_000
 """Most vertices of a piece that is searched for wrong entries: that takes a factorisation of its own."""

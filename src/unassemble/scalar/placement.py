@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
-from .planar.frame import Similarity, canonical_frame, collinear, fit_similarity
-from .planar.hinges import groups
-from .reductions import ConstantTensor
-from .topology import Piece, Topology
+from ..errors import InputError
+from ..planar.frame import Similarity, canonical_frame, collinear, fit_similarity
+from ..planar.hinges import groups
+from ..reductions import ConstantTensor
+from ..topology import Piece, Topology
 
 Anchor = tuple[int, float, float]
 Direction = tuple[int, int, float]

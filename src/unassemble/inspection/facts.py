@@ -9,11 +9,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from .errors import GeometryError
-from .matrix import OperatorMatrix
-from .operators import VectorReading
-from .planar.conformal import estimate_scale
-from .topology import Piece, Topology
+from ..errors import GeometryError
+from ..matrix import OperatorMatrix
+from ..operators import VectorReading
+from ..planar.conformal import estimate_scale
+from ..topology import Piece, Topology
 
 VANISHED = 1e-12  # an entry this small, relative to both of its rows, is zero up to rounding
 ZERO_SUM = 1e-10  # likewise the sum of a row, to which every entry adds its own rounding
@@ -54,9 +54,9 @@ def no_mesh(obstacle: str, planar: bool, witness: tuple[tuple[int, int], ...]) -
 
 def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]:
     """Of a vector-valued matrix."""
-    from .elasticity.nodal import nodal_matrix, uncoupled
-    from .structures import StructuralNumbering
-    from .structures.bars import bars_of
+    from ..elasticity.nodal import nodal_matrix, uncoupled
+    from ..structures import StructuralNumbering
+    from ..structures.bars import bars_of
 
     found = vector.numbering
     if isinstance(found, StructuralNumbering):

@@ -10,13 +10,13 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import Outcome, completed, in_doubt, wrong_entries
-from .errors import GeometryError, RecoveryError, SolverError
-from .linalg import Factorisation, UpperTriangle, factorisation
-from .matrix import OperatorMatrix
-from .planar.piece import EXACT, PieceMesh, positions, refined
-from .planar.triangles import lone_triangles
-from .topology import Piece, Polygons, Topology
+from ..cells import Outcome, completed, in_doubt, wrong_entries
+from ..errors import GeometryError, RecoveryError, SolverError
+from ..linalg import Factorisation, UpperTriangle, factorisation
+from ..matrix import OperatorMatrix
+from ..planar.piece import EXACT, PieceMesh, positions, refined
+from ..planar.triangles import lone_triangles
+from ..topology import Piece, Polygons, Topology
 
 Clock = Callable[[str], AbstractContextManager[None]]
 
@@ -150,7 +150,7 @@ def _start(
 
 def _by_angles(piece: Piece, weights: NDArray, scale: float | None) -> PieceMesh:
     """The method of the 2002 paper."""
-    from .paper import recover_angles
+    from ..paper import recover_angles
 
     found = recover_angles(piece, weights, scale=scale)
     return PieceMesh(found.z, found.scale, () if found.converged else (f"angle iteration {found.status}",))

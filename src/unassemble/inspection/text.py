@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .matrix.symmetry import ORDINARY
-from .topology.obstruction import obstruction_text
-from .words import count_of
+from ..matrix.symmetry import ORDINARY
+from ..topology.obstruction import obstruction_text
+from ..words import count_of
 
 if TYPE_CHECKING:
-    from .inspection import Inspection
+    from .inspect import Inspection
 
 
 def lines_of(facts: Inspection) -> list[tuple[str, str]]:

@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import Alternative
-from .cells.reading import FITS
-from .certify import CERTIFIED, CONFIDENCE, LARGEST_NOISE, Certificate
+from ..cells import Alternative
+from ..cells.reading import FITS
+from ..certify import CERTIFIED, CONFIDENCE, LARGEST_NOISE, Certificate
+from ..matrix import OperatorMatrix
+from ..topology import Topology
+from ..words import count_of
 from .evidence import Evidence
-from .matrix import OperatorMatrix
-from .topology import Topology
-from .words import count_of
 
 _MOST, _ROWS = 0.9, 6  # part of the squared misfit whose rows are named, and how many of them at most
 _SURE = 1e-8  # of a piece's size: how far off certified positions may be

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import guessed
-from .errors import NotPlanarError, TopologyError
-from .inspection_facts import matrix_facts, mesh_facts, no_mesh, nodes_facts
-from .inspection_text import lines_of, mesh_text
-from .matrix import OperatorMatrix, load
-from .operators import vector_valued
-from .topology import Topology, recognise, surfaces
-from .words import count_of
+from ..cells import guessed
+from ..errors import NotPlanarError, TopologyError
+from ..matrix import OperatorMatrix, load
+from ..operators import vector_valued
+from ..topology import Topology, recognise, surfaces
+from ..words import count_of
+from .facts import matrix_facts, mesh_facts, no_mesh, nodes_facts
+from .text import lines_of, mesh_text
 
 _IF = "if the entries agree, which recovery tells"
 

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaincc, ndtr
 
-from .cells.agreement import SAME_SCALE, SCALE_ERROR
-from .certify import CONFIDENCE
-from .errors import SolverError
-from .planar.deviations import factor_deviation
-from .planar.hinges import groups
-from .planar.piece import EXACT, PieceMesh
-from .topology import Topology
+from ..cells.agreement import SAME_SCALE, SCALE_ERROR
+from ..certify import CONFIDENCE
+from ..errors import SolverError
+from ..planar.deviations import factor_deviation
+from ..planar.hinges import groups
+from ..planar.piece import EXACT, PieceMesh
+from ..topology import Topology
 
 _CHANCE = 1e-6  # that factors which agree to within their errors do so by coincidence
 

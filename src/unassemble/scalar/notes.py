@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import incomplete_rows
-from .matrix import OperatorMatrix
-from .topology import Topology
-from .words import count_of
+from ..cells import incomplete_rows
+from ..matrix import OperatorMatrix
+from ..topology import Topology
+from ..words import count_of
 
 _EQUAL = 1e-12  # relative difference of entries that is rounding
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .topology import Polygons, Topology
-from .topology.together import Together, reversed_within
+from ..topology import Polygons, Topology
+from ..topology.together import Together, reversed_within
 
 
 @dataclass(frozen=True, eq=False)
