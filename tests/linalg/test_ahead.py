@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from meshes import edge_list, random_mesh, specimen
-from unassemble import linalg, recover, scalar
+from unassemble import linalg, recover
 from unassemble.linalg import AnalysisAhead, factorisation, upper_from_edges
 
 
@@ -32,5 +32,5 @@ def test_factorisation_is_that_of_the_matrix(foreseen):
 def test_recovery_does_not_depend_on_it(monkeypatch):
     known = specimen(*random_mesh(3000, seed=5), c=2.0)
     ahead = recover(known.matrix, refine=False)
-    monkeypatch.setattr(scalar, "AnalysisAhead", lambda pattern, threads: linalg.factorisation)
+    monkeypatch.setattr("unassemble.scalar.recover.AnalysisAhead", lambda pattern, threads: linalg.factorisation)
     assert np.array_equal(recover(known.matrix, refine=False).points, ahead.points)
