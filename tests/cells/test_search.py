@@ -9,6 +9,7 @@ from families import FAMILIES, HOPELESS
 from meshes import largest_error, random_mesh, specimen, triangle_set
 from unassemble import RecoveryError, recover
 from unassemble.cells import search
+from unassemble.cells.covers.program import Program
 from unassemble.cells.reading import Reading
 from unassemble.cells.small import small_map
 from unassemble.planar.conformal import conformal_map
@@ -103,14 +104,16 @@ def test_small_pieces_have_the_same_conformal_map():
     assert small_map(piece, np.zeros(len(piece.edges))) is None
 
 
-def test_grids_of_equal_entries_are_given_up_soon(monkeypatch):
-    """The Laplacian of a grid graph: a misfit would lead nowhere."""
+@pytest.mark.parametrize("shape", [(14, 17), (20, 21)])
+def test_grids_of_equal_entries_are_given_up_soon(monkeypatch, shape):
+    """The Laplacian of a grid graph: a misfit would lead nowhere, and programs for covers would take minutes."""
 
     def refused(*_):
-        raise AssertionError("labels are being tried")
+        raise AssertionError("labels or covers are being tried")
 
     monkeypatch.setattr(search, "mended", refused)
-    graph = networkx.convert_node_labels_to_integers(networkx.grid_2d_graph(20, 21))
+    monkeypatch.setattr(Program, "solution", refused)
+    graph = networkx.convert_node_labels_to_integers(networkx.grid_2d_graph(*shape))
     order = np.random.default_rng(0).permutation(len(graph))
     matrix = sp.csr_array(networkx.laplacian_matrix(graph), dtype=float)[order][:, order]
     with pytest.raises(RecoveryError, match="network"):

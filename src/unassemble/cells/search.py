@@ -14,7 +14,7 @@ from ..topology.embedding import drawing_with_corners, face_complexes
 from .candidates.candidates import Candidates
 from .candidates.cell_set import CellSet
 from .candidates.crosses import Crosses
-from .covers.covering import read_by_cover
+from .covers.covering import MOST_EQUAL_CELLS, read_by_cover
 from .labels.effort import SMALL_GRAPH, Effort
 from .labels.evidence import FEW, entries_are_to_blame
 from .labels.mending import MOST_VERTICES, mended
@@ -126,7 +126,7 @@ def _of_equal_weights(n: int, edges: NDArray, weights: NDArray, scale: float | N
             best = better(best, start)
         if best is not None and best.fits:
             return best
-    return read_by_cover(n, edges, weights, scale) or (
+    return read_by_cover(n, edges, weights, scale, most_cells=MOST_EQUAL_CELLS) or (
         descent(best, Effort(BATCH, effort.known)) if best is not None and best.pieces else None
     )
 

@@ -29,16 +29,20 @@ _log = logging.getLogger(__name__)
 MOST_VERTICES = 400
 _MOST_SHAPES = 3000
 _MOST_CELLS = 2500  # with their numbers
+MOST_EQUAL_CELLS = 1000
+"""The same where all weights are equal: bounds of such programs leave everything open, and larger ones take minutes."""
 _NUMBERS = 4  # that are tried at most
 _SCALES = 3  # of each kind that are tried
-_WORK = 12_000  # cells of all programs that are solved, together
+_WORK = 5e6  # squares of the cells of programs that have solutions, added up: ten seconds, those that fit took five
 _AGREE = 1e-7
 
 
-def read_by_cover(n: int, edges: NDArray, weights: NDArray, scale: float | None = None) -> Reading[CellSet] | None:
+def read_by_cover(
+    n: int, edges: NDArray, weights: NDArray, scale: float | None = None, *, most_cells: int = _MOST_CELLS
+) -> Reading[CellSet] | None:
     """A reading that fits, of triangles, corners and undivided quadrilaterals of few shapes; None if none is found.
 
-    Parameters are those of :func:`unassemble.cells.search.read_cells`.
+    Parameters are those of :func:`unassemble.cells.search.read_cells`. Programs of more than `most_cells` are left.
     """
     shapes = Shapes.of(n, edges, _MOST_SHAPES) if n <= MOST_VERTICES else None
     if shapes is None or not len(shapes):
@@ -47,7 +51,7 @@ def read_by_cover(n: int, edges: NDArray, weights: NDArray, scale: float | None 
     for c in [scale] if scale is not None else likely_scales(shapes, weights):
         tried = 0
         for cells in _numberings(shapes, weights, c):
-            if cells is None or len(cells.cell) > _MOST_CELLS or len(cells.cell) == tried:
+            if cells is None or len(cells.cell) > most_cells or len(cells.cell) == tried:
                 continue
             tried = len(cells.cell)
             reading, left = _covered(cells, weights, scale, left)
@@ -56,14 +60,16 @@ def read_by_cover(n: int, edges: NDArray, weights: NDArray, scale: float | None 
     return None
 
 
-def _covered(cells: Numbered, weights: NDArray, scale: float | None, left: int) -> tuple[Reading[CellSet] | None, int]:
-    """A reading that fits of numbered cells, or none; and how many may still be solved for of those `left`."""
+def _covered(
+    cells: Numbered, weights: NDArray, scale: float | None, left: float
+) -> tuple[Reading[CellSet] | None, float]:
+    """A reading that fits of numbered cells, or none; and how much work is left."""
     program, assembly = Program(cells), Assembly(cells)
     while left > 0:
-        left -= len(cells.cell)
         chosen = program.solution(program.fans)
-        if chosen is None:
+        if chosen is None:  # most such programs end before their search begins
             break
+        left -= len(cells.cell) ** 2
         conflict = assembly.conflict(chosen)
         _log.debug("%d cells, in conflict %d", len(chosen), 0 if conflict is None else len(conflict))
         if conflict is None:

@@ -18,7 +18,8 @@ from ...linalg import quiet
 from .numbered import Numbered
 
 _ROUNDING = 1e-4  # of angle sums; far more than what HiGHS neglects, 1e-6 before it scales rows
-_NODES = 40  # of the search tree of one solution
+_NODES = 1  # of the search tree: covers that fit come with its root, and branching takes ten times as long
+_SECONDS = 20.0  # of one solution, for want of a better measure; roots of programs of this size take a few
 
 Rows = tuple[sp.csr_array, NDArray, NDArray]
 
@@ -58,7 +59,7 @@ class Program:
                 constraints=LinearConstraint(self._matrix, self._low, self._high),
                 integrality=np.ones(size),
                 bounds=Bounds(0, 1),
-                options={"node_limit": _NODES},
+                options={"node_limit": _NODES, "time_limit": _SECONDS},
             )
         return None if found.x is None else np.flatnonzero(found.x[: len(cost)] > 0.5)
 
