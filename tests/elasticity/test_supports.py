@@ -145,7 +145,7 @@ def test_regions_that_were_labelled_from_different_sides_are_reconciled():
 def test_directions_that_contradict_each_other_are_not_certified(monkeypatch):
     for name in ("scattered", "scattered_without_zeros"):
         monkeypatch.setattr(f"unassemble.elasticity.unknowns.{name}", lambda matrix, sizes: None)
-    for room in ("directions", "searching"):
+    for room in ("directions.directions", "scattered.searching"):
         monkeypatch.setattr(
             f"unassemble.elasticity.{room}.set_right", lambda matrix, group, members, live, found, names: found
         )

@@ -25,16 +25,20 @@ _WRONG = 1e-9  # of the norm of all coordinates: what those of one node may be w
 
 
 def well_supplied(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(n, d, d) the valid pairs without those of rows that lack some, if these cannot place what they touch.
+    """(n, d, d) the valid pairs without those of rows that cannot place what they touch, where some rows lack pairs.
 
     Each node takes d equations, which the rows that touch it share. A row with less than its share leaves nodes free to
-    move; without it, others may be short of equations, too.
+    move; without it, others may be short of equations, too. In the plane whole rows are kept.
     """
     whole = np.asarray(valid.all(axis=(1, 2)))
     rows = np.flatnonzero(valid.any(axis=(1, 2)))
+    if whole[rows].all():  # nothing to gain
+        return valid
     while len(rows):
         local = identities(nodal, valid, rows)
-        short = short_of_equations(local) & ~whole[local.rows]
+        short = short_of_equations(local)
+        if nodal.dim == 2:  # of quadratic elements all rows would turn out short, one after the other
+            short &= ~whole[local.rows]
         rows = local.rows[~short]
         if not short.any():
             break
