@@ -1,7 +1,7 @@
 """What comes back from every kind of element, mesh, material, support, order of the unknowns and storage.
 
 Run ``python benchmarks/elasticity_cases.py``; ``--kinds tet-p1 hex-q1``, ``--supports roller symmetry``, ``--orders
-"by component"``, ``--zeros dropped``, ``--meshes structured``, ``--materials one`` choose among the cases, ``--list``
+"boundary first"``, ``--zeros dropped``, ``--meshes structured``, ``--materials one`` choose among the cases, ``--list``
 prints each of them as it ends, ``--jobs 8`` runs as many side by side. All of it takes hours of one processor, linear
 kinds in one order some minutes: the meshes are small boxes that scikit-fem assembles.
 

@@ -13,7 +13,7 @@ SUPPORTS = (
     "free", "clamp", "roller", "symmetry", "identity clamp", "identity rollers", "penalty clamp", "penalty rollers",
     "several",
 )  # fmt: skip
-ORDERS = ("interleaved", "by component", "at random")
+ORDERS = ("interleaved", "by component", "boundary first", "boundary first by component", "at random")
 ZEROS = ("stored", "dropped")
 
 
@@ -32,7 +32,8 @@ def given(case: Assembled, support: str, order: str, zeros: str, seed: int = 0) 
 
     Clamps hold all directions on the plane x = 0; rollers x there, and symmetry is rollers on the first planes across
     all axes. Several: x = 0 clamped and eliminated, y eliminated on y = 0 and replaced by the identity on y = 1, and a
-    penalty on all directions at x = 1.
+    penalty on all directions at x = 1. Boundary first: the nodes on the sides of a box come before all others, as mesh
+    generators number them.
     """
     n, d = case.points.shape
     held = np.zeros((n, d), dtype=bool)
@@ -63,7 +64,10 @@ def given(case: Assembled, support: str, order: str, zeros: str, seed: int = 0) 
     if zeros == "dropped":
         matrix.eliminate_zeros()
     rows = np.flatnonzero(~gone.ravel())
-    if order == "by component":
+    if order.startswith("boundary first"):
+        inside = ((case.points > case.points.min(axis=0)) & (case.points < case.points.max(axis=0))).all(axis=1)
+        rows = rows[np.argsort(inside[rows // d], kind="stable")]
+    if order.endswith("by component"):
         rows = rows[np.argsort(rows % d, kind="stable")]
     elif order == "at random":
         rows = rows[np.random.default_rng(seed).permutation(len(rows))]

@@ -86,7 +86,7 @@ def test_modes_are_annihilated_and_serve_multigrid():
         residuals = []
         solver.solve(rhs, tol=1e-8, accel="cg", residuals=residuals)
         counts[name] = len(residuals) - 1
-    assert abs(counts["recovered"] - counts["true"]) <= 0.05 * counts["true"]
+    assert abs(counts["recovered"] - counts["true"]) <= 1  # rounding may cost or save one
     assert counts["recovered"] < counts["none"]
 
 

@@ -21,6 +21,9 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     Where all entries are stored the halves of a node couple to the same nodes; and where unknowns stand in order, it
     tells which of them are in doubt. Where order alone joined rows that couple to different nodes, so are theirs.
     """
+    if numbering.kind in ORDERS and numbering.common < 1:
+        mixed = _mixed(nodal)
+        nodal = replace(nodal, doubtful=mixed) if mixed.any() else nodal
     if numbering.open_row is not None:
         unsure = numbering.open_row
         if nodal.blurred is not None and numbering.unnamed is not None:  # rows without a name were left out
@@ -29,12 +32,10 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
         doubtful[numbering.node_of_row[unsure]] = True
         doubtful &= (nodal.row_of < 0).any(axis=1)
         if doubtful.any():
-            nodal = replace(nodal, doubtful=doubtful, fellows=_fellows(numbering, doubtful))
+            fellows = _fellows(numbering, doubtful)
+            nodal = replace(nodal, doubtful=doubtful | _doubtful(nodal), fellows=fellows)
         if not _by_likeness(numbering):
             return nodal
-    if numbering.kind in ORDERS and not numbering.incomplete:
-        doubtful = _mixed(nodal) if numbering.common < 1 else np.zeros(nodal.n, dtype=bool)
-        return replace(nodal, doubtful=doubtful) if doubtful.any() else nodal
     ordered = numbering.kind != "pattern" and numbering.common == 1 and not numbering.odd
     if numbering.kind == "given" or not numbering.incomplete or ordered:
         return nodal
@@ -46,10 +47,16 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     alike = halves & (code[i] == code[j])
     apart = np.asarray(without_trace(nodal).any(axis=1))
     apart[i[alike]] = False
-    doubtful = np.zeros(nodal.n, dtype=bool) if nodal.doubtful is None else nodal.doubtful.copy()
+    doubtful = np.zeros(nodal.n, dtype=bool)
     doubtful[i[halves if apart.any() or numbering.common < 1 else alike]] = True
     around = np.asarray(nodal.graph @ doubtful.astype(float) > 0)  # even the directions of such rows were searched for
-    return replace(nodal, doubtful=doubtful, blurred=around if nodal.blurred is None else nodal.blurred | around)
+    blurred = around if nodal.blurred is None else nodal.blurred | around
+    return replace(nodal, doubtful=doubtful | _doubtful(nodal), blurred=blurred)
+
+
+def _doubtful(nodal: NodalMatrix) -> NDArray[np.bool_]:
+    """(n,) nodes that are doubtful so far."""
+    return np.zeros(nodal.n, dtype=bool) if nodal.doubtful is None else nodal.doubtful
 
 
 def _near(nodal: NodalMatrix, some: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -95,12 +102,14 @@ def unconfirmed(
         # Of fellows each was placed by itself, and none was taken to lack what another has.
         return nodal.doubtful if nodal.fellows is None else np.zeros(nodal.n, dtype=bool)
     outside = determined(points)
-    if not _by_likeness(numbering):
-        doubtful = nodal.doubtful | without_trace(nodal).any(axis=1)
-        outside &= nodal.graph @ doubtful.astype(float) > 0
+    confirmed: NDArray[np.bool_] = np.zeros(nodal.n, dtype=bool)
     if shown is not None:
-        outside &= ~(shown | (nodal.row_of < 0)).all(axis=1)
-    return np.asarray(outside)
+        confirmed = np.asarray((shown | (nodal.row_of < 0)).all(axis=1))
+    if not _by_likeness(numbering):
+        doubtful = nodal.doubtful & ~(confirmed & (nodal.row_of >= 0).all(axis=1))  # all rows of one node are its own
+        doubtful |= without_trace(nodal).any(axis=1)
+        outside &= nodal.graph @ doubtful.astype(float) > 0
+    return np.asarray(outside & ~confirmed)
 
 
 def _by_likeness(numbering: Numbering) -> bool:

@@ -91,6 +91,28 @@ class NodalMatrix:
         return np.add.reduceat(entries, self.indptr[:-1], axis=0)  # no node is empty
 
 
+def around(nodal: NodalMatrix, some: NDArray[np.bool_]) -> tuple[NodalMatrix, NDArray[np.int64]]:
+    """The blocks between some nodes, (n,) bool, and their neighbours' neighbours; and which nodes these are."""
+    graph = nodal.graph
+    nodes = np.flatnonzero(graph @ (graph @ some.astype(float)) > 0)
+    place = np.full(nodal.n, -1)
+    place[nodes] = np.arange(len(nodes))
+    kept = (place[nodal.node] >= 0) & (place[nodal.indices] >= 0)
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(place[nodal.node[kept]], minlength=len(nodes)))])
+    return replace(
+        nodal,
+        indptr=indptr.astype(np.int32),
+        indices=place[nodal.indices[kept]].astype(np.int32),
+        data=nodal.data[kept],
+        row_of=nodal.row_of[nodes],
+        size=nodal.size[nodes],
+        penalised=nodal.penalised[nodes],
+        doubtful=None,
+        blurred=None,
+        fellows=None,
+    ), nodes
+
+
 def nodal_matrix(
     matrix: sp.csr_array, numbering: Numbering, *, left_out: NDArray[np.bool_] | None = None
 ) -> NodalMatrix:

@@ -12,9 +12,9 @@ from ..linalg import blas_threads
 from ..matrix import check_matrix
 from ..words import count_of
 from .doubts import guessed_directions, unconfirmed, with_doubts
-from .elements.cells import no_cells, recognise_cells
+from .elements.cells import Cells, no_cells, recognise_cells
 from .halves import joined, taken_apart
-from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled
+from .nodal import NodalMatrix, around, determined, nodal_matrix, uncoupled
 from .nullspace.certificate import largest_residual
 from .nullspace.material import poisson_ratio
 from .nullspace.solution import Solution
@@ -198,9 +198,10 @@ def _describe(
         near = error < max(_NEAR, SPREADS * rounding)
         ratio = _poisson_ratio(nodal, solution, points) if near else None
     found = no_cells()
-    if (want_cells or solution.straight) and near:
+    lame_ratio = None if ratio is None else 2 * ratio / (1 - 2 * ratio)
+    if near and (want_cells or solution.straight or solution.hanging):
         with clock("cells"):
-            found = recognise_cells(nodal, points, None if ratio is None else 2 * ratio / (1 - 2 * ratio))
+            found = recognise_cells(nodal, points, lame_ratio)
     backward = found.backward_error if found.certified else error
     status, reason = verdict(nodal, solution, error, found, numbering)
     if rounding and near and not any(solution.freedoms):
@@ -210,6 +211,10 @@ def _describe(
     withheld = np.zeros(nodal.n, dtype=bool)
     if status == "certified" and (found.certified or numbering.open_row is not None or not numbering.incomplete):
         withheld = unconfirmed(nodal, numbering, points, found.shown)
+    if status == "certified" and solution.leaning is not None:
+        with clock("cells"):
+            withheld |= solution.leaning & ~_in_place(nodal, points, solution.leaning, found, lame_ratio)
+    if withheld.any():
         points = np.where(withheld[:, None], np.nan, points)
         found = found.among(~withheld)
     loose = ~determined(points)
@@ -240,6 +245,20 @@ def _describe(
         points, numbering.node_of_row, direction, np.asarray(loose, dtype=np.int8), component,
         solution.evidence, ratio, found, backward, status, reason, numbering.kind, tuple(warnings), clock.timings,
     )  # fmt: skip
+
+
+def _in_place(
+    nodal: NodalMatrix, points: NDArray[np.float64], leaning: NDArray[np.bool_], found: Cells, ratio: float | None
+) -> NDArray[np.bool_]:
+    """(n,) nodes with entries that elements re-assemble: those found; if none were looked for, some around these."""
+    told = np.zeros(nodal.n, dtype=bool)
+    if found.recognised or not leaning.any():
+        return told if found.shown is None else np.asarray(found.shown.any(axis=1))
+    part, nodes = around(nodal, leaning)
+    shown = recognise_cells(part, points[nodes], ratio).shown
+    if shown is not None:
+        told[nodes] = shown.any(axis=1)
+    return told
 
 
 def _poisson_ratio(nodal: NodalMatrix, solution: Solution, points: NDArray[np.float64]) -> float | None:

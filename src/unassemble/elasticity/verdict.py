@@ -52,7 +52,8 @@ def about_nodes(nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[
     if withheld.any():
         told.append(
             f"{count_of(int(withheld.sum()), 'node has', 'nodes have')} rows that no element shows to be theirs; "
-            "since it was inferred which rows make up a node, no coordinates are given there"
+            "since it was inferred which rows make up a node, or assumed that some lie in a plane or that Poisson's "
+            "ratio is one number, no coordinates are given there"
         )
     if unread.any():
         told.append(
@@ -172,6 +173,11 @@ def verdict(
         return "uncertified", (
             "the identities leave an affine map free, since the material around every valid row is homogeneous; "
             "elements determined it, but the matrix re-assembled on them is not the given one"
+        )
+    if solution.hanging:
+        return "uncertified", (
+            "more than translation and scale is free unless nodes that lack a direction lie in planes across it, and "
+            "no elements show that they do"
         )
     apart = np.asarray(without_trace(nodal).any(axis=1))
     if numbering.open_row is not None and nodal.doubtful is not None:

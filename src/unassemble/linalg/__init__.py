@@ -2,10 +2,11 @@
 
 from .ahead import AnalysisAhead
 from .augmented import AugmentedSystem
-from .definite import nearly_singular, solved
+from .definite import nearly_singular, solved, typical_diagonal
 from .factorisation import Factorisation, backend, factorisation
 from .least_norm import least_norm
 from .quiet import quiet
+from .singular import svd
 from .threads import blas_threads, threads
 from .upper import UpperTriangle, upper_from_edges
 
@@ -21,6 +22,8 @@ __all__ = [
     "nearly_singular",
     "quiet",
     "solved",
+    "svd",
     "threads",
+    "typical_diagonal",
     "upper_from_edges",
 ]

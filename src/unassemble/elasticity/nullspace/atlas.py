@@ -21,6 +21,7 @@ import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ...linalg import svd
 from ..nodal import NodalMatrix
 from .charts import Chart, chart, patches
 from .identities import identities
@@ -177,6 +178,6 @@ def _measured(
         local = identities(nodal, valid, part, terms)
         residual = local.residual(fields[place[local.columns]]).reshape(-1, k)
         triangle = np.asarray(np.linalg.qr(np.vstack([triangle, np.linalg.qr(residual, mode="r")]), mode="r"))
-    _, values, v = scipy.linalg.svd(triangle)
+    _, values, v = svd(triangle)
     fields = (fields.reshape(-1, k) @ v[::-1].T).reshape(-1, d, k)
     return NullFields(nodes, fields, values[::-1], sum(one.rows for one in made), len(made))

@@ -16,11 +16,11 @@ import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...linalg import Factorisation, UpperTriangle, nearly_singular
+from ...linalg import Factorisation, UpperTriangle, nearly_singular, svd
 from ..nodal import NodalMatrix
 from .identities import Identities, identities
 
-_SHIFTS = (1e-12, 3e-11, 1e-9)  # above the rounding of the normal matrix, below every eigenvalue that is not zero
+SHIFTS = (1e-12, 3e-11, 1e-9)  # above the rounding of the normal matrix, below every eigenvalue that is not zero
 _STEPS = 2  # each divides what is not wanted by its eigenvalue over the shift, 1e4 and more
 _STIFF = 1e-4  # fields whose singular value is larger need no place in a chart of several
 
@@ -75,7 +75,7 @@ def chart(
     if not n:
         return Chart(local.columns, np.empty((0, d, 0)), np.empty(0), 0)
     count = min(4 * d, n * d)
-    with nearly_singular(UpperTriangle.of(local.normal_matrix()), _SHIFTS) as solver:
+    with nearly_singular(UpperTriangle.of(local.normal_matrix()), SHIFTS) as solver:
         while True:
             fields, values = _least_fields(local, solver, count)
             if count == n * d or count >= 256 or values[-1] > (1e-6 if whole else _STIFF):
@@ -97,19 +97,19 @@ def _supported(
     chart touches leaves most of these free to move, each by itself. Neighbours that are short of equations, too, would
     only add to that.
     """
-    short = _short(local)
+    short = short_of_equations(local)
     if not short.any():
         return local
     near = np.unique(nodal.graph[local.rows[short]].indices)
     more = identities(nodal, valid, np.union1d(local.rows, near), terms)
-    kept = ~_short(more) | np.isin(more.rows, local.rows)
+    kept = ~short_of_equations(more) | np.isin(more.rows, local.rows)
     return more if kept.all() else identities(nodal, valid, more.rows[kept], terms)
 
 
-def _short(local: Identities) -> NDArray[np.bool_]:
+def short_of_equations(local: Identities) -> NDArray[np.bool_]:
     """(m,) rows with fewer equations than their share of what the nodes take that they touch."""
     touching = np.bincount(local.indices, minlength=len(local.columns))
-    taken = np.add.reduceat(local.dim / touching[local.indices], local.indptr[:-1])
+    taken = np.add.reduceat(local.dim / touching[local.indices], local.indptr[:-1]) if len(local.rows) else np.empty(0)
     return np.asarray(taken > local.equations)
 
 
@@ -128,7 +128,7 @@ def _ritz(local: Identities, x: NDArray) -> tuple[NDArray, NDArray]:
     """Rotate orthonormal fields to singular ones. Working with residuals, not with their squares, keeps all digits."""
     n, d, k = x.shape
     triangle = np.linalg.qr(local.residual(x).reshape(-1, k), mode="r")
-    _, values, v = scipy.linalg.svd(triangle)
+    _, values, v = svd(triangle)
     values = np.concatenate([values, np.zeros(k - len(values))])
     return (x.reshape(n * d, k) @ v[::-1].T).reshape(n, d, k), values[::-1]
 

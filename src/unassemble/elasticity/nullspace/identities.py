@@ -105,7 +105,7 @@ class Identities:
     @cached_property
     def equations(self) -> NDArray[np.int64]:
         """(m,) equations of each row once p and q are eliminated."""
-        count = self.valid.reshape(len(self.rows), -1).sum(axis=1)
+        count = self.valid.sum(axis=(1, 2, 3))
         for rows, basis in self._kinds:
             count[rows] -= basis.shape[3]
         return np.asarray(count)

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...errors import GeometryError
+from ...linalg import svd
 
 EXACT = 1e-9  # singular values below this are zero; matrices are rounded to 1e-16, gaps are 1e-4 and more
 SOFT = 2e-7  # singular values at which entries rounded to 1e-15 still give coordinates to 1e-8
@@ -109,7 +110,7 @@ def set_aside(null: NDArray, common: int) -> tuple[NDArray, NDArray[np.bool_]]:
     calm = np.argsort((null**2).sum(axis=(1, 2)), kind="stable")
     for share in (0.75, 0.5, 0.25, 0.12):
         some = calm[: max(int(share * n), min(n, common + 1))]
-        _, s, v = scipy.linalg.svd(null[some].reshape(-1, k), full_matrices=False)
+        _, s, v = svd(null[some].reshape(-1, k), full_matrices=False)
         if (s > _LOOSE * s[0]).sum() == common:
             own = np.einsum("nak,lk->nal", null, v[s <= _LOOSE * s[0]])
             loose = np.abs(own).max(axis=(1, 2)) > _STILL
@@ -129,7 +130,7 @@ def _without_translations(fields: NDArray) -> NDArray:
     """Orthonormal basis of the centred fields, d fewer: in slender bodies rounding leaves more of the translations."""
     n, d, k = fields.shape
     centred = (fields - fields.mean(axis=0)).reshape(n * d, k)
-    u, s, _ = scipy.linalg.svd(centred, full_matrices=False)
+    u, s, _ = svd(centred, full_matrices=False)
     return u[:, : k - d][:, s[: k - d] > 1e-6].reshape(n, d, -1)
 
 
@@ -142,7 +143,7 @@ def _choose(moving: NDArray, graph: sp.csr_array, *, exact: bool) -> tuple[NDArr
         return moving[..., 0], ""
     if k == 0:
         raise GeometryError("no field but translations fits the valid rows; this is no isotropic elasticity matrix")
-    single = [scipy.linalg.svd(moving[:, a], full_matrices=False) for a in range(d)]
+    single = [svd(moving[:, a], full_matrices=False) for a in range(d)]
     ranks = [int((s > 1e-6).sum()) for _, s, _ in single]
     if k == d and ranks == [1] * d:
         return np.stack([u[:, 0] for u, _, _ in single], axis=1) / np.sqrt(d), "axes"
@@ -173,7 +174,7 @@ def _of_one_direction(moving: NDArray) -> bool:
     _, d, k = moving.shape
     for a in range(d):
         others = np.delete(moving, a, axis=1).reshape(-1, k)
-        if scipy.linalg.svd(others, compute_uv=False)[-1] > _LOOSE:
+        if svd(others, full_matrices=False)[1][-1] > _LOOSE:
             return False
     return True
 

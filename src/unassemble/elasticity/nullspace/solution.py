@@ -35,6 +35,10 @@ class Solution:
         Whether nodes that lack a direction were taken to lie in planes across it.
     straight : tuple of float
         lambda / mu of the pieces whose axes the identities leave free and elements told; see :mod:`.straight`.
+    firm : (n, d) float64, optional
+        Points that rows with enough equations place, from which others were placed; see :mod:`.extending`.
+    leaning : (n,) bool, optional
+        Nodes that have a place only because others were taken to lie in planes, or Poisson's ratio to be one number.
     """
 
     valid: NDArray[np.bool_]
@@ -48,11 +52,19 @@ class Solution:
     strict: bool = True
     planes: bool = False
     straight: tuple[float, ...] = ()
+    firm: NDArray[np.float64] | None = None
+    leaning: NDArray[np.bool_] | None = None
 
     @property
     def unique(self) -> bool:
         """Whether what is determined is so up to translation and scale of its piece."""
         return self.exact and not any(self.freedoms)
+
+    @property
+    def hanging(self) -> bool:
+        """Whether all points, and not those of some nodes only, hang on what was assumed."""
+        known = np.isfinite(self.points).all(axis=1)
+        return self.leaning is not None and bool(known.any()) and bool(self.leaning[known].all())
 
     @property
     def whole(self) -> bool:

@@ -25,7 +25,7 @@ def by_component_with_gaps(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list
         one = by_component(inner, d)
         if one is not None:
             found.append(_spread(matrix, live, one, d, "by component"))
-            if _settled(found[-1]):
+            if found[-1].settled:
                 break
     return found
 
@@ -39,7 +39,7 @@ def interleaved_with_gaps(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[
     found: list[Numbering] = []
     for d in _likeliest_first(inner, sizes):
         found += [_spread(matrix, live, one, d, "interleaved") for one in told_by_likeness(inner, d)]
-        if any(_settled(one) for one in found):
+        if any(one.settled for one in found):
             break
     return found
 
@@ -55,11 +55,6 @@ def _likeliest_first(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[int]:
     """Sizes of nodes, that first of which most neighbouring rows of one pattern are."""
     length = run_lengths(same_pattern(matrix, np.zeros(matrix.shape[0], dtype=bool)))
     return sorted(sizes, key=lambda d: -np.count_nonzero(length == d))
-
-
-def _settled(one: Numbering) -> bool:
-    """Whether nodes of so many directions show, and none lacks one without a trace: no other number need be tried."""
-    return one.sound and one.common == 1 and not one.odd
 
 
 def _live_part(matrix: sp.csr_array) -> tuple[NDArray[np.int64], sp.csr_array]:

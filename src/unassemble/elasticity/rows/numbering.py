@@ -16,6 +16,7 @@ from .traces import unaccounted
 _LIKELY = 0.6  # quality of nodes apart from the share of sums that vanish; made-up ones have half or less
 WHOLE = 0.5  # share of sums that vanish in most rows, supports apart
 _ALIKE = 0.9  # rows of one node couple to common nodes by so much, where unknowns stand by component
+_FILLED = 0.8  # quality apart from the share: two directions read as three fill two thirds of the nodes' places
 ANNIHILATED = 0.02  # share of rows and directions below which an orderly numbering calls for a search
 
 
@@ -95,6 +96,16 @@ class Numbering:
     def sound(self) -> bool:
         """Whether its nodes look like nodes, however few of their rows annihilate constants."""
         return self.share > ANNIHILATED and self.quality > _LIKELY * self.share
+
+    @property
+    def settled(self) -> bool:
+        """Whether nodes of so many directions show, and none lacks one without a trace: no other number need be tried.
+
+        They show where all rows of each couple to the same nodes, or nearly all do, sums vanish in most rows and hardly
+        a node lacks any.
+        """
+        shows = self.common == 1 or (self.share >= WHOLE and self.quality > _FILLED * self.share)
+        return self.sound and shows and not self.odd
 
 
 def measured(

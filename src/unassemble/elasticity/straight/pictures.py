@@ -16,6 +16,7 @@ import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ...linalg import svd
 from ..elements.candidates import Block, candidates, coupled
 from ..elements.reference import reference_nodes
 from ..nodal import NodalMatrix
@@ -98,7 +99,7 @@ def _without_terms(
     place[nodes] = np.arange(n)
     scalar = identities(nodal, inside, nodes, no_terms(d))
     residual = scalar.residual(null[place[scalar.columns]]).reshape(-1, k)
-    _, values, v = scipy.linalg.svd(np.linalg.qr(residual, mode="r"))
+    _, values, v = svd(np.linalg.qr(residual, mode="r"))
     kept = np.concatenate([values, np.zeros(k - len(values))]) <= 10 * EXACT
     return np.asarray(null.reshape(-1, k) @ v[kept].T).reshape(n, d, -1)
 
@@ -106,7 +107,7 @@ def _without_terms(
 def _functions(null: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N, m) orthonormal basis of all components of the fields, constants aside."""
     flat = (null - null.mean(axis=0)).reshape(len(null), -1)
-    u, s, _ = scipy.linalg.svd(flat, full_matrices=False)
+    u, s, _ = svd(flat, full_matrices=False)
     return np.asarray(u[:, s > _NONE * max(s.max(initial=0), _NONE)])
 
 
@@ -153,7 +154,7 @@ def _improved(
 
 def _least(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(m, m) combinations of the columns of (r, m), and how large they are, increasing."""
-    _, size, v = scipy.linalg.svd(np.linalg.qr(values, mode="r"))
+    _, size, v = svd(np.linalg.qr(values, mode="r"))
     size = np.concatenate([size, np.zeros(values.shape[1] - len(size))])
     return v[::-1].T, size[::-1]
 

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from ..elements.entries import Entries, Pairs
 from ..elements.model import Model, assembled
+from ..nodal import NodalMatrix
 
 _STEP = 1e-4  # of the mean length of an edge: displacement whose effect on entries is measured
 _RIGID = 1e-4  # least effect on an entry of a displacement by one such length, relative to the largest
+_SAME = 1e-8  # of a row: entries that do not differ by more are the same
 _NODES = 40  # whose rows are looked at, and so many again for each function
 
 
@@ -49,6 +51,19 @@ def rigid(models: tuple[Model, ...], entries: Entries, ratio: float, functions: 
             effects.append((there - back) / (2 * _STEP))
     size = np.linalg.svd(np.linalg.qr(np.column_stack(effects), mode="r"), compute_uv=False)
     return len(size) == len(effects) and bool(size[-2] > _RIGID * size[0])
+
+
+def interchangeable(nodal: NodalMatrix, valid: NDArray[np.bool_], body: NDArray[np.bool_]) -> bool:
+    """Whether two nodes of a body, (n,), have the same entries in all whole rows, so that they may be exchanged.
+
+    As in the middle of a box so small that only one row is whole. Nodes that no such row touches are placed otherwise.
+    """
+    rows = valid.all(axis=(1, 2))
+    rng = np.random.default_rng(0)
+    weight = rng.standard_normal(nodal.n) * rows / np.where(rows, nodal.size, 1.0)
+    entries = weight[nodal.node] * (nodal.data.reshape(-1, nodal.dim**2) @ rng.standard_normal(nodal.dim**2))
+    code = np.bincount(nodal.indices, entries, nodal.n)[body]
+    return bool((np.diff(np.sort(code[code != 0])) < _SAME).any())
 
 
 def _moved(entries: Entries, functions: NDArray) -> NDArray[np.int64]:

@@ -23,7 +23,7 @@ from ..nullspace.solution import Solution
 from ..results import Evidence
 from .frame import frame
 from .pictures import picture
-from .rigid import rigid
+from .rigid import interchangeable, rigid
 
 Rows = tuple[NodalMatrix, NDArray[np.bool_]]  # which of them are valid, (n, d, d) or (n, d, d, d)
 
@@ -111,7 +111,8 @@ def _straight(
         points = np.full_like(shown.points, np.nan)
         points[body] = in_gauge(shown.points[body] @ one.map.T, graph[body][:, body])
         models = tuple(replace(model, points=points) for model in one.models)
-        if not shown.told_by_cells or rigid(models, one.entries, one.ratio, shown.functions):
+        told = not shown.told_by_cells or not interchangeable(nodal, inside, body)
+        if told and (not shown.told_by_cells or rigid(models, one.entries, one.ratio, shown.functions)):
             residual, gap = map(float, null.values[[nodal.dim, exact.sum()]])
             yield Straight(points, one.ratio, Evidence(shown.fields, residual, gap, null.rows))
 

@@ -1,0 +1,150 @@
+"""Directions held where no plane across them is: what fits there all the same must not be certified."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from assembled import box, heterogeneous, on_plane, permuted_nodes, stiffness
+from supported import Given, given, judged, with_zeros
+
+from unassemble.elasticity import recover_elasticity
+from unassemble.elasticity.doubts import with_doubts
+from unassemble.elasticity.nodal import nodal_matrix, valid_pairs
+from unassemble.elasticity.nullspace.extending import extended, overdetermined, well_supplied
+from unassemble.elasticity.nullspace.placing import placed
+from unassemble.elasticity.nullspace.planes import with_planes
+from unassemble.elasticity.unknowns import find_numbering
+
+
+def varying_shear(x):
+    return 1 + x[1] + x[0] * x[1]
+
+
+def body(kind, counts, perturb=0.0, *, varying=False):
+    material = {"lam": heterogeneous, "mu": varying_shear} if varying else {"lam": 1.5, "mu": 1.0}
+    return stiffness(kind, box(kind, counts, perturb=perturb), **material)
+
+
+def held(case, gone=(), identity=(), order="interleaved", zeros="stored", *, boundary_first=False, seed=3):
+    """Rows of a body of which sides, (axis, value, direction), lack directions, or have rows of the identity."""
+    n, d = case.points.shape
+    masks = np.zeros((2, n, d), dtype=bool)
+    for mask, sides in zip(masks, (gone, identity), strict=True):
+        for axis, value, direction in sides:
+            mask[on_plane(case, axis, value), direction] = True
+    matrix = with_zeros(case.matrix, d, zeros).tocoo()
+    lost = (masks[1] & ~masks[0]).ravel()
+    entries = (
+        np.where(lost[matrix.row] | lost[matrix.col], 0.0, matrix.data) + (matrix.row == matrix.col) * lost[matrix.row]
+    )
+    matrix = sp.csr_array((entries, (matrix.row, matrix.col)), shape=matrix.shape)
+    if zeros == "dropped":
+        matrix.eliminate_zeros()
+    nodes = np.random.default_rng(seed).permutation(n)
+    if boundary_first:
+        inside = ((case.points > 0) & (case.points < case.points.max(axis=0))).all(axis=1)
+        nodes = nodes[np.argsort(inside[nodes], kind="stable")]
+    rows = (nodes[:, None] * d + np.arange(d)).ravel()
+    rows = rows[~masks[0].ravel()[rows]]
+    if order == "by component":
+        rows = rows[np.argsort(rows % d, kind="stable")]
+    return Given(sp.csr_array(matrix[rows][:, rows]), rows // d, rows % d, case.points)
+
+
+X0, X1, Y0, Y1 = ((axis, value, axis) for axis in (0, 1) for value in (0.0, 1.0))
+
+
+def clamped(side):
+    return tuple((side[0], side[1], direction) for direction in (0, 1))
+
+
+def slide(side):
+    """The direction along a side, as no roller has it."""
+    return (side[0], side[1], 1 - side[0])
+
+
+@pytest.mark.parametrize(
+    ("case", "gone", "identity"),
+    [
+        (body("quad-q2", (4, 5), varying=True), (Y0, *clamped(Y1)), (slide(X1),)),
+        (body("quad-q2", (4, 4)), (*clamped(X0), slide(Y1)), ()),
+        (body("quad-s2", (4, 4)), (*clamped(X0), slide(Y0)), ()),
+        (body("quad-q1", (4, 4), 0.2, varying=True), (*clamped(X1), slide(Y0)), ()),
+        (body("tri-p2", (4, 4)), (slide(Y0),), (Y1,)),
+    ],
+    ids=["quad-q2 varying", "quad-q2", "quad-s2", "quad-q1", "tri-p2"],
+)
+@pytest.mark.parametrize("order", ["interleaved", "by component"])
+def test_planes_that_fit_by_chance_are_not_certified(case, gone, identity, order):
+    """In the plane there are hardly more equations next to rollers than coordinates: garbage fits them exactly."""
+    case = held(case, gone, identity, order)
+    found = recover_elasticity(case.matrix)
+    if found.certified:
+        assert judged(found, case).error < 1e-8
+    else:
+        assert "no elements show that they do" in found.reason or "inferred" in found.reason
+
+
+def test_a_homogeneous_body_whose_axes_planes_alone_tell_is_certified_by_elements_only():
+    case = held(body("tri-p2", (4, 4)), (slide(Y0),), (Y1,), seed=1)
+    found = recover_elasticity(case.matrix)
+    assert found.status == "uncertified"
+    assert "no elements show that they do" in found.reason
+
+
+@pytest.mark.parametrize("seed", [6, 19])
+def test_rows_on_both_sides_of_a_row_of_the_identity_are_not_one_node_for_certain(seed):
+    """Boundary first: single rows of nodes of two rollers, between them a row of the identity that one of them lost."""
+    case = held(body("quad-q1", (5, 5)), (Y1,), (X1,), zeros="dropped", boundary_first=True, seed=seed)
+    found = recover_elasticity(case.matrix)
+    assert found.certified
+    assert judged(found, case).error < 1e-8
+
+
+def test_cells_around_one_whole_row_leave_opposite_nodes_interchangeable():
+    """Of nine nodes around the only whole row those on opposite sides have the same entries in it."""
+    case = held(body("quad-q2", (4, 4)), (*clamped(X0), *clamped(X1), *clamped(Y0), *clamped(Y1)), seed=0)
+    found = recover_elasticity(case.matrix)
+    assert not found.certified
+
+
+@pytest.mark.parametrize("kind", ["tet-p2", "hex-s2"])
+def test_rows_short_of_equations_are_left_for_later(kind):
+    """They leave dozens of fields free, and hold no node that others do not."""
+    case = given(permuted_nodes(body(kind, (4, 4, 4), 0.2, varying=True)), "symmetry", "interleaved", "stored")
+    numbering = find_numbering(case.matrix)
+    nodal = with_doubts(nodal_matrix(case.matrix, numbering), numbering)
+    valid = valid_pairs(nodal)
+    first = well_supplied(nodal, valid)
+    assert first.any(axis=(1, 2)).sum() < valid.any(axis=(1, 2)).sum()
+    np.testing.assert_array_equal(first[valid.all(axis=(1, 2))], True)
+    early, late = placed(nodal, first, None), placed(nodal, valid, None)
+    assert early.evidence[0].null_dimension == 4
+    assert early.evidence[0].gap > 2 * late.evidence[0].gap
+    assert early.unique
+
+
+def test_nodes_are_placed_from_others_or_not_at_all():
+    case = given(permuted_nodes(body("tet-p1", (4, 5, 5), 0.2, varying=True)), "symmetry", "interleaved", "stored")
+    numbering = find_numbering(case.matrix)
+    nodal = with_doubts(nodal_matrix(case.matrix, numbering), numbering)
+    valid = valid_pairs(nodal)
+    points = np.zeros((nodal.n, 3))
+    points[numbering.node_of_row] = case.points[case.node]
+    start = points.copy()
+    edge = ((points[:, :2] == 0).sum(axis=1) == 2) | ((points[:, 1:] == 0).sum(axis=1) == 2)
+    start[edge] = np.nan
+    strict, _ = extended(nodal, valid, start)
+    assert np.isnan(strict[edge]).all()
+    completed, full = with_planes(nodal, valid)
+    more, residual = extended(completed, full, start)
+    assert residual < 1e-13
+    assert np.isfinite(more).all()
+    np.testing.assert_allclose(more, points, atol=1e-11)
+    assert overdetermined(completed, full, start)[edge].all()
+    inner = np.flatnonzero((points > 0).all(axis=1))[0]
+    wrong = replace(completed, data=completed.data.copy())
+    wrong.data[nodal.node == inner] *= 1 + 1e-3 * np.arange(9).reshape(3, 3)
+    start[inner] = np.nan
+    assert extended(wrong, full, start) is None
