@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from .nodal import NodalMatrix, valid_pairs
+from .nodal import NodalMatrix, determined, valid_pairs
+from .nullspace.control import uncontrolled
+from .nullspace.corners import with_corners
 from .nullspace.identities import boundary_terms
 from .nullspace.material import poisson_ratio
 from .nullspace.placing import placed
@@ -47,6 +49,8 @@ def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
         if found is None:
             continue
         found = replace(_with_ratio(nodal, found, completed, patch), strict=strict)
+        if strict:
+            found = _with_corners(nodal, found, rows)
         if found.unique:
             return found
         best = best or found
@@ -86,6 +90,9 @@ def _with_planes(
         other = replace(placed(completed, full, patch), planes=True, valid=valid)
     except GeometryError:
         return found
+    if other.unique:
+        hanging = uncontrolled(completed, full, full & ~valid[..., None], other.points)
+        other = replace(other, hanging=hanging if hanging.any() else None)
     if not other.exact or (found is not None and other.rank <= found.rank):
         return found
     return other
@@ -100,13 +107,44 @@ def _with_ratio(
     """Once more with Poisson's ratio, if it is one number and nodes were left loose."""
     if found.whole or not found.unique or found.straight:  # only points that are unique have a ratio to read off
         return found
-    nu = poisson_ratio(nodal, found.valid, found.points)
+    firm = found.firm_points
+    nu = poisson_ratio(nodal, found.valid, firm)
     if nu is None:
         return found
-    rows = completed if completed is not None and found.planes else (nodal, found.valid)
-    ratio = 2 * nu / (1 - 2 * nu)
+    rows, full = completed if completed is not None and found.planes else (nodal, found.valid)
+    terms = boundary_terms(nodal.dim, 2 * nu / (1 - 2 * nu))
     try:
-        other = placed(*rows, patch, boundary_terms(nodal.dim, ratio))
+        other = placed(rows, full, patch, terms)
     except GeometryError:
         return found
-    return replace(other, planes=found.planes, valid=found.valid, ratio=ratio) if other.rank > found.rank else found
+    if other.unique:  # that the ratio is the same there is an assumption, too
+        new = determined(other.points) & ~determined(firm)
+        assumed = ~found.valid | (nodal.graph @ new.astype(float) > 0)[:, None, None]
+        full = full if full.ndim == 4 else np.repeat(full[..., None], nodal.dim, axis=3)
+        hanging = uncontrolled(rows, full, full & assumed[..., None], other.points, terms)
+        other = replace(other, hanging=hanging if hanging.any() else None)
+    if other.rank <= found.rank:
+        return found
+    return replace(other, planes=found.planes, valid=found.valid, ratio=2 * nu / (1 - 2 * nu))
+
+
+def _with_corners(nodal: NodalMatrix, found: Solution, valid: NDArray[np.bool_]) -> Solution:
+    """Once more where planes of rollers meet, with Poisson's ratio if that is what it takes."""
+    if found.whole or not found.unique or found.straight:
+        return found
+    nu = poisson_ratio(nodal, found.valid, found.firm_points)
+    for ratio in (None,) if nu is None else (None, 2 * nu / (1 - 2 * nu)):
+        terms = None if ratio is None else boundary_terms(nodal.dim, ratio)
+        firm = found.firm_points
+        points, component = with_corners(nodal, valid, firm, found.component, terms)
+        new = determined(points) & ~determined(firm)
+        if new.any():
+            found = replace(
+                found,
+                points=np.where(new[:, None], points, found.points),
+                component=component,
+                planes=True,
+                ratio=found.ratio if ratio is None else ratio,
+                hanging=None if found.hanging is None else found.hanging & ~new,
+            )
+    return found

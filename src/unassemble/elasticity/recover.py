@@ -11,7 +11,7 @@ from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..matrix import check_matrix
 from ..words import count_of
-from .doubts import guessed_directions, unconfirmed, with_doubts
+from .doubts import guessed_directions, unborne, unconfirmed, with_doubts
 from .elements.cells import no_cells, recognise_cells
 from .halves import joined, taken_apart
 from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled
@@ -198,7 +198,7 @@ def _describe(
         near = error < max(_NEAR, SPREADS * rounding)
         ratio = _poisson_ratio(nodal, solution, points) if near else None
     found = no_cells()
-    if (want_cells or solution.straight) and near:
+    if (want_cells or solution.straight or solution.hanging is not None) and near:
         with clock("cells"):
             found = recognise_cells(nodal, points, None if ratio is None else 2 * ratio / (1 - 2 * ratio))
     backward = found.backward_error if found.certified else error
@@ -212,12 +212,16 @@ def _describe(
         withheld = unconfirmed(nodal, numbering, points, found.shown)
         points = np.where(withheld[:, None], np.nan, points)
         found = found.among(~withheld)
+    hanging = unborne(nodal, solution, found)
+    if hanging.any():
+        points = np.where(hanging[:, None], np.nan, points)
+        found = found.among(~hanging)
     loose = ~determined(points)
     component = np.where(loose, -1, solution.component)
     warnings = list(solution.warnings)
     if want_cells:
         warnings += about_cells(found)
-    warnings += about_nodes(nodal, loose, withheld)
+    warnings += about_nodes(nodal, loose, withheld, hanging)
     if solution.planes:
         warnings.append(
             "nodes that lack a direction were taken to lie in planes across it, which fits, to determine others"

@@ -34,7 +34,9 @@ def about_cells(found: Cells) -> list[str]:
     return []
 
 
-def about_nodes(nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[np.bool_]) -> list[str]:
+def about_nodes(
+    nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[np.bool_], hanging: NDArray[np.bool_]
+) -> list[str]:
     """Why nodes have no coordinates.
 
     Parameters
@@ -44,11 +46,13 @@ def about_nodes(nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[
         Nodes without coordinates.
     withheld : (n,) bool
         Those that no cell confirms.
+    hanging : (n,) bool
+        Those whose coordinates rest on an assumption that nothing confirms.
     """
     apart: NDArray[np.bool_] = np.asarray(without_trace(nodal).any(axis=1))
     beside = np.zeros(nodal.n, dtype=bool)
     beside[nodal.node[apart[nodal.indices]]] = True
-    unread, told = loose & ~withheld & beside, []
+    unread, told = loose & ~withheld & ~hanging & beside, []
     if withheld.any():
         told.append(
             f"{count_of(int(withheld.sum()), 'node has', 'nodes have')} rows that no element shows to be theirs; "
@@ -59,7 +63,14 @@ def about_nodes(nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[
             f"{count_of(int(unread.sum()), 'node is', 'nodes are')} not determined, since rows there, or next to it, "
             "belong to nodes that were not recognised; give the numbering if it is known"
         )
-    rest = int((loose & ~withheld & ~unread).sum())
+    resting = int((hanging & ~withheld).sum())
+    if resting:
+        told.append(
+            f"{count_of(resting, 'node is', 'nodes are')} determined only if nodes that lack a direction lie in planes "
+            "across it, or if Poisson's ratio is the same there, which neither another equation nor an element "
+            "confirms; no coordinates are given there"
+        )
+    rest = int((loose & ~withheld & ~hanging & ~unread).sum())
     if rest:
         told.append(
             f"{count_of(rest, 'node is', 'nodes are')} not determined: rows coupled to {'it' if rest == 1 else 'them'} "

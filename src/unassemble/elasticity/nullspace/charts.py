@@ -20,7 +20,7 @@ from ...linalg import Factorisation, UpperTriangle, nearly_singular
 from ..nodal import NodalMatrix
 from .identities import Identities, identities
 
-_SHIFTS = (1e-12, 3e-11, 1e-9)  # above the rounding of the normal matrix, below every eigenvalue that is not zero
+SHIFTS = (1e-12, 3e-11, 1e-9)  # above the rounding of the normal matrix, below every eigenvalue that is not zero
 _STEPS = 2  # each divides what is not wanted by its eigenvalue over the shift, 1e4 and more
 _STIFF = 1e-4  # fields whose singular value is larger need no place in a chart of several
 
@@ -75,7 +75,7 @@ def chart(
     if not n:
         return Chart(local.columns, np.empty((0, d, 0)), np.empty(0), 0)
     count = min(4 * d, n * d)
-    with nearly_singular(UpperTriangle.of(local.normal_matrix()), _SHIFTS) as solver:
+    with nearly_singular(UpperTriangle.of(local.normal_matrix()), SHIFTS) as solver:
         while True:
             fields, values = _least_fields(local, solver, count)
             if count == n * d or count >= 256 or values[-1] > (1e-6 if whole else _STIFF):

@@ -35,6 +35,9 @@ class Solution:
         Whether nodes that lack a direction were taken to lie in planes across it.
     straight : tuple of float
         lambda / mu of the pieces whose axes the identities leave free and elements told; see :mod:`.straight`.
+    hanging : (n,) bool, optional
+        Nodes that hang on equations that rest on an assumption, of planes or of one Poisson's ratio, which no other
+        equation controls; see :mod:`.control`.
     """
 
     valid: NDArray[np.bool_]
@@ -48,6 +51,7 @@ class Solution:
     strict: bool = True
     planes: bool = False
     straight: tuple[float, ...] = ()
+    hanging: NDArray[np.bool_] | None = None
 
     @property
     def unique(self) -> bool:
@@ -56,10 +60,16 @@ class Solution:
 
     @property
     def whole(self) -> bool:
-        """Whether every node is determined, up to translation and scale of its piece."""
-        return self.unique and bool(np.isfinite(self.points).all())
+        """Whether every node is determined, up to translation and scale of its piece, and none hangs."""
+        return self.unique and bool(np.isfinite(self.firm_points).all())
 
     @property
-    def rank(self) -> tuple[bool, bool, int]:
-        """For comparison of solutions: exact, unique, and how many coordinates are determined."""
-        return self.exact, not any(self.freedoms), int(np.isfinite(self.points).sum())
+    def firm_points(self) -> NDArray[np.float64]:
+        """(n, d) the points, NaN where they hang on an assumption that nothing controls."""
+        return self.points if self.hanging is None else np.where(self.hanging[:, None], np.nan, self.points)
+
+    @property
+    def rank(self) -> tuple[bool, bool, int, int]:
+        """For comparison of solutions: exact, unique, and how many coordinates are determined, firmly and at all."""
+        firm, points = np.isfinite(self.firm_points).sum(), np.isfinite(self.points).sum()
+        return self.exact, not any(self.freedoms), int(firm), int(points)

@@ -137,8 +137,8 @@ def told_by_likeness(matrix: sp.csr_array, d: int) -> list[Reading]:
     freely = reconsidered(matrix, directions, d)
     other = _increasing(matrix, reached, freely, link)
     found = [(_mended(matrix, *one, d), one[1]) for one in ((node, directions), (other, freely))]
-    node = found[0][0]
-    found.append((node, find_directions(matrix, node, nobody, d, ordered=True)))
+    third = find_directions(matrix, found[0][0], nobody, d, ordered=True)
+    found.append((_mended(matrix, _increasing(matrix, reached, third, link), third, d), third))
     return [Reading(*one, unnamed=~proven_directions(matrix, one[1], one[0], d)) for one in found]
 
 
