@@ -1,20 +1,12 @@
 """Directions held where no plane across them is: what fits there all the same must not be certified."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from assembled import box, heterogeneous, on_plane, permuted_nodes, stiffness
-from supported import Given, given, judged, with_zeros
+from assembled import box, heterogeneous, on_plane, stiffness
+from supported import Given, judged, with_zeros
 
 from unassemble.elasticity import recover_elasticity
-from unassemble.elasticity.doubts import with_doubts
-from unassemble.elasticity.nodal import nodal_matrix, valid_pairs
-from unassemble.elasticity.nullspace.extending import extended, overdetermined, well_supplied
-from unassemble.elasticity.nullspace.placing import placed
-from unassemble.elasticity.nullspace.planes import with_planes
-from unassemble.elasticity.unknowns import find_numbering
 
 
 def varying_shear(x):
@@ -107,44 +99,3 @@ def test_cells_around_one_whole_row_leave_opposite_nodes_interchangeable():
     case = held(body("quad-q2", (4, 4)), (*clamped(X0), *clamped(X1), *clamped(Y0), *clamped(Y1)), seed=0)
     found = recover_elasticity(case.matrix)
     assert not found.certified
-
-
-@pytest.mark.parametrize("kind", ["tet-p2", "hex-s2"])
-def test_rows_short_of_equations_are_left_for_later(kind):
-    """They leave dozens of fields free, and hold no node that others do not."""
-    case = given(permuted_nodes(body(kind, (4, 4, 4), 0.2, varying=True)), "symmetry", "interleaved", "stored")
-    numbering = find_numbering(case.matrix)
-    nodal = with_doubts(nodal_matrix(case.matrix, numbering), numbering)
-    valid = valid_pairs(nodal)
-    first = well_supplied(nodal, valid)
-    assert first.any(axis=(1, 2)).sum() < valid.any(axis=(1, 2)).sum()
-    np.testing.assert_array_equal(first[valid.all(axis=(1, 2))], True)
-    early, late = placed(nodal, first, None), placed(nodal, valid, None)
-    assert early.evidence[0].null_dimension == 4
-    assert early.evidence[0].gap > 2 * late.evidence[0].gap
-    assert early.unique
-
-
-def test_nodes_are_placed_from_others_or_not_at_all():
-    case = given(permuted_nodes(body("tet-p1", (4, 5, 5), 0.2, varying=True)), "symmetry", "interleaved", "stored")
-    numbering = find_numbering(case.matrix)
-    nodal = with_doubts(nodal_matrix(case.matrix, numbering), numbering)
-    valid = valid_pairs(nodal)
-    points = np.zeros((nodal.n, 3))
-    points[numbering.node_of_row] = case.points[case.node]
-    start = points.copy()
-    edge = ((points[:, :2] == 0).sum(axis=1) == 2) | ((points[:, 1:] == 0).sum(axis=1) == 2)
-    start[edge] = np.nan
-    strict, _ = extended(nodal, valid, start)
-    assert np.isnan(strict[edge]).all()
-    completed, full = with_planes(nodal, valid)
-    more, residual = extended(completed, full, start)
-    assert residual < 1e-13
-    assert np.isfinite(more).all()
-    np.testing.assert_allclose(more, points, atol=1e-11)
-    assert overdetermined(completed, full, start)[edge].all()
-    inner = np.flatnonzero((points > 0).all(axis=1))[0]
-    wrong = replace(completed, data=completed.data.copy())
-    wrong.data[nodal.node == inner] *= 1 + 1e-3 * np.arange(9).reshape(3, 3)
-    start[inner] = np.nan
-    assert extended(wrong, full, start) is None

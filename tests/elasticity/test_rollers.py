@@ -57,12 +57,11 @@ def test_quadratic_triangles_lose_nothing_at_a_roller():
     assert any("planes" in one for one in found.warnings)
 
 
-@pytest.mark.parametrize("kind", ["tri-p2", "tet-p2", "hex-s2"])
+@pytest.mark.parametrize("kind", ["tri-p2", "quad-s2"])
 def test_quadratic_elements_lose_little_where_symmetry_planes_meet(kind):
-    """Next to the edges some nodes stay loose; they are set aside, and the others are unique."""
-    counts = COUNTS.get(kind, (3, 4, 3))
-    whole = permuted_nodes(stiffness(kind, box(kind, counts), lam=heterogeneous, mu=varying_shear), seed=1)
-    case = given(whole, "identity rollers", "interleaved", "stored")
+    """In the plane some nodes stay loose next to the corner; they are set aside, and the others are unique."""
+    whole = stiffness(kind, box(kind, COUNTS["tri-p2"]), lam=heterogeneous, mu=varying_shear)
+    case = given(permuted_nodes(whole, seed=1), "identity rollers", "interleaved", "stored")
     found = recover_elasticity(case.matrix)
     truth = judged(found, case)
     assert found.certified

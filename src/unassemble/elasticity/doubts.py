@@ -9,7 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .elements.cells import Cells
 from .nodal import NodalMatrix, annihilating, determined, without_trace
+from .nullspace.solution import Solution
 from .rows.grouping import by_first_row
 from .rows.numbering import Numbering
 from .rows.orders import ORDERS
@@ -24,6 +26,7 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     if numbering.kind in ORDERS and numbering.common < 1:
         mixed = _mixed(nodal)
         nodal = replace(nodal, doubtful=mixed) if mixed.any() else nodal
+    nodal = replace(nodal, sure=_sure(nodal, numbering))
     if numbering.open_row is not None:
         unsure = numbering.open_row
         if nodal.blurred is not None and numbering.unnamed is not None:  # rows without a name were left out
@@ -49,6 +52,9 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     apart[i[alike]] = False
     doubtful = np.zeros(nodal.n, dtype=bool)
     doubtful[i[halves if apart.any() or numbering.common < 1 else alike]] = True
+    if numbering.common < 1 and numbering.unnamed is not None:  # one of its rows may be another node's, taken for it
+        named = np.bincount(numbering.node_of_row, numbering.unnamed, nodal.n) == 0
+        doubtful |= _mixed(nodal) & ~named
     around = np.asarray(nodal.graph @ doubtful.astype(float) > 0)  # even the directions of such rows were searched for
     blurred = around if nodal.blurred is None else nodal.blurred | around
     return replace(nodal, doubtful=doubtful | _doubtful(nodal), blurred=blurred)
@@ -57,6 +63,24 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
 def _doubtful(nodal: NodalMatrix) -> NDArray[np.bool_]:
     """(n,) nodes that are doubtful so far."""
     return np.zeros(nodal.n, dtype=bool) if nodal.doubtful is None else nodal.doubtful
+
+
+def _sure(nodal: NodalMatrix, numbering: Numbering) -> NDArray[np.bool_] | None:
+    """(n,) nodes that are beyond doubt without an equation that shows it; None if all are.
+
+    Node by node these are single rows before and after which others stand that couple to other unknowns. Two rows that
+    couple to the same, in the order of directions, may be two nodes that lack all others.
+    """
+    if numbering.kind == "given" or (numbering.kind in ORDERS and not numbering.incomplete):
+        return None
+    sure = np.zeros(nodal.n, dtype=bool)
+    if numbering.kind == "interleaved" and numbering.common == 1 and not numbering.odd:
+        count = (nodal.row_of >= 0).sum(axis=1)
+        live = np.flatnonzero(count)
+        code = _neighbourhoods(nodal)[live]
+        same = np.concatenate([[False], code[1:] == code[:-1], [False]])
+        sure[live] = (count[live] == 1) & ~same[1:] & ~same[:-1]
+    return sure
 
 
 def _near(nodal: NodalMatrix, some: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -110,6 +134,15 @@ def unconfirmed(
         doubtful |= without_trace(nodal).any(axis=1)
         outside &= nodal.graph @ doubtful.astype(float) > 0
     return np.asarray(outside & ~confirmed)
+
+
+def unborne(nodal: NodalMatrix, solution: Solution, found: Cells) -> NDArray[np.bool_]:
+    """(n,) nodes whose coordinates hang on an assumption that neither other equations nor cells confirm."""
+    if solution.hanging is None:
+        return np.zeros(nodal.n, dtype=bool)
+    if not found.certified or found.shown is None:
+        return solution.hanging
+    return np.asarray(solution.hanging & ~(found.shown | (nodal.row_of < 0)).all(axis=1))
 
 
 def _by_likeness(numbering: Numbering) -> bool:

@@ -35,6 +35,8 @@ class NodalMatrix:
         Nodes coupled to rows that were left out, or whose directions may be others.
     fellows : (n,) int64, optional
         Labels of nodes whose rows couple to the same unknowns and may belong together; each other node has its own.
+    sure : (n,) bool, optional
+        Nodes whose rows are one node's though no equation shows it; all, where not given.
     """
 
     indptr: NDArray[np.int32]
@@ -46,6 +48,7 @@ class NodalMatrix:
     doubtful: NDArray[np.bool_] | None = None
     blurred: NDArray[np.bool_] | None = None
     fellows: NDArray[np.int64] | None = None
+    sure: NDArray[np.bool_] | None = None
 
     @classmethod
     def of(cls, indptr: NDArray, indices: NDArray, data: NDArray, row_of: NDArray[np.int64]) -> NodalMatrix:
@@ -89,28 +92,6 @@ class NodalMatrix:
         """(n, ...) sums over each node's blocks."""
         entries = self.data if entries is None else entries
         return np.add.reduceat(entries, self.indptr[:-1], axis=0)  # no node is empty
-
-
-def around(nodal: NodalMatrix, some: NDArray[np.bool_]) -> tuple[NodalMatrix, NDArray[np.int64]]:
-    """The blocks between some nodes, (n,) bool, and their neighbours' neighbours; and which nodes these are."""
-    graph = nodal.graph
-    nodes = np.flatnonzero(graph @ (graph @ some.astype(float)) > 0)
-    place = np.full(nodal.n, -1)
-    place[nodes] = np.arange(len(nodes))
-    kept = (place[nodal.node] >= 0) & (place[nodal.indices] >= 0)
-    indptr = np.concatenate([[0], np.cumsum(np.bincount(place[nodal.node[kept]], minlength=len(nodes)))])
-    return replace(
-        nodal,
-        indptr=indptr.astype(np.int32),
-        indices=place[nodal.indices[kept]].astype(np.int32),
-        data=nodal.data[kept],
-        row_of=nodal.row_of[nodes],
-        size=nodal.size[nodes],
-        penalised=nodal.penalised[nodes],
-        doubtful=None,
-        blurred=None,
-        fellows=None,
-    ), nodes
 
 
 def nodal_matrix(

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from ..errors import GeometryError
 from .nodal import NodalMatrix, determined, valid_pairs
-from .nullspace.extending import extended, overdetermined, well_supplied
+from .nullspace.control import uncontrolled
+from .nullspace.corners import with_corners
 from .nullspace.identities import boundary_terms
 from .nullspace.material import poisson_ratio
 from .nullspace.placing import placed
@@ -17,7 +18,9 @@ from .nullspace.planes import with_planes
 from .nullspace.solution import Solution
 from .straight.straight import straightened
 
-_ACCURATE = 1e-11  # residual over gap up to which nodes are placed from others without loss
+# Nodes beyond which planes are asked at once where there are rollers: without them rows next to rollers leave hundreds
+# of fields free, all of which charts would look for.
+_LARGE = 2000
 
 
 def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
@@ -28,23 +31,26 @@ def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
         valid = valid_pairs(nodal, strict=strict)
         if best is not None and np.array_equal(valid, best.valid):
             break
-        rows, completed = valid, None
-        found = _well_supplied_first(nodal, valid, patch) if strict else None
+        found, rows, completed = None, valid, None
+        if strict and nodal.n > _LARGE and not nodal.penalised.any():
+            found, completed = _planes_at_once(nodal, valid, patch)
         if found is None:
             try:
                 found = placed(nodal, valid, patch)
             except GeometryError as error:
                 failure = failure or error
-        if strict and not (found is not None and found.whole):
-            found, rows = _with_diagonals(nodal, found, valid, patch)
-        completed = with_planes(nodal, rows) if strict and not (found is not None and found.whole) else None
-        if completed is not None:
-            found = _with_planes(*completed, found, rows, patch)
+            if strict and not (found is not None and found.whole):
+                found, rows = _with_diagonals(nodal, found, valid, patch)
+            completed = with_planes(nodal, rows) if strict and not (found is not None and found.whole) else None
+            if completed is not None:
+                found = _with_planes(*completed, found, rows, patch)
         if strict and not (found is not None and found.unique):
             found = straightened(nodal, found, valid, completed, patch)
         if found is None:
             continue
         found = replace(_with_ratio(nodal, found, completed, patch), strict=strict)
+        if strict:
+            found = _with_corners(nodal, found, rows)
         if found.unique:
             return found
         best = best or found
@@ -67,82 +73,29 @@ def _with_diagonals(
     return (other, more) if other.exact and (found is None or other.rank > found.rank) else (found, valid)
 
 
+def _planes_at_once(
+    nodal: NodalMatrix, valid: NDArray[np.bool_], patch: int | None
+) -> tuple[Solution | None, tuple[NodalMatrix, NDArray[np.bool_]] | None]:
+    """Positions with what rows next to rollers say, and these rows; None if there are none, or much stays free."""
+    completed = with_planes(nodal, valid)
+    found = None if completed is None else _with_planes(*completed, None, valid, patch)
+    return (found, completed) if found is not None and found.unique else (None, None)
+
+
 def _with_planes(
     completed: NodalMatrix, full: NDArray[np.bool_], found: Solution | None, valid: NDArray[np.bool_], patch: int | None
 ) -> Solution | None:
     """Once more with what rows next to rollers say, if that fits and determines more."""
-    other = _more(completed, full, found, patch)
-    if other is None or not other.exact or (found is not None and other.rank <= found.rank):
-        return found
-    return replace(other, planes=True, valid=valid, leaning=_leaning(found, other, (completed, full)))
-
-
-def _well_supplied_first(nodal: NodalMatrix, valid: NDArray[np.bool_], patch: int | None) -> Solution | None:
-    """Positions from rows that have enough equations, then from the others; None if the first are not unique so."""
-    first = well_supplied(nodal, valid)
-    if np.array_equal(first, valid):
-        return None
     try:
-        found = placed(nodal, first, patch)
+        other = replace(placed(completed, full, patch), planes=True, valid=valid)
     except GeometryError:
-        return None
-    if not found.unique:
-        return None
-    more = _more(nodal, valid, found, patch) if _firm(found) else None
-    return replace(found if more is None else more, valid=valid)
-
-
-def _more(
-    nodal: NodalMatrix,
-    valid: NDArray[np.bool_],
-    found: Solution | None,
-    patch: int | None,
-    terms: NDArray[np.float64] | None = None,
-) -> Solution | None:
-    """Positions from more rows than those found; None if these do not fit.
-
-    Nodes of one piece with places that are unique stay where they are, if these are known without loss. What other rows
-    have placed since is placed anew: nodes that few rows hold feel rounding, and would hand it on.
-    """
-    if found is None or not _firm(found):
-        try:
-            return placed(nodal, valid, patch, terms)
-        except GeometryError:
-            return None
-    firm = found.points if found.firm is None else found.firm
-    more = extended(nodal, valid, firm, terms)
-    if more is None:
-        return None
-    points, residual = more
-    (one,) = found.evidence
-    evidence = (replace(one, residual=float(np.hypot(one.residual, residual))),)
-    component = np.where(determined(points), 0, -1)
-    return replace(found, points=points, component=component, evidence=evidence, firm=firm)
-
-
-def _firm(found: Solution) -> bool:
-    """Whether others can be placed from what was found."""
-    if not found.unique or len(found.evidence) > 1:
-        return False
-    return found.firm is not None or found.evidence[0].residual <= _ACCURATE * found.evidence[0].gap
-
-
-def _leaning(
-    before: Solution | None,
-    after: Solution,
-    rows: tuple[NodalMatrix, NDArray[np.bool_]],
-    terms: NDArray[np.float64] | None = None,
-) -> NDArray[np.bool_]:
-    """(n,) nodes that an assumption places and few equations: all, if without it more than translation, scale is free.
-
-    Where there are equations enough they would not fit if it were false.
-    """
-    leaning = determined(after.points)
-    if before is not None and before.unique:
-        leaning &= ~determined(before.points) & ~overdetermined(*rows, before.points, terms)
-        if before.leaning is not None:
-            leaning |= before.leaning
-    return leaning
+        return found
+    if other.unique:
+        hanging = uncontrolled(completed, full, full & ~valid[..., None], other.points)
+        other = replace(other, hanging=hanging if hanging.any() else None)
+    if not other.exact or (found is not None and other.rank <= found.rank):
+        return found
+    return other
 
 
 def _with_ratio(
@@ -154,15 +107,44 @@ def _with_ratio(
     """Once more with Poisson's ratio, if it is one number and nodes were left loose."""
     if found.whole or not found.unique or found.straight:  # only points that are unique have a ratio to read off
         return found
-    nu = poisson_ratio(nodal, found.valid, found.points)
+    firm = found.firm_points
+    nu = poisson_ratio(nodal, found.valid, firm)
     if nu is None:
         return found
-    rows = completed if completed is not None and found.planes else (nodal, found.valid)
-    ratio = 2 * nu / (1 - 2 * nu)
-    terms = boundary_terms(nodal.dim, ratio)
-    other = _more(*rows, found, patch, terms)
-    if other is None or not other.exact or other.rank <= found.rank:
+    rows, full = completed if completed is not None and found.planes else (nodal, found.valid)
+    terms = boundary_terms(nodal.dim, 2 * nu / (1 - 2 * nu))
+    try:
+        other = placed(rows, full, patch, terms)
+    except GeometryError:
         return found
-    return replace(
-        other, planes=found.planes, valid=found.valid, ratio=ratio, leaning=_leaning(found, other, rows, terms)
-    )
+    if other.unique:  # that the ratio is the same there is an assumption, too
+        new = determined(other.points) & ~determined(firm)
+        assumed = ~found.valid | (nodal.graph @ new.astype(float) > 0)[:, None, None]
+        full = full if full.ndim == 4 else np.repeat(full[..., None], nodal.dim, axis=3)
+        hanging = uncontrolled(rows, full, full & assumed[..., None], other.points, terms)
+        other = replace(other, hanging=hanging if hanging.any() else None)
+    if other.rank <= found.rank:
+        return found
+    return replace(other, planes=found.planes, valid=found.valid, ratio=2 * nu / (1 - 2 * nu))
+
+
+def _with_corners(nodal: NodalMatrix, found: Solution, valid: NDArray[np.bool_]) -> Solution:
+    """Once more where planes of rollers meet, with Poisson's ratio if that is what it takes."""
+    if found.whole or not found.unique or found.straight:
+        return found
+    nu = poisson_ratio(nodal, found.valid, found.firm_points)
+    for ratio in (None,) if nu is None else (None, 2 * nu / (1 - 2 * nu)):
+        terms = None if ratio is None else boundary_terms(nodal.dim, ratio)
+        firm = found.firm_points
+        points, component = with_corners(nodal, valid, firm, found.component, terms)
+        new = determined(points) & ~determined(firm)
+        if new.any():
+            found = replace(
+                found,
+                points=np.where(new[:, None], points, found.points),
+                component=component,
+                planes=True,
+                ratio=found.ratio if ratio is None else ratio,
+                hanging=None if found.hanging is None else found.hanging & ~new,
+            )
+    return found

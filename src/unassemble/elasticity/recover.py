@@ -11,10 +11,10 @@ from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..matrix import check_matrix
 from ..words import count_of
-from .doubts import guessed_directions, unconfirmed, with_doubts
-from .elements.cells import Cells, no_cells, recognise_cells
+from .doubts import guessed_directions, unborne, unconfirmed, with_doubts
+from .elements.cells import no_cells, recognise_cells
 from .halves import joined, taken_apart
-from .nodal import NodalMatrix, around, determined, nodal_matrix, uncoupled
+from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled
 from .nullspace.certificate import largest_residual
 from .nullspace.material import poisson_ratio
 from .nullspace.solution import Solution
@@ -23,7 +23,15 @@ from .positions import solve
 from .results import ElasticityRecovery, ScalarParts
 from .rows.numbering import Numbering
 from .unknowns import find_numbering
-from .verdict import about_cells, about_made_up_nodes, about_nodes, about_open_rows, of_few_digits, verdict
+from .verdict import (
+    RESTS_ON_PLANES,
+    about_cells,
+    about_made_up_nodes,
+    about_nodes,
+    about_open_rows,
+    of_few_digits,
+    verdict,
+)
 
 _SAME = 1e-6  # difference up to which Poisson's ratios of pieces are one
 _NEAR = 1e-6  # residual up to which positions are good enough to look for elements
@@ -199,7 +207,7 @@ def _describe(
         ratio = _poisson_ratio(nodal, solution, points) if near else None
     found = no_cells()
     lame_ratio = None if ratio is None else 2 * ratio / (1 - 2 * ratio)
-    if near and (want_cells or solution.straight or solution.hanging):
+    if (want_cells or solution.straight or solution.hanging is not None) and near:
         with clock("cells"):
             found = recognise_cells(nodal, points, lame_ratio)
     backward = found.backward_error if found.certified else error
@@ -211,18 +219,21 @@ def _describe(
     withheld = np.zeros(nodal.n, dtype=bool)
     if status == "certified" and (found.certified or numbering.open_row is not None or not numbering.incomplete):
         withheld = unconfirmed(nodal, numbering, points, found.shown)
-    if status == "certified" and solution.leaning is not None:
-        with clock("cells"):
-            withheld |= solution.leaning & ~_in_place(nodal, points, solution.leaning, found, lame_ratio)
     if withheld.any():
         points = np.where(withheld[:, None], np.nan, points)
         found = found.among(~withheld)
+    hanging = unborne(nodal, solution, found)
+    if hanging.any() and (hanging | ~determined(points)).all():
+        status, reason = "uncertified", RESTS_ON_PLANES
+    elif hanging.any():
+        points = np.where(hanging[:, None], np.nan, points)
+        found = found.among(~hanging)
     loose = ~determined(points)
     component = np.where(loose, -1, solution.component)
     warnings = list(solution.warnings)
     if want_cells:
         warnings += about_cells(found)
-    warnings += about_nodes(nodal, loose, withheld)
+    warnings += about_nodes(nodal, loose, withheld, hanging & loose)
     if solution.planes:
         warnings.append(
             "nodes that lack a direction were taken to lie in planes across it, which fits, to determine others"
@@ -245,20 +256,6 @@ def _describe(
         points, numbering.node_of_row, direction, np.asarray(loose, dtype=np.int8), component,
         solution.evidence, ratio, found, backward, status, reason, numbering.kind, tuple(warnings), clock.timings,
     )  # fmt: skip
-
-
-def _in_place(
-    nodal: NodalMatrix, points: NDArray[np.float64], leaning: NDArray[np.bool_], found: Cells, ratio: float | None
-) -> NDArray[np.bool_]:
-    """(n,) nodes with entries that elements re-assemble: those found; if none were looked for, some around these."""
-    told = np.zeros(nodal.n, dtype=bool)
-    if found.recognised or not leaning.any():
-        return told if found.shown is None else np.asarray(found.shown.any(axis=1))
-    part, nodes = around(nodal, leaning)
-    shown = recognise_cells(part, points[nodes], ratio).shown
-    if shown is not None:
-        told[nodes] = shown.any(axis=1)
-    return told
 
 
 def _poisson_ratio(nodal: NodalMatrix, solution: Solution, points: NDArray[np.float64]) -> float | None:

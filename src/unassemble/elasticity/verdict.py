@@ -17,6 +17,12 @@ CERTIFIED = 1e-9
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
 
 
+RESTS_ON_PLANES = (
+    "more than translation and scale is free unless nodes that lack a direction lie in planes across it, and no "
+    "elements show that they do"
+)
+
+
 def about_cells(found: Cells) -> list[str]:
     """What there is to say of the elements."""
     if not found.recognised:
@@ -34,7 +40,9 @@ def about_cells(found: Cells) -> list[str]:
     return []
 
 
-def about_nodes(nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[np.bool_]) -> list[str]:
+def about_nodes(
+    nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[np.bool_], hanging: NDArray[np.bool_]
+) -> list[str]:
     """Why nodes have no coordinates.
 
     Parameters
@@ -44,11 +52,13 @@ def about_nodes(nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[
         Nodes without coordinates.
     withheld : (n,) bool
         Those that no cell confirms.
+    hanging : (n,) bool
+        Those whose coordinates rest on an assumption that nothing confirms.
     """
     apart: NDArray[np.bool_] = np.asarray(without_trace(nodal).any(axis=1))
     beside = np.zeros(nodal.n, dtype=bool)
     beside[nodal.node[apart[nodal.indices]]] = True
-    unread, told = loose & ~withheld & beside, []
+    unread, told = loose & ~withheld & ~hanging & beside, []
     if withheld.any():
         told.append(
             f"{count_of(int(withheld.sum()), 'node has', 'nodes have')} rows that no element shows to be theirs; "
@@ -60,7 +70,14 @@ def about_nodes(nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[
             f"{count_of(int(unread.sum()), 'node is', 'nodes are')} not determined, since rows there, or next to it, "
             "belong to nodes that were not recognised; give the numbering if it is known"
         )
-    rest = int((loose & ~withheld & ~unread).sum())
+    resting = int((hanging & ~withheld).sum())
+    if resting:
+        told.append(
+            f"{count_of(resting, 'node is', 'nodes are')} determined only if nodes that lack a direction lie in planes "
+            "across it, or if Poisson's ratio is the same there, which neither another equation nor an element "
+            "confirms; no coordinates are given there"
+        )
+    rest = int((loose & ~withheld & ~hanging & ~unread).sum())
     if rest:
         told.append(
             f"{count_of(rest, 'node is', 'nodes are')} not determined: rows coupled to {'it' if rest == 1 else 'them'} "
@@ -173,11 +190,6 @@ def verdict(
         return "uncertified", (
             "the identities leave an affine map free, since the material around every valid row is homogeneous; "
             "elements determined it, but the matrix re-assembled on them is not the given one"
-        )
-    if solution.hanging:
-        return "uncertified", (
-            "more than translation and scale is free unless nodes that lack a direction lie in planes across it, and "
-            "no elements show that they do"
         )
     apart = np.asarray(without_trace(nodal).any(axis=1))
     if numbering.open_row is not None and nodal.doubtful is not None:

@@ -35,10 +35,9 @@ class Solution:
         Whether nodes that lack a direction were taken to lie in planes across it.
     straight : tuple of float
         lambda / mu of the pieces whose axes the identities leave free and elements told; see :mod:`.straight`.
-    firm : (n, d) float64, optional
-        Points that rows with enough equations place, from which others were placed; see :mod:`.extending`.
-    leaning : (n,) bool, optional
-        Nodes that have a place only because others were taken to lie in planes, or Poisson's ratio to be one number.
+    hanging : (n,) bool, optional
+        Nodes that hang on equations that rest on an assumption, of planes or of one Poisson's ratio, which no other
+        equation controls; see :mod:`.control`.
     """
 
     valid: NDArray[np.bool_]
@@ -52,8 +51,7 @@ class Solution:
     strict: bool = True
     planes: bool = False
     straight: tuple[float, ...] = ()
-    firm: NDArray[np.float64] | None = None
-    leaning: NDArray[np.bool_] | None = None
+    hanging: NDArray[np.bool_] | None = None
 
     @property
     def unique(self) -> bool:
@@ -61,17 +59,17 @@ class Solution:
         return self.exact and not any(self.freedoms)
 
     @property
-    def hanging(self) -> bool:
-        """Whether all points, and not those of some nodes only, hang on what was assumed."""
-        known = np.isfinite(self.points).all(axis=1)
-        return self.leaning is not None and bool(known.any()) and bool(self.leaning[known].all())
-
-    @property
     def whole(self) -> bool:
-        """Whether every node is determined, up to translation and scale of its piece."""
-        return self.unique and bool(np.isfinite(self.points).all())
+        """Whether every node is determined, up to translation and scale of its piece, and none hangs."""
+        return self.unique and bool(np.isfinite(self.firm_points).all())
 
     @property
-    def rank(self) -> tuple[bool, bool, int]:
-        """For comparison of solutions: exact, unique, and how many coordinates are determined."""
-        return self.exact, not any(self.freedoms), int(np.isfinite(self.points).sum())
+    def firm_points(self) -> NDArray[np.float64]:
+        """(n, d) the points, NaN where they hang on an assumption that nothing controls."""
+        return self.points if self.hanging is None else np.where(self.hanging[:, None], np.nan, self.points)
+
+    @property
+    def rank(self) -> tuple[bool, bool, int, int]:
+        """For comparison of solutions: exact, unique, and how many coordinates are determined, firmly and at all."""
+        firm, points = np.isfinite(self.firm_points).sum(), np.isfinite(self.points).sum()
+        return self.exact, not any(self.freedoms), int(firm), int(points)

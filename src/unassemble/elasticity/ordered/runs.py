@@ -86,29 +86,25 @@ def _by_pattern(matrix: sp.csr_array, group: NDArray[np.int64], run: NDArray[np.
         direction = named_by_sums(matrix, run, direction, d)
         unnamed = ~proven_directions(matrix, direction, group, d)
     if unnamed.any():
-        likelier = _in_equilibrium(matrix, group, run, direction, unnamed, d)
-        if likelier is not None:
-            direction, unnamed = likelier, ~proven_directions(matrix, likelier, group, d)
+        direction, unnamed = _in_equilibrium(matrix, group, direction, unnamed, d)
     return Reading(_cut_where(run, direction), direction, np.zeros(order, dtype=bool), unnamed)
 
 
 def _in_equilibrium(
-    matrix: sp.csr_array,
-    group: NDArray[np.int64],
-    run: NDArray[np.int64],
-    direction: NDArray[np.int64],
-    unnamed: NDArray[np.bool_],
-    d: int,
-) -> NDArray[np.int64] | None:
-    """Directions with which translations are in equilibrium, likelier than those of least energy where no sum decides.
+    matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], unnamed: NDArray[np.bool_], d: int
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Directions with which translations are in equilibrium, and rows whose direction no sum proves even then.
 
-    None if they contradict rows whose direction is proven, or the order of rows within a node.
+    They are likelier than those of least energy where no sum decides: along an edge in which planes meet, energy is
+    lower yet with a wrong direction. Those given are kept if these contradict rows whose direction is proven, or leave
+    more rows without a proof.
     """
-    proven = np.where(unnamed, -1, direction)
-    other, share = extended_directions(matrix, group, np.ones(len(run), dtype=bool), d, known=proven)
+    known = np.where(unnamed, -1, direction)
+    other, share = extended_directions(matrix, group, np.ones(len(direction), dtype=bool), d, known=known)
     if share < WHOLE or (other != direction)[~unnamed].any():
-        return None
-    return other if _cut_where(run, other)[-1] <= _cut_where(run, direction)[-1] else None
+        return direction, unnamed
+    still = ~proven_directions(matrix, other, group, d)
+    return (other, still) if np.count_nonzero(still) <= np.count_nonzero(unnamed) else (direction, unnamed)
 
 
 def _cut_where(run: NDArray[np.int64], direction: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -141,8 +137,8 @@ def told_by_likeness(matrix: sp.csr_array, d: int) -> list[Reading]:
     freely = reconsidered(matrix, directions, d)
     other = _increasing(matrix, reached, freely, link)
     found = [(_mended(matrix, *one, d), one[1]) for one in ((node, directions), (other, freely))]
-    node = found[0][0]
-    found.append((node, find_directions(matrix, node, nobody, d, ordered=True)))
+    third = find_directions(matrix, found[0][0], nobody, d, ordered=True)
+    found.append((_mended(matrix, _increasing(matrix, reached, third, link), third, d), third))
     return [Reading(*one, unnamed=~proven_directions(matrix, one[1], one[0], d)) for one in found]
 
 

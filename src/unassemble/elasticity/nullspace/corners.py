@@ -1,0 +1,125 @@
+"""Corners in which planes of rollers meet: nodes that only rows touch which lack coefficients of every direction.
+
+The node in such a corner lacks all directions and is not in the matrix. If it lies on all of the planes, what
+:mod:`.planes` says of rows next to one plane holds next to all of them: block (c, b) with the missing sum put to the
+plane across b gives A^{cb} x_b = p_c + 2 delta_cb q_b. In space that leaves d - 2 equations of each row, in the plane
+none, unless lambda / mu is known. They are few and local, so that a small dense problem at each corner places its
+nodes after all others.
+
+That the missing node lies on all planes is an assumption, and so is that nodes lie in the planes across the directions
+that they lack. They are borne out where the equations hold exactly and are more than the coordinates they determine, by
+as many as are assumed at least: a node that lies elsewhere could make up for no more.
+
+Of each coordinate x_b only the unknowns of direction b feel something, so that three nodes with one row each fit as
+well as one with three. Only nodes get coordinates that are beyond doubt for other reasons.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..nodal import NodalMatrix, determined, eliminated, surrounded
+from .identities import Identities, identities
+from .planes import with_planes
+from .shape import EXACT, SOFT
+
+
+def with_corners(
+    nodal: NodalMatrix,
+    valid: NDArray[np.bool_],
+    points: NDArray[np.float64],
+    component: NDArray[np.int64],
+    terms: NDArray[np.float64] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Points and pieces after loose nodes next to corners were placed, as far as that is borne out.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    valid : (n, d, d) bool
+        By the strict rule.
+    points : (n, d) float64
+        Unique but for translation and scale, mean edge length 1; NaN where not determined.
+    component : (n,) int64
+        Piece of each node, -1 where not determined.
+    terms : (d, d, d, t) float64, optional
+        Unknown boundary terms; see :func:`.identities.identities`.
+
+    Returns
+    -------
+    points : (n, d) float64
+    component : (n,) int64
+    """
+    whole = surrounded(nodal, valid)
+    lacking = eliminated(nodal)
+    corner = ~whole & (nodal.graph @ lacking.astype(float) > 0).all(axis=1)
+    loose = ~determined(points)
+    corner &= nodal.graph @ loose.astype(float) > 0
+    completed = with_planes(nodal, valid, whole=whole | corner) if corner.any() else None
+    if completed is None:
+        return points, component
+    changed, full = completed
+    points, component = points.copy(), component.copy()
+    for rows, nodes in _places(nodal, corner, loose):
+        around = identities(changed, full, rows, terms)
+        pieces = np.unique(component[around.columns])
+        if len(pieces[pieces >= 0]) == 1:
+            points[nodes] = _placed(around, corner, nodes, int(lacking[nodes].sum()), points)
+            if nodal.sure is not None:
+                points[nodes[~nodal.sure[nodes]]] = np.nan
+            component[nodes] = np.where(determined(points[nodes]), pieces[-1], -1)
+    return points, component
+
+
+def _places(
+    nodal: NodalMatrix, corner: NDArray[np.bool_], loose: NDArray[np.bool_]
+) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Rows and the loose nodes that they touch, corner by corner; rows of loose nodes say which planes hold these."""
+    graph = nodal.graph
+    touched = loose & (graph @ corner.astype(float) > 0)
+    rows = corner | touched
+    pairs = rows[nodal.node] & touched[nodal.indices]
+    shape = (2 * nodal.n, 2 * nodal.n)
+    link = sp.csr_array((np.ones(pairs.sum()), (nodal.node[pairs], nodal.n + nodal.indices[pairs])), shape=shape)
+    label = sp.csgraph.connected_components(link, directed=False)[1]
+    found = []
+    for place in np.unique(label[nodal.n :][touched]):
+        here = label[: nodal.n] == place
+        found.append((np.flatnonzero(here & rows), np.flatnonzero((label[nodal.n :] == place) & touched)))
+    return found
+
+
+def _placed(
+    around: Identities, corner: NDArray[np.bool_], nodes: NDArray[np.int64], level: int, points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(k, d) points of the loose nodes of one corner, NaN where they are not determined or it is not borne out.
+
+    The loose nodes lack `level` directions in all, and so many of their coordinates are assumed to be those of planes.
+    """
+    d, count = around.dim, len(nodes)
+    none = np.full((count, d), np.nan)
+    known = determined(points[around.columns])
+    if np.isin(around.columns[~known], nodes, invert=True).any():
+        return none
+    unit = np.zeros((len(around.columns), d, count * d))
+    place = np.searchsorted(around.columns, nodes)
+    touched = np.isin(nodes, around.columns)
+    for k in np.flatnonzero(touched):
+        unit[place[k], range(d), range(k * d, k * d + d)] = 1
+    design = around.residual(unit).reshape(len(around.rows), -1, count * d)
+    given = np.where(known[:, None], points[around.columns], 0.0)[:, :, None]
+    right = -around.residual(given).reshape(-1)
+    whole = design.reshape(-1, count * d)
+    u, s, v = np.linalg.svd(whole, full_matrices=False)
+    strong = s > SOFT
+    found = v[strong].T @ ((u[:, strong].T @ right) / s[strong])
+    here = corner[around.rows]
+    planes = np.linalg.matrix_rank(design[~here].reshape(-1, count * d), tol=SOFT) if (~here).any() else 0
+    spare = around.equations[here].sum() - (strong.sum() - planes)
+    if spare < d + level or np.abs(whole @ found - right).max() > EXACT:
+        return none
+    free = np.abs(v[~strong]).max(axis=0, initial=0) > EXACT
+    loose = free.reshape(count, d).any(axis=1) | ~touched
+    return np.where(loose[:, None], np.nan, found.reshape(count, d))
