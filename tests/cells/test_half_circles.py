@@ -8,23 +8,24 @@ from unassemble import recover
 from vanishing import forgotten
 
 
-def half_hexagons(count: int, seed: int):
+def half_polygons(corners: int, count: int, seed: int):
     """Some in a row along the lower boundary, arbitrary triangles above."""
     rng = np.random.default_rng(seed)
     foot = np.column_stack([np.arange(-1, 2 * count, 2.0), np.zeros(count + 1)])
-    middle = 2.0 * np.arange(count)
-    head = [np.column_stack([middle + shift, np.full(count, np.sqrt(0.75))]) for shift in (-0.5, 0.5)]
+    middle = 2.0 * np.arange(count)[:, None]
+    angle = np.linspace(0, np.pi, corners)[1:-1]
+    head = np.stack([middle + np.cos(angle), np.broadcast_to(np.sin(angle), (count, corners - 2))], axis=-1)
     x, y = np.meshgrid(np.arange(-1, 2 * count), np.arange(1.7, 6, 0.9))
     above = np.column_stack([x.ravel(), y.ravel()]) + rng.uniform(-0.25, 0.25, (x.size, 2))
-    return delaunay(np.concatenate([foot, *head, above]), longest=2.5)
+    return delaunay(np.concatenate([foot, head.reshape(-1, 2), above]), longest=2.5)
 
 
-@pytest.mark.parametrize(("count", "seed"), [(1, 0), (3, 1), (6, 2)])
-def test_half_hexagons_on_the_boundary(count, seed):
-    known = forgotten(specimen(*half_hexagons(count, seed), c=-2.5, seed=seed))
+@pytest.mark.parametrize(("corners", "count", "seed"), [(4, 1, 0), (4, 3, 1), (4, 6, 2), (5, 4, 1)])
+def test_half_polygons_on_the_boundary(corners, count, seed):
+    known = forgotten(specimen(*half_polygons(corners, count, seed), c=-2.5, seed=seed))
     found = recover(known.matrix)
     assert found.certified, found.reason
-    assert np.diff(found.polygons_offsets).tolist() == [4] * count
+    assert np.diff(found.polygons_offsets).tolist() == [corners] * count
     assert largest_error(found.points, known.points) <= 1e-11
 
 

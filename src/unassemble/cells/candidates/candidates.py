@@ -94,8 +94,9 @@ class Candidates(CellSet):
         corners = OpenCorners.of(whole, outside[blocks.face])
         about = vertex_excess(blocks, angles)
         paths = half_circles(whole, outside[blocks.face], angles, about)
-        size = np.r_[blocks.size[faces], np.full(len(corners), 3), np.full(len(paths), 4)]
-        open_ones, none = len(corners) + len(paths), np.zeros(len(size), dtype=bool)
+        edges_on = np.concatenate([np.full(len(some), some.shape[1]) for some in paths])  # of paths
+        size = np.r_[blocks.size[faces], np.full(len(corners), 3), edges_on + 1]
+        open_ones, none = len(corners) + len(edges_on), np.zeros(len(size), dtype=bool)
         chosen = np.isin(blocks.face[blocks.order], faces)
         number = np.full(len(blocks.size), -1)
         number[faces] = np.arange(len(faces))
@@ -115,23 +116,28 @@ class Candidates(CellSet):
                 np.r_[
                     blocks.tail[blocks.order[chosen]],
                     corners.vertices.ravel(),
-                    np.column_stack([whole.tail[paths], whole.head[paths[:, -1]]]).ravel(),
+                    *(np.column_stack([whole.tail[some], whole.head[some[:, -1]]]).ravel() for some in paths),
                 ],
             ),
             sides=np.concatenate(
                 [
                     np.column_stack([number[blocks.face[blocks.order[chosen]]], blocks.order[chosen]]),
                     corners.sides + [len(faces), 0],
-                    np.column_stack([np.repeat(np.arange(len(size) - len(paths), len(size)), 3), paths.ravel()]),
+                    np.column_stack(
+                        [
+                            np.repeat(np.arange(len(size) - len(edges_on), len(size)), edges_on),
+                            np.concatenate([some.ravel() for some in paths]),
+                        ]
+                    ),
                 ]
             ),
-            belief=np.r_[1 - np.abs(sums[faces] / np.pi - 1), belief, np.full(len(paths), 0.5)],
+            belief=np.r_[1 - np.abs(sums[faces] / np.pi - 1), belief, np.full(len(edges_on), 0.5)],
             rim_sum=np.r_[rim_sums[faces], np.zeros(open_ones)],
             first=np.r_[(blocks.size <= _SHORT)[faces] & ~outer[faces], none[:open_ones]],
             outer=np.r_[outer[faces], none[:open_ones]],
-            corner=np.r_[none[: len(faces)], np.ones(len(corners), bool), none[: len(paths)]],
-            strip=np.r_[none[: len(faces)], corners.in_strip, none[: len(paths)]],
-            half=np.arange(len(size)) >= len(size) - len(paths),
+            corner=np.r_[none[: len(faces)], np.ones(len(corners), bool), none[: len(edges_on)]],
+            strip=np.r_[none[: len(faces)], corners.in_strip, none[: len(edges_on)]],
+            half=np.arange(len(size)) >= len(size) - len(edges_on),
             turns=corners.turns,
         )
 

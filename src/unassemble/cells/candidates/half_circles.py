@@ -1,22 +1,27 @@
 """Cells on half circles: their longest side, a diameter, faces right angles only and has vanished from the boundary.
 
-A corner triangle is one with three vertices. Those with four show as paths of three edges along an empty face;
-longer ones are not looked for.
+A corner triangle is one with three vertices. Those with four show as paths of three edges along an empty face, and so
+on; on irregular points more than six on one circle are rare.
 """
 
 from __future__ import annotations
+
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...topology.faces import FaceComplex, joined
 
+_EDGES = (3, 4, 5)  # of a path
 _FULL = 0.85 * np.pi  # angle sum below which a path may be one: it should be pi/2, but shares weights with neighbours
-_INNER = 0.35 * np.pi  # excess of angles at its two inner vertices, which look like vertices inside the mesh
+_INNER = 0.35 * np.pi  # excess of angles at its inner vertices, which look like vertices inside the mesh
 
 
-def half_circles(whole: FaceComplex, outside: NDArray[np.bool_], angles: NDArray, excess: NDArray) -> NDArray[np.int64]:
-    """(k, 3) half-edges of paths that may be cells on half circles.
+def half_circles(
+    whole: FaceComplex, outside: NDArray[np.bool_], angles: NDArray, excess: NDArray
+) -> list[NDArray[np.int64]]:
+    """(k, m) half-edges of paths of m edges that may be cells on half circles, for each m.
 
     Parameters
     ----------
@@ -29,13 +34,24 @@ def half_circles(whole: FaceComplex, outside: NDArray[np.bool_], angles: NDArray
     excess : (n,) float64
         Of the angles about each vertex over 2 pi.
     """
-    one = np.flatnonzero(outside)
-    two = whole.successor[one]
-    three = whole.successor[two]
-    a, b, c, d = whole.tail[one], whole.head[one], whole.head[two], whole.head[three]
-    paths = np.column_stack([one, two, three])
-    chosen = outside[paths].all(axis=1) & (a != c) & (b != d) & (a != d) & (angles[paths].sum(axis=1) < _FULL)
-    chosen &= (np.abs(excess[b]) < _INNER) & (np.abs(excess[c]) < _INNER)
-    for p, q in ((a, c), (b, d), (a, d)):
-        chosen &= ~joined(whole.n_vertices, whole.edges, p, q)
-    return paths[chosen]
+    return [_paths(whole, outside, angles, excess, m) for m in _EDGES]
+
+
+def _paths(
+    whole: FaceComplex, outside: NDArray[np.bool_], angles: NDArray, excess: NDArray, m: int
+) -> NDArray[np.int64]:
+    """Those of m edges: nowhere else joined to themselves."""
+    half = [np.flatnonzero(outside)]
+    for _ in range(m - 1):
+        half.append(whole.successor[half[-1]])
+    paths = np.column_stack(half)
+    chosen = outside[paths].all(axis=1) & (angles[paths].sum(axis=1) < _FULL)
+    chosen &= (np.abs(excess[whole.head[paths[:, :-1]]]) < _INNER).all(axis=1)
+    paths = paths[chosen]
+    vertices = np.column_stack([whole.tail[paths], whole.head[paths[:, -1]]])
+    apart = np.ones(len(paths), dtype=bool)
+    for i, j in combinations(range(m + 1), 2):
+        apart &= vertices[:, i] != vertices[:, j]
+        if j > i + 1:
+            apart &= ~joined(whole.n_vertices, whole.edges, vertices[:, i], vertices[:, j])
+    return paths[apart]
