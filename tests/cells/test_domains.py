@@ -18,12 +18,10 @@ from vanishing import area, forgotten
 
 
 # Corners of a twentieth of a square; a cell across the mouth of a slit; corners that have to change places; one corner
-# that leaves the misfit of a wrong entry; several that leave little without six entries, or what looks like noise;
-# right angles left open that no entry shows; a face that takes the place of a corner that moves away.
+# that leaves the misfit of a wrong entry; several that leave little without six entries, or what looks like noise.
 @pytest.mark.parametrize(
     ("family", "seed"),
-    [("cut_cells", 4), ("bisected", 5), ("stairs", 6), ("stairs", 9), ("cut_cells", 17), ("stairs", 319)]
-    + [("cut_cells", 413), ("cut_cells", 448), ("cut_cells", 412)],
+    [("cut_cells", 4), ("bisected", 5), ("stairs", 6), ("stairs", 9), ("cut_cells", 17), ("stairs", 319)],
 )
 def test_domain(family, seed):
     rng = np.random.default_rng(seed)

@@ -64,8 +64,10 @@ def slide(side):
         (body("quad-s2", (4, 4)), (*clamped(X0), slide(Y0)), ()),
         (body("quad-q1", (4, 4), 0.2, varying=True), (*clamped(X1), slide(Y0)), ()),
         (body("tri-p2", (4, 4)), (slide(Y0),), (Y1,)),
+        (body("tri-p2", (4, 3)), clamped(X0), (slide(X1),)),
+        (body("tri-p1", (6, 6), varying=True), (), (*clamped(X0), slide(X1), Y1)),
     ],
-    ids=["quad-q2 varying", "quad-q2", "quad-s2", "quad-q1", "tri-p2"],
+    ids=["quad-q2 varying", "quad-q2", "quad-s2", "quad-q1", "tri-p2", "tri-p2 clamped", "tri-p1"],
 )
 @pytest.mark.parametrize("order", ["interleaved", "by component"])
 def test_planes_that_fit_by_chance_are_not_certified(case, gone, identity, order):

@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from assembled import box, error, heterogeneous, on_plane, permuted_nodes, stiffness
 from supported import given, judged
 
-from unassemble.elasticity import recover_elasticity
+from unassemble.elasticity import positions, recover_elasticity
 from unassemble.elasticity.scattered.searching import searched
 from unassemble.elasticity.unknowns import find_numbering
 from unassemble.errors import RecoveryError
@@ -36,6 +36,19 @@ def test_structured_meshes_of_linear_elements(kind, support, order, zeros):
     assert found.certified
     assert truth.error < 1e-10
     assert truth.missing == 0
+
+
+@pytest.mark.parametrize("support", ["clamp", "roller", "symmetry", "identity rollers", "several"])
+def test_planes_asked_at_once_place_as_many_nodes(support, monkeypatch):
+    """As in large bodies, where the fields that are free without them would cost most of the time."""
+    case = given(body("tet-p1", perturb=0.2), support, "interleaved", "stored")
+    before = judged(recover_elasticity(case.matrix), case)
+    monkeypatch.setattr(positions, "_LARGE", 0)
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert truth.error < 1e-8
+    assert truth.missing <= before.missing
 
 
 @pytest.mark.parametrize("order", ["interleaved", "by component"])

@@ -55,11 +55,6 @@ class Begun:
     settled: bool = False
     spoilt: Reading | None = None
 
-    @property
-    def misfit(self) -> float:
-        """Of the best start."""
-        return min((start.size for start in self.starts), default=np.inf)
-
 
 def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = None) -> Reading | None:
     """The reading of a connected planar graph that fits its weights, or else the one that fits best.
@@ -111,8 +106,7 @@ def _searched(
             if begun[-1].settled:
                 return _settled(best, begun[-1].starts[0]), spoilt
             spoilt = spoilt or begun[-1].spoilt
-        # What is hopeless in the best of them ends the search.
-        for one in sorted(begun, key=lambda one: one.misfit):
+        for one in begun:
             best, done = _carried_on(best, one, effort, cover)
             if done:
                 return best, spoilt
@@ -153,7 +147,7 @@ def _carried_on(
     try:
         best = _finished(best, begun, effort)
     except HopelessError:
-        best, hopeless = better(best, _soon_repaired(begun, effort)), True
+        best, hopeless = better(best, begun.starts[0]), True
     if best is not None and best.fits:
         return best, True
     if best is not None and best.like_noise:  # or wrong in cells that leave little
@@ -166,16 +160,6 @@ def _carried_on(
     if covered is not None:
         return covered, True
     return (best if best is not None and best.pieces else None), hopeless
-
-
-def _soon_repaired(begun: Begun, effort: Effort) -> Reading:
-    """The best of the starts, each after a few solves: those with few wrong labels may have large misfits."""
-    best = begun.starts[0]
-    for start in begun.starts:
-        best = better(best, repaired(start, Effort(BATCH, effort.known)))
-        if best.fits:
-            break
-    return best
 
 
 def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Iterator[Candidates]:

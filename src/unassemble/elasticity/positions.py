@@ -18,8 +18,8 @@ from .nullspace.planes import with_planes
 from .nullspace.solution import Solution
 from .straight.straight import straightened
 
-# Nodes beyond which planes are asked at once where there are rollers: without them rows next to rollers leave hundreds
-# of fields free, all of which charts would look for.
+# Nodes of a body in space beyond which planes are asked at once where there are rollers: without them rows next to
+# rollers leave hundreds of fields free, all of which charts would look for.
 _LARGE = 2000
 
 
@@ -32,7 +32,7 @@ def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
         if best is not None and np.array_equal(valid, best.valid):
             break
         found, rows, completed = None, valid, None
-        if strict and nodal.n > _LARGE and not nodal.penalised.any():
+        if strict and nodal.dim == 3 and nodal.n > _LARGE and not nodal.penalised.any():
             found, completed = _planes_at_once(nodal, valid, patch)
         if found is None:
             try:
@@ -92,10 +92,24 @@ def _with_planes(
         return found
     if other.unique:
         hanging = uncontrolled(completed, full, full & ~valid[..., None], other.points)
-        other = replace(other, hanging=hanging if hanging.any() else None)
+        other = _hanging_on(other, hanging, found)
     if not other.exact or (found is not None and other.rank <= found.rank):
         return found
     return other
+
+
+def _hanging_on(found: Solution, uncontrolled: NDArray[np.bool_], before: Solution | None) -> Solution:
+    """Positions, and which of them hang on an assumption: in the plane all that are not determined without it.
+
+    There a row next to a roller has as many equations as it has coordinates, or hardly more, and in meshes that repeat
+    those that control each other are controlled by none.
+    """
+    hanging = uncontrolled
+    if found.points.shape[1] == 2:
+        hanging = determined(found.points)
+        if before is not None and before.unique:
+            hanging &= ~determined(before.firm_points)
+    return replace(found, hanging=hanging if hanging.any() else None)
 
 
 def _with_ratio(
@@ -122,7 +136,7 @@ def _with_ratio(
         assumed = ~found.valid | (nodal.graph @ new.astype(float) > 0)[:, None, None]
         full = full if full.ndim == 4 else np.repeat(full[..., None], nodal.dim, axis=3)
         hanging = uncontrolled(rows, full, full & assumed[..., None], other.points, terms)
-        other = replace(other, hanging=hanging if hanging.any() else None)
+        other = _hanging_on(other, hanging, found)
     if other.rank <= found.rank:
         return found
     return replace(other, planes=found.planes, valid=found.valid, ratio=2 * nu / (1 - 2 * nu))

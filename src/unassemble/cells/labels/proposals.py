@@ -1,9 +1,8 @@
 """Which labels to turn over next.
 
-Four things speak for a change: the linear explanation of the misfit (see :mod:`unassemble.cells.labels.evidence`),
-which is right from afar; right angles that are open (:mod:`unassemble.cells.labels.gaps`); what the entries of a cell's
-sides say by themselves (:mod:`unassemble.cells.labels.left_out`); and the misfit itself, which gathers around the last
-wrong cells.
+Three things speak for a change: the linear explanation of the misfit (see :mod:`unassemble.cells.labels.evidence`),
+which is right from afar; what the entries of a cell's sides say by themselves
+(:mod:`unassemble.cells.labels.left_out`); and the misfit itself, which gathers around the last wrong cells.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..reading import Reading
-from .gaps import right_gaps
 from .left_out import left_out
 
 _CLEAR = 0.35  # a label that is to change by so much is turned over
@@ -44,7 +42,6 @@ def proposals(reading: Reading, changes: NDArray) -> Iterator[NDArray[np.bool_]]
     seen = {reading.labels.tobytes()}
     for turned in chain(
         [clear],
-        right_gaps(reading),
         left_out(reading),
         _moved_corners(reading, nearby),
         _singles(reading, gain, nearby),
@@ -118,7 +115,7 @@ def _turned(reading: Reading, changes: NDArray, rows: NDArray[np.int64]) -> NDAr
     value = np.where(labels, 1.0, -np.inf)
     value[turned] = np.where(labels[turned], -np.inf, 2.0 + changes[turned])
     chosen = candidates.compatible(value)
-    fallback = np.where(labels, 1.0, candidates.belief) + changes - 10.0 * (turned & labels)
+    fallback = np.where(changes != 0, labels + changes, candidates.belief) - 10.0 * (turned & labels)
     # A cell is rather kept than replaced by a corner that can be none.
     fallback[candidates.corner & (candidates.belief < _HOPELESS)] -= 20.0
     return candidates.covering(chosen, fallback)
