@@ -77,7 +77,7 @@ def test_planes_that_fit_by_chance_are_not_certified(case, gone, identity, order
     if found.certified:
         assert judged(found, case).error < 1e-8
     else:
-        assert "no elements show that they do" in found.reason or "inferred" in found.reason
+        assert any(why in found.reason for why in ("no elements show", "inferred", "null space is larger"))
 
 
 def test_a_homogeneous_body_whose_axes_planes_alone_tell_is_certified_by_elements_only():
