@@ -18,6 +18,9 @@ _FEW = 0.08  # share of pairs of rows whose likeness may be an exception
 _DENSE = 6000  # rows up to which all cosines fit in memory, 144 MB
 _CHEAP = 100  # how much cheaper a product of dense matrices is than one of as many entries of sparse ones
 _MOST = 60_000_000  # entries of a reach beyond which it is not taken a step further
+_NUMBERS = 64  # of a sketch: 1 - cosine comes out to 18 % or so
+_FACTOR = 3.0  # that 1 - cosine of a contender may be above the least, five times that error
+_CLOSE = 0.06  # ... or whatever the least is: alignments weigh pairs that are nearly as alike against each other
 
 
 def reach(matrix: sp.csr_array, steps: int = _STEPS) -> sp.csr_array:
@@ -51,13 +54,45 @@ def alike(reached: sp.csr_array, r: NDArray, s: NDArray) -> NDArray[np.float64]:
     return np.concatenate([np.empty(0), *parts])
 
 
+def contenders(reached: sp.csr_array, r: NDArray, s: NDArray) -> NDArray[np.int64]:
+    """Places of the pairs of rows that may be each other's likest.
+
+    Cosines of long sparse rows are costly, and most pairs are far from alike. A few random combinations of the columns
+    keep angles, about, and leave a few pairs of each row (Johnson and Lindenstrauss, 1984).
+
+    Parameters
+    ----------
+    reached : (N, N) sparse
+        See :func:`reach`.
+    r, s : (k,) int64
+        Rows.
+    """
+    order = reached.shape[0]
+    mixed = np.random.default_rng(0).standard_normal((order, _NUMBERS), dtype=np.float32)
+    sketch = reached @ mixed
+    sketch /= np.maximum(np.linalg.norm(sketch, axis=1, keepdims=True), np.finfo(np.float32).tiny)
+    apart = np.empty(len(r), np.float32)
+    for k in range(0, len(r), _AT_ONCE // _NUMBERS):
+        some = slice(k, k + _AT_ONCE // _NUMBERS)
+        apart[some] = 1 - np.einsum("ij,ij->i", sketch[r[some]], sketch[s[some]])
+    least = np.full(order, np.inf, np.float32)
+    for rows in (r, s):
+        np.minimum.at(least, rows, apart)
+    return np.flatnonzero(apart <= np.maximum(_CLOSE, _FACTOR * np.maximum(least[r], least[s])))
+
+
 def compared(
     pattern: sp.csr_array, reached: sp.csr_array, rows_c: NDArray, rows_b: NDArray
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Pairs (r, s) of places in two lists of rows at most two steps apart, and how alike they are."""
+    """Pairs (r, s) of places in two lists of rows, at most two steps apart, and how alike they are.
+
+    Pairs far less alike than others of both rows are left out.
+    """
     cross = pattern[rows_c][:, rows_b]
     near = sp.coo_array(cross @ pattern[rows_b][:, rows_b] + pattern[rows_c][:, rows_c] @ cross)
     r, s = near.row.astype(np.int64), near.col.astype(np.int64)
+    some = contenders(reached, rows_c[r], rows_b[s])
+    r, s = r[some], s[some]
     return r, s, alike(reached, rows_c[r], rows_b[s])
 
 

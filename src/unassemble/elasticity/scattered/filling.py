@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..rows.grouping import same_pattern
-from ..rows.likeness import SAME, alike, partners, reach
+from ..rows.likeness import SAME, alike, contenders, partners, reach
 
 _STEPS = 4  # of the graph; rows of all directions have more to tell apart
 _STEPS_BY_DIRECTION = 3
@@ -32,12 +32,15 @@ def likest(matrix: sp.csr_array) -> NDArray[np.int64]:
     """
     pattern = _pattern(matrix)
     near = sp.coo_array(sp.triu(pattern @ pattern, 1))
-    value = alike(reach(matrix, _STEPS), near.row, near.col)
+    reached = reach(matrix, _STEPS)
+    some = contenders(reached, near.row, near.col)
+    r, s = near.row[some], near.col[some]
+    value = alike(reached, r, s)
     best = np.zeros(matrix.shape[0])
-    for ends in (near.row, near.col):
+    for ends in (r, s):
         np.maximum.at(best, ends, value)
-    chosen = (value >= best[near.row] - SAME) & (value >= best[near.col] - SAME)
-    return _linked(near.row[chosen], near.col[chosen], np.arange(matrix.shape[0]))
+    chosen = (value >= best[r] - SAME) & (value >= best[s] - SAME)
+    return _linked(r[chosen], s[chosen], np.arange(matrix.shape[0]))
 
 
 def filled(matrix: sp.csr_array, label: NDArray[np.int64]) -> sp.csr_array:
