@@ -14,6 +14,7 @@ from ..rows.constants import ROUNDING
 from ..rows.grouping import same_pattern
 from ..rows.orders import Reading
 from ..rows.traces import shows_all
+from ..scattered.filling import filled_by_direction
 from ..scattered.row_positions import placed_together
 from .matching import matched_by_likeness, matched_by_pattern
 
@@ -32,15 +33,21 @@ def by_component(matrix: sp.csr_array, d: int) -> Reading | None:
     direction = directions_by_component(matrix, d)
     if direction is None:
         return None
+    for whole in (matrix, filled_by_direction(matrix, direction, np.ones(len(direction), dtype=bool), d)):
+        found = _by_pattern(whole, direction, d)
+        if 2 * np.count_nonzero(np.bincount(found.node)[found.node] == d) > len(direction) and shows_all(whole, found, d):
+            return found
+    return Reading(matched_by_likeness(matrix, direction, d), direction)
+
+
+def _by_pattern(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> Reading:
+    """Nodes of rows of the same pattern, as far as order and positions decide."""
     everywhere = np.ones(matrix.shape[0], dtype=bool)
     group = same_pattern(matrix, ~everywhere)
     node, open_row = matched_by_pattern(group, direction, d)
     if open_row.any():
         node, open_row = placed_together(matrix, everywhere, group, node, direction, d, open_row, ordered=True)
-    found = Reading(node, direction, open_row)
-    if 2 * np.count_nonzero(np.bincount(node)[node] == d) > len(node) and shows_all(matrix, found, d):
-        return found
-    return Reading(matched_by_likeness(matrix, direction, d), direction)
+    return Reading(node, direction, open_row)
 
 
 def directions_by_component(matrix: sp.csr_array, d: int, rounding: float = ROUNDING) -> NDArray[np.int64] | None:
