@@ -87,6 +87,18 @@ def test_a_homogeneous_body_whose_axes_planes_alone_tell_is_certified_by_element
     assert "no elements show that they do" in found.reason
 
 
+@pytest.mark.parametrize("zeros", ["stored", "dropped"])
+@pytest.mark.parametrize("order", ["interleaved", "by component"])
+def test_false_planes_of_a_body_held_all_around(order, zeros):
+    """Elements tell its axes; they do not show where the nodes along the false plane are."""
+    case = held(body("tri-p1", (7, 7), 0.2), (slide(X0), X1, Y0, Y1), (), order, zeros)
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert truth.error < 1e-8
+    assert truth.missing < 0.5
+
+
 @pytest.mark.parametrize("seed", [6, 19])
 def test_rows_on_both_sides_of_a_row_of_the_identity_are_not_one_node_for_certain(seed):
     """Boundary first: single rows of nodes of two rollers, between them a row of the identity that one of them lost."""

@@ -85,3 +85,18 @@ def test_structured_quadratic_elements_come_back(kind, support, material, missin
     assert truth.error < 1e-10
     assert truth.missing <= missing
     assert truth.split == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "counts", "perturb", "support", "material"),
+    [("tri-p1", (12, 13), 0.0, "roller", "one"), ("tet-p1", (6, 6, 6), 0.2, "symmetry", "varying")],
+)
+def test_direction_by_direction_no_node_is_lost(kind, counts, perturb, support, material):
+    """Alignment of whole directions leaves some rows apart there."""
+    case = stiffness(kind, box(kind, counts, perturb=perturb), **MATERIALS[material])
+    case = given(permuted_nodes(case, seed=3), support, "by component", "dropped")
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert truth.error < 1e-9
+    assert truth.missing == 0

@@ -46,6 +46,8 @@ def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
                 found = _with_planes(*completed, found, rows, patch)
         if strict and not (found is not None and found.unique):
             found = straightened(nodal, found, valid, completed, patch)
+            if found is not None and found.straight and found.planes:  # elements told axes only
+                found = replace(found, hanging=determined(found.points))
         if found is None:
             continue
         found = replace(_with_ratio(nodal, found, completed, patch), strict=strict)

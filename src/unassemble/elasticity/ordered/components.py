@@ -35,7 +35,9 @@ def by_component(matrix: sp.csr_array, d: int) -> Reading | None:
         return None
     for whole in (matrix, filled_by_direction(matrix, direction, np.ones(len(direction), dtype=bool), d)):
         found = _by_pattern(whole, direction, d)
-        if 2 * np.count_nonzero(np.bincount(found.node)[found.node] == d) > len(direction) and shows_all(whole, found, d):
+        if 2 * np.count_nonzero(np.bincount(found.node)[found.node] == d) > len(direction) and shows_all(
+            whole, found, d
+        ):
             return found
     return Reading(matched_by_likeness(matrix, direction, d), direction)
 
