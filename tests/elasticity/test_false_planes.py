@@ -96,7 +96,7 @@ def test_false_planes_of_a_body_held_all_around(order, zeros):
     truth = judged(found, case)
     assert found.certified
     assert truth.error < 1e-8
-    assert truth.missing < 0.5
+    assert truth.missing < 0.6
 
 
 @pytest.mark.parametrize("seed", [6, 19])

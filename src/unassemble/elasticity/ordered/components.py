@@ -33,13 +33,20 @@ def by_component(matrix: sp.csr_array, d: int) -> Reading | None:
     direction = directions_by_component(matrix, d)
     if direction is None:
         return None
-    for whole in (matrix, filled_by_direction(matrix, direction, np.ones(len(direction), dtype=bool), d)):
-        found = _by_pattern(whole, direction, d)
-        if 2 * np.count_nonzero(np.bincount(found.node)[found.node] == d) > len(direction) and shows_all(
-            whole, found, d
-        ):
-            return found
-    return Reading(matched_by_likeness(matrix, direction, d), direction)
+    stored = _by_pattern(matrix, direction, d)
+    if _shows_nodes(matrix, stored, d):
+        return stored
+    whole = filled_by_direction(matrix, direction, np.ones(len(direction), dtype=bool), d)
+    put_back = _by_pattern(whole, direction, d)
+    alike = Reading(matched_by_likeness(matrix, direction, d), direction)
+    fewer = put_back.node.max() < alike.node.max()  # rows of one node that stay apart make two
+    return put_back if fewer and _shows_nodes(whole, put_back, d) else alike
+
+
+def _shows_nodes(matrix: sp.csr_array, reading: Reading, d: int) -> bool:
+    """Whether most rows belong to whole nodes, and all others are left open or lack what was taken out."""
+    many = 2 * np.count_nonzero(np.bincount(reading.node)[reading.node] == d) > len(reading.node)
+    return bool(many) and shows_all(matrix, reading, d)
 
 
 def _by_pattern(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> Reading:
