@@ -2,7 +2,7 @@
 
 from .ahead import AnalysisAhead
 from .augmented import AugmentedSystem
-from .definite import nearly_singular, solved, typical_diagonal
+from .definite import nearly_singular, solved
 from .factorisation import Factorisation, backend, factorisation
 from .least_norm import least_norm
 from .quiet import quiet
@@ -24,6 +24,5 @@ __all__ = [
     "solved",
     "svd",
     "threads",
-    "typical_diagonal",
     "upper_from_edges",
 ]

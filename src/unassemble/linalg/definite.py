@@ -17,9 +17,7 @@ _NOTHING = float(np.finfo(float).eps) ** 2  # of the largest entry: unknowns in 
 
 
 @contextmanager
-def nearly_singular(
-    matrix: UpperTriangle, shifts: Sequence[float], unit: float | None = None
-) -> Iterator[Factorisation]:
+def nearly_singular(matrix: UpperTriangle, shifts: Sequence[float]) -> Iterator[Factorisation]:
     """Cholesky factor of a positive semidefinite matrix plus the least multiple of the identity that rounding allows.
 
     Parameters
@@ -27,9 +25,7 @@ def nearly_singular(
     matrix : UpperTriangle
         Real; a normal matrix, for example.
     shifts : sequence of float
-        To be tried one after the other.
-    unit : float, optional
-        Of the shifts. The median of the diagonal, without entries that are next to zero, where not given.
+        To be tried one after the other, in units of the median of the diagonal, without entries that are next to zero.
 
     Raises
     ------
@@ -39,7 +35,9 @@ def nearly_singular(
     block = matrix.block
     start = matrix.indptr[:-1]
     own = matrix.data[start].reshape(-1, block, block)
-    typical = typical_diagonal(np.diagonal(own, axis1=1, axis2=2)) if unit is None else unit
+    diagonal = np.diagonal(own, axis1=1, axis2=2)
+    there = diagonal > _NOTHING * diagonal.max(initial=0.0)
+    typical = float(np.median(diagonal[there])) if there.any() else 1.0
     for shift in shifts:
         data = matrix.data.copy()
         data[start] = (own + shift * typical * np.eye(block)).reshape(data[start].shape)
@@ -56,12 +54,6 @@ def nearly_singular(
             solver.release()
         return
     raise GeometryError("the normal matrix of the equations is not positive; the entries may differ too much in size")
-
-
-def typical_diagonal(diagonal: NDArray[np.float64]) -> float:
-    """Median of the entries that are not next to zero; 1 if all are."""
-    there = diagonal > _NOTHING * diagonal.max(initial=0.0)
-    return float(np.median(diagonal[there])) if there.any() else 1.0
 
 
 def solved(normal: sp.csr_array, rhs: NDArray) -> NDArray[np.float64]:

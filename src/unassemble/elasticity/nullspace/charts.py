@@ -97,16 +97,16 @@ def _supported(
     chart touches leaves most of these free to move, each by itself. Neighbours that are short of equations, too, would
     only add to that.
     """
-    short = short_of_equations(local)
+    short = _short(local)
     if not short.any():
         return local
     near = np.unique(nodal.graph[local.rows[short]].indices)
     more = identities(nodal, valid, np.union1d(local.rows, near), terms)
-    kept = ~short_of_equations(more) | np.isin(more.rows, local.rows)
+    kept = ~_short(more) | np.isin(more.rows, local.rows)
     return more if kept.all() else identities(nodal, valid, more.rows[kept], terms)
 
 
-def short_of_equations(local: Identities) -> NDArray[np.bool_]:
+def _short(local: Identities) -> NDArray[np.bool_]:
     """(m,) rows with fewer equations than their share of what the nodes take that they touch."""
     touching = np.bincount(local.indices, minlength=len(local.columns))
     taken = np.add.reduceat(local.dim / touching[local.indices], local.indptr[:-1]) if len(local.rows) else np.empty(0)
