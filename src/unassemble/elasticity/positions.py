@@ -158,7 +158,7 @@ def _with_corners(nodal: NodalMatrix, found: Solution, valid: NDArray[np.bool_])
             found = replace(
                 found,
                 points=np.where(new[:, None], points, found.points),
-                component=component,
+                component=np.where(new, component, found.component),
                 planes=True,
                 ratio=found.ratio if ratio is None else ratio,
                 hanging=None if found.hanging is None else found.hanging & ~new,

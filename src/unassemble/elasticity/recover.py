@@ -24,6 +24,7 @@ from .results import ElasticityRecovery, ScalarParts
 from .rows.numbering import Numbering
 from .unknowns import find_numbering
 from .verdict import (
+    NOTHING_SHOWN,
     RESTS_ON_PLANES,
     about_cells,
     about_made_up_nodes,
@@ -229,6 +230,8 @@ def _describe(
         points = np.where(hanging[:, None], np.nan, points)
         found = found.among(~hanging)
     loose = ~determined(points)
+    if status == "certified" and loose.all():
+        status, reason = "uncertified", NOTHING_SHOWN
     component = np.where(loose, -1, solution.component)
     warnings = list(solution.warnings)
     if want_cells:

@@ -17,6 +17,7 @@ CERTIFIED = 1e-9
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
 
 
+NOTHING_SHOWN = "no node is left whose rows are shown to be its own and whose coordinates hang on no assumption"
 RESTS_ON_PLANES = (
     "more than translation and scale is free unless nodes that lack a direction lie in planes across it, and no "
     "elements show that they do"
@@ -62,8 +63,7 @@ def about_nodes(
     if withheld.any():
         told.append(
             f"{count_of(int(withheld.sum()), 'node has', 'nodes have')} rows that no element shows to be theirs; "
-            "since it was inferred which rows make up a node, or assumed that some lie in a plane or that Poisson's "
-            "ratio is one number, no coordinates are given there"
+            "since it was inferred which rows make up a node, no coordinates are given there"
         )
     if unread.any():
         told.append(

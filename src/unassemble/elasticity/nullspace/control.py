@@ -59,6 +59,8 @@ def uncontrolled(
     kept = valid.copy()
     kept[around.rows] &= ~doubted
     less = identities(nodal, kept, rows, terms)
+    if not near[less.columns].any():
+        return near & determined(points)
     field = np.random.default_rng(1).standard_normal((len(less.columns), nodal.dim, 1)) * near[less.columns, None, None]
     field = field - _least_squares(less, near, less.gradient(less.residual(field)))
     loose = near.copy()

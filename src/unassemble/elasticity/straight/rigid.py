@@ -61,9 +61,11 @@ def interchangeable(nodal: NodalMatrix, valid: NDArray[np.bool_], body: NDArray[
     rows = valid.all(axis=(1, 2))
     rng = np.random.default_rng(0)
     weight = rng.standard_normal(nodal.n) * rows / np.where(rows, nodal.size, 1.0)
-    entries = weight[nodal.node] * (nodal.data.reshape(-1, nodal.dim**2) @ rng.standard_normal(nodal.dim**2))
-    code = np.bincount(nodal.indices, entries, nodal.n)[body]
-    return bool((np.diff(np.sort(code[code != 0])) < _SAME).any())
+    blocks = nodal.data.reshape(-1, nodal.dim**2) @ rng.standard_normal((nodal.dim**2, 2))
+    code = np.column_stack([np.bincount(nodal.indices, weight[nodal.node] * one, nodal.n)[body] for one in blocks.T])
+    code = code[(code != 0).any(axis=1)]
+    code = code[np.argsort(code[:, 0])]  # of many nodes two have one number in common by chance, but not two
+    return bool((np.abs(np.diff(code, axis=0)) < _SAME).all(axis=1).any())
 
 
 def _moved(entries: Entries, functions: NDArray) -> NDArray[np.int64]:
