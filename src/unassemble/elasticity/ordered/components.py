@@ -40,7 +40,10 @@ def by_component(matrix: sp.csr_array, d: int) -> Reading | None:
     put_back = _by_pattern(whole, direction, d)
     alike = Reading(matched_by_likeness(matrix, direction, d), direction)
     fewer = put_back.node.max() < alike.node.max()  # rows of one node that stay apart make two
-    return put_back if fewer and _shows_nodes(whole, put_back, d) else alike
+    if not fewer or not _shows_nodes(whole, put_back, d):
+        return alike
+    none_open = put_back.open_row is None or not put_back.open_row.any()
+    return Reading(put_back.node, direction) if none_open else put_back  # that patterns show them is an inference here
 
 
 def _shows_nodes(matrix: sp.csr_array, reading: Reading, d: int) -> bool:
