@@ -155,12 +155,15 @@ def _with_corners(nodal: NodalMatrix, found: Solution, valid: NDArray[np.bool_])
         points, component = with_corners(nodal, valid, firm, found.component, terms)
         new = determined(points) & ~determined(firm)
         if new.any():
+            hanging = np.zeros(nodal.n, dtype=bool) if found.hanging is None else found.hanging & ~new
+            if nodal.dim == 2:  # as all that an assumption places there
+                hanging |= new
             found = replace(
                 found,
                 points=np.where(new[:, None], points, found.points),
                 component=np.where(new, component, found.component),
                 planes=True,
                 ratio=found.ratio if ratio is None else ratio,
-                hanging=None if found.hanging is None else found.hanging & ~new,
+                hanging=hanging if hanging.any() else None,
             )
     return found
