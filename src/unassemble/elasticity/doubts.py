@@ -23,25 +23,35 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     Where all entries are stored the halves of a node couple to the same nodes; and where unknowns stand in order, it
     tells which of them are in doubt. Where order alone joined rows that couple to different nodes, so are theirs.
     """
-    if numbering.kind in ORDERS and numbering.common < 1:
-        mixed = _mixed(nodal)
-        nodal = replace(nodal, doubtful=mixed) if mixed.any() else nodal
+    inferred = numbering.common < 1 and numbering.kind != "given"
+    mixed = _mixed(nodal) if inferred else np.zeros(nodal.n, dtype=bool)
     nodal = replace(nodal, sure=_sure(nodal, numbering))
+    if numbering.kind in ORDERS and mixed.any():
+        nodal = replace(nodal, doubtful=mixed)
     if numbering.open_row is not None:
-        unsure = numbering.open_row
-        if nodal.blurred is not None and numbering.unnamed is not None:  # rows without a name were left out
-            unsure = unsure | numbering.unnamed
-        doubtful = np.zeros(nodal.n, dtype=bool)
-        doubtful[numbering.node_of_row[unsure]] = True
-        doubtful &= (nodal.row_of < 0).any(axis=1)
-        if doubtful.any():
-            fellows = _fellows(numbering, doubtful)
-            nodal = replace(nodal, doubtful=doubtful | _doubtful(nodal), fellows=fellows)
+        nodal = _with_open_rows(nodal, numbering, numbering.open_row)
         if not _by_likeness(numbering):
             return nodal
     ordered = numbering.kind != "pattern" and numbering.common == 1 and not numbering.odd
     if numbering.kind == "given" or not numbering.incomplete or ordered:
         return nodal
+    return _with_halves(nodal, numbering, mixed)
+
+
+def _with_open_rows(nodal: NodalMatrix, numbering: Numbering, unsure: NDArray[np.bool_]) -> NodalMatrix:
+    """Mark nodes with rows that were left open, (N,) `unsure`, where a direction is missing."""
+    if nodal.blurred is not None and numbering.unnamed is not None:  # rows without a name were left out
+        unsure = unsure | numbering.unnamed
+    doubtful = np.zeros(nodal.n, dtype=bool)
+    doubtful[numbering.node_of_row[unsure]] = True
+    doubtful &= (nodal.row_of < 0).any(axis=1)
+    if not doubtful.any():
+        return nodal
+    return replace(nodal, doubtful=doubtful | _doubtful(nodal), fellows=_fellows(numbering, doubtful))
+
+
+def _with_halves(nodal: NodalMatrix, numbering: Numbering, mixed: NDArray[np.bool_]) -> NodalMatrix:
+    """Mark nodes that may be two halves of one, and those that may be halves of two, `mixed`, (n,)."""
     present = nodal.row_of >= 0
     some = np.asarray(present.any(axis=1) & ~present.all(axis=1))
     i, j = _near(nodal, some) if numbering.common < 1 else (nodal.node, nodal.indices)
@@ -52,9 +62,9 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     apart[i[alike]] = False
     doubtful = np.zeros(nodal.n, dtype=bool)
     doubtful[i[halves if apart.any() or numbering.common < 1 else alike]] = True
-    if numbering.common < 1 and numbering.unnamed is not None:  # one of its rows may be another node's, taken for it
+    if numbering.unnamed is not None:  # one of its rows may be another node's, taken for it
         named = np.bincount(numbering.node_of_row, numbering.unnamed, nodal.n) == 0
-        doubtful |= _mixed(nodal) & ~named
+        doubtful |= mixed & ~named
     around = np.asarray(nodal.graph @ doubtful.astype(float) > 0)  # even the directions of such rows were searched for
     blurred = around if nodal.blurred is None else nodal.blurred | around
     return replace(nodal, doubtful=doubtful | _doubtful(nodal), blurred=blurred)

@@ -12,7 +12,7 @@ from .nodal import NodalMatrix, determined, valid_pairs
 from .nullspace.control import uncontrolled
 from .nullspace.corners import with_corners
 from .nullspace.identities import boundary_terms
-from .nullspace.material import poisson_ratio
+from .nullspace.material import lame_ratio
 from .nullspace.placing import placed
 from .nullspace.planes import with_planes
 from .nullspace.solution import Solution
@@ -50,9 +50,12 @@ def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
                 found = replace(found, hanging=determined(found.points))
         if found is None:
             continue
-        found = replace(_with_ratio(nodal, found, completed, patch), strict=strict)
+        ratio = _read_ratio(nodal, found)
+        if ratio is not None:
+            found = _with_ratio(nodal, found, ratio, completed, patch)
+        found = replace(found, strict=strict)
         if strict:
-            found = _with_corners(nodal, found, rows)
+            found = _with_corners(nodal, found, ratio, rows)
         if found.unique:
             return found
         best = best or found
@@ -92,65 +95,71 @@ def _with_planes(
         other = replace(placed(completed, full, patch), planes=True, valid=valid)
     except GeometryError:
         return found
-    if other.unique:
-        hanging = uncontrolled(completed, full, full & ~valid[..., None], other.points)
-        other = _hanging_on(other, hanging, found)
-    if not other.exact or (found is not None and other.rank <= found.rank):
+    if not other.exact:
         return found
-    return other
+    return _better(found, other, completed, full, full & ~valid[..., None])
 
 
-def _hanging_on(found: Solution, uncontrolled: NDArray[np.bool_], before: Solution | None) -> Solution:
-    """Positions, and which of them hang on an assumption: in the plane all that are not determined without it.
+def _better(
+    found: Solution | None,
+    other: Solution,
+    rows: NodalMatrix,
+    valid: NDArray[np.bool_],
+    assumed: NDArray[np.bool_],
+    terms: NDArray[np.float64] | None = None,
+) -> Solution:
+    """The solution that rests on assumed equations, and which of its points hang on them; `found` if that has more.
 
-    There a row next to a roller has as many equations as it has coordinates, or hardly more, and in meshes that repeat
-    those that control each other are controlled by none.
+    In the plane all of them hang that are not determined without. There a row next to a roller has as many equations as
+    it has coordinates, or hardly more, and in meshes that repeat those that control each other are controlled by none.
     """
-    hanging = uncontrolled
-    if found.points.shape[1] == 2:
-        hanging = determined(found.points)
-        if before is not None and before.unique:
-            hanging &= ~determined(before.firm_points)
-    return replace(found, hanging=hanging if hanging.any() else None)
+    if found is not None and other.rank <= found.rank:
+        return found
+    if not other.unique:
+        return other
+    if rows.dim == 2:
+        hanging = determined(other.points)
+        if found is not None and found.unique:
+            hanging &= ~determined(found.firm_points)
+    else:
+        hanging = uncontrolled(rows, valid, assumed, other.points, terms)
+    other = replace(other, hanging=hanging if hanging.any() else None)
+    return found if found is not None and other.rank <= found.rank else other
+
+
+def _read_ratio(nodal: NodalMatrix, found: Solution) -> float | None:
+    """The number lambda / mu where it may place nodes that were left loose."""
+    if found.whole or not found.unique or found.straight:  # only points that are unique have a ratio to read off
+        return None
+    return lame_ratio(nodal, found.valid, found.firm_points)
 
 
 def _with_ratio(
     nodal: NodalMatrix,
     found: Solution,
+    ratio: float,
     completed: tuple[NodalMatrix, NDArray[np.bool_]] | None,
     patch: int | None,
 ) -> Solution:
-    """Once more with Poisson's ratio, if it is one number and nodes were left loose."""
-    if found.whole or not found.unique or found.straight:  # only points that are unique have a ratio to read off
-        return found
-    firm = found.firm_points
-    nu = poisson_ratio(nodal, found.valid, firm)
-    if nu is None:
-        return found
-    rows, full = completed if completed is not None and found.planes else (nodal, found.valid)
-    terms = boundary_terms(nodal.dim, 2 * nu / (1 - 2 * nu))
+    """Once more with lambda / mu, if it is one number; that it is the same everywhere is an assumption, too."""
+    rows, valid = completed if completed is not None and found.planes else (nodal, found.valid)
+    terms = boundary_terms(nodal.dim, ratio)
     try:
-        other = placed(rows, full, patch, terms)
+        other = replace(placed(rows, valid, patch, terms), planes=found.planes, valid=found.valid, ratio=ratio)
     except GeometryError:
         return found
-    if other.unique:  # that the ratio is the same there is an assumption, too
-        new = determined(other.points) & ~determined(firm)
-        assumed = ~found.valid | (nodal.graph @ new.astype(float) > 0)[:, None, None]
-        full = full if full.ndim == 4 else np.repeat(full[..., None], nodal.dim, axis=3)
-        hanging = uncontrolled(rows, full, full & assumed[..., None], other.points, terms)
-        other = _hanging_on(other, hanging, found)
-    if other.rank <= found.rank:
-        return found
-    return replace(other, planes=found.planes, valid=found.valid, ratio=2 * nu / (1 - 2 * nu))
+    new = determined(other.points) & ~determined(found.firm_points)
+    assumed = ~found.valid | (nodal.graph @ new.astype(float) > 0)[:, None, None]
+    valid = valid if valid.ndim == 4 else np.repeat(valid[..., None], nodal.dim, axis=3)
+    return _better(found, other, rows, valid, valid & assumed[..., None], terms)
 
 
-def _with_corners(nodal: NodalMatrix, found: Solution, valid: NDArray[np.bool_]) -> Solution:
-    """Once more where planes of rollers meet, with Poisson's ratio if that is what it takes."""
+def _with_corners(nodal: NodalMatrix, found: Solution, ratio: float | None, valid: NDArray[np.bool_]) -> Solution:
+    """Once more where planes of rollers meet, with lambda / mu if that is what it takes."""
     if found.whole or not found.unique or found.straight:
         return found
-    nu = poisson_ratio(nodal, found.valid, found.firm_points)
-    for ratio in (None,) if nu is None else (None, 2 * nu / (1 - 2 * nu)):
-        terms = None if ratio is None else boundary_terms(nodal.dim, ratio)
+    for used in (None,) if ratio is None else (None, ratio):
+        terms = None if used is None else boundary_terms(nodal.dim, used)
         firm = found.firm_points
         points, component = with_corners(nodal, valid, firm, found.component, terms)
         new = determined(points) & ~determined(firm)
@@ -163,7 +172,7 @@ def _with_corners(nodal: NodalMatrix, found: Solution, valid: NDArray[np.bool_])
                 points=np.where(new[:, None], points, found.points),
                 component=np.where(new, component, found.component),
                 planes=True,
-                ratio=found.ratio if ratio is None else ratio,
+                ratio=found.ratio if used is None else used,
                 hanging=hanging if hanging.any() else None,
             )
     return found

@@ -4,38 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from ..clock import Clock
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..matrix import check_matrix
-from ..words import count_of
-from .doubts import guessed_directions, unborne, unconfirmed, with_doubts
-from .elements.cells import no_cells, recognise_cells
+from .description import described
+from .doubts import with_doubts
 from .halves import joined, taken_apart
-from .nodal import NodalMatrix, determined, nodal_matrix, uncoupled
-from .nullspace.certificate import largest_residual
-from .nullspace.material import poisson_ratio
+from .nodal import NodalMatrix, nodal_matrix, uncoupled
 from .nullspace.solution import Solution
-from .ordered.rounded import SPREADS, with_exact_sums
+from .ordered.rounded import with_exact_sums
 from .positions import solve
 from .results import ElasticityRecovery, ScalarParts
 from .rows.numbering import Numbering
 from .unknowns import find_numbering
-from .verdict import (
-    NOTHING_SHOWN,
-    RESTS_ON_PLANES,
-    about_cells,
-    about_made_up_nodes,
-    about_nodes,
-    about_open_rows,
-    of_few_digits,
-    verdict,
-)
-
-_SAME = 1e-6  # difference up to which Poisson's ratios of pieces are one
-_NEAR = 1e-6  # residual up to which positions are good enough to look for elements
+from .verdict import about_made_up_nodes, about_open_rows
 
 
 def scalar_parts(matrix: sp.csr_array, *, block_size: int | None = None) -> ScalarParts | None:
@@ -144,7 +128,7 @@ def place_nodes(
                 "is known"
             )
         nodal, numbering, solution = _rejoined(nodal, numbering, solution, patch)
-    return _describe(nodal, numbering, solution, clock, cells, rounding)
+    return described(nodal, numbering, solution, clock, cells=cells, rounding=rounding)
 
 
 def _solved(
@@ -195,83 +179,3 @@ def _rejoined(
     except RecoveryError:
         return nodal, numbering, solution
     return (other, better[1], again) if again.unique or not solution.unique else (nodal, numbering, solution)
-
-
-def _describe(
-    nodal: NodalMatrix, numbering: Numbering, solution: Solution, clock: Clock, want_cells: bool, rounding: float
-) -> ElasticityRecovery:
-    """Certificate, material, cells and the sentences that go with them."""
-    points = solution.points
-    with clock("certify"):
-        error = largest_residual(nodal, solution.valid, points, solution.ratio)
-        near = error < max(_NEAR, SPREADS * rounding)
-        ratio = _poisson_ratio(nodal, solution, points) if near else None
-    found = no_cells()
-    lame_ratio = None if ratio is None else 2 * ratio / (1 - 2 * ratio)
-    if (want_cells or solution.straight or solution.hanging is not None) and near:
-        with clock("cells"):
-            found = recognise_cells(nodal, points, lame_ratio)
-    backward = found.backward_error if found.certified else error
-    status, reason = verdict(nodal, solution, error, found, numbering)
-    if rounding and near and not any(solution.freedoms):
-        status, reason = "uncertified", of_few_digits(rounding, error)
-    elif rounding:
-        reason = f"{reason}; the entries are rounded to {rounding:.0e} of themselves, which may hide what rows lack"
-    withheld = np.zeros(nodal.n, dtype=bool)
-    if status == "certified" and (found.certified or numbering.open_row is not None or not numbering.incomplete):
-        withheld = unconfirmed(nodal, numbering, points, found.shown)
-    if withheld.any():
-        points = np.where(withheld[:, None], np.nan, points)
-        found = found.among(~withheld)
-    hanging = unborne(nodal, solution, found)
-    if hanging.any() and (hanging | ~determined(points)).all():
-        status, reason = "uncertified", RESTS_ON_PLANES
-    elif hanging.any():
-        points = np.where(hanging[:, None], np.nan, points)
-        found = found.among(~hanging)
-    loose = ~determined(points)
-    if status == "certified" and loose.all():
-        status, reason = "uncertified", NOTHING_SHOWN
-    component = np.where(loose, -1, solution.component)
-    warnings = list(solution.warnings)
-    if want_cells:
-        warnings += about_cells(found)
-    warnings += about_nodes(nodal, loose, withheld, hanging & loose)
-    if solution.planes:
-        warnings.append(
-            "nodes that lack a direction were taken to lie in planes across it, which fits, to determine others"
-        )
-    if solution.straight:
-        warnings.append(
-            "the body is homogeneous and held all around, where the identities leave an affine map free; the elements "
-            "determined it"
-        )
-    if solution.ratio is not None:
-        warnings.append("Poisson's ratio, read off the nodes that determine it, was used to determine others")
-    guessed = guessed_directions(numbering, loose)
-    if guessed.any():
-        warnings.append(
-            f"which directions {count_of(int(guessed.sum()), 'row', 'rows')} of nodes without coordinates belong to is "
-            "not proven: `direction_of_row` is -1 there, and rigid-body modes are zero"
-        )
-    direction = np.where(guessed, -1, numbering.direction_of_row)
-    return ElasticityRecovery(
-        points, numbering.node_of_row, direction, np.asarray(loose, dtype=np.int8), component,
-        solution.evidence, ratio, found, backward, status, reason, numbering.kind, tuple(warnings), clock.timings,
-    )  # fmt: skip
-
-
-def _poisson_ratio(nodal: NodalMatrix, solution: Solution, points: NDArray[np.float64]) -> float | None:
-    """Poisson's ratio as the boundary terms have it, and as the elements that told axes have it; None if they differ.
-
-    None too where more than translation and scale is free, since boundary terms go with the points.
-    """
-    if any(solution.freedoms):
-        return None
-    told = [ratio / (2 * (1 + ratio)) for ratio in solution.straight]
-    if len(solution.straight) < len(solution.evidence):
-        nu = poisson_ratio(nodal, solution.valid, points)
-        if nu is None:
-            return None
-        told.append(nu)
-    return told[0] if np.ptp(told) < _SAME else None

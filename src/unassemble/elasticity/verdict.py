@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from ..words import count_of
 from .elements.cells import Cells
@@ -15,76 +14,11 @@ from .rows.numbering import Numbering
 
 CERTIFIED = 1e-9
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
-
-
 NOTHING_SHOWN = "no node is left whose rows are shown to be its own and whose coordinates hang on no assumption"
 RESTS_ON_PLANES = (
     "more than translation and scale is free unless nodes that lack a direction lie in planes across it, and no "
     "elements show that they do"
 )
-
-
-def about_cells(found: Cells) -> list[str]:
-    """What there is to say of the elements."""
-    if not found.recognised:
-        return [
-            "no elements were recognised: looked for are triangles and quadrilaterals, tetrahedra and hexahedra, "
-            "linear, or quadratic and of one kind throughout"
-        ]
-    if not found.certified:
-        return [
-            "the elements were read off the graph and are not certified: no material was found with which they "
-            "re-assemble to the matrix"
-        ]
-    if found.varying:
-        return ["the material differs within elements: their Lame coefficients are means"]
-    return []
-
-
-def about_nodes(
-    nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[np.bool_], hanging: NDArray[np.bool_]
-) -> list[str]:
-    """Why nodes have no coordinates.
-
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    loose : (n,) bool
-        Nodes without coordinates.
-    withheld : (n,) bool
-        Those that no cell confirms.
-    hanging : (n,) bool
-        Those whose coordinates rest on an assumption that nothing confirms.
-    """
-    apart: NDArray[np.bool_] = np.asarray(without_trace(nodal).any(axis=1))
-    beside = np.zeros(nodal.n, dtype=bool)
-    beside[nodal.node[apart[nodal.indices]]] = True
-    unread, told = loose & ~withheld & ~hanging & beside, []
-    if withheld.any():
-        told.append(
-            f"{count_of(int(withheld.sum()), 'node has', 'nodes have')} rows that no element shows to be theirs; "
-            "since it was inferred which rows make up a node, no coordinates are given there"
-        )
-    if unread.any():
-        told.append(
-            f"{count_of(int(unread.sum()), 'node is', 'nodes are')} not determined, since rows there, or next to it, "
-            "belong to nodes that were not recognised; give the numbering if it is known"
-        )
-    resting = int((hanging & ~withheld).sum())
-    if resting:
-        told.append(
-            f"{count_of(resting, 'node is', 'nodes are')} determined only if nodes that lack a direction lie in planes "
-            "across it, or if Poisson's ratio is the same there, which neither another equation nor an element "
-            "confirms; no coordinates are given there"
-        )
-    rest = int((loose & ~withheld & ~hanging & ~unread).sum())
-    if rest:
-        told.append(
-            f"{count_of(rest, 'node is', 'nodes are')} not determined: rows coupled to {'it' if rest == 1 else 'them'} "
-            "lack entries, as next to eliminated unknowns, or belong to other axes, as at inclined supports, and no "
-            "equation that holds for every element and material is left of these"
-        )
-    return told
 
 
 def about_open_rows(numbering: Numbering) -> str:

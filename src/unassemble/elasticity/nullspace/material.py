@@ -1,4 +1,4 @@
-"""Poisson's ratio, read off the boundary terms p and q."""
+"""The ratio of the Lame coefficients, read off the boundary terms p and q, and Poisson's ratio."""
 
 from __future__ import annotations
 
@@ -11,8 +11,13 @@ from .identities import identities
 _CONSTANT = 1e-6  # spread of lambda / mu, relative to 1 + lambda / mu, up to which it counts as one number
 
 
-def poisson_ratio(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64]) -> float | None:
-    """Poisson's ratio of the body, in plane strain where d is 2; None where it varies or does not show.
+def poisson_ratio(lame_ratio: float) -> float:
+    """Poisson's ratio, in plane strain where the body is plane, of lambda / mu."""
+    return lame_ratio / (2 * (1 + lame_ratio))
+
+
+def lame_ratio(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64]) -> float | None:
+    """The number lambda / mu of the body; None where it varies or does not show.
 
     p = int lambda grad phi_i and q = int mu grad phi_i are in the ratio lambda : mu at every node. They vanish at nodes
     around which the material is homogeneous, so that nodes on free surfaces and material interfaces count.
@@ -38,8 +43,8 @@ def poisson_ratio(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[
     if not len(q) or strength.max() < 1e-8:
         return None
     p, q = p[strength > 1e-3 * strength.max()], q[strength > 1e-3 * strength.max()]
-    ratio = (p * q).sum() / (q * q).sum()
+    ratio = float((p * q).sum() / (q * q).sum())
     misfit = np.linalg.norm(p - ratio * q, axis=1) / np.linalg.norm(q, axis=1)
     if np.max(misfit) > _CONSTANT * (1 + abs(ratio)):
         return None
-    return float(ratio / (2 * (1 + ratio)))
+    return ratio

@@ -1,0 +1,105 @@
+"""What is said of positions once they are found: certificate, material, cells, and what is not certain."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..clock import Clock
+from .doubts import guessed_directions, unborne, unconfirmed
+from .elements.cells import no_cells, recognise_cells
+from .nodal import NodalMatrix, determined
+from .nullspace.certificate import largest_residual
+from .nullspace.material import lame_ratio, poisson_ratio
+from .nullspace.solution import Solution
+from .ordered.rounded import SPREADS
+from .remarks import about_assumptions, about_cells, about_directions, about_nodes
+from .results import ElasticityRecovery
+from .rows.numbering import Numbering
+from .verdict import NOTHING_SHOWN, RESTS_ON_PLANES, of_few_digits, verdict
+
+_SAME = 1e-6  # difference up to which Poisson's ratios of pieces are one
+_NEAR = 1e-6  # residual up to which positions are good enough to look for elements
+
+
+def described(
+    nodal: NodalMatrix, numbering: Numbering, solution: Solution, clock: Clock, *, cells: bool, rounding: float
+) -> ElasticityRecovery:
+    """The recovery, with its certificate, material and cells, and the sentences that go with them.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    numbering : Numbering
+    solution : Solution
+    clock : Clock
+    cells : bool
+        Look for elements too.
+    rounding : float
+        Of the entries, relative, where they have few digits; else 0.
+    """
+    with clock("certify"):
+        error = largest_residual(nodal, solution.valid, solution.points, solution.ratio)
+        near = error < max(_NEAR, SPREADS * rounding)
+        ratio = _lame_ratio(nodal, solution) if near else None
+    found = no_cells()
+    if (cells or solution.straight or solution.hanging is not None) and near:
+        with clock("cells"):
+            found = recognise_cells(nodal, solution.points, ratio)
+    backward = found.backward_error if found.certified else error
+    status, reason = verdict(nodal, solution, error, found, numbering)
+    if rounding and near and not any(solution.freedoms):
+        status, reason = "uncertified", of_few_digits(rounding, error)
+    elif rounding:
+        reason = f"{reason}; the entries are rounded to {rounding:.0e} of themselves, which may hide what rows lack"
+    withheld = np.zeros(nodal.n, dtype=bool)
+    if status == "certified" and (found.certified or numbering.open_row is not None or not numbering.incomplete):
+        withheld = unconfirmed(nodal, numbering, solution.points, found.shown)
+    hanging = unborne(nodal, solution, found)
+    if hanging.any() and (hanging | withheld | ~determined(solution.points)).all():
+        status, reason = "uncertified", RESTS_ON_PLANES
+        hanging = np.zeros(nodal.n, dtype=bool)  # said of all of them
+    kept = ~(withheld | hanging)
+    points = np.where(kept[:, None], solution.points, np.nan)
+    found = found.among(kept)
+    loose = ~determined(points)
+    if status == "certified" and loose.all():
+        status, reason = "uncertified", NOTHING_SHOWN
+    guessed = guessed_directions(numbering, loose)
+    return ElasticityRecovery(
+        points=points,
+        node_of_row=numbering.node_of_row,
+        direction_of_row=np.where(guessed, -1, numbering.direction_of_row),
+        node_status=np.asarray(loose, dtype=np.int8),
+        component=np.where(loose, -1, solution.component),
+        evidence=solution.evidence,
+        poisson_ratio=None if ratio is None else poisson_ratio(ratio),
+        cells=found,
+        backward_error=backward,
+        status=status,
+        reason=reason,
+        numbering=numbering.kind,
+        warnings=(
+            *solution.warnings,
+            *(about_cells(found) if cells else ()),
+            *about_nodes(nodal, loose, withheld, hanging),
+            *about_assumptions(solution),
+            *about_directions(int(guessed.sum())),
+        ),
+        timings=clock.timings,
+    )
+
+
+def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
+    """The number lambda / mu as boundary terms have it, and as the elements that told axes do; None if they differ.
+
+    None too where more than translation and scale is free, since boundary terms go with the points.
+    """
+    if any(solution.freedoms):
+        return None
+    told = list(solution.straight)
+    if len(solution.straight) < len(solution.evidence):
+        read = lame_ratio(nodal, solution.valid, solution.points)
+        if read is None:
+            return None
+        told.append(read)
+    return told[0] if np.ptp([poisson_ratio(one) for one in told]) < _SAME else None
