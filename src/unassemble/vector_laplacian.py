@@ -58,23 +58,11 @@ def recover_directions(
     except RecoveryError as error:
         raise type(error)(f"the directions are not coupled (a vector Laplacian), and of one: {error}") from error
     worst = max([mesh, *others], key=lambda one: (not one.certified, one.backward_error))
-    n = numbering.n_nodes
-    points, component = np.full((n, 2), np.nan), np.full(n, -1)
-    points[nodes], component[nodes] = mesh.points, mesh.component
-    status = np.ones(n, np.int8)
-    status[nodes] = mesh.node_status
     notes = ["the directions are not coupled: each was treated as a scalar matrix"]
     if others:
         notes.append("the directions have different matrices; the mesh is that of the one with most nodes")
     return replace(
-        mesh,
-        points=points,
-        triangles=nodes[mesh.triangles],
-        component=component,
-        hinges=nodes[mesh.hinges],
-        boundary=nodes[mesh.boundary],
-        node_status=status,
-        worst_entries=_rows_of(parts, lead)[mesh.worst_entries],
+        _among_all_nodes(mesh, nodes, _rows_of(parts, lead), numbering.n_nodes),
         status=worst.status,
         reason=worst.reason,
         backward_error=worst.backward_error,
@@ -83,6 +71,28 @@ def recover_directions(
         node_of_row=numbering.node_of_row,
         direction_of_row=numbering.direction_of_row,
         numbering=numbering.kind,
+    )
+
+
+def _among_all_nodes(mesh: Recovery, nodes: NDArray[np.int64], rows: NDArray[np.int64], n: int) -> Recovery:
+    """The mesh of one direction with the numbers of all n nodes, and entries with those of the rows of the matrix.
+
+    Its point k is node ``nodes[k]`` and has the row ``rows[k]``.
+    """
+    points, component, status = np.full((n, 2), np.nan), np.full(n, -1), np.ones(n, np.int8)
+    points[nodes], component[nodes], status[nodes] = mesh.points, mesh.component, mesh.node_status
+    return replace(
+        mesh,
+        points=points,
+        component=component,
+        node_status=status,
+        triangles=nodes[mesh.triangles],
+        polygons_data=nodes[mesh.polygons_data],
+        hinges=nodes[mesh.hinges],
+        boundary=nodes[mesh.boundary],
+        alternatives=tuple(one.renumbered(nodes) for one in mesh.alternatives),
+        worst_entries=rows[mesh.worst_entries],
+        suspects=rows[mesh.suspects],
     )
 
 

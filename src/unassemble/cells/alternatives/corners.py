@@ -36,6 +36,21 @@ class Alternative:
     same_scale: bool = True
     tested: bool = True
 
+    def renumbered(self, number: NDArray[np.int64]) -> Alternative:
+        """The same with row v called ``number[v]``."""
+
+        def named(rows: tuple[int, ...]) -> tuple[int, ...]:
+            return tuple(number[list(rows)].tolist())
+
+        return replace(
+            self,
+            around=named(self.around),
+            found=named(self.found),
+            other=named(self.other),
+            cells=tuple(named(cell) for cell in self.cells),
+            other_cells=tuple(named(cell) for cell in self.other_cells),
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class OrientedMesh:
