@@ -9,6 +9,8 @@ import numpy as np
 import scipy.sparse as sp
 from assembled import Assembled, on_plane
 
+from unassemble.elasticity import recover_elasticity
+
 SUPPORTS = (
     "free", "clamp", "roller", "symmetry", "identity clamp", "identity rollers", "penalty clamp", "penalty rollers",
     "several",
@@ -131,6 +133,19 @@ def judged(found, truth: Given) -> Judgement:
         elif here.any():
             worst = max(worst, _misfit(found.points[here], true[here][:, axes], np.ptp(truth.points, axis=0)))
     return Judgement(worst, missing, split)
+
+
+def assert_certified(case: Given, error: float, missing: float, split: int | None = None) -> None:
+    """What comes back has to be certified and right, to leave out no larger share of the nodes, and to split no more.
+
+    `error` is that of positions in diameters.
+    """
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified, found.reason
+    assert truth.error < error
+    assert truth.missing <= missing
+    assert split is None or truth.split == split
 
 
 def _misfit(a: np.ndarray, b: np.ndarray, extent: np.ndarray) -> float:

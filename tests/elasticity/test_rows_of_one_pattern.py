@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from assembled import box, heterogeneous, permuted_nodes, stiffness
-from supported import Given, given, judged
+from supported import Given, assert_certified, given, judged
 
 from unassemble.elasticity import recover_elasticity
 from unassemble.elasticity.nodal import nodal_matrix
@@ -31,12 +31,7 @@ def body(kind, support, material="varying", perturb=0.0, zeros="stored", counts=
 def test_quadrilaterals_of_nine_nodes(material, perturb, support, missing):
     """In each cell of the rim at least two nodes share their neighbours, and so do 80 of 143 nodes here."""
     case = body("quad-q2", support, material, perturb)
-    found = recover_elasticity(case.matrix)
-    truth = judged(found, case)
-    assert found.certified
-    assert truth.error < 1e-10
-    assert truth.missing <= missing
-    assert truth.split == 0
+    assert_certified(case, 1e-10, missing, split=0)
 
 
 def test_halves_are_not_joined_where_that_sets_others_free():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from assembled import box, heterogeneous, permuted_nodes, stiffness
-from supported import given, judged
+from supported import assert_certified, given, judged
 
 from unassemble.elasticity import recover_elasticity
 from unassemble.elasticity.directions.extension import extended_directions
@@ -66,12 +66,7 @@ def test_rows_of_one_pattern_are_joined_where_they_coincide():
 @pytest.mark.parametrize(("kind", "support", "missing"), [("hex-s2", "free", 0), ("tet-p2", "clamp", 0.3)])
 def test_quadratic_solids_come_back_with_rows_at_random(kind, support, missing):
     case = quadratic(kind, support)
-    found = recover_elasticity(case.matrix)
-    truth = judged(found, case)
-    assert found.certified
-    assert truth.error < 1e-10
-    assert truth.missing <= missing
-    assert truth.split == 0
+    assert_certified(case, 1e-10, missing, split=0)
 
 
 @pytest.mark.parametrize(
@@ -82,12 +77,7 @@ def test_halves_do_not_pass_for_nodes_that_lack_a_direction(support, perturb, co
     """Most rows next to a support have no position of their own; what their fellows lack is counted by pattern."""
     body = permuted_nodes(stiffness("hex-s2", box("hex-s2", counts, perturb=perturb), lam=1.5), seed=1)
     case = given(body, support, "at random", "stored")
-    found = recover_elasticity(case.matrix)
-    truth = judged(found, case)
-    assert found.certified
-    assert truth.error < 1e-10
-    assert truth.missing <= missing
-    assert truth.split == 0
+    assert_certified(case, 1e-10, missing, split=0)
 
 
 def test_what_a_pattern_lacks_is_counted():

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from assembled import box, heterogeneous, permuted_nodes, stiffness
-from supported import given, judged
+from supported import assert_certified, given
 
-from unassemble.elasticity import recover_elasticity
 from unassemble.elasticity.directions.extension import SETTLED, extended_directions
 from unassemble.elasticity.rows.grouping import same_pattern
 from unassemble.elasticity.scattered.filling import filled, filled_by_direction, likest
@@ -79,12 +78,7 @@ def test_directions_spread_from_rows_that_may_be_no_node(kind, material):
 )
 def test_structured_quadratic_elements_come_back(kind, support, material, missing):
     case = body(kind, support, material)
-    found = recover_elasticity(case.matrix)
-    truth = judged(found, case)
-    assert found.certified
-    assert truth.error < 1e-10
-    assert truth.missing <= missing
-    assert truth.split == 0
+    assert_certified(case, 1e-10, missing, split=0)
 
 
 @pytest.mark.parametrize(
@@ -95,8 +89,4 @@ def test_direction_by_direction_no_node_is_lost(kind, counts, perturb, support, 
     """Alignment of whole directions leaves some rows apart there."""
     case = stiffness(kind, box(kind, counts, perturb=perturb), **MATERIALS[material])
     case = given(permuted_nodes(case, seed=3), support, "by component", "dropped")
-    found = recover_elasticity(case.matrix)
-    truth = judged(found, case)
-    assert found.certified
-    assert truth.error < 1e-9
-    assert truth.missing == 0
+    assert_certified(case, 1e-9, 0.0)
