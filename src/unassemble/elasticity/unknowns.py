@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError, RecoveryError
-from .ordered.gaps import by_component_with_gaps, interleaved_by_pattern, interleaved_with_gaps
+from .ordered.gaps import by_component_with_gaps, interleaved_by_pattern, interleaved_with_gaps, same_cuts
 from .ordered.sampling import promising
 from .rows.constants import annihilated_share, uncoupled_rows
 from .rows.grouping import by_first_row, coupled_in_common, made_up, same_pattern
@@ -179,12 +179,14 @@ def _with_gaps(matrix: sp.csr_array, regular: Numbering, sizes: tuple[int, ...])
     nodes that have all of theirs. Sums tell their directions, or they couple to no node in common. Where neither shows,
     rows that couple to different nodes can be one node's all the same, as entries that vanished need not be stored.
     """
+    impossible = int(made_up(matrix, regular.node_of_row, regular.direction_of_row, regular.block_size).sum())
     if regular.kind == "interleaved":
         told = interleaved_by_pattern(matrix, sizes)
         found = [] if told is None else [told]
+    elif not impossible and same_cuts(matrix, regular):
+        return regular
     else:
         found = by_component_with_gaps(matrix, sizes)
-    impossible = int(made_up(matrix, regular.node_of_row, regular.direction_of_row, regular.block_size).sum())
     for one in found:
         if one.common == 1 and not one.odd and (impossible or _contradicts(one, regular)):
             return one

@@ -13,7 +13,7 @@ from ..rows.constants import uncoupled_rows
 from ..rows.grouping import by_first_row, same_pattern
 from ..rows.numbering import Numbering, measured
 from ..rows.orders import Reading
-from .components import by_component
+from .components import by_component, directions_by_component
 from .runs import run_lengths, told_by_likeness, told_by_pattern
 
 
@@ -28,6 +28,13 @@ def by_component_with_gaps(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list
             if found[-1].settled:
                 break
     return found
+
+
+def same_cuts(matrix: sp.csr_array, regular: Numbering) -> bool:
+    """Whether rows show the same cuts between directions as the order without gaps has, so that it is the only one."""
+    live, inner = _live_part(matrix)
+    direction = directions_by_component(inner, regular.block_size)
+    return direction is not None and np.array_equal(direction, regular.direction_of_row[live])
 
 
 def interleaved_with_gaps(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[Numbering]:

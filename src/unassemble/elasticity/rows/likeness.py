@@ -15,8 +15,9 @@ _AT_ONCE = 1 << 22  # entries of the reach to multiply at a time
 SAME = 1e-6  # single precision
 _SAMPLE = 100
 _FEW = 0.08  # share of pairs of rows whose likeness may be an exception
-_DENSE = 6000  # rows up to which all cosines fit in memory, 144 MB
-_CHEAP = 100  # how much cheaper a product of dense matrices is than one of as many entries of sparse ones
+_DENSE = 6000  # rows up to which the reach of all fits in memory as a dense matrix, 144 MB
+_FULL = 0.05  # share of its entries beyond which a dense one costs less time than a sparse one
+_CHEAP = 30  # how much less time a product of dense matrices takes than as many products of single rows
 _MOST = 60_000_000  # entries of a reach beyond which it is not taken a step further
 _NUMBERS = 64  # of a sketch: 1 - cosine comes out to 18 % or so
 _FACTOR = 3.0  # that 1 - cosine of a contender may be above the least, five times that error
@@ -35,7 +36,7 @@ def reach(matrix: sp.csr_array, steps: int = _STEPS) -> sp.csr_array:
     for _ in range(steps - 1):
         if reached.nnz * (step.nnz / max(step.shape[0], 1)) > _MOST * 8:
             break
-        reached = sp.csr_array(reached @ step)
+        reached = sp.csr_array(step @ reached.toarray() if _full(reached) else step @ reached)  # which commute
     norm = np.sqrt(np.asarray(reached.power(2).sum(axis=1)).ravel())
     return sp.csr_array(sp.diags_array(1 / np.where(norm > 0, norm, 1).astype(np.float32)) @ reached)
 
@@ -43,15 +44,26 @@ def reach(matrix: sp.csr_array, steps: int = _STEPS) -> sp.csr_array:
 def alike(reached: sp.csr_array, r: NDArray, s: NDArray) -> NDArray[np.float64]:
     """(k,) cosines between the reaches of rows r and s."""
     order = reached.shape[0]
-    if order <= _DENSE and order**3 < _CHEAP * len(r) * (reached.nnz / order):
+    if _full(reached) and order**2 < _CHEAP * len(r):
         whole = reached.toarray()
         return np.asarray((whole @ whole.T)[r, s], dtype=np.float64)
-    step = max(int(_AT_ONCE / max(reached.nnz / max(reached.shape[0], 1), 1)), 1)
-    parts = [
-        np.asarray(reached[r[k : k + step]].multiply(reached[s[k : k + step]]).sum(axis=1), dtype=np.float64).ravel()
-        for k in range(0, len(r), step)
-    ]
+    rows = reached.toarray() if _full(reached) else reached
+    step = max(_AT_ONCE * order // max(reached.nnz, 1), 1)
+    parts = [_products(rows[r[k : k + step]], rows[s[k : k + step]]) for k in range(0, len(r), step)]
     return np.concatenate([np.empty(0), *parts])
+
+
+def _products(rows: sp.csr_array | NDArray, others: sp.csr_array | NDArray) -> NDArray[np.float64]:
+    """(k,) inner products of rows of one matrix with those of another, added up in double precision."""
+    if isinstance(rows, np.ndarray):
+        return np.einsum("ij,ij->i", rows, others, dtype=np.float64)
+    return np.asarray(rows.multiply(others).sum(axis=1), dtype=np.float64).ravel()
+
+
+def _full(reached: sp.csr_array) -> bool:
+    """Whether a dense matrix is the better one for it."""
+    order = reached.shape[0]
+    return order <= _DENSE and reached.nnz > _FULL * order**2
 
 
 def contenders(reached: sp.csr_array, r: NDArray, s: NDArray) -> NDArray[np.int64]:
