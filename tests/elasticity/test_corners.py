@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from assembled import Assembled, box, heterogeneous, permuted_nodes, stiffness
+from assembled import Assembled, box, heterogeneous, permuted_nodes, stiffness, vector_laplace
 from supported import Given, given, judged, with_zeros
 
 from unassemble.elasticity import recover_elasticity
+from unassemble.elasticity.nodal import nodal_matrix, valid_pairs
+from unassemble.elasticity.nullspace.corners import said
+from unassemble.elasticity.nullspace.identities import identities
+from unassemble.elasticity.unknowns import given_numbering
 
 
 def varying_shear(x):
@@ -114,3 +118,16 @@ def test_nodes_that_hang_on_an_assumption_alone_get_no_coordinates(kind, offset,
     assert truth.error < 1e-9
     if kind == "tri-p2" and offset[0]:
         assert truth.missing > 0
+
+
+@pytest.mark.parametrize(("form", "least", "most"), [(None, 12, 21), (vector_laplace, 3, 3)])
+def test_equations_without_coefficients_say_nothing(form, least, most):
+    """Where directions are not coupled, entries between them vanish, and so does what would have to fit."""
+    given_matrix = stiffness("hex-s2", box("hex-s2", (3, 3, 3), perturb=0.2), form=form).matrix
+    n = given_matrix.shape[0] // 3
+    numbering = given_numbering(given_matrix, np.repeat(np.arange(n), 3), np.tile(np.arange(3), n))
+    nodal = nodal_matrix(given_matrix, numbering)
+    around = identities(nodal, valid_pairs(nodal), np.arange(n))
+    every = np.ones(len(around.rows), dtype=bool)
+    assert (around.equations == 21).all()
+    assert least * n <= said(around, every) <= most * n

@@ -117,9 +117,17 @@ def _placed(
     found = v[strong].T @ ((u[:, strong].T @ right) / s[strong])
     here = corner[around.rows]
     planes = np.linalg.matrix_rank(design[~here].reshape(-1, count * d), tol=SOFT) if (~here).any() else 0
-    spare = around.equations[here].sum() - (strong.sum() - planes)
+    spare = said(around, here) - (strong.sum() - planes)
     if spare < d + level or np.abs(whole @ found - right).max() > EXACT:
         return none
     free = np.abs(v[~strong]).max(axis=0, initial=0) > EXACT
     loose = free.reshape(count, d).any(axis=1) | ~touched
     return np.where(loose[:, None], np.nan, found.reshape(count, d))
+
+
+def said(around: Identities, some: NDArray[np.bool_]) -> int:
+    """Independent equations of some rows, (m,) bool; those whose coefficients all vanish say nothing."""
+    count = around.dim**3  # as many as a row can have
+    fields = np.random.default_rng(0).standard_normal((len(around.columns), around.dim, count))
+    values = around.residual(fields)[some].reshape(-1, count, count)
+    return int(np.linalg.matrix_rank(values, tol=SOFT).sum()) if len(values) else 0
