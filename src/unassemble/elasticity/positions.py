@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import GeometryError
 from .nodal import NodalMatrix, determined, valid_pairs
 from .nullspace.control import uncontrolled
-from .nullspace.corners import with_corners
+from .nullspace.corners import corners_of, with_corners
 from .nullspace.identities import boundary_terms
 from .nullspace.material import poisson_ratio
 from .nullspace.placing import placed
@@ -148,7 +148,7 @@ def _with_corners(nodal: NodalMatrix, found: Solution, valid: NDArray[np.bool_])
     """Once more where planes of rollers meet, with Poisson's ratio if that is what it takes."""
     if found.whole or not found.unique or found.straight:
         return found
-    nu = poisson_ratio(nodal, found.valid, found.firm_points)
+    nu, loose = poisson_ratio(nodal, found.valid, found.firm_points), ~determined(found.firm_points)
     for ratio in (None,) if nu is None else (None, 2 * nu / (1 - 2 * nu)):
         terms = None if ratio is None else boundary_terms(nodal.dim, ratio)
         firm = found.firm_points
@@ -158,6 +158,8 @@ def _with_corners(nodal: NodalMatrix, found: Solution, valid: NDArray[np.bool_])
             hanging = np.zeros(nodal.n, dtype=bool) if found.hanging is None else found.hanging & ~new
             if nodal.dim == 2:  # as all that an assumption places there
                 hanging |= new
+            elif nodal.sure is not None:
+                hanging |= new & ~nodal.sure
             found = replace(
                 found,
                 points=np.where(new[:, None], points, found.points),
@@ -166,4 +168,4 @@ def _with_corners(nodal: NodalMatrix, found: Solution, valid: NDArray[np.bool_])
                 ratio=found.ratio if ratio is None else ratio,
                 hanging=hanging if hanging.any() else None,
             )
-    return found
+    return replace(found, corners=corners_of(nodal, valid, found.points, loose))

@@ -210,7 +210,7 @@ def _describe(
     lame_ratio = None if ratio is None else 2 * ratio / (1 - 2 * ratio)
     if (want_cells or solution.straight or solution.hanging is not None) and near:
         with clock("cells"):
-            found = recognise_cells(nodal, points, lame_ratio)
+            found = recognise_cells(nodal, points, lame_ratio, solution.corners)
     backward = found.backward_error if found.certified else error
     status, reason = verdict(nodal, solution, error, found, numbering)
     if rounding and near and not any(solution.freedoms):

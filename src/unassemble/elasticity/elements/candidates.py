@@ -89,9 +89,10 @@ def _simplices(kind: Kind, graph: Graph, points: NDArray, edges: Graph) -> Block
 
 
 def coupled(nodal: NodalMatrix, points: NDArray) -> Graph:
-    """Pairs of determined nodes with an entry."""
-    known = determined(points)
+    """Pairs of determined nodes with an entry that is not zero, or that lack some, which may not have been zero."""
+    known, lacking = determined(points), np.asarray((nodal.row_of < 0).any(axis=1))
     i, j = nodal.node, nodal.indices
     live = np.abs(nodal.data).max(axis=(1, 2)) > 1e-13 * np.minimum(nodal.size[i], nodal.size[j])  # symmetric
+    live |= lacking[i] | lacking[j]
     live &= known[i] & known[j]
     return Graph(sp.csr_array((np.ones(live.sum()), (i[live], j[live])), shape=(nodal.n,) * 2))

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..corner_nodes import Corner, with_corner_nodes
 from ..nodal import NodalMatrix, determined, surrounded, valid_pairs
 from .candidates import Block, candidates, coupled
 from .cliques import Graph
@@ -96,7 +97,12 @@ def no_cells() -> Cells:
     return Cells({}, np.empty((0, 2)), float("nan"))
 
 
-def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: float | None = None) -> Cells:
+def recognise_cells(
+    nodal: NodalMatrix,
+    points: NDArray[np.float64],
+    ratio: float | None = None,
+    corners: Sequence[Corner] = (),
+) -> Cells:
     """Find cells that re-assemble to the matrix: simplices or boxes, linear or quadratic; or linear ones of both.
 
     With lambda / mu known to be one number, `ratio`, linear simplices of one material are tried first, which is quick.
@@ -106,10 +112,27 @@ def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: floa
     Entries between two nodes that both miss a neighbour are left out, since cells that lost a node to a support
     contribute to them. Cells all of whose entries are left out cannot be seen and are not reported. First neighbours
     that lack some of their directions only, as on rollers, and those of nodes with a penalty count as being there,
-    which fewer rows can tell.
+    which fewer rows can tell. So do the nodes in `corners`, if that explains the matrix: cells that have them are none
+    of those returned, but show that the rows next to them are what they were taken for.
     """
+    if corners:
+        more = np.vstack([points, [one.point for one in corners]])
+        found = _among_complete(with_corner_nodes(nodal, corners), more, ratio, [one.nodes for one in corners])
+        if found.certified:
+            shown = None if found.shown is None else found.shown[: nodal.n]
+            return replace(found.among(np.arange(len(more)) < nodal.n), shown=shown)
+    return _among_complete(nodal, points, ratio)
+
+
+def _among_complete(
+    nodal: NodalMatrix, points: NDArray[np.float64], ratio: float | None, complete: Sequence[NDArray[np.int64]] = ()
+) -> Cells:
+    """Cells that explain entries of nodes that lost no neighbour; those named are taken to have lost none."""
     graph, known = coupled(nodal, points), determined(points)
-    likely = Entries.of(nodal, known, surrounded(nodal, valid_pairs(nodal, inferred=True)))
+    likeliest = surrounded(nodal, valid_pairs(nodal, inferred=True))
+    for nodes in complete:
+        likeliest[nodes] = True
+    likely = Entries.of(nodal, known, likeliest)
     found = no_cells()
     # The power of two next to the largest entry: squares of what is measured in it neither overflow nor vanish.
     unit = float(2.0 ** np.frexp(nodal.size.max(initial=0.0))[1])
