@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..corner_nodes import Corner, with_corner_nodes
 from ..nodal import NodalMatrix, determined, surrounded, valid_pairs
-from .candidates import Block, candidates, coupled
+from .candidates import Block, candidates, coupled, perhaps_coupled
 from .cliques import Graph
 from .entries import Entries, Pairs
 from .materials import fits
@@ -133,24 +133,27 @@ def _among_complete(
     for nodes in complete:
         likeliest[nodes] = True
     likely = Entries.of(nodal, known, likeliest)
+    wider = perhaps_coupled(nodal, graph) if (nodal.row_of < 0).any() else None
     found = no_cells()
     # The power of two next to the largest entry: squares of what is measured in it neither overflow nor vanish.
     unit = float(2.0 ** np.frexp(nodal.size.max(initial=0.0))[1])
     for entries in [likely, Entries.of(nodal, known)] if (likely.complete != likely.sure).any() else [likely]:
-        other = _recognised(points, graph, entries.over(unit), ratio)
+        other = _recognised(points, graph, entries.over(unit), ratio, wider)
         if other.certified:
             return replace(other, lame=other.lame * unit)
         found = found if found.recognised else other
     return found
 
 
-def _recognised(points: NDArray[np.float64], graph: Graph, entries: Entries, ratio: float | None) -> Cells:
+def _recognised(
+    points: NDArray[np.float64], graph: Graph, entries: Entries, ratio: float | None, wider: Graph | None
+) -> Cells:
     """Cells that explain most entries.
 
     Cells that hide next to supports are excused, and those of another kind must not pass for such.
     """
     best, most = no_cells(), 0
-    for blocks in candidates(graph, points, entries.complete) if len(entries.key) else ():
+    for blocks in candidates(graph, points, entries.complete, wider=wider) if len(entries.key) else ():
         told = entries.explained_by([Pairs.of(one.cells, entries) for one in blocks], graph, FITS)
         if told is None or len(told.key) <= most:
             continue
