@@ -204,7 +204,7 @@ def _describe(
     points = solution.points
     with clock("certify"):
         error = largest_residual(nodal, solution.valid, points, solution.ratio)
-        near = error < max(_NEAR, SPREADS * rounding)
+        near = not error >= max(_NEAR, SPREADS * rounding)  # NaN where only elements can tell
         ratio = _poisson_ratio(nodal, solution, points) if near else None
     found = no_cells()
     lame_ratio = None if ratio is None else 2 * ratio / (1 - 2 * ratio)
