@@ -115,3 +115,11 @@ def test_where_no_whole_row_is_left_to_certify_the_reason_says_so():
     assert not found.certified
     assert "no identity is left" in found.reason
     assert judged(found, case).error < 1e-8
+
+
+def test_fields_that_hardly_any_node_shares():
+    """A plate of twelve squares with supports on all sides: all but one or two nodes of a piece are loose."""
+    body = permuted_nodes(stiffness("tri-p2", box("tri-p2", (4, 5)), lam=49.0), seed=0)
+    case = held(body, "several", "boundary first by component", "stored")
+    found = recover_elasticity(case.matrix)
+    assert judged(found, case).error < 1e-9
