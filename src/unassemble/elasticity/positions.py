@@ -24,6 +24,24 @@ _LARGE = 2000
 
 
 def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
+    """Place all nodes, those that only rows in doubt determine once more without the doubts.
+
+    The equations without doubts are among the others, so that nodes which they determine lie where they lay. All others
+    need elements that show them; where these do not, the solution with doubts is still there.
+    """
+    found = _solve(nodal, patch)
+    if found.whole or not found.unique or (nodal.doubtful is None and nodal.blurred is None):
+        return found
+    try:
+        other = _solve(replace(nodal, doubtful=None, blurred=None), patch)
+    except GeometryError:
+        return found
+    if not other.unique or other.straight or determined(other.points).sum() <= determined(found.points).sum():
+        return found
+    return replace(other, hanging=determined(other.points) & ~determined(found.firm_points), cautious=found)
+
+
+def _solve(nodal: NodalMatrix, patch: int | None) -> Solution:
     """Place all nodes: read validity strictly, and only where that determines nothing leniently."""
     best: Solution | None = None
     failure: GeometryError | None = None

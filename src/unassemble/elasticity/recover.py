@@ -211,6 +211,8 @@ def _describe(
     if (want_cells or solution.straight or solution.hanging is not None) and near:
         with clock("cells"):
             found = recognise_cells(nodal, points, lame_ratio, solution.corners)
+    if solution.cautious is not None and not found.certified:
+        return _describe(nodal, numbering, solution.cautious, clock, want_cells, rounding)
     backward = found.backward_error if found.certified else error
     status, reason = verdict(nodal, solution, error, found, numbering)
     if rounding and near and not any(solution.freedoms):

@@ -41,6 +41,8 @@ class Solution:
         equation controls; see :mod:`.control`. So do nodes next to corners whose rows may be several nodes'.
     corners : tuple of Corner
         Nodes that are not in the matrix, but whose place planes tell.
+    cautious : Solution, optional
+        The solution to fall back on where no elements show nodes that rows in doubt determine.
     """
 
     valid: NDArray[np.bool_]
@@ -56,6 +58,7 @@ class Solution:
     straight: tuple[float, ...] = ()
     hanging: NDArray[np.bool_] | None = None
     corners: tuple[Corner, ...] = ()
+    cautious: Solution | None = None
 
     @property
     def unique(self) -> bool:
