@@ -129,3 +129,14 @@ def test_nodes_that_hang_on_an_assumption_alone_get_no_coordinates(kind, offset,
     assert truth.error < 1e-9
     if kind == "tri-p2" and offset[0]:
         assert truth.missing > 0
+
+
+def test_elements_confirm_rows_that_order_leaves_open():
+    """Nodes of the same neighbours, which order and planes join rightly; those joined otherwise no element shows."""
+    body = permuted_nodes(stiffness("hex-q2", box("hex-q2", (4, 4, 4), perturb=0.2), **MATERIALS["one"]), seed=1)
+    case = given(body, "symmetry", "boundary first by component", "stored")
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert truth.error < 1e-11
+    assert truth.missing < 0.02
