@@ -113,14 +113,14 @@ def _in_equilibrium(
 def _with_least_sums(
     matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], unnamed: NDArray[np.bool_], d: int
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Directions with which sums are least, and rows without a proof, if these are fewer.
+    """Directions with which sums are least, and rows without a proof, if these are no more.
 
     Material that is stiff against a change of volume has wrong directions of less energy along edges, and translations
     in equilibrium with these.
     """
     other = named_by_least_sums(matrix, direction, unnamed, d)
     still = ~proven_directions(matrix, other, group, d)
-    return (other, still) if np.count_nonzero(still) < np.count_nonzero(unnamed) else (direction, unnamed)
+    return (other, still) if np.count_nonzero(still) <= np.count_nonzero(unnamed) else (direction, unnamed)
 
 
 def _cut_where(run: NDArray[np.int64], direction: NDArray[np.int64]) -> NDArray[np.int64]:
