@@ -206,3 +206,15 @@ def test_halves_of_a_node_need_not_be_coupled():
     numbering = measured(case.matrix, node, case.direction, 2, "interleaved")
     nodal = with_doubts(nodal_matrix(case.matrix, numbering), numbering)
     assert set(node[rows]) <= set(np.flatnonzero(nodal.doubtful))
+
+
+@pytest.mark.parametrize("material", [{"lam": 1.5}, {"lam": heterogeneous, "mu": lambda x: 1 + x[1] + x[0] * x[1]}])
+def test_an_order_without_gaps_is_not_given_up_for_patterns_that_leave_rows_open(material):
+    """Rows of the identity stand among the others, and entries that vanished are not stored."""
+    body = permuted_nodes(stiffness("hex-s2", box("hex-s2", (3, 4, 4), perturb=0.2), **material), seed=1)
+    case = given(body, "identity rollers", "by component", "dropped")
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert truth.error < 1e-11
+    assert truth.missing == truth.split == 0

@@ -162,3 +162,19 @@ def test_rows_that_look_little_alike_but_stand_in_order(support):
     assert found.certified
     assert truth.error < 1e-10
     assert truth.missing == truth.split == 0
+
+
+@pytest.mark.parametrize(
+    ("support", "order"),
+    [("symmetry", "by component"), ("identity rollers", "interleaved"), ("symmetry", "interleaved")],
+)
+def test_cells_with_nodes_all_of_whose_entries_were_taken_out(support, order):
+    """Where zeros are dropped, two nodes on rollers may have no entry left, though they belong to one tetrahedron."""
+    body = permuted_nodes(stiffness("tet-p2", box("tet-p2", (3, 4, 4)), lam=1.5), seed=1)
+    case = given(body, support, order, "dropped")
+    found = recover_elasticity(case.matrix)
+    truth = judged(found, case)
+    assert found.certified
+    assert truth.error < 1e-12
+    assert truth.missing == truth.split == 0
+    assert found.cells.n_cells == len(body.cells) - 6  # those in the corner, which is not in the matrix

@@ -39,12 +39,14 @@ def described(
     """
     with clock("certify"):
         error = largest_residual(nodal, solution.valid, solution.points, solution.ratio)
-        near = error < max(_NEAR, SPREADS * rounding)
+        near = not error >= max(_NEAR, SPREADS * rounding)  # NaN where only elements can tell
         ratio = _lame_ratio(nodal, solution) if near else None
     found = no_cells()
     if (cells or solution.straight or solution.hanging is not None) and near:
         with clock("cells"):
-            found = recognise_cells(nodal, solution.points, ratio)
+            found = recognise_cells(nodal, solution.points, ratio, solution.corners)
+    if solution.cautious is not None and not found.certified:
+        return described(nodal, numbering, solution.cautious, clock, cells=cells, rounding=rounding)
     backward = found.backward_error if found.certified else error
     status, reason = verdict(nodal, solution, error, found, numbering)
     if rounding and near and not any(solution.freedoms):

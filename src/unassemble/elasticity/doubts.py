@@ -132,13 +132,13 @@ def unconfirmed(
     """
     if nodal.doubtful is None:
         return np.zeros(nodal.n, dtype=bool)
-    if numbering.open_row is not None and not _by_likeness(numbering):  # nothing was joined that order does not join
-        # Of fellows each was placed by itself, and none was taken to lack what another has.
-        return nodal.doubtful if nodal.fellows is None else np.zeros(nodal.n, dtype=bool)
-    outside = determined(points)
     confirmed: NDArray[np.bool_] = np.zeros(nodal.n, dtype=bool)
     if shown is not None:
         confirmed = np.asarray((shown | (nodal.row_of < 0)).all(axis=1))
+    if numbering.open_row is not None and not _by_likeness(numbering):  # nothing was joined that order does not join
+        # Of fellows each was placed by itself, and none was taken to lack what another has.
+        return nodal.doubtful & ~confirmed if nodal.fellows is None else np.zeros(nodal.n, dtype=bool)
+    outside = determined(points)
     if not _by_likeness(numbering):
         doubtful = nodal.doubtful & ~(confirmed & (nodal.row_of >= 0).all(axis=1))  # all rows of one node are its own
         doubtful |= without_trace(nodal).any(axis=1)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import GeometryError
 from .nodal import NodalMatrix, determined, valid_pairs
 from .nullspace.control import uncontrolled
-from .nullspace.corners import with_corners
+from .nullspace.corners import corners_of, with_corners
 from .nullspace.identities import boundary_terms
 from .nullspace.material import lame_ratio
 from .nullspace.placing import placed
@@ -24,6 +24,24 @@ _LARGE = 2000
 
 
 def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
+    """Place all nodes, those that only rows in doubt determine once more without the doubts.
+
+    The equations without doubts are among the others, so that nodes which they determine lie where they lay. All others
+    need elements that show them; where these do not, the solution with doubts is still there.
+    """
+    found = _solve(nodal, patch)
+    if found.whole or not found.unique or (nodal.doubtful is None and nodal.blurred is None):
+        return found
+    try:
+        other = _solve(replace(nodal, doubtful=None, blurred=None), patch)
+    except GeometryError:
+        return found
+    if not other.unique or other.straight or determined(other.points).sum() <= determined(found.points).sum():
+        return found
+    return replace(other, hanging=determined(other.points) & ~determined(found.firm_points), cautious=found)
+
+
+def _solve(nodal: NodalMatrix, patch: int | None) -> Solution:
     """Place all nodes: read validity strictly, and only where that determines nothing leniently."""
     best: Solution | None = None
     failure: GeometryError | None = None
@@ -158,6 +176,7 @@ def _with_corners(nodal: NodalMatrix, found: Solution, ratio: float | None, vali
     """Once more where planes of rollers meet, with lambda / mu if that is what it takes."""
     if found.whole or not found.unique or found.straight:
         return found
+    loose = ~determined(found.firm_points)
     for used in (None,) if ratio is None else (None, ratio):
         terms = None if used is None else boundary_terms(nodal.dim, used)
         firm = found.firm_points
@@ -167,6 +186,8 @@ def _with_corners(nodal: NodalMatrix, found: Solution, ratio: float | None, vali
             hanging = np.zeros(nodal.n, dtype=bool) if found.hanging is None else found.hanging & ~new
             if nodal.dim == 2:  # as all that an assumption places there
                 hanging |= new
+            elif nodal.sure is not None:
+                hanging |= new & ~nodal.sure
             found = replace(
                 found,
                 points=np.where(new[:, None], points, found.points),
@@ -175,4 +196,4 @@ def _with_corners(nodal: NodalMatrix, found: Solution, ratio: float | None, vali
                 ratio=found.ratio if used is None else used,
                 hanging=hanging if hanging.any() else None,
             )
-    return found
+    return replace(found, corners=corners_of(nodal, valid, found.points, loose))

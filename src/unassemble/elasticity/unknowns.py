@@ -68,7 +68,7 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
         best = _best([best, *by_component_with_gaps(matrix, sizes)])
         clear = best is not None and best.sound and best.common == 1
         apart = None if clear else scattered(matrix, sizes)
-        if apart is not None:
+        if apart is not None and not (best is not None and best.sound and best.quality > apart.quality):
             best, clear = apart, True
         if not clear and (matrix.shape[0] <= _LARGE or promising(matrix, sizes)):
             best = _best([best, *interleaved_with_gaps(matrix, sizes)])
@@ -78,7 +78,7 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
     if best is None:
         raise RecoveryError(
             f"no numbering with {block_size or '2 or 3'} unknowns per node makes the rows annihilate translations: "
-            f"this is no elasticity matrix, or {MORE_THAN_STIFFNESS}"
+            f"this is no elasticity matrix, or {MORE_THAN_STIFFNESS}, or supports take entries from nearly all rows"
         )
     return best
 

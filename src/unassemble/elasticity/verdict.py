@@ -15,6 +15,10 @@ from .rows.numbering import Numbering
 CERTIFIED = 1e-9
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
 NOTHING_SHOWN = "no node is left whose rows are shown to be its own and whose coordinates hang on no assumption"
+NOTHING_LEFT = (
+    "each row that is whole touches nodes that are not determined, so that no identity is left to certify the others, "
+    "and no elements do"
+)
 RESTS_ON_PLANES = (
     "more than translation and scale is free unless nodes that lack a direction lie in planes across it, and no "
     "elements show that they do"
@@ -147,6 +151,8 @@ def verdict(
         )
     if error <= CERTIFIED:
         return "certified", "the valid identities hold to rounding, and only translations and scale satisfy them"
+    if np.isnan(error):
+        return "uncertified", NOTHING_LEFT
     return "uncertified", f"the largest residual of a valid identity is {error:.1e}"
 
 

@@ -33,7 +33,12 @@ class Block:
 
 
 def candidates(
-    graph: Graph, points: NDArray[np.float64], complete: NDArray[np.bool_], *, linear_simplices: bool = True
+    graph: Graph,
+    points: NDArray[np.float64],
+    complete: NDArray[np.bool_],
+    *,
+    linear_simplices: bool = True,
+    wider: Graph | None = None,
 ) -> Iterator[tuple[Block, ...]]:
     """What could be the cells, those kinds first that have most nodes: of one kind, then simplices beside boxes.
 
@@ -47,6 +52,8 @@ def candidates(
         Nodes all of whose cells are there.
     linear_simplices : bool
         Whether to look for these, too; of some graphs there are many.
+    wider : Graph, optional
+        The same with pairs all of whose entries may have been taken out; see :func:`perhaps_coupled`.
     """
     d, known = points.shape[1], int(determined(points).sum())
     boxes, simplex = None, None
@@ -57,9 +64,14 @@ def candidates(
             if len(graph.row) + graph.n <= graph.n * _LINEAR[d]:
                 yield (_simplices(kind, graph, points, graph),)
             continue
-        cells = ordered(_sets(kind, graph, points), points, kind)
+        sets = _sets(kind, graph, points)
+        cells = ordered(sets, points, kind)
         if len(np.unique(cells)) > _COVERED * known:
             yield (Block(kind, cells),)
+            if kind.simplex and wider is not None:
+                more = np.unique(np.vstack([sets, straight_simplices(wider, points, kind.dim)]), axis=0)
+                if len(more) > len(sets):
+                    yield (Block(kind, ordered(more, points, kind)),)
         if not kind.quadratic:
             boxes = Block(kind, cells[convex(cells, points, kind)])
     if boxes is not None and simplex is not None and len(boxes.cells):
@@ -89,9 +101,25 @@ def _simplices(kind: Kind, graph: Graph, points: NDArray, edges: Graph) -> Block
 
 
 def coupled(nodal: NodalMatrix, points: NDArray) -> Graph:
-    """Pairs of determined nodes with an entry."""
-    known = determined(points)
+    """Pairs of determined nodes with an entry that is not zero, or that lack some, which may not have been zero."""
+    known, lacking = determined(points), np.asarray((nodal.row_of < 0).any(axis=1))
     i, j = nodal.node, nodal.indices
     live = np.abs(nodal.data).max(axis=(1, 2)) > 1e-13 * np.minimum(nodal.size[i], nodal.size[j])  # symmetric
+    live |= lacking[i] | lacking[j]
     live &= known[i] & known[j]
     return Graph(sp.csr_array((np.ones(live.sum()), (i[live], j[live])), shape=(nodal.n,) * 2))
+
+
+def perhaps_coupled(nodal: NodalMatrix, graph: Graph) -> Graph:
+    """Coupled pairs, and those of two nodes that both lack a direction and have half of a cell's nodes in common.
+
+    Where entries that vanish are not stored, those that such nodes had may all have been taken out.
+    """
+    lacking = np.flatnonzero((nodal.row_of < 0).any(axis=1))
+    closed = graph.closed()
+    around = closed[lacking]
+    common = sp.coo_array(around @ around.T)
+    near = common.data > nodal.dim + 1
+    i, j = lacking[common.row[near]], lacking[common.col[near]]
+    more = sp.csr_array((np.ones(len(i), np.int32), (i, j)), shape=(graph.n, graph.n))
+    return Graph(sp.csr_array(closed + more))

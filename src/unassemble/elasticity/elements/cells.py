@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..corner_nodes import Corner, with_corner_nodes
 from ..nodal import NodalMatrix, determined, surrounded, valid_pairs
-from .candidates import Block, candidates, coupled
+from .candidates import Block, candidates, coupled, perhaps_coupled
 from .cliques import Graph
 from .entries import Entries, Pairs
 from .materials import fits
@@ -96,7 +97,12 @@ def no_cells() -> Cells:
     return Cells({}, np.empty((0, 2)), float("nan"))
 
 
-def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: float | None = None) -> Cells:
+def recognise_cells(
+    nodal: NodalMatrix,
+    points: NDArray[np.float64],
+    ratio: float | None = None,
+    corners: Sequence[Corner] = (),
+) -> Cells:
     """Find cells that re-assemble to the matrix: simplices or boxes, linear or quadratic; or linear ones of both.
 
     With lambda / mu known to be one number, `ratio`, linear simplices of one material are tried first, which is quick.
@@ -106,28 +112,48 @@ def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: floa
     Entries between two nodes that both miss a neighbour are left out, since cells that lost a node to a support
     contribute to them. Cells all of whose entries are left out cannot be seen and are not reported. First neighbours
     that lack some of their directions only, as on rollers, and those of nodes with a penalty count as being there,
-    which fewer rows can tell.
+    which fewer rows can tell. So do the nodes in `corners`, if that explains the matrix: cells that have them are none
+    of those returned, but show that the rows next to them are what they were taken for.
     """
+    if corners:
+        more = np.vstack([points, [one.point for one in corners]])
+        found = _among_complete(with_corner_nodes(nodal, corners), more, ratio, [one.nodes for one in corners])
+        if found.certified:
+            shown = None if found.shown is None else found.shown[: nodal.n]
+            return replace(found.among(np.arange(len(more)) < nodal.n), shown=shown)
+    return _among_complete(nodal, points, ratio)
+
+
+def _among_complete(
+    nodal: NodalMatrix, points: NDArray[np.float64], ratio: float | None, complete: Sequence[NDArray[np.int64]] = ()
+) -> Cells:
+    """Cells that explain entries of nodes that lost no neighbour; those named are taken to have lost none."""
     graph, known = coupled(nodal, points), determined(points)
-    likely = Entries.of(nodal, known, surrounded(nodal, valid_pairs(nodal, inferred=True)))
+    likeliest = surrounded(nodal, valid_pairs(nodal, inferred=True))
+    for nodes in complete:
+        likeliest[nodes] = True
+    likely = Entries.of(nodal, known, likeliest)
+    wider = perhaps_coupled(nodal, graph) if (nodal.row_of < 0).any() else None
     found = no_cells()
     # The power of two next to the largest entry: squares of what is measured in it neither overflow nor vanish.
     unit = float(2.0 ** np.frexp(nodal.size.max(initial=0.0))[1])
     for entries in [likely, Entries.of(nodal, known)] if (likely.complete != likely.sure).any() else [likely]:
-        other = _recognised(points, graph, entries.over(unit), ratio)
+        other = _recognised(points, graph, entries.over(unit), ratio, wider)
         if other.certified:
             return replace(other, lame=other.lame * unit)
         found = found if found.recognised else other
     return found
 
 
-def _recognised(points: NDArray[np.float64], graph: Graph, entries: Entries, ratio: float | None) -> Cells:
+def _recognised(
+    points: NDArray[np.float64], graph: Graph, entries: Entries, ratio: float | None, wider: Graph | None
+) -> Cells:
     """Cells that explain most entries.
 
     Cells that hide next to supports are excused, and those of another kind must not pass for such.
     """
     best, most = no_cells(), 0
-    for blocks in candidates(graph, points, entries.complete) if len(entries.key) else ():
+    for blocks in candidates(graph, points, entries.complete, wider=wider) if len(entries.key) else ():
         told = entries.explained_by([Pairs.of(one.cells, entries) for one in blocks], graph, FITS)
         if told is None or len(told.key) <= most:
             continue

@@ -11,7 +11,8 @@ that they lack. They are borne out where the equations hold exactly and are more
 as many as are assumed at least: a node that lies elsewhere could make up for no more.
 
 Of each coordinate x_b only the unknowns of direction b feel something, so that three nodes with one row each fit as
-well as one with three. Only nodes get coordinates that are beyond doubt for other reasons.
+well as one with three. Nodes that are not beyond doubt for other reasons need elements that show them; and since these
+have the missing node for a corner, it is given a place, too.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..corner_nodes import Corner
 from ..nodal import NodalMatrix, determined, eliminated, surrounded
 from .identities import Identities, identities
 from .planes import with_planes
@@ -54,9 +56,8 @@ def with_corners(
     """
     whole = surrounded(nodal, valid)
     lacking = eliminated(nodal)
-    corner = ~whole & (nodal.graph @ lacking.astype(float) > 0).all(axis=1)
     loose = ~determined(points)
-    corner &= nodal.graph @ loose.astype(float) > 0
+    corner = _next_to_corners(nodal, valid, loose)
     completed = with_planes(nodal, valid, whole=whole | corner) if corner.any() else None
     if completed is None:
         return points, component
@@ -67,10 +68,44 @@ def with_corners(
         pieces = np.unique(component[around.columns])
         if len(pieces[pieces >= 0]) == 1:
             points[nodes] = _placed(around, corner, nodes, int(lacking[nodes].sum()), points)
-            if nodal.sure is not None:
-                points[nodes[~nodal.sure[nodes]]] = np.nan
             component[nodes] = np.where(determined(points[nodes]), pieces[-1], -1)
     return points, component
+
+
+def corners_of(
+    nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64], loose: NDArray[np.bool_]
+) -> tuple[Corner, ...]:
+    """Where planes meet next to nodes that are not determined otherwise.
+
+    A corner lies at the level of the nodes that lack a direction, for each; where these differ there is none.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    valid : (n, d, d) bool
+        By the strict rule.
+    points : (n, d) float64
+        Mean edge length 1; NaN where not determined.
+    loose : (n,) bool
+        Nodes that nothing but what holds next to corners determines, if anything does.
+    """
+    corner, lacking = _next_to_corners(nodal, valid, loose), eliminated(nodal) & determined(points)[:, None]
+    open_rows = ~surrounded(nodal, valid) & (nodal.row_of >= 0).any(axis=1)
+    found = []
+    for rows, nodes in _places(nodal, corner, loose):
+        here = np.zeros(nodal.n)
+        here[nodes] = here[rows[corner[rows]]] = 1
+        near = np.asarray(nodal.graph @ here > 0)
+        held = [points[near & lacking[:, b], b] for b in range(nodal.dim)]
+        if all(len(level) and np.ptp(level) <= EXACT for level in held):
+            found.append(Corner(np.array([level.mean() for level in held]), np.flatnonzero(near & open_rows)))
+    return tuple(found)
+
+
+def _next_to_corners(nodal: NodalMatrix, valid: NDArray[np.bool_], loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(n,) nodes whose rows lack coefficients of every direction, and couple to loose ones."""
+    near = (nodal.graph @ eliminated(nodal).astype(float) > 0).all(axis=1)
+    return np.asarray(~surrounded(nodal, valid) & near & (nodal.graph @ loose.astype(float) > 0))
 
 
 def _places(

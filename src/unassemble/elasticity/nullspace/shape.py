@@ -114,6 +114,8 @@ def set_aside(null: NDArray, common: int) -> tuple[NDArray, NDArray[np.bool_]]:
         if (s > _LOOSE * s[0]).sum() == common:
             own = np.einsum("nak,lk->nal", null, v[s <= _LOOSE * s[0]])
             loose = np.abs(own).max(axis=(1, 2)) > _STILL
+            if np.count_nonzero(~loose) * null.shape[1] < common:  # too few are left to carry what they share
+                break
             return _orthonormal(np.einsum("nak,lk->nal", null, v[:common]), ~loose), loose
     return null, np.zeros(n, dtype=bool)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..corner_nodes import Corner
 from ..results import Evidence
 
 
@@ -37,7 +38,11 @@ class Solution:
         lambda / mu of the pieces whose axes the identities leave free and elements told; see :mod:`.straight`.
     hanging : (n,) bool, optional
         Nodes that hang on equations that rest on an assumption, of planes or of one Poisson's ratio, which no other
-        equation controls; see :mod:`.control`.
+        equation controls; see :mod:`.control`. So do nodes next to corners whose rows may be several nodes'.
+    corners : tuple of Corner
+        Nodes that are not in the matrix, but whose place planes tell.
+    cautious : Solution, optional
+        The solution to fall back on where no elements show nodes that rows in doubt determine.
     """
 
     valid: NDArray[np.bool_]
@@ -52,6 +57,8 @@ class Solution:
     planes: bool = False
     straight: tuple[float, ...] = ()
     hanging: NDArray[np.bool_] | None = None
+    corners: tuple[Corner, ...] = ()
+    cautious: Solution | None = None
 
     @property
     def unique(self) -> bool:

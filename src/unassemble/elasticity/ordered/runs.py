@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..directions.directions import find_directions, reconsidered
 from ..directions.extension import extended_directions
+from ..directions.least_sums import named_by_least_sums
 from ..directions.plane_names import named_by_sums
 from ..rows.constants import proven_directions
 from ..rows.grouping import by_first_row, same_pattern
@@ -87,6 +88,8 @@ def _by_pattern(matrix: sp.csr_array, group: NDArray[np.int64], run: NDArray[np.
         unnamed = ~proven_directions(matrix, direction, group, d)
     if unnamed.any():
         direction, unnamed = _in_equilibrium(matrix, group, direction, unnamed, d)
+    if unnamed.any():
+        direction, unnamed = _with_least_sums(matrix, group, direction, unnamed, d)
     return Reading(_cut_where(run, direction), direction, np.zeros(order, dtype=bool), unnamed)
 
 
@@ -103,6 +106,19 @@ def _in_equilibrium(
     other, share = extended_directions(matrix, group, np.ones(len(direction), dtype=bool), d, known=known)
     if share < WHOLE or (other != direction)[~unnamed].any():
         return direction, unnamed
+    still = ~proven_directions(matrix, other, group, d)
+    return (other, still) if np.count_nonzero(still) <= np.count_nonzero(unnamed) else (direction, unnamed)
+
+
+def _with_least_sums(
+    matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], unnamed: NDArray[np.bool_], d: int
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Directions with which sums are least, and rows without a proof, if these are no more.
+
+    Material that is stiff against a change of volume has wrong directions of less energy along edges, and translations
+    in equilibrium with these.
+    """
+    other = named_by_least_sums(matrix, direction, unnamed, d)
     still = ~proven_directions(matrix, other, group, d)
     return (other, still) if np.count_nonzero(still) <= np.count_nonzero(unnamed) else (direction, unnamed)
 
