@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from meshes import random_mesh, specimen, triangle_set
 from unassemble import recover
 from unassemble.planar.cotangent import edge_weights
-from unassemble.planar.deviations import factor_deviation
+from unassemble.planar.deviations import factor_deviations
 from unassemble.topology import recognise
 
 C = 1.7
@@ -45,15 +45,38 @@ def test_noise_explains_that_factors_differ(count, heights, sigma):
     found = recover(noisy(known.matrix, sigma * C, 1), noise=sigma * C)
     assert found.certified, found.reason
     assert triangle_set(found.triangles) == triangle_set(known.triangles)
-    assert np.ptp(found.scale) > 1e-7 * C
+    assert np.ptp(found.scale) == 0  # all pieces are fitted with one
+    assert found.chi_square["degrees_of_freedom"] == count - 1
 
 
-def test_noise_that_is_not_given_is_named():
+def deviates(found, known, rows):
+    """Error of a piece, the best similarity onto the truth being taken off, over its error bars; root mean squares."""
+    true, z = known.points[rows] @ [1, 1j], found.points[rows] @ [1, 1j]
+    true, z = true - true.mean(), z - z.mean()
+    errors = [z - s * (np.vdot(s, z) / np.vdot(s, s)) for s in (true, true.conj())]
+    return min(map(np.linalg.norm, errors)) / np.linalg.norm(found.standard_deviations[rows])
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_error_bars_of_pieces_with_one_factor(told):
+    """A triangle by itself tells neither c nor how large the noise is; all together do."""
+    known, sigma = specimen(*chain(12, 5), c=C, seed=3), 1e-5 * C
+    squares, levels = [], []
+    for seed in range(40):
+        found = recover(noisy(known.matrix, sigma, seed), noise=sigma if told else None, standard_deviations=True)
+        assert found.certified == told
+        squares += [deviates(found, known, rows) ** 2 for rows in known.triangles]
+        levels.append(found.estimated_noise / sigma)
+    assert np.mean(np.square(levels)) == pytest.approx(1, abs=0.3)
+    assert np.mean(squares) == pytest.approx(1, abs=0.3)
+
+
+def test_noise_that_is_not_given_is_estimated_from_factors():
     known = specimen(*chain(20, 5), c=C, seed=3)
     found = recover(noisy(known.matrix, 1e-6 * C, 1))
     assert not found.certified
-    named = float(found.reason.split("standard deviation ")[1].split()[0])
-    assert 0.5e-6 * C < named < 2e-6 * C
+    assert found.estimated_noise == pytest.approx(1e-6 * C, rel=0.6)
+    assert f"noise of standard deviation {found.estimated_noise:.2g}" in found.reason
 
 
 def test_more_than_noise_is_none():
@@ -109,4 +132,4 @@ def test_deviation_of_a_factor():
     z = z if edge_weights(piece, z).sum() > 0 else np.conj(z)
     a, b, c = (edge_weights(piece, z) + 1e-6 * np.random.default_rng(0).standard_normal((4000, 3))).T
     expected = np.log(2 * np.sqrt(a * b + b * c + c * a)).std() / 1e-6
-    assert factor_deviation(piece, z) == pytest.approx(expected, rel=0.1)
+    assert factor_deviations([piece], [z], [None])[0] == pytest.approx(expected, rel=0.1)

@@ -1,74 +1,214 @@
-"""Whether pieces that share vertices have one factor c: each by itself, small ones fit nearly anything."""
+"""Factors c of pieces that share vertices: there is one, but each piece by itself has its own, and errors move it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaincc, ndtr
+from scipy.special import fdtrc, gammaincc, ndtr
 
 from ..cells.agreement import SAME_SCALE, SCALE_ERROR
-from ..certify import CONFIDENCE
-from ..errors import SolverError
-from ..planar.deviations import factor_deviation
+from ..certify import CONFIDENCE, LARGEST_NOISE
+from ..planar.cotangent import weights_of_all
+from ..planar.deviations import factor_deviations
 from ..planar.hinges import groups
-from ..planar.piece import EXACT, PieceMesh
+from ..planar.piece import EXACT, PieceMesh, refined_with_one_scale
+from ..planar.polish import PolishOptions
 from ..topology import Topology
 
+_EQUAL = 1e-12  # relative difference of factors that rounding leaves: each piece keeps its own
+_UNTOLD = 1e100  # standard deviation of log c where entries do not tell c
 _CHANCE = 1e-6  # that factors which agree to within their errors do so by coincidence
 
 
-def discord(
-    topology: Topology, meshes: Sequence[PieceMesh], backward_error: float, noise: float | None = None
-) -> str | None:
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """What the entries of each piece by itself say of c, and which pieces were fitted with one c.
+
+    Attributes
+    ----------
+    own : (pieces,) float64
+        c of each piece by itself.
+    deviation : (pieces,) float64
+        Standard deviation of log c for noise 1 in the entries; those that have vanished are exact. Infinite where the
+        entries of a piece do not tell c, or where it does not matter.
+    group : (pieces,) int64
+        Label of the pieces that hang together by vertices.
+    fitted : (pieces,) int64
+        Label of the pieces that were fitted with one c.
+    """
+
+    own: NDArray[np.float64]
+    deviation: NDArray[np.float64]
+    group: NDArray[np.int64]
+    fitted: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, topology: Topology, meshes: Sequence[PieceMesh]) -> Factors:
+        """Those of pieces that were fitted one by one."""
+        n = len(meshes)
+        group = groups(topology) if len(topology.hinges) else np.arange(n)
+        own = np.array([mesh.scale for mesh in meshes])
+        return cls(own, np.full(n, np.inf), np.asarray(group, dtype=np.int64), np.arange(n))
+
+    @property
+    def count(self) -> int:
+        """How many were fitted."""
+        return len(np.unique(self.fitted))
+
+    @property
+    def together(self) -> NDArray[np.bool_]:
+        """(pieces,) those that were fitted with others."""
+        return np.bincount(self.fitted)[self.fitted] > 1
+
+    @cached_property
+    def first(self) -> NDArray[np.int64]:
+        """(pieces,) the first piece of each one's group."""
+        return np.unique(self.group, return_index=True)[1][self.group]
+
+    @property
+    def differences(self) -> NDArray[np.float64]:
+        """(pieces,) of their own factors from those of the first pieces of their groups, relative."""
+        return np.abs(self.own / self.own[self.first] - 1)
+
+
+def with_one_factor(
+    topology: Topology, weights: NDArray, meshes: list[PieceMesh], noise: float | None, *, refine: bool
+) -> tuple[list[PieceMesh], Factors]:
+    """Fit pieces that share vertices with one c, where errors of the entries explain that theirs differ.
+
+    Parameters
+    ----------
+    topology : Topology
+    weights : (e,) float64
+        -A_ij of each edge.
+    meshes : list of PieceMesh
+        Each piece with the c that fits it best.
+    noise : float, optional
+        Standard deviation of the entries' errors; without it their misfit tells how large they are.
+    refine : bool
+        Whether anything is to be fitted.
+    """
+    factors = Factors.of(topology, meshes)
+    if not (len(topology.hinges) and (noise or factors.differences.max() > _EQUAL)):
+        return meshes, factors
+    vanished = np.zeros(len(topology.edges), dtype=bool)
+    vanished[topology.vanished] = True
+    several = np.flatnonzero(np.bincount(factors.group)[factors.group] > 1)
+    pieces = [topology.pieces[p] for p in several]
+    errors = [np.where(vanished[piece.edge_rows], EXACT, 1.0) for piece in pieces]
+    deviation = factor_deviations(pieces, [meshes[p].z for p in several], errors)
+    factors.deviation[several] = np.minimum(deviation / np.abs(factors.own[several]), _UNTOLD)
+    if not refine:
+        return meshes, factors
+    meshes = list(meshes)
+    for label in np.unique(factors.group[several]):
+        inside = np.flatnonzero(factors.group == label)
+        c = _common(topology, weights, meshes, factors, inside, noise)
+        if c is None or sum(topology.pieces[p].n_vertices for p in inside) > PolishOptions().direct_limit:
+            continue
+        together = refined_with_one_scale(
+            [topology.pieces[p] for p in inside],
+            weights,
+            [meshes[p] for p in inside],
+            c,
+            rounding=noise is None,
+            exact=vanished,
+        )
+        factors.fitted[inside] = inside[0]
+        for p, mesh in zip(inside, together, strict=True):
+            meshes[p] = mesh
+    return meshes, factors
+
+
+def _common(
+    topology: Topology,
+    weights: NDArray,
+    meshes: Sequence[PieceMesh],
+    factors: Factors,
+    inside: NDArray[np.int64],
+    noise: float | None,
+) -> float | None:
+    """The mean of the factors of some pieces, or None where errors do not explain that they differ."""
+    c, deviation = factors.own[inside], factors.deviation[inside]
+    if not np.isfinite(c).all() or (c * c[0] <= 0).any():
+        return None
+    ratio = np.log(c / c[0])
+    mean = float(np.average(ratio, weights=deviation**-2))
+    misfit, freedom = (ratio - mean) / deviation, len(inside) - 1
+    if noise:
+        explained = _explained(misfit / noise, freedom)
+    else:
+        apart = float(misfit @ misfit)
+        left, spare = _left(topology, weights, meshes, inside)
+        sigma = np.sqrt((apart + left) / (freedom + spare))
+        explained = sigma <= LARGEST_NOISE * np.abs(c).min()
+        if spare:
+            explained &= left > 0 and fdtrc(freedom, spare, (apart / freedom) / (left / spare)) >= CONFIDENCE
+    return float(c[0] * np.exp(mean)) if explained else None
+
+
+def _left(
+    topology: Topology, weights: NDArray, meshes: Sequence[PieceMesh], inside: NDArray[np.int64]
+) -> tuple[float, int]:
+    """Sum of squares of what some pieces, each with its c, leave of their entries; and how many these have to spare."""
+    pieces = [topology.pieces[p] for p in inside]
+    c = np.repeat([meshes[p].scale for p in inside], [len(piece.edge_rows) for piece in pieces])
+    with np.errstate(all="ignore"):  # flat triangles leave what is not finite
+        fitted = c * weights_of_all(pieces, [meshes[p].z for p in inside])
+        left = float(np.sum((weights[np.concatenate([piece.edge_rows for piece in pieces])] - fitted) ** 2))
+    return left, sum(piece.redundancy for piece in pieces)
+
+
+def _explained(misfit: NDArray, freedom: int) -> bool:
+    """Whether numbers of standard deviation 1, with their mean taken off, are not improbably large."""
+    largest = 2 * len(misfit) * float(ndtr(-np.abs(misfit).max()))
+    return min(float(gammaincc(freedom / 2, misfit @ misfit / 2)), largest) >= CONFIDENCE
+
+
+def discord(topology: Topology, factors: Factors, backward_error: float, noise: float | None = None) -> str | None:
     """What is wrong where pieces share vertices but not c, errors of the entries being allowed for.
 
     Parameters
     ----------
     topology : Topology
-    meshes : sequence of PieceMesh
+    factors : Factors
     backward_error : float
         Of the entries.
     noise : float, optional
         Standard deviation of their errors.
     """
-    if not len(topology.hinges):
+    difference, together = factors.differences, factors.together
+    # A null vector that is not polished may be off by more than the entries; noise has been asked how much it explains.
+    allowed = max(SAME_SCALE, 0.0 if noise else SCALE_ERROR * backward_error)
+    apart = np.where(together, 0.0, difference)
+    if apart.max() > allowed:
+        more = f", more than noise of standard deviation {noise:.3g} explains" if noise else ""
+        return f"pieces that share vertices have different factors c: {_named(topology, factors, apart)}{more}"
+    if not noise or not difference.max() > SAME_SCALE:
         return None
-    scale = np.array([mesh.scale for mesh in meshes])
-    _, one, group = np.unique(groups(topology), return_index=True, return_inverse=True)
-    first = one[group]
-    difference = np.abs(scale / scale[first] - 1)
-    worst = int(difference.argmax())
-    # With noise its size tells how far factors may differ: a misfit of a hundred thousandth would excuse anything.
-    if difference[worst] <= max(SAME_SCALE, 0.0 if noise else SCALE_ERROR * backward_error):
-        return None
-    a, b = int(first[worst]), worst
-    differ = (
-        f"the matrix is given back to {backward_error:.1e}, but by pieces with different factors c that "
-        f"share vertices: {scale[a]:.6g} in piece {a}, of row {topology.pieces[a].vertices.min()}, and "
-        f"{scale[b]:.6g} in piece {b}, of row {topology.pieces[b].vertices.min()}"
-    )
-    if (scale * scale[first] < 0).any():
-        return differ
-    ratio = np.log(scale / scale[first])
-    deviation = _deviations(topology, meshes)  # for noise 1
-    several = np.bincount(group)[group] > 1
-    misfit = (ratio - _mean(ratio, deviation, group))[several] / deviation[several]
-    freedom = len(misfit) - len(np.unique(group[several]))
-    if noise is None:
-        sigma = float(np.sqrt(misfit @ misfit / freedom))
-        return f"{differ}; noise of standard deviation {sigma:.2g} in the entries would make them differ as much"
-    misfit /= noise
-    largest = 2 * len(misfit) * float(ndtr(-np.abs(misfit).max()))
-    if min(float(gammaincc(freedom / 2, misfit @ misfit / 2)), largest) < CONFIDENCE:
-        return f"{differ}, more than noise of standard deviation {noise:.3g} explains"
     # The first piece of each group tells c, and every other one confirms it to within its error.
-    others = several & (np.arange(len(scale)) != first)
-    unproved = others & _to_be_confirmed(topology, group)
-    if unproved.any() and np.log(np.minimum(noise * deviation[others], 1.0)).sum() > np.log(_CHANCE):
-        return f"{differ}, as much as noise of standard deviation {noise:.3g} explains, but too few for a certificate"
+    others = together & (np.arange(len(difference)) != factors.first)
+    unproved = others & _to_be_confirmed(topology, factors.group)
+    if unproved.any() and np.log(np.minimum(noise * factors.deviation[others], 1.0)).sum() > np.log(_CHANCE):
+        return (
+            f"noise of standard deviation {noise:.3g} explains that pieces which share vertices have different "
+            f"factors c by themselves ({_named(topology, factors, difference)}), but they agree too roughly, or are "
+            "too few, for a certificate"
+        )
     return None
+
+
+def _named(topology: Topology, factors: Factors, difference: NDArray[np.float64]) -> str:
+    """The factor of the first piece of a group, and the one that differs most from it."""
+    worst = int(difference.argmax())
+    return " and ".join(
+        f"{factors.own[p]:.6g} in piece {p}, of row {topology.pieces[p].vertices.min()}"
+        for p in (int(factors.first[worst]), worst)
+    )
 
 
 def _to_be_confirmed(topology: Topology, group: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -90,23 +230,3 @@ def _to_be_confirmed(topology: Topology, group: NDArray[np.int64]) -> NDArray[np
     )
     told = np.bincount(group, spare) > 0
     return np.asarray(~told[group] | (loose & ~spare))
-
-
-def _mean(values: NDArray, deviation: NDArray, group: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(k,) mean of each group, with weights 1 / deviation^2."""
-    weight = deviation**-2
-    return np.asarray((np.bincount(group, weight * values) / np.bincount(group, weight))[group])
-
-
-def _deviations(topology: Topology, meshes: Sequence[PieceMesh]) -> NDArray[np.float64]:
-    """(pieces,) standard deviations of log c for noise 1 in the entries; those that have vanished are exact."""
-    vanished = np.zeros(len(topology.edges), dtype=bool)
-    vanished[topology.vanished] = True
-    found = []
-    for piece, mesh in zip(topology.pieces, meshes, strict=True):
-        try:
-            deviation = factor_deviation(piece, mesh.z, np.where(vanished[piece.edge_rows], EXACT, 1.0))
-        except SolverError:
-            deviation = np.inf
-        found.append(min(deviation / abs(mesh.scale), 1e100))
-    return np.array(found)

@@ -14,7 +14,7 @@ from ..cells import AGREE, Alternative, OrientedMesh, alternatives, coincident, 
 from ..clock import Clock
 from ..linalg import AnalysisAhead, factorisation
 from ..matrix import OperatorMatrix
-from ..planar.deviations import coordinate_covariances
+from ..planar.deviations import coordinate_covariances, factor_deviations
 from ..planar.hinges import free_images, join
 from ..planar.pencil import pencil_pattern
 from ..planar.piece import PieceMesh
@@ -60,7 +60,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
         if planar and triangles_everywhere(stored.n, numbering.edges):
             analyse = AnalysisAhead(pencil_pattern(stored.n, numbering.edges), options.threads)
         topology = surfaces(stored.n, stored.edges, numbering)
-    matrix, topology, meshes = solve(
+    matrix, topology, meshes, factors = solve(
         topology,
         stored,
         clock,
@@ -77,11 +77,11 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
         shift = origins[mesh.component]
         points = mesh.points + np.column_stack([shift.real, shift.imag])
     with clock("certify"):
-        freedom = _freedom(topology, scale)
+        freedom = _freedom(topology, factors.count if scale is None else 0)
         certificate, chi_square = _held_against(stored, mesh, mesh.points, placement, noise, freedom)
-        factors = np.array([m.scale for m in meshes])
+        scales = np.array([m.scale for m in meshes])
         # A misfit at rounding level, or one that noise explains, hides no wrong entry.
-        search = not passes(certificate, chi_square, factors)
+        search = not passes(certificate, chi_square, scales)
         search |= (noise is None or freedom <= 0) and certificate.backward_error > certificates.SUSPICIOUS
         evidence = weigh(
             topology,
@@ -97,15 +97,18 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     if options.standard_deviations:
         with clock("deviations"):
             sigma = noise or pooled_noise(topology, matrix, meshes, freedom)
-            deviations = _deviations(topology, placement, placed, meshes, sigma, scale is None)
+            deviations = _deviations(
+                topology, placement, placed, meshes, sigma, factors.fitted if scale is None else None
+            )
     trouble = [note for m in meshes for note in m.notes]
     doubt = max(m.doubt for m in meshes)
-    apart = discord(topology, meshes, certificate.backward_error, noise)
-    status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble, doubt, apart)
+    apart = discord(topology, factors, certificate.backward_error, noise)
+    status, reason = verdict(topology, certificate, chi_square, matrix, evidence, scales, trouble, doubt, apart)
     others: list[Alternative] = []
     if status == "certified":
         with clock("ambiguity") if topology.method == "the numbers" else nullcontext():  # else next to nothing
-            agree = AGREE if noise is None else max(AGREE, _SIGMAS * noise / float(np.abs(factors).min()))
+            sigma = (evidence.noise or 0.0) if noise is None else noise
+            agree = max(AGREE, _SIGMAS * sigma / float(np.abs(scales).min()))
             others, doubt_of_cells = _alternatives(topology, stored, placement, mesh, stretch, agree, known)
         if doubt_of_cells and not others:
             status, reason = doubt_of_cells(certificate)
@@ -114,7 +117,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     distant = False
     if origins.any():
         near, (certificate, chi_square) = certificate, _held_against(stored, mesh, points, placement, noise, freedom)
-        distant = status == "certified" and not passes(certificate, chi_square, factors)
+        distant = status == "certified" and not passes(certificate, chi_square, scales)
         if distant:
             status, reason = far_away(origins, certificate, near)
     worst, misfits = certificate.worst(
@@ -223,10 +226,9 @@ def _place(
     return placed, notes
 
 
-def _freedom(topology: Topology, scale: float | None) -> int:
-    """Entries less fitted unknowns: 2 v - 4 coordinates of each piece, and its c."""
-    unknowns = sum(2 * piece.n_vertices - 4 + (scale is None) for piece in topology.pieces)
-    return len(topology.edges) - unknowns
+def _freedom(topology: Topology, scales: int) -> int:
+    """Entries less fitted unknowns: 2 v - 4 coordinates of each piece, and so many factors c."""
+    return len(topology.edges) - sum(2 * piece.n_vertices - 4 for piece in topology.pieces) - scales
 
 
 def _deviations(
@@ -235,19 +237,31 @@ def _deviations(
     placed: list[NDArray],
     meshes: list[PieceMesh],
     sigma: float,
-    free_scale: bool,
+    fitted: NDArray | None,
 ) -> NDArray:
-    """(n, 2) standard deviations in the final frame."""
+    """(n, 2) standard deviations in the final frame; pieces with the same label `fitted`, where c is free, have one."""
     tensor = placement.tensor
     result = np.full((topology.n_vertices, 2), np.nan)
-    for piece, z, mesh in reversed(list(zip(topology.pieces, placed, meshes, strict=True))):
+    beside = np.zeros(len(meshes)) if fitted is None else _beside(topology, meshes, fitted)
+    for piece, z, mesh, more in reversed(list(zip(topology.pieces, placed, meshes, beside, strict=True))):
         covariance = coordinate_covariances(
             piece,
             tensor.to_laplacian(z) if tensor else z,
             sigma=sigma / abs(mesh.scale),
-            free_scale=free_scale,
+            free_scale=fitted is not None,
+            beside=more,
             stretch=tensor.root if tensor else None,
             spread=mesh.spread,
         )
         result[piece.vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     return result
+
+
+def _beside(topology: Topology, meshes: list[PieceMesh], fitted: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(pieces,) what the others with the same label say of c, for noise 1 in the weights."""
+    told = np.zeros(len(meshes))
+    several = np.flatnonzero(np.bincount(fitted)[fitted] > 1)
+    if len(several):
+        pieces, some = [topology.pieces[p] for p in several], [meshes[p] for p in several]
+        told[several] = factor_deviations(pieces, [m.z for m in some], [m.spread for m in some]) ** -2
+    return np.asarray(np.bincount(fitted, told)[fitted] - told)

@@ -56,7 +56,7 @@ def verdict(
     """
     good = passes(certificate, chi_square, scale)
     if good and apart:
-        return "uncertified", apart
+        return "uncertified", f"the matrix is given back to {certificate.backward_error:.1e}, but {apart}"
     if chi_square and _tested(certificate, chi_square, scale):
         return ("certified" if good else "uncertified"), _with_noise(
             chi_square, certificate, topology, evidence, scale, notes
