@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from meshes import random_mesh, specimen, triangle_set
+from meshes import largest_error, random_mesh, specimen, triangle_set
 from unassemble import recover
 from unassemble.planar.cotangent import edge_weights
 from unassemble.planar.deviations import factor_deviations
@@ -69,6 +69,53 @@ def test_error_bars_of_pieces_with_one_factor(told):
         levels.append(found.estimated_noise / sigma)
     assert np.mean(np.square(levels)) == pytest.approx(1, abs=0.3)
     assert np.mean(squares) == pytest.approx(1, abs=0.3)
+
+
+def with_tied_triangles(n, count, seed):
+    """A random mesh in which some triangles have lost their three neighbours: each hangs by all of its corners."""
+    points, triangles = random_mesh(n, seed, holes=False)
+    sides = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]], axis=2) @ [len(points), 1]
+    boundary = np.bincount(np.unique(sides, return_inverse=True)[1].ravel()) == 1
+    keep, taken = np.ones(len(triangles), bool), np.zeros(len(points), bool)
+    edge = np.unique(sides)[boundary]
+    taken[np.r_[edge // len(points), edge % len(points)]] = True
+    for k in np.random.default_rng(seed).permutation(len(triangles)).tolist():
+        around = np.isin(sides, sides[k]).any(axis=1)
+        around[k] = False
+        if count and not taken[triangles[around]].any():
+            keep[around] = False
+            taken[triangles[around]] = True
+            count -= 1
+    assert not count
+    return points, triangles[keep]
+
+
+@pytest.mark.parametrize("options", [{}, {"scale": C}], ids=str)
+@pytest.mark.parametrize("sigma", [1e-9, 1e-5])
+def test_pieces_that_hold_each_other_are_fitted_as_they_do(sigma, options):
+    """Each by itself has no reason to meet the others where it should."""
+    known = specimen(*with_tied_triangles(120, 3, 1), c=C, seed=3)
+    found = recover(noisy(known.matrix, sigma * C, 1), noise=sigma * C, **options)
+    assert found.certified, found.reason
+    assert triangle_set(found.triangles) == triangle_set(known.triangles)
+    assert len(found.scale) == 4
+    entries = sp.triu(known.matrix, 1).nnz
+    assert found.chi_square["degrees_of_freedom"] == entries - 2 * len(known.points) + 4 - ("scale" not in options)
+    assert found.chi_square["p_value"] > 1e-3
+    assert largest_error(found.points, known.points) < 20 * sigma
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_error_bars_of_pieces_that_hold_each_other(told):
+    known, sigma = specimen(*with_tied_triangles(80, 2, 1), c=C, seed=3), 3e-8 * C
+    every = np.arange(len(known.points))
+    squares, levels = [], []
+    for seed in range(20):
+        found = recover(noisy(known.matrix, sigma, seed), noise=sigma if told else None, standard_deviations=True)
+        squares.append(deviates(found, known, every) ** 2)
+        levels.append(found.estimated_noise / sigma)
+    assert np.mean(np.square(levels)) == pytest.approx(1, abs=0.35)
+    assert np.mean(squares) == pytest.approx(1, abs=0.5)
 
 
 def test_noise_that_is_not_given_is_estimated_from_factors():

@@ -27,6 +27,7 @@ def coordinate_covariances(
     beside: float = 0.0,
     stretch: NDArray | None = None,
     spread: NDArray | None = None,
+    pins: NDArray | None = None,
 ) -> NDArray[np.float64]:
     """Covariance of each vertex for independent noise of standard deviation sigma in the weights.
 
@@ -50,13 +51,15 @@ def coordinate_covariances(
         Linear map from that frame to the one in which covariances are wanted.
     spread : (e,) float64, optional
         Standard deviations of the weights relative to `sigma`, for which z is the least-squares estimate.
+    pins : (k,) int, optional
+        Vertices that are held, where two do not fix all similarities.
 
     Returns
     -------
     (n, 2, 2) float64
     """
     jacobian = WeightJacobian(piece, z, spread)
-    equations = NormalEquations(jacobian, distant_pair(z))
+    equations = NormalEquations(jacobian, distant_pair(z) if pins is None else pins)
     weights = edge_weights(piece, z) / jacobian.spread
     slope = jacobian.transpose(weights)
     response = equations.solve(slope)

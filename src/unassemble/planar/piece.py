@@ -14,6 +14,7 @@ from ..topology import Piece
 from .cautious import cautious_polish, count_flipped
 from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
+from .hinged import Hinged
 from .pivoted import PivotedEquations, affordable
 from .polish import PolishedMesh, polish
 from .robust import ASIDE
@@ -112,16 +113,17 @@ def refined(
     return PieceMesh(found.z, found.scale, (*mesh.notes, note), spread, found.last_step, mesh.aside)
 
 
-def refined_with_one_scale(
+def refined_together(
     pieces: Sequence[Piece],
     weights: NDArray,
     meshes: Sequence[PieceMesh],
-    scale: float,
+    joined: Hinged | None,
+    scale: float | None,
     *,
     rounding: bool,
     exact: NDArray[np.bool_],
 ) -> list[PieceMesh]:
-    """Polish several pieces with a single c, which is fitted.
+    """Polish several pieces with a single c.
 
     Parameters
     ----------
@@ -130,25 +132,29 @@ def refined_with_one_scale(
         -A_ij of each edge of the whole graph.
     meshes : sequence of PieceMesh
         Starts.
-    scale : float
-        c to begin with.
+    joined : Hinged or None
+        The pieces, where rings of them hold each other; without it each has a similarity of its own.
+    scale : float, optional
+        c, where it is known.
     rounding : bool
         As for :func:`refined`.
     exact : (e,) bool
         Entries of the whole graph that have vanished.
     """
-    union = SideBySide.of(pieces, [mesh.z for mesh in meshes])
-    aside = [first + mesh.aside for first, mesh in zip(union.edges, meshes, strict=False) if mesh.aside is not None]
+    beside = SideBySide.of(pieces, [mesh.z for mesh in meshes])
+    union = joined or beside
+    aside = [first + mesh.aside for first, mesh in zip(beside.edges, meshes, strict=False) if mesh.aside is not None]
     notes = tuple(dict.fromkeys(note for mesh in meshes for note in mesh.notes))
-    start = PieceMesh(union.z, scale, notes, aside=np.concatenate(aside) if aside else None)
+    start = PieceMesh(union.z, meshes[0].scale, notes, aside=np.concatenate(aside) if aside else None)
     rows = union.piece.edge_rows
     found = refined(
-        union.piece, weights[rows], start, scale=None, rounding=rounding, exact=exact[rows], pins=union.pins
+        union.piece, weights[rows], start, scale=scale, rounding=rounding, exact=exact[rows], pins=union.pins
     )
-    spreads = [None] * len(pieces) if found.spread is None else union.split(found.spread, union.edges)
+    spreads = [None] * len(pieces) if found.spread is None else beside.split(found.spread, beside.edges)
+    positions = [found.z[own] for own in joined.local] if joined else beside.split(found.z, beside.vertices)
     return [
         PieceMesh(z, found.scale, found.notes, spread, found.doubt, mesh.aside)
-        for z, spread, mesh in zip(union.split(found.z, union.vertices), spreads, meshes, strict=True)
+        for z, spread, mesh in zip(positions, spreads, meshes, strict=True)
     ]
 
 

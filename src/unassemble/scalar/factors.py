@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,13 +14,15 @@ from ..cells.agreement import SAME_SCALE, SCALE_ERROR
 from ..certify import CONFIDENCE, LARGEST_NOISE
 from ..planar.cotangent import weights_of_all
 from ..planar.deviations import factor_deviations
-from ..planar.hinges import groups
-from ..planar.piece import EXACT, PieceMesh, refined_with_one_scale
+from ..planar.hinged import Hinged
+from ..planar.hinges import CLOSED, groups, join, rings
+from ..planar.piece import EXACT, PieceMesh, refined_together
 from ..planar.polish import PolishOptions
 from ..topology import Topology
 
 _EQUAL = 1e-12  # relative difference of factors that rounding leaves: each piece keeps its own
 _UNTOLD = 1e100  # standard deviation of log c where entries do not tell c
+_GAP = 30.0  # that noise may leave in rings of pieces, in units of their size and of noise over c
 _CHANCE = 1e-6  # that factors which agree to within their errors do so by coincidence
 
 
@@ -38,13 +40,16 @@ class Factors:
     group : (pieces,) int64
         Label of the pieces that hang together by vertices.
     fitted : (pieces,) int64
-        Label of the pieces that were fitted with one c.
+        Label of the pieces that have one c, as far as errors explain that their own differ.
+    closings : int
+        Equations by which rings of pieces, fitted together, held these.
     """
 
     own: NDArray[np.float64]
     deviation: NDArray[np.float64]
     group: NDArray[np.int64]
     fitted: NDArray[np.int64]
+    closings: int = 0
 
     @classmethod
     def of(cls, topology: Topology, meshes: Sequence[PieceMesh]) -> Factors:
@@ -75,10 +80,16 @@ class Factors:
         return np.abs(self.own / self.own[self.first] - 1)
 
 
-def with_one_factor(
-    topology: Topology, weights: NDArray, meshes: list[PieceMesh], noise: float | None, *, refine: bool
+def fitted_together(
+    topology: Topology,
+    weights: NDArray,
+    meshes: list[PieceMesh],
+    noise: float | None,
+    scale: float | None,
+    *,
+    refine: bool,
 ) -> tuple[list[PieceMesh], Factors]:
-    """Fit pieces that share vertices with one c, where errors of the entries explain that theirs differ.
+    """Fit pieces that share vertices with one c, and as they hold each other, where errors of the entries ask for it.
 
     Parameters
     ----------
@@ -86,11 +97,13 @@ def with_one_factor(
     weights : (e,) float64
         -A_ij of each edge.
     meshes : list of PieceMesh
-        Each piece with the c that fits it best.
+        Each piece by itself.
     noise : float, optional
         Standard deviation of the entries' errors; without it their misfit tells how large they are.
+    scale : float, optional
+        c, where it is known.
     refine : bool
-        Whether anything is to be fitted.
+        Whether anything is fitted; it is only found out otherwise what errors explain.
     """
     factors = Factors.of(topology, meshes)
     if not (len(topology.hinges) and (noise or factors.differences.max() > _EQUAL)):
@@ -98,30 +111,47 @@ def with_one_factor(
     vanished = np.zeros(len(topology.edges), dtype=bool)
     vanished[topology.vanished] = True
     several = np.flatnonzero(np.bincount(factors.group)[factors.group] > 1)
-    pieces = [topology.pieces[p] for p in several]
-    errors = [np.where(vanished[piece.edge_rows], EXACT, 1.0) for piece in pieces]
-    deviation = factor_deviations(pieces, [meshes[p].z for p in several], errors)
-    factors.deviation[several] = np.minimum(deviation / np.abs(factors.own[several]), _UNTOLD)
-    if not refine:
-        return meshes, factors
-    meshes = list(meshes)
+    if scale is None:
+        factors.deviation[several] = _deviations(topology, meshes, several, vanished)
+    meshes, closings = list(meshes), 0
     for label in np.unique(factors.group[several]):
         inside = np.flatnonzero(factors.group == label)
-        c = _common(topology, weights, meshes, factors, inside, noise)
+        c, sigma = (scale, noise or 0.0) if scale else _common(topology, weights, meshes, factors, inside, noise)
         if c is None or sum(topology.pieces[p].n_vertices for p in inside) > PolishOptions().direct_limit:
             continue
-        together = refined_with_one_scale(
-            [topology.pieces[p] for p in inside],
-            weights,
-            [meshes[p] for p in inside],
-            c,
-            rounding=noise is None,
-            exact=vanished,
-        )
+        if not refine:
+            factors.fitted[inside] = inside[0]
+            continue
+        pieces, own = [topology.pieces[p] for p in inside], [replace(meshes[p], scale=c) for p in inside]
+        joined = hinged(topology, inside, [mesh.z for mesh in own], _GAP * sigma / abs(c))
+        if joined is None and scale is not None:
+            continue
+        together = refined_together(pieces, weights, own, joined, scale, rounding=noise is None, exact=vanished)
+        closings += joined.closings if joined else 0
         factors.fitted[inside] = inside[0]
         for p, mesh in zip(inside, together, strict=True):
             meshes[p] = mesh
-    return meshes, factors
+    return meshes, replace(factors, closings=closings)
+
+
+def hinged(
+    topology: Topology, inside: NDArray[np.int64], positions: list[NDArray], error: float = 0.0
+) -> Hinged | None:
+    """A group of pieces joined at the vertices that they share, if rings of them hold each other."""
+    pieces = [topology.pieces[p] for p in inside]
+    some = replace(topology, pieces=tuple(pieces))
+    closed = max(CLOSED, error)
+    return Hinged.of(pieces, join(some, positions, closed=closed)) if rings(some) > 0 else None
+
+
+def _deviations(
+    topology: Topology, meshes: Sequence[PieceMesh], some: NDArray[np.int64], vanished: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Of some pieces: standard deviations of log c for noise 1 in the entries; those that have vanished are exact."""
+    pieces = [topology.pieces[p] for p in some]
+    errors = [np.where(vanished[piece.edge_rows], EXACT, 1.0) for piece in pieces]
+    deviation = factor_deviations(pieces, [meshes[p].z for p in some], errors)
+    return np.minimum(deviation / np.abs([meshes[p].scale for p in some]), _UNTOLD)
 
 
 def _common(
@@ -131,24 +161,25 @@ def _common(
     factors: Factors,
     inside: NDArray[np.int64],
     noise: float | None,
-) -> float | None:
-    """The mean of the factors of some pieces, or None where errors do not explain that they differ."""
+) -> tuple[float | None, float]:
+    """The mean of the factors of some pieces, or None where errors do not explain that they differ; and their size."""
     c, deviation = factors.own[inside], factors.deviation[inside]
     if not np.isfinite(c).all() or (c * c[0] <= 0).any():
-        return None
+        return None, 0.0
     ratio = np.log(c / c[0])
     mean = float(np.average(ratio, weights=deviation**-2))
     misfit, freedom = (ratio - mean) / deviation, len(inside) - 1
+    sigma = noise or 0.0
     if noise:
         explained = _explained(misfit / noise, freedom)
     else:
         apart = float(misfit @ misfit)
         left, spare = _left(topology, weights, meshes, inside)
-        sigma = np.sqrt((apart + left) / (freedom + spare))
+        sigma = float(np.sqrt((apart + left) / (freedom + spare)))
         explained = sigma <= LARGEST_NOISE * np.abs(c).min()
         if spare:
             explained &= left > 0 and fdtrc(freedom, spare, (apart / freedom) / (left / spare)) >= CONFIDENCE
-    return float(c[0] * np.exp(mean)) if explained else None
+    return float(c[0] * np.exp(mean)) if explained else None, sigma
 
 
 def _left(
@@ -190,10 +221,12 @@ def discord(topology: Topology, factors: Factors, backward_error: float, noise: 
         return f"pieces that share vertices have different factors c: {_named(topology, factors, apart)}{more}"
     if not noise or not difference.max() > SAME_SCALE:
         return None
-    # The first piece of each group tells c, and every other one confirms it to within its error.
+    # The first piece of each group tells c, and others confirm it to within their errors; so do rings that close.
     others = together & (np.arange(len(difference)) != factors.first)
     unproved = others & _to_be_confirmed(topology, factors.group)
-    if unproved.any() and np.log(np.minimum(noise * factors.deviation[others], 1.0)).sum() > np.log(_CHANCE):
+    chance = np.log(np.minimum(noise * factors.deviation[others], 1.0)).sum()
+    chance += factors.closings * np.log(min(_GAP * noise / float(np.abs(factors.own).max()), 1.0))
+    if unproved.any() and chance > np.log(_CHANCE):
         return (
             f"noise of standard deviation {noise:.3g} explains that pieces which share vertices have different "
             f"factors c by themselves ({_named(topology, factors, difference)}), but they agree too roughly, or are "

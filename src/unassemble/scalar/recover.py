@@ -21,7 +21,7 @@ from ..planar.piece import PieceMesh
 from ..recovery import Recovery
 from ..topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
 from .evidence import pooled_noise, weigh
-from .factors import discord
+from .factors import Factors, discord, hinged
 from .joined import JoinedMesh
 from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
 from .placement import Placement
@@ -77,7 +77,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
         shift = origins[mesh.component]
         points = mesh.points + np.column_stack([shift.real, shift.imag])
     with clock("certify"):
-        freedom = _freedom(topology, factors.count if scale is None else 0)
+        freedom = _freedom(topology, factors, scale)
         certificate, chi_square = _held_against(stored, mesh, mesh.points, placement, noise, freedom)
         scales = np.array([m.scale for m in meshes])
         # A misfit at rounding level, or one that noise explains, hides no wrong entry.
@@ -97,9 +97,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     if options.standard_deviations:
         with clock("deviations"):
             sigma = noise or pooled_noise(topology, matrix, meshes, freedom)
-            deviations = _deviations(
-                topology, placement, placed, meshes, sigma, factors.fitted if scale is None else None
-            )
+            deviations = _deviations(topology, placement, placed, meshes, sigma, factors, free=scale is None)
     trouble = [note for m in meshes for note in m.notes]
     doubt = max(m.doubt for m in meshes)
     apart = discord(topology, factors, certificate.backward_error, noise)
@@ -226,9 +224,10 @@ def _place(
     return placed, notes
 
 
-def _freedom(topology: Topology, scales: int) -> int:
-    """Entries less fitted unknowns: 2 v - 4 coordinates of each piece, and so many factors c."""
-    return len(topology.edges) - sum(2 * piece.n_vertices - 4 for piece in topology.pieces) - scales
+def _freedom(topology: Topology, factors: Factors, scale: float | None) -> int:
+    """Entries less fitted unknowns: 2 v - 4 coordinates of each piece, as far as rings do not tie them, and each c."""
+    coordinates = sum(2 * piece.n_vertices - 4 for piece in topology.pieces) - factors.closings
+    return len(topology.edges) - coordinates - (factors.count if scale is None else 0)
 
 
 def _deviations(
@@ -237,23 +236,45 @@ def _deviations(
     placed: list[NDArray],
     meshes: list[PieceMesh],
     sigma: float,
-    fitted: NDArray | None,
+    factors: Factors,
+    *,
+    free: bool,
 ) -> NDArray:
-    """(n, 2) standard deviations in the final frame; pieces with the same label `fitted`, where c is free, have one."""
+    """(n, 2) standard deviations in the final frame."""
     tensor = placement.tensor
+    stretch = tensor.root if tensor else None
+    drawn = [tensor.to_laplacian(z) if tensor else z for z in placed]
     result = np.full((topology.n_vertices, 2), np.nan)
-    beside = np.zeros(len(meshes)) if fitted is None else _beside(topology, meshes, fitted)
-    for piece, z, mesh, more in reversed(list(zip(topology.pieces, placed, meshes, beside, strict=True))):
+    beside = _beside(topology, meshes, factors.fitted) if free else np.zeros(len(meshes))
+    for piece, z, mesh, more in reversed(list(zip(topology.pieces, drawn, meshes, beside, strict=True))):
         covariance = coordinate_covariances(
             piece,
-            tensor.to_laplacian(z) if tensor else z,
+            z,
             sigma=sigma / abs(mesh.scale),
-            free_scale=fitted is not None,
+            free_scale=free,
             beside=more,
-            stretch=tensor.root if tensor else None,
+            stretch=stretch,
             spread=mesh.spread,
         )
         result[piece.vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    for label in np.unique(factors.fitted[factors.together]) if factors.closings else ():
+        inside = np.flatnonzero(factors.fitted == label)
+        joined = hinged(topology, inside, [drawn[p] for p in inside])
+        if joined is not None:
+            z = np.empty(joined.piece.n_vertices, dtype=np.complex128)
+            for p, own in zip(inside, joined.local, strict=True):
+                z[own] = drawn[p]
+            spreads = [spread for p in inside if (spread := meshes[p].spread) is not None]
+            covariance = coordinate_covariances(
+                joined.piece,
+                z,
+                sigma=sigma / abs(meshes[inside[0]].scale),
+                free_scale=free,
+                stretch=stretch,
+                spread=np.concatenate(spreads) if spreads else None,
+                pins=joined.pins,
+            )
+            result[joined.piece.vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     return result
 
 

@@ -17,7 +17,7 @@ from ..matrix import OperatorMatrix
 from ..planar.piece import EXACT, PieceMesh, positions, refined
 from ..planar.triangles import lone_triangles
 from ..topology import Piece, Polygons, Topology
-from .factors import Factors, with_one_factor
+from .factors import Factors, fitted_together
 
 Clock = Callable[[str], AbstractContextManager[None]]
 
@@ -84,12 +84,8 @@ def solve(
         outcomes = [attempt(piece) for piece in topology.pieces]
     topology, meshes = _successes(topology, outcomes)
     with clock("polish") if refine else nullcontext():
-        if refine:
-            meshes = _polished(topology, matrix, meshes, scale, noise)
-        if scale is None:
-            meshes, factors = with_one_factor(topology, -matrix.entries, meshes, noise, refine=refine)
-        else:
-            factors = Factors.of(topology, meshes)
+        meshes = _polished(topology, matrix, meshes, scale, noise) if refine else meshes
+        meshes, factors = fitted_together(topology, -matrix.entries, meshes, noise, scale, refine=refine)
     return matrix, topology, meshes, factors
 
 
