@@ -126,6 +126,14 @@ def test_noise_that_is_not_given_is_estimated_from_factors():
     assert f"noise of standard deviation {found.estimated_noise:.2g}" in found.reason
 
 
+@pytest.mark.parametrize("sigma", [1e-5, 1e-3])
+def test_a_small_misfit_of_few_entries_is_said_to_be_as_noise_would_leave_it(sigma):
+    known = specimen(*with_rings(2, 0, hole=False), c=C, seed=3)
+    found = recover(noisy(known.matrix, sigma * C, 1))
+    assert f"noise of standard deviation {found.estimated_noise:.2g} in the entries would leave as much" in found.reason
+    assert "no set of cells" not in found.reason
+
+
 def test_more_than_noise_is_none():
     """Half of the triangles have another factor."""
     points, triangles = chain(20, 5)

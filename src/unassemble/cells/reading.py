@@ -185,6 +185,8 @@ def even(misfit: NDArray) -> bool:
 
     Of normal errors half are above 0.67 times their root mean square.
     """
+    if not misfit.max(initial=0.0) < 1:  # squares of more may overflow
+        return False
     size = float(np.sqrt(np.mean(misfit**2)))
     return size < 0.03 and float(misfit.max()) < 8 * size and float(np.median(misfit)) > 0.3 * size
 
