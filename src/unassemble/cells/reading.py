@@ -168,16 +168,21 @@ def _add_discord(
     """
     if not solved or (len(solved) == 1 and scale is None):
         return
-    scale = scale or max(solved, key=lambda item: item[0].n_vertices)[1].scale
-    apart = np.minimum(np.abs(np.array([mesh.scale for _, mesh in solved]) / scale - 1), 1.0)
-    rows = np.concatenate([piece.edge_rows for piece, _ in solved])
-    misfit[rows] = np.maximum(misfit[rows], np.repeat(apart, [len(piece.edge_rows) for piece, _ in solved]))
+    add_differing_factors(solved, misfit, scale)
     if (misfit > FITS).any():  # whether rings close is the last question, and the dearest
         return
     topology = Topology(n, edges, tuple(piece for piece, _ in solved), "")
     left = gap(topology, [mesh.z / np.abs(mesh.z).max() for _, mesh in solved])
     at_hinges = np.isin(edges, topology.hinges).any(axis=1)
     misfit[at_hinges] = np.maximum(misfit[at_hinges], min(left, 1.0))
+
+
+def add_differing_factors(solved: list[tuple[Piece, PieceMesh]], misfit: NDArray, scale: float | None) -> None:
+    """Raise the misfit of pieces with another factor than is known, or than the largest has, by that difference."""
+    scale = scale or max(solved, key=lambda item: item[0].n_vertices)[1].scale
+    apart = np.minimum(np.abs(np.array([mesh.scale for _, mesh in solved]) / scale - 1), 1.0)
+    rows = np.concatenate([piece.edge_rows for piece, _ in solved])
+    misfit[rows] = np.maximum(misfit[rows], np.repeat(apart, [len(piece.edge_rows) for piece, _ in solved]))
 
 
 def even(misfit: NDArray) -> bool:
