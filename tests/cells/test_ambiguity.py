@@ -112,6 +112,27 @@ def test_right_angles_that_touch_may_lie_in_the_gaps_between_them(kind, c):
     assert added >= triangle_set(same.triangles) - triangle_set(found.triangles)
 
 
+def noisy(matrix, sigma):
+    upper = sp.triu(matrix, 1).tocoo()
+    value = upper.data + sigma * np.random.default_rng(0).standard_normal(upper.nnz)
+    ends = np.r_[upper.row, upper.col], np.r_[upper.col, upper.row]
+    return sp.coo_array((np.r_[value, value], ends), shape=matrix.shape)
+
+
+@pytest.mark.parametrize("told", [True, False])
+@pytest.mark.parametrize("sigma", [3e-10, 1e-6, 1e-3])
+def test_noise_leaves_right_angles_that_touch_in_doubt(sigma, told):
+    """Corners of cells that rectangles become are right angles to within the noise only."""
+    mask = np.ones((5, 4), bool)
+    mask[[2, 1], [1, 2]] = False  # two holes that meet in a vertex
+    known = forgotten(specimen(*squares(mask, width=0.7), c=2.0, seed=5))
+    assert recover(known.matrix, scale=2.0).alternatives
+    found = recover(noisy(known.matrix, sigma), noise=sigma if told else None)
+    assert found.status == "uncertified"
+    if told or sigma < 1e-9:
+        assert found.alternatives
+
+
 def test_rectangles_of_other_shapes_that_touch_are_certified():
     points, own, _ = touching("rectangles")
     points[[2, 5], 1] = 0.5

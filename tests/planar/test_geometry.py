@@ -33,6 +33,16 @@ def test_weights_are_those_of_scikit_fem():
     assert edge_weights(piece, z) == pytest.approx(weights, abs=1e-13)
 
 
+def test_flat_triangles_have_no_weights_and_give_no_warnings():
+    piece, _, z = single_piece(100)
+    a, _, c = piece.triangles[0]
+    z[c] = z[a]
+    with np.errstate(all="raise"):
+        weights = edge_weights(piece, z)
+        WeightJacobian(piece, z, np.ones(len(weights)))
+    assert not np.isfinite(weights).all()
+
+
 def mean_orientation(piece, z):
     a, b, c = z[piece.triangles].T
     return (np.conj(b - a) * (c - a)).imag.sum()

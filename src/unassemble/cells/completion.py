@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from ..errors import GeometryError, RecoveryError
 from ..matrix import OperatorMatrix
+from ..planar.piece import PieceMesh
 from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar, settled_numbering
 from ..topology.keys import contains, distinct, pair_keys
 from .by_component import with_pieces
 from .eliminated import incomplete_rows, without_boundary
 from .misfits.doubt import Attempt, Outcome, Solved, misfits_of, unexplained
-from .reading import Reading
+from .reading import Reading, add_differing_factors
 from .search import first_reading, read_cells
 from .undivided import undivided
 
@@ -130,7 +131,7 @@ def _read_again(
     reading = read_cells(len(numbering.vertices), numbering.edges, weights, scale)
     if reading is not None and (reading.fits or reading.has_wrong_entries):
         return _part(matrix, numbering, reading)
-    before = float(np.sqrt(np.mean(misfit_of_triangles()[numbering.edge_rows] ** 2)))
+    before = _misfit_of_own(misfit_of_triangles(), numbering, own, attempt, scale)
     if reading is not None and reading.size < _BETTER * before and reading.misfit.max() < 1:
         return _part(matrix, numbering, reading)
     n, e = len(numbering.vertices), len(numbering.edges)
@@ -146,6 +147,17 @@ def _read_again(
         f"of the meshes tried on the graph of the matrix, which is planar ({n} rows, {e} entries above the diagonal), "
         "none has its entries: they may belong to no mesh, as those of a network, or lack zeros that should be stored"
     )
+
+
+def _misfit_of_own(
+    misfit: NDArray, numbering: Numbering, own: list[Piece], attempt: Attempt, scale: float | None
+) -> float:
+    """Root mean square misfit of a component's triangles; what their factors differ by counts as in a reading."""
+    solved = [(piece, mesh) for piece in own if isinstance(mesh := attempt(piece), PieceMesh)]
+    misfit = misfit.copy()
+    if solved:
+        add_differing_factors(solved, misfit, scale)
+    return float(np.sqrt(np.mean(misfit[numbering.edge_rows] ** 2)))
 
 
 def _part(matrix: OperatorMatrix, numbering: Numbering, reading: Reading) -> _Part:

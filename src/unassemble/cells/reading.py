@@ -168,10 +168,7 @@ def _add_discord(
     """
     if not solved or (len(solved) == 1 and scale is None):
         return
-    scale = scale or max(solved, key=lambda item: item[0].n_vertices)[1].scale
-    apart = np.minimum(np.abs(np.array([mesh.scale for _, mesh in solved]) / scale - 1), 1.0)
-    rows = np.concatenate([piece.edge_rows for piece, _ in solved])
-    misfit[rows] = np.maximum(misfit[rows], np.repeat(apart, [len(piece.edge_rows) for piece, _ in solved]))
+    add_differing_factors(solved, misfit, scale)
     if (misfit > FITS).any():  # whether rings close is the last question, and the dearest
         return
     topology = Topology(n, edges, tuple(piece for piece, _ in solved), "")
@@ -180,11 +177,21 @@ def _add_discord(
     misfit[at_hinges] = np.maximum(misfit[at_hinges], min(left, 1.0))
 
 
+def add_differing_factors(solved: list[tuple[Piece, PieceMesh]], misfit: NDArray, scale: float | None) -> None:
+    """Raise the misfit of pieces with another factor than is known, or than the largest has, by that difference."""
+    scale = scale or max(solved, key=lambda item: item[0].n_vertices)[1].scale
+    apart = np.minimum(np.abs(np.array([mesh.scale for _, mesh in solved]) / scale - 1), 1.0)
+    rows = np.concatenate([piece.edge_rows for piece, _ in solved])
+    misfit[rows] = np.maximum(misfit[rows], np.repeat(apart, [len(piece.edge_rows) for piece, _ in solved]))
+
+
 def even(misfit: NDArray) -> bool:
     """Whether a misfit is small and spread evenly, as that of errors in the entries is, and that of wrong cells is not.
 
     Of normal errors half are above 0.67 times their root mean square.
     """
+    if not misfit.max(initial=0.0) < 1:  # squares of more may overflow
+        return False
     size = float(np.sqrt(np.mean(misfit**2)))
     return size < 0.03 and float(misfit.max()) < 8 * size and float(np.median(misfit)) > 0.3 * size
 

@@ -47,6 +47,7 @@ def cautious_polish(
     *,
     scale: float | None = None,
     spread: NDArray | None = None,
+    pins: NDArray | None = None,
     equations: Callable[[WeightJacobian, NDArray], Equations] = NormalEquations,
     options: CautiousOptions | None = None,
 ) -> PolishedMesh:
@@ -59,6 +60,7 @@ def cautious_polish(
     z : (n,) complex128
     scale : float, optional
     spread : (e,) float64, optional
+    pins : (k,) int, optional
         As for the polish.
     equations : callable
         Makes the linearised problem from its Jacobian and two vertices to be held.
@@ -68,7 +70,7 @@ def cautious_polish(
     spread = np.ones(len(weights)) if spread is None else spread
     extent = np.abs(z - z.mean()).max()
     z = (z - z.mean()) / extent
-    pins = distant_pair(z)
+    pins = distant_pair(z) if pins is None else pins
     problem = Problem(piece, weights, spread, scale)
     fit, steps, length, converged = problem.at(z), 0, np.inf, False
     history: list[tuple[float, float]] = []

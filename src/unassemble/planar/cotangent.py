@@ -23,12 +23,15 @@ def _sides(piece: Piece, z: NDArray) -> tuple[tuple[NDArray, NDArray], tuple[NDA
 
 def _halved(piece: Piece, left: NDArray, right: NDArray) -> NDArray:
     """Half the sum over both sides of each edge; on the boundary there is no right one."""
-    return (left + np.where(piece.inner, right, 0)) / 2
+    with np.errstate(invalid="ignore"):  # flat triangles on both sides
+        return np.asarray((left + np.where(piece.inner, right, 0)) / 2)
 
 
 def _cotangent(u: NDArray, w: NDArray) -> NDArray[np.float64]:
+    """Not finite at flat triangles."""
     product = np.conj(u) * w
-    return product.real / product.imag
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(product.real / product.imag)
 
 
 def edge_weights(piece: Piece, z: NDArray) -> NDArray[np.float64]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SolverError
 from ..topology import Piece
 from .cotangent import edge_weights
 from .normal import NormalEquations, WeightJacobian, distant_pair
+from .side_by_side import SideBySide
 
 _EXACT = 3000
 _SAMPLES = 400
@@ -22,8 +24,10 @@ def coordinate_covariances(
     *,
     sigma: float,
     free_scale: bool,
+    beside: float = 0.0,
     stretch: NDArray | None = None,
     spread: NDArray | None = None,
+    pins: NDArray | None = None,
 ) -> NDArray[np.float64]:
     """Covariance of each vertex for independent noise of standard deviation sigma in the weights.
 
@@ -41,21 +45,25 @@ def coordinate_covariances(
         In units of the weights, that is divided by the modulus of c.
     free_scale : bool
         Whether c was fitted as well.
+    beside : float
+        What other pieces, fitted with the same c, say of it: the inverse of the variance of log c for sigma = 1.
     stretch : (2, 2) float64, optional
         Linear map from that frame to the one in which covariances are wanted.
     spread : (e,) float64, optional
         Standard deviations of the weights relative to `sigma`, for which z is the least-squares estimate.
+    pins : (k,) int, optional
+        Vertices that are held, where two do not fix all similarities.
 
     Returns
     -------
     (n, 2, 2) float64
     """
     jacobian = WeightJacobian(piece, z, spread)
-    equations = NormalEquations(jacobian, distant_pair(z))
+    equations = NormalEquations(jacobian, distant_pair(z) if pins is None else pins)
     weights = edge_weights(piece, z) / jacobian.spread
     slope = jacobian.transpose(weights)
     response = equations.solve(slope)
-    complement = float(weights @ weights) - float(np.vdot(slope, response).real)
+    complement = float(weights @ weights) - float(np.vdot(slope, response).real) + beside
     gauge = _gauge(z)
     root = np.eye(2) if stretch is None else stretch
     total = np.zeros((len(z), 2, 2))
@@ -64,39 +72,64 @@ def coordinate_covariances(
         if free_scale and complement > 0:
             along = (weights @ noise - np.real(slope.conj() @ y)) / complement
             y = y - response[:, None] * along
-        flat = np.stack([y.real, y.imag], axis=1).reshape(2 * len(z), -1)
-        flat -= gauge @ (gauge.T @ flat)
-        moved = root @ flat.reshape(len(z), 2, -1)
-        total += moved @ moved.transpose(0, 2, 1)
+        total += _spread(y, gauge, root)
+    if free_scale and complement > 0:
+        total += _spread(response[:, None] * np.sqrt(beside) / complement, gauge, root)
     equations.release()
     return sigma**2 * total
 
 
-def factor_deviation(piece: Piece, z: NDArray, spread: NDArray | None = None) -> float:
-    """Standard deviation of log c for independent noise in the weights, positions being fitted as well.
+def _spread(moves: NDArray, gauge: NDArray, root: NDArray) -> NDArray[np.float64]:
+    """(n, 2, 2) sums of the products of some displacements (n, k), without their similarities."""
+    flat = np.stack([moves.real, moves.imag], axis=1).reshape(2 * len(moves), -1)
+    flat -= gauge @ (gauge.T @ flat)
+    moved = root @ flat.reshape(len(moves), 2, -1)
+    return moved @ moved.transpose(0, 2, 1)
+
+
+def factor_deviations(
+    pieces: Sequence[Piece], positions: Sequence[NDArray], spreads: Sequence[NDArray | None]
+) -> NDArray[np.float64]:
+    """Standard deviations of log c for independent noise in the weights, positions being fitted as well.
 
     1 / |w - J (J'J)^+ J'w|: what of the weights no displacement explains tells c.
 
     Parameters
     ----------
-    piece : Piece
-    z : (n,) complex128
-        The Laplacian's frame.
-    spread : (e,) float64, optional
+    pieces : sequence of Piece
+    positions : sequence of (n,) complex128
+        Each in the Laplacian's frame, of any size.
+    spreads : sequence of (e,) float64 or None
         Standard deviations of the weights, in units of c; 1 by default.
 
     Returns
     -------
-    float
+    (pieces,) float64
         Infinite where the weights do not tell c.
     """
-    jacobian = WeightJacobian(piece, z, spread)
-    equations = NormalEquations(jacobian, distant_pair(z))
-    weights = edge_weights(piece, z) / jacobian.spread
-    slope = jacobian.transpose(weights)
-    complement = float(weights @ weights) - float(np.vdot(slope, equations.solve(slope)).real)
+    try:
+        return _factor_deviations(pieces, positions, spreads)
+    except SolverError:  # flat triangles; those of one piece should not stop the others
+        if len(pieces) == 1:
+            return np.array([np.inf])
+        one_by_one = zip(pieces, positions, spreads, strict=True)
+        return np.concatenate([factor_deviations([p], [z], [s]) for p, z, s in one_by_one])
+
+
+def _factor_deviations(
+    pieces: Sequence[Piece], positions: Sequence[NDArray], spreads: Sequence[NDArray | None]
+) -> NDArray[np.float64]:
+    union = SideBySide.of(pieces, positions)
+    given = zip(pieces, spreads, strict=True)
+    spread = np.concatenate([np.ones(len(piece.edges)) if s is None else s for piece, s in given])
+    jacobian = WeightJacobian(union.piece, union.z, spread)
+    weights = edge_weights(union.piece, union.z) / spread
+    equations = NormalEquations(jacobian, union.pins)
+    left = weights - jacobian.forward(equations.fitted(jacobian, weights))
     equations.release()
-    return 1 / float(np.sqrt(complement)) if complement > 0 else np.inf
+    told = np.add.reduceat(weights * left, union.edges[:-1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(told > 0, 1 / np.sqrt(told), np.inf)
 
 
 def _gauge(z: NDArray) -> NDArray:

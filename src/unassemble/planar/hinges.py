@@ -14,7 +14,7 @@ from ..linalg import least_norm
 from ..topology import Topology
 from .images import growing_images
 
-_CLOSED = 1e-6  # distance at shared vertices, relative to the largest piece, below which rings count as closed
+CLOSED = 1e-6  # distance at shared vertices, relative to the largest piece, below which rings count as closed
 _MOST_IMAGES = 100  # pieces; above, those images are taken in which all have the orientation that they were drawn in
 _FEW, _SOME = 9, 24  # pieces of which several, or two, are turned over at once
 _MOST_TOGETHER = 4
@@ -22,7 +22,9 @@ _TRIED = 4  # choices of images
 _DENSE = 100  # pieces; above, sparse linear algebra is faster
 
 
-def join(topology: Topology, positions: list[NDArray], known: NDArray | None = None) -> list[NDArray]:
+def join(
+    topology: Topology, positions: list[NDArray], known: NDArray | None = None, closed: float = CLOSED
+) -> list[NDArray]:
     """Move pieces by similarities close to translations so that shared vertices coincide.
 
     With turn t_p and shift s_p of piece p, t_p z_p + s_p = t_q z_q + s_q at every shared vertex; of all
@@ -37,6 +39,8 @@ def join(topology: Topology, positions: list[NDArray], known: NDArray | None = N
     known : (number of pieces,) int, optional
         Known positions in each piece. Pieces with two or more stay where they are; of others joined to none
         of those the one with the most, or the first, does.
+    closed : float
+        Distance at shared vertices, relative to the largest piece, below which rings count as closed.
     """
     if not len(topology.hinges):
         return positions
@@ -44,9 +48,9 @@ def join(topology: Topology, positions: list[NDArray], known: NDArray | None = N
     known = np.zeros(n, dtype=np.int64) if known is None else known
     group = groups(topology)
     held = _held(group, known)
-    if _rings(topology) <= 0 and np.count_nonzero(held) == group.max() + 1:
+    if rings(topology) <= 0 and np.count_nonzero(held) == group.max() + 1:
         return _along_trees(topology, positions, held)
-    positions = _matching_images(topology, positions, held)
+    positions = _matching_images(topology, positions, held, closed)
     joined, _ = _joined(topology, positions, held)
     # Once more from there: turns and shifts of small pieces in a large mesh differ in size by many digits.
     return _joined(topology, joined, held)[0]
@@ -61,7 +65,7 @@ def free_images(topology: Topology, joined: list[NDArray]) -> NDArray[np.int64]:
     joined : list of (n_p,) complex128
         Positions by :func:`join`.
     """
-    if _rings(topology) <= 0 or len(joined) > _MOST_IMAGES:
+    if rings(topology) <= 0 or len(joined) > _MOST_IMAGES:
         return np.empty(0, dtype=np.int64)
     held = _held(groups(topology), np.zeros(len(joined), dtype=np.int64))
     shared = [np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces]
@@ -69,37 +73,39 @@ def free_images(topology: Topology, joined: list[NDArray]) -> NDArray[np.int64]:
     for piece in np.flatnonzero(~held & (np.array(shared) > 1)):
         turned = list(joined)
         turned[piece] = np.conj(turned[piece])
-        if _joined(topology, turned, held)[1] <= _CLOSED:
+        if _joined(topology, turned, held)[1] <= CLOSED:
             free.append(piece)
     return np.array(free, dtype=np.int64)
 
 
 def gap(topology: Topology, positions: list[NDArray]) -> float:
     """How far apart the pieces stay at shared vertices when they are joined, relative to the largest piece."""
-    if _rings(topology) <= 0:
+    if rings(topology) <= 0:
         return 0.0
     held = _held(groups(topology), np.zeros(len(positions), dtype=np.int64))
-    return _joined(topology, _matching_images(topology, positions, held), held)[1]
+    return _joined(topology, _matching_images(topology, positions, held, CLOSED), held)[1]
 
 
-def _matching_images(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> list[NDArray]:
+def _matching_images(
+    topology: Topology, positions: list[NDArray], held: NDArray[np.bool_], closed: float
+) -> list[NDArray]:
     """Mirror images of pieces in rings that let these close.
 
     Where they are not found piece by piece, one after the other is turned over as long as that lowers the gap, then two
     at once are tried, and of few pieces more.
     """
-    if _rings(topology) <= 0:
+    if rings(topology) <= 0:
         return positions
     best = _joined(topology, positions, held)[1]
     for images in (_as_drawn, _grown):
-        if best > _CLOSED:
-            positions, best = _closed_by(images(topology, positions), topology, positions, held, best)
+        if best > closed:
+            positions, best = _closed_by(images(topology, positions, closed), topology, positions, held, best, closed)
     if len(positions) > _MOST_IMAGES:
         return positions
     free = np.flatnonzero(~held).tolist()
     most = _MOST_TOGETHER if len(free) <= _FEW else 2 if len(free) <= _SOME else 1
     together = 1
-    while best > _CLOSED and together <= most:
+    while best > closed and together <= most:
         trials = []
         for pieces in combinations(free, together):
             turned = [np.conj(z) if p in pieces else z for p, z in enumerate(positions)]
@@ -118,6 +124,7 @@ def _closed_by(
     positions: list[NDArray],
     held: NDArray[np.bool_],
     gap: float,
+    closed: float,
 ) -> tuple[list[NDArray], float]:
     """Positions with the first of some images that close all rings, and what gap they leave; else those given."""
     for turned in images:
@@ -126,27 +133,27 @@ def _closed_by(
         away = np.isin(group, group[held & turned]) ^ turned
         trial = [np.conj(z) if over else z for z, over in zip(positions, away, strict=True)]
         left = _joined(topology, trial, held)[1]
-        if left <= _CLOSED:
+        if left <= closed:
             return trial, left
     return positions, gap
 
 
-def _as_drawn(topology: Topology, positions: list[NDArray]) -> Iterator[NDArray[np.bool_]]:
+def _as_drawn(topology: Topology, positions: list[NDArray], _: float) -> Iterator[NDArray[np.bool_]]:
     """Pieces that lie with their triangles the other way round: those of one drawing are all alike."""
     corners = (z[piece.triangles].T for piece, z in zip(topology.pieces, positions, strict=True))
     yield np.array([float((np.conj(b - a) * (c - a)).imag.sum()) < 0 for a, b, c in corners])
 
 
-def _grown(topology: Topology, positions: list[NDArray]) -> Iterator[NDArray[np.bool_]]:
+def _grown(topology: Topology, positions: list[NDArray], closed: float) -> Iterator[NDArray[np.bool_]]:
     """Images that close all rings, piece by piece."""
     if len(positions) > _MOST_IMAGES:
         return
     shared = [np.flatnonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces]
     vertices = [piece.vertices[s] for piece, s in zip(topology.pieces, shared, strict=True)]
-    yield from growing_images(vertices, [z[s] for z, s in zip(positions, shared, strict=True)], _CLOSED)[:_TRIED]
+    yield from growing_images(vertices, [z[s] for z, s in zip(positions, shared, strict=True)], closed)[:_TRIED]
 
 
-def _rings(topology: Topology) -> int:
+def rings(topology: Topology) -> int:
     """Independent rings of pieces."""
     shared = sum(np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces)
     return int(shared) - len(topology.hinges) - (len(topology.pieces) - len(np.unique(groups(topology))))
@@ -167,7 +174,7 @@ def _joined(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_
     solution = np.linalg.lstsq(system.toarray(), rhs, rcond=1e-12)[0] if n <= _DENSE else least_norm(system, rhs)
     turn, shift = 1 + (weight * solution)[:n], (weight * solution)[n:]
     left = float(np.abs(system @ solution - rhs).max(initial=0.0) / extent)
-    if (np.abs(turn) * size <= _CLOSED * extent).any():
+    if (np.abs(turn) * size <= CLOSED * extent).any():
         left = max(left, 1.0)
     return [turn[p] * z + shift[p] for p, z in enumerate(positions)], left
 

@@ -27,7 +27,8 @@ class WeightJacobian:
         self.n = piece.n_vertices
         self.spread = np.ones(len(piece.edges)) if spread is None else spread
         self._vertices = piece.stencil
-        self._gradient = weight_gradient(piece, z) / self.spread
+        with np.errstate(invalid="ignore"):  # flat triangles
+            self._gradient = weight_gradient(piece, z) / self.spread
 
     @property
     def matrix(self) -> sp.bsr_array:

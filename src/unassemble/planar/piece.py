@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,9 +14,11 @@ from ..topology import Piece
 from .cautious import cautious_polish, count_flipped
 from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
+from .hinged import Hinged
 from .pivoted import PivotedEquations, affordable
 from .polish import PolishedMesh, polish
 from .robust import ASIDE
+from .side_by_side import SideBySide
 
 _ROUNDING = 1e-12
 """Errors of the weights that may be rounding."""
@@ -77,13 +79,14 @@ def refined(
     scale: float | None,
     rounding: bool,
     exact: NDArray[np.bool_] | None = None,
+    pins: NDArray[np.int64] | None = None,
 ) -> PieceMesh:
     """Gauss-Newton polish; where it cannot be done the mesh stays as it is, with a note.
 
     With `rounding`, errors are taken to be those of assembly in floating-point arithmetic, unless the misfit is beyond
     that and more likely to be noise of one size. Noise leaves the entries `exact`, (e,) bool, as they are: these have
     vanished.
-    Without it the noise is known, and tested: entries set aside count as any other.
+    Without it the noise is known, and tested: entries set aside count as any other. `pins` are as for the polish.
     """
     noise = None if exact is None or not exact.any() else np.where(exact, EXACT, 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -96,10 +99,10 @@ def refined(
         weights[mesh.aside] = mesh.scale * edge_weights(piece, mesh.z)[mesh.aside]
         spread = _set_aside(mesh.aside, len(weights), spread)
     try:
-        found = _polished(piece, weights, mesh.z, scale, spread)
+        found = _polished(piece, weights, mesh.z, scale, spread, pins)
         if rounding and spread is not None and _is_uniform_noise(piece, weights, found, spread):
             spread = noise
-            found = _polished(piece, weights, found.z, scale, spread)
+            found = _polished(piece, weights, found.z, scale, spread, pins)
     except SolverError as error:
         return replace(mesh, notes=(*mesh.notes, f"no polish: {error}"))
     if not (np.isfinite(found.z).all() and np.isfinite(found.scale)):
@@ -110,6 +113,51 @@ def refined(
     return PieceMesh(found.z, found.scale, (*mesh.notes, note), spread, found.last_step, mesh.aside)
 
 
+def refined_together(
+    pieces: Sequence[Piece],
+    weights: NDArray,
+    meshes: Sequence[PieceMesh],
+    joined: Hinged | None,
+    scale: float | None,
+    *,
+    rounding: bool,
+    exact: NDArray[np.bool_],
+) -> list[PieceMesh]:
+    """Polish several pieces with a single c.
+
+    Parameters
+    ----------
+    pieces : sequence of Piece
+    weights : (e,) float64
+        -A_ij of each edge of the whole graph.
+    meshes : sequence of PieceMesh
+        Starts.
+    joined : Hinged or None
+        The pieces, where rings of them hold each other; without it each has a similarity of its own.
+    scale : float, optional
+        c, where it is known.
+    rounding : bool
+        As for :func:`refined`.
+    exact : (e,) bool
+        Entries of the whole graph that have vanished.
+    """
+    beside = SideBySide.of(pieces, [mesh.z for mesh in meshes])
+    union = joined or beside
+    aside = [first + mesh.aside for first, mesh in zip(beside.edges, meshes, strict=False) if mesh.aside is not None]
+    notes = tuple(dict.fromkeys(note for mesh in meshes for note in mesh.notes))
+    start = PieceMesh(union.z, meshes[0].scale, notes, aside=np.concatenate(aside) if aside else None)
+    rows = union.piece.edge_rows
+    found = refined(
+        union.piece, weights[rows], start, scale=scale, rounding=rounding, exact=exact[rows], pins=union.pins
+    )
+    spreads = [None] * len(pieces) if found.spread is None else beside.split(found.spread, beside.edges)
+    positions = [found.z[own] for own in joined.local] if joined else beside.split(found.z, beside.vertices)
+    return [
+        PieceMesh(z, found.scale, found.notes, spread, found.doubt, mesh.aside)
+        for z, spread, mesh in zip(positions, spreads, meshes, strict=True)
+    ]
+
+
 def _set_aside(edges: NDArray[np.int64], count: int, spread: NDArray | None) -> NDArray[np.float64]:
     """The standard deviations with those of some edges beyond all others."""
     spread = np.ones(count) if spread is None else spread.copy()
@@ -118,23 +166,29 @@ def _set_aside(edges: NDArray[np.int64], count: int, spread: NDArray | None) -> 
 
 
 def _polished(
-    piece: Piece, weights: NDArray, start: NDArray, scale: float | None, spread: NDArray | None
+    piece: Piece,
+    weights: NDArray,
+    start: NDArray,
+    scale: float | None,
+    spread: NDArray | None,
+    pins: NDArray[np.int64] | None,
 ) -> PolishedMesh:
     """By the chord iteration; where it fails, by small steps from the better of start and result.
 
     Rounding in the normal equations of long thin pieces is one reason to fail.
     """
-    found = polish(piece, weights, start, scale=scale, spread=spread)
+    found = polish(piece, weights, start, scale=scale, spread=spread, pins=pins)
     finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
     flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
     if found.converged and not flipped:
         return found
     if not flipped and _near(piece, weights, found) and affordable(piece.edges, found.z):
-        return cautious_polish(piece, weights, found.z, scale=scale, spread=spread, equations=PivotedEquations)
+        pivoted = PivotedEquations
+        return cautious_polish(piece, weights, found.z, scale=scale, spread=spread, pins=pins, equations=pivoted)
     if piece.n_vertices > _CAUTIOUS_LIMIT:
         return found
     nearest = found.z if flipped <= count_flipped(piece, start) else start
-    again = cautious_polish(piece, weights, nearest, scale=scale, spread=spread)
+    again = cautious_polish(piece, weights, nearest, scale=scale, spread=spread, pins=pins)
     return again if again.residual < found.residual or not finite else found
 
 

@@ -1,74 +1,247 @@
-"""Whether pieces that share vertices have one factor c: each by itself, small ones fit nearly anything."""
+"""Factors c of pieces that share vertices: there is one, but each piece by itself has its own, and errors move it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaincc, ndtr
+from scipy.special import fdtrc, gammaincc, ndtr
 
 from ..cells.agreement import SAME_SCALE, SCALE_ERROR
-from ..certify import CONFIDENCE
-from ..errors import SolverError
-from ..planar.deviations import factor_deviation
-from ..planar.hinges import groups
-from ..planar.piece import EXACT, PieceMesh
+from ..certify import CONFIDENCE, LARGEST_NOISE
+from ..planar.cotangent import weights_of_all
+from ..planar.deviations import factor_deviations
+from ..planar.hinged import Hinged
+from ..planar.hinges import CLOSED, groups, join, rings
+from ..planar.piece import EXACT, PieceMesh, refined_together
+from ..planar.polish import PolishOptions
 from ..topology import Topology
 
+_EQUAL = 1e-12  # relative difference of factors that rounding leaves: each piece keeps its own
+_UNTOLD = 1e100  # standard deviation of log c where entries do not tell c
+_GAP = 30.0  # that noise may leave in rings of pieces, in units of their size and of noise over c
 _CHANCE = 1e-6  # that factors which agree to within their errors do so by coincidence
 
 
-def discord(
-    topology: Topology, meshes: Sequence[PieceMesh], backward_error: float, noise: float | None = None
-) -> str | None:
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """What the entries of each piece by itself say of c, and which pieces were fitted with one c.
+
+    Attributes
+    ----------
+    own : (pieces,) float64
+        c of each piece by itself.
+    deviation : (pieces,) float64
+        Standard deviation of log c for noise 1 in the entries; those that have vanished are exact. Infinite where the
+        entries of a piece do not tell c, or where it does not matter.
+    group : (pieces,) int64
+        Label of the pieces that hang together by vertices.
+    fitted : (pieces,) int64
+        Label of the pieces that have one c, as far as errors explain that their own differ.
+    closings : int
+        Equations by which rings of pieces, fitted together, held these.
+    """
+
+    own: NDArray[np.float64]
+    deviation: NDArray[np.float64]
+    group: NDArray[np.int64]
+    fitted: NDArray[np.int64]
+    closings: int = 0
+
+    @classmethod
+    def of(cls, topology: Topology, meshes: Sequence[PieceMesh]) -> Factors:
+        """Those of pieces that were fitted one by one."""
+        n = len(meshes)
+        group = groups(topology) if len(topology.hinges) else np.arange(n)
+        own = np.array([mesh.scale for mesh in meshes])
+        return cls(own, np.full(n, np.inf), np.asarray(group, dtype=np.int64), np.arange(n))
+
+    @property
+    def count(self) -> int:
+        """How many were fitted."""
+        return len(np.unique(self.fitted))
+
+    @property
+    def together(self) -> NDArray[np.bool_]:
+        """(pieces,) those that were fitted with others."""
+        return np.bincount(self.fitted)[self.fitted] > 1
+
+    @cached_property
+    def first(self) -> NDArray[np.int64]:
+        """(pieces,) the first piece of each one's group."""
+        return np.unique(self.group, return_index=True)[1][self.group]
+
+    @property
+    def differences(self) -> NDArray[np.float64]:
+        """(pieces,) of their own factors from those of the first pieces of their groups, relative."""
+        return np.abs(self.own / self.own[self.first] - 1)
+
+
+def fitted_together(
+    topology: Topology,
+    weights: NDArray,
+    meshes: list[PieceMesh],
+    noise: float | None,
+    scale: float | None,
+    *,
+    refine: bool,
+) -> tuple[list[PieceMesh], Factors]:
+    """Fit pieces that share vertices with one c, and as they hold each other, where errors of the entries ask for it.
+
+    Parameters
+    ----------
+    topology : Topology
+    weights : (e,) float64
+        -A_ij of each edge.
+    meshes : list of PieceMesh
+        Each piece by itself.
+    noise : float, optional
+        Standard deviation of the entries' errors; without it their misfit tells how large they are.
+    scale : float, optional
+        c, where it is known.
+    refine : bool
+        Whether anything is fitted; it is only found out otherwise what errors explain.
+    """
+    factors = Factors.of(topology, meshes)
+    if not (len(topology.hinges) and (noise or factors.differences.max() > _EQUAL)):
+        return meshes, factors
+    vanished = np.zeros(len(topology.edges), dtype=bool)
+    vanished[topology.vanished] = True
+    several = np.flatnonzero(np.bincount(factors.group)[factors.group] > 1)
+    if scale is None:
+        factors.deviation[several] = _deviations(topology, meshes, several, vanished)
+    meshes, closings = list(meshes), 0
+    for label in np.unique(factors.group[several]):
+        inside = np.flatnonzero(factors.group == label)
+        c, sigma = (scale, noise or 0.0) if scale else _common(topology, weights, meshes, factors, inside, noise)
+        if c is None or sum(topology.pieces[p].n_vertices for p in inside) > PolishOptions().direct_limit:
+            continue
+        if not refine:
+            factors.fitted[inside] = inside[0]
+            continue
+        pieces, own = [topology.pieces[p] for p in inside], [replace(meshes[p], scale=c) for p in inside]
+        joined = hinged(topology, inside, [mesh.z for mesh in own], _GAP * sigma / abs(c))
+        if joined is None and scale is not None:
+            continue
+        together = refined_together(pieces, weights, own, joined, scale, rounding=noise is None, exact=vanished)
+        closings += joined.closings if joined else 0
+        factors.fitted[inside] = inside[0]
+        for p, mesh in zip(inside, together, strict=True):
+            meshes[p] = mesh
+    return meshes, replace(factors, closings=closings)
+
+
+def hinged(
+    topology: Topology, inside: NDArray[np.int64], positions: list[NDArray], error: float = 0.0
+) -> Hinged | None:
+    """A group of pieces joined at the vertices that they share, if rings of them hold each other."""
+    pieces = [topology.pieces[p] for p in inside]
+    some = replace(topology, pieces=tuple(pieces))
+    closed = max(CLOSED, error)
+    return Hinged.of(pieces, join(some, positions, closed=closed)) if rings(some) > 0 else None
+
+
+def _deviations(
+    topology: Topology, meshes: Sequence[PieceMesh], some: NDArray[np.int64], vanished: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Of some pieces: standard deviations of log c for noise 1 in the entries; those that have vanished are exact."""
+    pieces = [topology.pieces[p] for p in some]
+    errors = [np.where(vanished[piece.edge_rows], EXACT, 1.0) for piece in pieces]
+    deviation = factor_deviations(pieces, [meshes[p].z for p in some], errors)
+    return np.minimum(deviation / np.abs([meshes[p].scale for p in some]), _UNTOLD)
+
+
+def _common(
+    topology: Topology,
+    weights: NDArray,
+    meshes: Sequence[PieceMesh],
+    factors: Factors,
+    inside: NDArray[np.int64],
+    noise: float | None,
+) -> tuple[float | None, float]:
+    """The mean of the factors of some pieces, or None where errors do not explain that they differ; and their size."""
+    c, deviation = factors.own[inside], factors.deviation[inside]
+    if not np.isfinite(c).all() or (c * c[0] <= 0).any():
+        return None, 0.0
+    ratio = np.log(c / c[0])
+    mean = float(np.average(ratio, weights=deviation**-2))
+    misfit, freedom = (ratio - mean) / deviation, len(inside) - 1
+    sigma = noise or 0.0
+    if noise:
+        explained = _explained(misfit / noise, freedom)
+    else:
+        apart = float(misfit @ misfit)
+        left, spare = _left(topology, weights, meshes, inside)
+        sigma = float(np.sqrt((apart + left) / (freedom + spare)))
+        explained = sigma <= LARGEST_NOISE * np.abs(c).min()
+        if spare:
+            explained &= left > 0 and fdtrc(freedom, spare, (apart / freedom) / (left / spare)) >= CONFIDENCE
+    return float(c[0] * np.exp(mean)) if explained else None, sigma
+
+
+def _left(
+    topology: Topology, weights: NDArray, meshes: Sequence[PieceMesh], inside: NDArray[np.int64]
+) -> tuple[float, int]:
+    """Sum of squares of what some pieces, each with its c, leave of their entries; and how many these have to spare."""
+    pieces = [topology.pieces[p] for p in inside]
+    c = np.repeat([meshes[p].scale for p in inside], [len(piece.edge_rows) for piece in pieces])
+    with np.errstate(all="ignore"):  # flat triangles leave what is not finite
+        fitted = c * weights_of_all(pieces, [meshes[p].z for p in inside])
+        left = float(np.sum((weights[np.concatenate([piece.edge_rows for piece in pieces])] - fitted) ** 2))
+    return left, sum(piece.redundancy for piece in pieces)
+
+
+def _explained(misfit: NDArray, freedom: int) -> bool:
+    """Whether numbers of standard deviation 1, with their mean taken off, are not improbably large."""
+    largest = 2 * len(misfit) * float(ndtr(-np.abs(misfit).max()))
+    return min(float(gammaincc(freedom / 2, misfit @ misfit / 2)), largest) >= CONFIDENCE
+
+
+def discord(topology: Topology, factors: Factors, backward_error: float, noise: float | None = None) -> str | None:
     """What is wrong where pieces share vertices but not c, errors of the entries being allowed for.
 
     Parameters
     ----------
     topology : Topology
-    meshes : sequence of PieceMesh
+    factors : Factors
     backward_error : float
         Of the entries.
     noise : float, optional
         Standard deviation of their errors.
     """
-    if not len(topology.hinges):
+    difference, together = factors.differences, factors.together
+    # A null vector that is not polished may be off by more than the entries; noise has been asked how much it explains.
+    allowed = max(SAME_SCALE, 0.0 if noise else SCALE_ERROR * backward_error)
+    apart = np.where(together, 0.0, difference)
+    if apart.max() > allowed:
+        more = f", more than noise of standard deviation {noise:.3g} explains" if noise else ""
+        return f"pieces that share vertices have different factors c: {_named(topology, factors, apart)}{more}"
+    if not noise or not difference.max() > SAME_SCALE:
         return None
-    scale = np.array([mesh.scale for mesh in meshes])
-    _, one, group = np.unique(groups(topology), return_index=True, return_inverse=True)
-    first = one[group]
-    difference = np.abs(scale / scale[first] - 1)
-    worst = int(difference.argmax())
-    # With noise its size tells how far factors may differ: a misfit of a hundred thousandth would excuse anything.
-    if difference[worst] <= max(SAME_SCALE, 0.0 if noise else SCALE_ERROR * backward_error):
-        return None
-    a, b = int(first[worst]), worst
-    differ = (
-        f"the matrix is given back to {backward_error:.1e}, but by pieces with different factors c that "
-        f"share vertices: {scale[a]:.6g} in piece {a}, of row {topology.pieces[a].vertices.min()}, and "
-        f"{scale[b]:.6g} in piece {b}, of row {topology.pieces[b].vertices.min()}"
-    )
-    if (scale * scale[first] < 0).any():
-        return differ
-    ratio = np.log(scale / scale[first])
-    deviation = _deviations(topology, meshes)  # for noise 1
-    several = np.bincount(group)[group] > 1
-    misfit = (ratio - _mean(ratio, deviation, group))[several] / deviation[several]
-    freedom = len(misfit) - len(np.unique(group[several]))
-    if noise is None:
-        sigma = float(np.sqrt(misfit @ misfit / freedom))
-        return f"{differ}; noise of standard deviation {sigma:.2g} in the entries would make them differ as much"
-    misfit /= noise
-    largest = 2 * len(misfit) * float(ndtr(-np.abs(misfit).max()))
-    if min(float(gammaincc(freedom / 2, misfit @ misfit / 2)), largest) < CONFIDENCE:
-        return f"{differ}, more than noise of standard deviation {noise:.3g} explains"
-    # The first piece of each group tells c, and every other one confirms it to within its error.
-    others = several & (np.arange(len(scale)) != first)
-    unproved = others & _to_be_confirmed(topology, group)
-    if unproved.any() and np.log(np.minimum(noise * deviation[others], 1.0)).sum() > np.log(_CHANCE):
-        return f"{differ}, as much as noise of standard deviation {noise:.3g} explains, but too few for a certificate"
+    # The first piece of each group tells c, and others confirm it to within their errors; so do rings that close.
+    others = together & (np.arange(len(difference)) != factors.first)
+    unproved = others & _to_be_confirmed(topology, factors.group)
+    chance = np.log(np.minimum(noise * factors.deviation[others], 1.0)).sum()
+    chance += factors.closings * np.log(min(_GAP * noise / float(np.abs(factors.own).max()), 1.0))
+    if unproved.any() and chance > np.log(_CHANCE):
+        return (
+            f"noise of standard deviation {noise:.3g} explains that pieces which share vertices have different "
+            f"factors c by themselves ({_named(topology, factors, difference)}), but they agree too roughly, or are "
+            "too few, for a certificate"
+        )
     return None
+
+
+def _named(topology: Topology, factors: Factors, difference: NDArray[np.float64]) -> str:
+    """The factor of the first piece of a group, and the one that differs most from it."""
+    worst = int(difference.argmax())
+    return " and ".join(
+        f"{factors.own[p]:.6g} in piece {p}, of row {topology.pieces[p].vertices.min()}"
+        for p in (int(factors.first[worst]), worst)
+    )
 
 
 def _to_be_confirmed(topology: Topology, group: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -90,23 +263,3 @@ def _to_be_confirmed(topology: Topology, group: NDArray[np.int64]) -> NDArray[np
     )
     told = np.bincount(group, spare) > 0
     return np.asarray(~told[group] | (loose & ~spare))
-
-
-def _mean(values: NDArray, deviation: NDArray, group: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(k,) mean of each group, with weights 1 / deviation^2."""
-    weight = deviation**-2
-    return np.asarray((np.bincount(group, weight * values) / np.bincount(group, weight))[group])
-
-
-def _deviations(topology: Topology, meshes: Sequence[PieceMesh]) -> NDArray[np.float64]:
-    """(pieces,) standard deviations of log c for noise 1 in the entries; those that have vanished are exact."""
-    vanished = np.zeros(len(topology.edges), dtype=bool)
-    vanished[topology.vanished] = True
-    found = []
-    for piece, mesh in zip(topology.pieces, meshes, strict=True):
-        try:
-            deviation = factor_deviation(piece, mesh.z, np.where(vanished[piece.edge_rows], EXACT, 1.0))
-        except SolverError:
-            deviation = np.inf
-        found.append(min(deviation / abs(mesh.scale), 1e100))
-    return np.array(found)

@@ -14,14 +14,14 @@ from ..cells import AGREE, Alternative, OrientedMesh, alternatives, coincident, 
 from ..clock import Clock
 from ..linalg import AnalysisAhead, factorisation
 from ..matrix import OperatorMatrix
-from ..planar.deviations import coordinate_covariances
+from ..planar.deviations import coordinate_covariances, factor_deviations
 from ..planar.hinges import free_images, join
 from ..planar.pencil import pencil_pattern
 from ..planar.piece import PieceMesh
 from ..recovery import Recovery
 from ..topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
 from .evidence import pooled_noise, weigh
-from .factors import discord
+from .factors import Factors, discord, hinged
 from .joined import JoinedMesh
 from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
 from .placement import Placement
@@ -60,7 +60,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
         if planar and triangles_everywhere(stored.n, numbering.edges):
             analyse = AnalysisAhead(pencil_pattern(stored.n, numbering.edges), options.threads)
         topology = surfaces(stored.n, stored.edges, numbering)
-    matrix, topology, meshes = solve(
+    matrix, topology, meshes, factors = solve(
         topology,
         stored,
         clock,
@@ -77,11 +77,11 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
         shift = origins[mesh.component]
         points = mesh.points + np.column_stack([shift.real, shift.imag])
     with clock("certify"):
-        freedom = _freedom(topology, scale)
+        freedom = _freedom(topology, factors, scale)
         certificate, chi_square = _held_against(stored, mesh, mesh.points, placement, noise, freedom)
-        factors = np.array([m.scale for m in meshes])
+        scales = np.array([m.scale for m in meshes])
         # A misfit at rounding level, or one that noise explains, hides no wrong entry.
-        search = not passes(certificate, chi_square, factors)
+        search = not passes(certificate, chi_square, scales)
         search |= (noise is None or freedom <= 0) and certificate.backward_error > certificates.SUSPICIOUS
         evidence = weigh(
             topology,
@@ -97,15 +97,16 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     if options.standard_deviations:
         with clock("deviations"):
             sigma = noise or pooled_noise(topology, matrix, meshes, freedom)
-            deviations = _deviations(topology, placement, placed, meshes, sigma, scale is None)
+            deviations = _deviations(topology, placement, placed, meshes, sigma, factors, free=scale is None)
     trouble = [note for m in meshes for note in m.notes]
     doubt = max(m.doubt for m in meshes)
-    apart = discord(topology, meshes, certificate.backward_error, noise)
-    status, reason = verdict(topology, certificate, chi_square, matrix, evidence, factors, trouble, doubt, apart)
+    apart = discord(topology, factors, certificate.backward_error, noise)
+    status, reason = verdict(topology, certificate, chi_square, matrix, evidence, scales, trouble, doubt, apart)
     others: list[Alternative] = []
     if status == "certified":
         with clock("ambiguity") if topology.method == "the numbers" else nullcontext():  # else next to nothing
-            agree = AGREE if noise is None else max(AGREE, _SIGMAS * noise / float(np.abs(factors).min()))
+            sigma = (evidence.noise or 0.0) if noise is None else noise
+            agree = max(AGREE, _SIGMAS * sigma / float(np.abs(scales).min()))
             others, doubt_of_cells = _alternatives(topology, stored, placement, mesh, stretch, agree, known)
         if doubt_of_cells and not others:
             status, reason = doubt_of_cells(certificate)
@@ -114,7 +115,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     distant = False
     if origins.any():
         near, (certificate, chi_square) = certificate, _held_against(stored, mesh, points, placement, noise, freedom)
-        distant = status == "certified" and not passes(certificate, chi_square, factors)
+        distant = status == "certified" and not passes(certificate, chi_square, scales)
         if distant:
             status, reason = far_away(origins, certificate, near)
     worst, misfits = certificate.worst(
@@ -223,10 +224,10 @@ def _place(
     return placed, notes
 
 
-def _freedom(topology: Topology, scale: float | None) -> int:
-    """Entries less fitted unknowns: 2 v - 4 coordinates of each piece, and its c."""
-    unknowns = sum(2 * piece.n_vertices - 4 + (scale is None) for piece in topology.pieces)
-    return len(topology.edges) - unknowns
+def _freedom(topology: Topology, factors: Factors, scale: float | None) -> int:
+    """Entries less fitted unknowns: 2 v - 4 coordinates of each piece, as far as rings do not tie them, and each c."""
+    coordinates = sum(2 * piece.n_vertices - 4 for piece in topology.pieces) - factors.closings
+    return len(topology.edges) - coordinates - (factors.count if scale is None else 0)
 
 
 def _deviations(
@@ -235,19 +236,53 @@ def _deviations(
     placed: list[NDArray],
     meshes: list[PieceMesh],
     sigma: float,
-    free_scale: bool,
+    factors: Factors,
+    *,
+    free: bool,
 ) -> NDArray:
     """(n, 2) standard deviations in the final frame."""
     tensor = placement.tensor
+    stretch = tensor.root if tensor else None
+    drawn = [tensor.to_laplacian(z) if tensor else z for z in placed]
     result = np.full((topology.n_vertices, 2), np.nan)
-    for piece, z, mesh in reversed(list(zip(topology.pieces, placed, meshes, strict=True))):
+    beside = _beside(topology, meshes, factors.fitted) if free else np.zeros(len(meshes))
+    for piece, z, mesh, more in reversed(list(zip(topology.pieces, drawn, meshes, beside, strict=True))):
         covariance = coordinate_covariances(
             piece,
-            tensor.to_laplacian(z) if tensor else z,
+            z,
             sigma=sigma / abs(mesh.scale),
-            free_scale=free_scale,
-            stretch=tensor.root if tensor else None,
+            free_scale=free,
+            beside=more,
+            stretch=stretch,
             spread=mesh.spread,
         )
         result[piece.vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    for label in np.unique(factors.fitted[factors.together]) if factors.closings else ():
+        inside = np.flatnonzero(factors.fitted == label)
+        joined = hinged(topology, inside, [drawn[p] for p in inside])
+        if joined is not None:
+            z = np.empty(joined.piece.n_vertices, dtype=np.complex128)
+            for p, own in zip(inside, joined.local, strict=True):
+                z[own] = drawn[p]
+            spreads = [spread for p in inside if (spread := meshes[p].spread) is not None]
+            covariance = coordinate_covariances(
+                joined.piece,
+                z,
+                sigma=sigma / abs(meshes[inside[0]].scale),
+                free_scale=free,
+                stretch=stretch,
+                spread=np.concatenate(spreads) if spreads else None,
+                pins=joined.pins,
+            )
+            result[joined.piece.vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     return result
+
+
+def _beside(topology: Topology, meshes: list[PieceMesh], fitted: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(pieces,) what the others with the same label say of c, for noise 1 in the weights."""
+    told = np.zeros(len(meshes))
+    several = np.flatnonzero(np.bincount(fitted)[fitted] > 1)
+    if len(several):
+        pieces, some = [topology.pieces[p] for p in several], [meshes[p] for p in several]
+        told[several] = factor_deviations(pieces, [m.z for m in some], [m.spread for m in some]) ** -2
+    return np.asarray(np.bincount(fitted, told)[fitted] - told)

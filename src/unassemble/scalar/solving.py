@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import cache
 
@@ -17,6 +17,7 @@ from ..matrix import OperatorMatrix
 from ..planar.piece import EXACT, PieceMesh, positions, refined
 from ..planar.triangles import lone_triangles
 from ..topology import Piece, Polygons, Topology
+from .factors import Factors, fitted_together
 
 Clock = Callable[[str], AbstractContextManager[None]]
 
@@ -31,7 +32,7 @@ def solve(
     refine: bool,
     noise: float | None,
     analyse: Callable[[UpperTriangle], Factorisation] = factorisation,
-) -> tuple[OperatorMatrix, Topology, list[PieceMesh]]:
+) -> tuple[OperatorMatrix, Topology, list[PieceMesh], Factors]:
     """Positions and scale of each piece, in no particular frame; `analyse` as for the conformal map.
 
     Entries have errors of the standard deviation `noise`, or of rounding.
@@ -43,6 +44,8 @@ def solve(
     topology : Topology
         Of that matrix, without the pieces that have no positions; these are listed in its ``failures``.
     meshes : list of PieceMesh
+    factors : Factors
+        What each piece by itself says of c.
 
     Raises
     ------
@@ -80,25 +83,32 @@ def solve(
     else:
         outcomes = [attempt(piece) for piece in topology.pieces]
     topology, meshes = _successes(topology, outcomes)
-    if refine:
-        vanished = np.zeros(len(matrix.edges), dtype=bool)
-        vanished[topology.vanished] = True
-        with clock("polish"):
-            errors = None if noise is None else np.where(vanished, EXACT, 1.0)
-            exact = lone_triangles(topology.pieces, -matrix.entries, scale, errors)
-            meshes = [
-                exact.get(piece)
-                or refined(
-                    piece,
-                    -matrix.entries[piece.edge_rows],
-                    mesh,
-                    scale=scale,
-                    rounding=noise is None,
-                    exact=vanished[piece.edge_rows],
-                )
-                for piece, mesh in zip(topology.pieces, meshes, strict=True)
-            ]
-    return matrix, topology, meshes
+    with clock("polish") if refine else nullcontext():
+        meshes = _polished(topology, matrix, meshes, scale, noise) if refine else meshes
+        meshes, factors = fitted_together(topology, -matrix.entries, meshes, noise, scale, refine=refine)
+    return matrix, topology, meshes, factors
+
+
+def _polished(
+    topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], scale: float | None, noise: float | None
+) -> list[PieceMesh]:
+    """Each piece by itself."""
+    vanished = np.zeros(len(matrix.edges), dtype=bool)
+    vanished[topology.vanished] = True
+    errors = None if noise is None else np.where(vanished, EXACT, 1.0)
+    exact = lone_triangles(topology.pieces, -matrix.entries, scale, errors)
+    return [
+        exact.get(piece)
+        or refined(
+            piece,
+            -matrix.entries[piece.edge_rows],
+            mesh,
+            scale=scale,
+            rounding=noise is None,
+            exact=vanished[piece.edge_rows],
+        )
+        for piece, mesh in zip(topology.pieces, meshes, strict=True)
+    ]
 
 
 def _is_spoilt(mesh: Outcome) -> bool:

@@ -16,6 +16,7 @@ from ..words import count_of
 from .evidence import Evidence
 
 _MOST, _ROWS = 0.9, 6  # part of the squared misfit whose rows are named, and how many of them at most
+_MANY = 50  # entries, of which it can be said what their misfit looks like
 _SURE = 1e-8  # of a piece's size: how far off certified positions may be
 
 
@@ -56,7 +57,7 @@ def verdict(
     """
     good = passes(certificate, chi_square, scale)
     if good and apart:
-        return "uncertified", apart
+        return "uncertified", f"the matrix is given back to {certificate.backward_error:.1e}, but {apart}"
     if chi_square and _tested(certificate, chi_square, scale):
         return ("certified" if good else "uncertified"), _with_noise(
             chi_square, certificate, topology, evidence, scale, notes
@@ -69,11 +70,18 @@ def verdict(
         )
     if good and not evidence.certain:
         return "certified", f"the operator re-assembled on this mesh gives the matrix back to {error:.1e}"
-    return "uncertified", _misfit(topology, certificate, matrix, evidence, notes)
+    return "uncertified", _misfit(topology, certificate, matrix, evidence, scale, notes) + (
+        f"; {apart}" if apart else ""
+    )
 
 
 def _misfit(
-    topology: Topology, certificate: Certificate, matrix: OperatorMatrix, evidence: Evidence, notes: Sequence[str]
+    topology: Topology,
+    certificate: Certificate,
+    matrix: OperatorMatrix,
+    evidence: Evidence,
+    scale: NDArray,
+    notes: Sequence[str],
 ) -> str:
     """What does not fit, the gravest first."""
     if topology.failures:
@@ -100,7 +108,7 @@ def _misfit(
         f"the re-assembled matrix differs, most in the entry of rows {i} and {j} (by {misfit:.1e} of the row's "
         f"largest; {CERTIFIED:g} is allowed)"
     )
-    remark = _like_noise(certificate, evidence)
+    remark = _like_noise(certificate, evidence, scale)
     begun = _culprits(evidence) or ("" if remark else _unexplained(certificate))
     return begun + differs + remark + _because(notes)
 
@@ -200,13 +208,15 @@ def _unexplained(certificate: Certificate) -> str:
     )
 
 
-def _like_noise(certificate: Certificate, evidence: Evidence) -> str:
-    """The remark that the misfit is small and nowhere concentrated."""
+def _like_noise(certificate: Certificate, evidence: Evidence, scale: NDArray) -> str:
+    """The remark that the misfit is small and nowhere concentrated; of few entries that cannot be said."""
     size = np.abs(certificate.differences)
-    if len(evidence.suspects) or not evidence.noise or not certificate.backward_error < 1e-2:
+    if len(evidence.suspects) or not evidence.noise or not evidence.noise <= LARGEST_NOISE * np.abs(scale).min():
         return ""
-    if len(size) < 50 or size.max() > 8 * np.sqrt(np.mean(size**2)):
+    if size.max() > 8 * np.sqrt(np.mean(size**2)):
         return ""
+    if len(size) < _MANY:
+        return f"; noise of standard deviation {evidence.noise:.2g} in the entries would leave as much"
     return f"; the misfit looks like noise of standard deviation {evidence.noise:.2g} in the entries"
 
 

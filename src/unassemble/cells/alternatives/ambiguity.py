@@ -60,14 +60,14 @@ def alternatives(
     """
     found: list[Alternative] = []
     corners = Corners.of(stored.n, stored.edges, mesh)
-    around = list(hubs(corners, mesh.z))
+    around = list(hubs(corners, mesh.z, agree))
     closed = closed_at(stored.n, around)
     left_open = False
     if len(topology.vanished) > (topology.polygons.size - 3).sum():  # not on diagonals only
         found = twins(stored, mesh, agree)
         orders = [other for hub in around if (other := rearranged(hub, agree)) is not None]
         # Parts that hang together at a hub only may yet be joined by other pieces.
-        found += fitting(stored, mesh, factors, orders) if len(topology.hinges) else orders
+        found += fitting(stored, mesh, factors, orders, agree) if len(topology.hinges) else orders
         found += turned_over(corners, mesh.z, agree)
         if scale is None:
             found += _loose_pieces(stored, topology, corners, around, closed)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from .corners import Alternative, Corners, cell
 
 _MOST_PARTS = 5
-_STRAIGHT = 1e-6  # radians by which angles around a vertex may differ from a full turn
+_STRAIGHT = 1e-6  # radians by which angles around a vertex may differ from a full turn, without noise
 
 Order = tuple["Part", ...]
 
@@ -67,11 +67,14 @@ class Hub:
         Counter-clockwise.
     closed : bool
         Whether a right angle also lies between the last and the first.
+    error : float
+        Radians by which angles around the vertex may differ from a full turn.
     """
 
     row: int
     parts: Order
     closed: bool
+    error: float
 
     def orders(self) -> Iterator[tuple[Order, bool]]:
         """Other orders of the parts that make other cells, each once: parts, and whether they close a ring."""
@@ -81,7 +84,7 @@ class Hub:
         for closed in (self.closed, not self.closed):
             right_angles = len(self.parts) - (not closed)
             total = sectors + right_angles * np.pi / 2 - 2 * np.pi
-            if total > _STRAIGHT or (closed and (total < -_STRAIGHT or right_angles < 2)):
+            if total > self.error or (closed and (total < -self.error or right_angles < 2)):
                 continue
             for choice in product(*turns):
                 for parts in permutations(choice):
@@ -103,11 +106,11 @@ class Hub:
         )
 
 
-def hubs(corners: Corners, z: NDArray) -> Iterator[Hub]:
+def hubs(corners: Corners, z: NDArray, agree: float) -> Iterator[Hub]:
     """All vertices with right angles in the same loop, loop by loop."""
     order = np.lexsort((corners.loop, corners.apex))
     for (h, loop), rows in groupby(order.tolist(), key=lambda k: (int(corners.apex[k]), int(corners.loop[k]))):
-        hub = _hub(corners, list(rows), h, loop, z)
+        hub = _hub(corners, list(rows), h, loop, z, max(_STRAIGHT, agree))
         if 2 <= len(hub.parts) <= _MOST_PARTS:
             yield hub
 
@@ -127,12 +130,12 @@ def rearranged(hub: Hub, agree: float) -> Alternative | None:
     return None
 
 
-def _hub(corners: Corners, rows: list[int], h: int, loop: int, z: NDArray) -> Hub:
+def _hub(corners: Corners, rows: list[int], h: int, loop: int, z: NDArray, error: float) -> Hub:
     after = corners.next_at.get((h, loop))
     before = corners.previous_at.get((h, loop))
     legs = z[corners.first[rows]] - z[h]
     start = legs[0] if after is None else z[after] - z[h]
-    turn = np.mod(np.angle(legs / start) + _STRAIGHT, 2 * np.pi)
+    turn = np.mod(np.angle(legs / start) + error, 2 * np.pi)
     rows = [rows[k] for k in np.argsort(turn)]
     first, second = corners.first[rows].tolist(), corners.second[rows].tolist()
     length = {x: float(abs(z[x] - z[h])) for x in first + second}
@@ -151,7 +154,7 @@ def _hub(corners: Corners, rows: list[int], h: int, loop: int, z: NDArray) -> Hu
     for (right, left), (gets_right, gets_left) in zip(ends, gets, strict=True):
         angle = 0.0 if right == left else float(np.mod(np.angle((z[left] - z[h]) / (z[right] - z[h])), 2 * np.pi))
         parts.append(Part(right, left, gets_right, gets_left, angle))
-    return Hub(h, tuple(parts), closed)
+    return Hub(h, tuple(parts), closed, error)
 
 
 def _pairs(parts: Order, closed: bool) -> frozenset[frozenset[int]]:

@@ -31,7 +31,7 @@ _MOST_TRIALS = 60
 _AT_ONCE = 1000  # of which it is asked together whether the rest excludes them
 _LISTED, _SLOW = 0.1, 50  # solutions that listing one costs, and rows of a component that cost as much as one more
 _AS_WELL = 10.0  # times the misfit of the mesh that was found
-_RIGHT = 1e-6  # cosine of an angle that may be a right one
+_RIGHT = 1e-6  # cosine of an angle that may be a right one, without noise
 
 
 def regrouped(
@@ -44,12 +44,18 @@ def regrouped(
     corners : Corners
         All corners of the mesh that was found.
     """
-    groups = right_angles(stored.n, stored.edges, mesh, corners)
-    return fitting(stored, mesh, factors, _regroupings(groups, agree), first=True)
+    groups = right_angles(stored.n, stored.edges, mesh, corners, agree)
+    return fitting(stored, mesh, factors, _regroupings(groups, agree), agree, first=True)
 
 
 def fitting(
-    stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, others: Iterable[Alternative], *, first: bool = False
+    stored: OperatorMatrix,
+    mesh: OrientedMesh,
+    factors: NDArray,
+    others: Iterable[Alternative],
+    agree: float,
+    *,
+    first: bool = False,
 ) -> list[Alternative]:
     """Those about one vertex that fit, as their solution shows; of large graphs, those that the rest does not exclude.
 
@@ -92,7 +98,7 @@ def fitting(
                 return [*chain(*found.values()), replace(mine[0], tested=False)]
             if not (first and fits) and len(mine) > trials:
                 untried = mine[trials:]
-                excluded = _excluded(stored.n, mesh, untried)
+                excluded = _excluded(stored.n, mesh, untried, max(_RIGHT, agree))
                 fits += [replace(other, tested=False) for other, out in zip(untried, excluded, strict=True) if not out]
             if fits:
                 found.setdefault(k, []).extend(fits[:1] if first else fits)
@@ -165,7 +171,7 @@ def _cells(mesh: OrientedMesh, number: NDArray[np.int64], other: Alternative) ->
     return whole, np.arange(len(cells)) >= len(cells) - new_corners
 
 
-def _excluded(n: int, mesh: OrientedMesh, others: list[Alternative]) -> list[bool]:
+def _excluded(n: int, mesh: OrientedMesh, others: list[Alternative], error: float) -> list[bool]:
     """Whether the rest of the mesh shows that each is none.
 
     If all rows of both corners belong to one piece without any of these cells, they are where they are, and the new
@@ -194,14 +200,14 @@ def _excluded(n: int, mesh: OrientedMesh, others: list[Alternative]) -> list[boo
         surfaces = [{surface[k] for k in at[row]} for row in (h, *other.found)]
         fixed = bool(set.intersection(*surfaces))
         corners = [new for new in other.other_cells if h in new]
-        excluded.append(fixed and not all(_has_room(mesh.z, h, new, rest[at[h]]) for new in corners))
+        excluded.append(fixed and not all(_has_room(mesh.z, h, new, rest[at[h]], error) for new in corners))
     return excluded
 
 
-def _has_room(z: NDArray[np.complex128], h: int, new: tuple[int, ...], around: NDArray[np.int64]) -> bool:
+def _has_room(z: NDArray[np.complex128], h: int, new: tuple[int, ...], around: NDArray[np.int64], error: float) -> bool:
     """Whether a corner has a right angle at h as its vertices lie, and no triangle `around` h on its side of a leg."""
     a, b = (row for row in new if row != h)
-    if abs((np.conj(z[a] - z[h]) * (z[b] - z[h])).real) > _RIGHT * abs(z[a] - z[h]) * abs(z[b] - z[h]):
+    if abs((np.conj(z[a] - z[h]) * (z[b] - z[h])).real) > error * abs(z[a] - z[h]) * abs(z[b] - z[h]):
         return False
     for leg, end in ((a, b), (b, a)):
         beside = around[(around == leg).any(axis=1)]

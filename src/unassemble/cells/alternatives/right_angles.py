@@ -16,7 +16,7 @@ from ...topology.faces import joined
 from ...topology.keys import contains
 from .corners import Corners, OrientedMesh, cell
 
-_RIGHT = 1e-6  # cosine of an angle that may be a right one
+_RIGHT = 1e-6  # cosine of an angle that may be a right one, without noise
 
 Cells = tuple[tuple[int, ...], ...]
 
@@ -45,7 +45,7 @@ class RightAngle:
     rest: Cells
 
 
-def right_angles(n: int, edges: NDArray, mesh: OrientedMesh, corners: Corners) -> list[list[RightAngle]]:
+def right_angles(n: int, edges: NDArray, mesh: OrientedMesh, corners: Corners, agree: float) -> list[list[RightAngle]]:
     """Those of each vertex that has several: all corners, and cells whose sides at the vertex border no other.
 
     Parameters
@@ -55,8 +55,10 @@ def right_angles(n: int, edges: NDArray, mesh: OrientedMesh, corners: Corners) -
         Stored ones, i < j.
     mesh : OrientedMesh
     corners : Corners
+    agree : float
+        Error of angles that noise may cause.
     """
-    first, apex, second, polygon = _alone(n, edges, mesh)
+    first, apex, second, polygon = _alone(n, edges, mesh, max(_RIGHT, agree))
     polygon = np.append(np.full(len(corners), -1), polygon)
     h, a, b = (np.append(*pair) for pair in ((corners.apex, apex), (corners.first, first), (corners.second, second)))
     # Lone corners are found in both ways.
@@ -78,7 +80,7 @@ def right_angles(n: int, edges: NDArray, mesh: OrientedMesh, corners: Corners) -
     return list(found.values())
 
 
-def _alone(n: int, edges: NDArray, mesh: OrientedMesh) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+def _alone(n: int, edges: NDArray, mesh: OrientedMesh, error: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Right angles of cells both of whose sides there lie on the boundary: ends, the vertex between, and the polygon.
 
     -1 stands for a triangle.
@@ -99,7 +101,7 @@ def _alone(n: int, edges: NDArray, mesh: OrientedMesh) -> tuple[NDArray, NDArray
     chosen = chosen[lone & contains(outline, previous[chosen] * n + apex[chosen])]
     apex, following, previous, polygon = apex[chosen], following[chosen], previous[chosen], polygon[chosen]
     u, w = mesh.z[following] - mesh.z[apex], mesh.z[previous] - mesh.z[apex]
-    right = np.abs((np.conj(u) * w).real) <= _RIGHT * np.abs(u) * np.abs(w)
+    right = np.abs((np.conj(u) * w).real) <= error * np.abs(u) * np.abs(w)
     # A stored third side that no other cell has would be left without any.
     bare = contains(outline, following * n + previous) & joined(n, edges, following, previous) & (polygon < 0)
     right &= ~bare

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,11 +11,12 @@ from scipy.sparse import csgraph
 
 from ...errors import RecoveryError, SolverError
 from ...matrix import OperatorMatrix
-from ...planar.deviations import factor_deviation
+from ...planar.cotangent import weights_of_all
+from ...planar.deviations import factor_deviations
 from ...planar.piece import PieceMesh
 from ...planar.polish import PolishOptions, polish
 from ...topology import Piece, Topology
-from ..agreement import SAME_SCALE, SCALE_ERROR
+from ..agreement import SAME_SCALE
 from ..reading import FITS, even, misfits
 
 _WIDE = 200  # rows of a matrix on which the misfit of a wrong cell stays near it
@@ -23,6 +24,8 @@ SURE = 1e-3
 """Misfit, even if spread evenly, that no wrong cell is known to leave."""
 
 _SIGMAS = 5.0  # errors of c by which pieces may differ: the last word on that is not spoken here
+_CHANCE = np.log(1e-6)  # that factors agree by coincidence
+_NORMAL_MEDIAN = 1.4826  # standard deviation of normal errors, over the median of their moduli
 _SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 
 Outcome = PieceMesh | RecoveryError
@@ -68,39 +71,62 @@ def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None, noi
     if any is: where these differ from each other, or from the known one, other cells are no help.
     """
     having = [(piece, mesh) for piece, mesh in solved if isinstance(mesh, PieceMesh)]
+    none = np.zeros(matrix.n, dtype=bool)
     if not having:
-        return np.zeros(matrix.n, dtype=bool)
+        return none
+    pieces, meshes = zip(*having, strict=True)
     label = components_of(matrix)
     count = int(label.max()) + 1
-    bound = np.full(count, SAME_SCALE)
-    if not noise:
-        np.maximum.at(bound, label[matrix.edges[:, 0]], SCALE_ERROR * misfits_of(matrix, list(having)))
-    own = label[[piece.vertices[0] for piece, _ in having]]
-    loose = np.array([piece.redundancy <= 0 for piece, _ in having])
-    c = np.array([mesh.scale for _, mesh in having])
-    right = np.full(count, scale or 0.0)
-    if scale is None:  # the last one counts
-        order = np.lexsort((np.array([piece.n_vertices for piece, _ in having]), ~loose))
-        right[own[order]] = c[order]
-    apart = np.abs(c / right[own] - 1) > bound[own]
-    if noise and apart.any():
-        error = noise * np.array([_factor_deviation(piece, mesh) for piece, mesh in having])
-        told = np.zeros(count)
-        if scale is None:
-            told[own[order]] = error[order]
-        apart &= np.abs(c / right[own] - 1) > _SIGMAS * np.hypot(error, told[own])
+    own = label[[piece.vertices[0] for piece in pieces]]
+    loose = np.array([piece.redundancy <= 0 for piece in pieces])
+    c = np.array([mesh.scale for mesh in meshes])
+    order = np.lexsort((np.array([piece.n_vertices for piece in pieces]), ~loose))
+    telling = np.full(count, -1)  # the piece that tells c: the largest of those with entries to spare, if there is one
+    telling[own[order]] = order
+    right = np.full(len(c), scale) if scale else c[telling[own]]
+    apart = np.abs(c / right - 1) > SAME_SCALE
+    if not apart.any():
+        return none
+    deviation = factor_deviations(pieces, [mesh.z for mesh in meshes], [None] * len(pieces)) / np.abs(c)
+    told = np.zeros(len(c)) if scale else deviation[telling[own]]
+    sigma = np.full(count, noise) if noise else _noise(matrix, pieces, meshes, own, count, c, deviation)
+    apart &= np.abs(c / right - 1) > _SIGMAS * sigma[own] * np.hypot(deviation, told)
     wrong, hopeless = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
     wrong[own[apart]] = True
     hopeless[own[apart & ~loose]] = True
     return np.asarray((wrong & ~hopeless)[label])
 
 
-def _factor_deviation(piece: Piece, mesh: PieceMesh) -> float:
-    """Relative standard deviation of c for noise 1 in the entries; infinite where they do not tell c."""
-    try:
-        return factor_deviation(piece, mesh.z) / abs(mesh.scale)
-    except SolverError:
-        return np.inf
+def _noise(
+    matrix: OperatorMatrix,
+    pieces: Sequence[Piece],
+    meshes: Sequence[PieceMesh],
+    own: NDArray,
+    count: int,
+    c: NDArray,
+    deviation: NDArray,
+) -> NDArray[np.float64]:
+    """(count,) standard deviation of the entries' errors in each component, from what their pieces leave unexplained.
+
+    Where no piece has entries to spare it is the one for which half of them have the same c, if they are so many that
+    this is no coincidence, and 0 otherwise.
+    """
+    sizes = [len(piece.edge_rows) for piece in pieces]
+    weights = -matrix.entries[np.concatenate([piece.edge_rows for piece in pieces])]
+    with np.errstate(all="ignore"):  # flat triangles
+        left = weights - np.repeat(c, sizes) * weights_of_all(pieces, [mesh.z for mesh in meshes])
+    squares = np.bincount(np.repeat(own, sizes), left**2, count)
+    spare = np.bincount(own, [piece.redundancy for piece in pieces], count)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sigma = np.where(spare > 0, np.sqrt(squares / spare), 0.0)
+    for component in np.flatnonzero((spare <= 0) & (np.bincount(own, minlength=count) > 2)):
+        inside = own == component
+        if (c[inside] * c[inside][0] > 0).all():
+            size = np.log(np.abs(c[inside]))
+            away = np.abs(size - np.median(size))
+            if (inside.sum() / 2 - 1) * np.log(np.median(away)) < _CHANCE:
+                sigma[component] = _NORMAL_MEDIAN * np.median(away / deviation[inside])
+    return np.asarray(sigma)
 
 
 def _like_noise(misfit: NDArray, n: int) -> bool:
