@@ -115,13 +115,17 @@ def recognise_cells(
     which fewer rows can tell. So do the nodes in `corners`, if that explains the matrix: cells that have them are none
     of those returned, but show that the rows next to them are what they were taken for.
     """
-    if corners:
-        more = np.vstack([points, [one.point for one in corners]])
-        found = _among_complete(with_corner_nodes(nodal, corners), more, ratio, [one.nodes for one in corners])
-        if found.certified:
-            shown = None if found.shown is None else found.shown[: nodal.n]
-            return replace(found.among(np.arange(len(more)) < nodal.n), shown=shown)
-    return _among_complete(nodal, points, ratio)
+    plain = _among_complete(nodal, points, ratio)
+    if not corners:
+        return plain
+    more = np.vstack([points, [one.point for one in corners]])
+    found = _among_complete(with_corner_nodes(nodal, corners), more, ratio, [one.nodes for one in corners])
+    if not found.certified or found.shown is None:
+        return plain
+    shown = found.shown[: nodal.n]
+    if plain.certified and plain.shown is not None and plain.shown.sum() >= shown.sum():  # cells of several kinds hide
+        return plain
+    return replace(found.among(np.arange(len(more)) < nodal.n), shown=shown)
 
 
 def _among_complete(
