@@ -146,8 +146,8 @@ def _carried_on(
     before, hopeless = best, False
     try:
         best = _finished(best, begun, effort)
-    except HopelessError:
-        best, hopeless = better(best, begun.starts[0]), True
+    except HopelessError:  # from afar; a few wrong labels may have bent the map
+        best, hopeless = better(best, descent(begun.starts[0], Effort(_LAST, effort.known))), True
     if best is not None and best.fits:
         return best, True
     if best is not None and best.like_noise:  # or wrong in cells that leave little
