@@ -25,6 +25,7 @@ BATCH = 8
 
 _IN_VAIN = 40  # small changes in all without an improvement
 _TRIED = 0.25  # a reading with a batch tried is put off behind those with so much more misfit
+_BETTER = 0.9  # misfit, relative to the least before, that is an improvement worth its price
 _SOLVES = 10  # that telling what changes would leave is worth
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 
@@ -83,6 +84,8 @@ def descent(reading: Reading, effort: Effort) -> Reading:
             trial = effort.reading(candidates, labels)
             best, after = better(best, trial), _value(trial)
             in_vain = 0 if after < least else in_vain + 1
+            if after < _BETTER * least:  # nothing of what led here was in vain
+                effort.solves += _SOLVES
             least = min(after, least)
             if trial.pieces:
                 heapq.heappush(waiting, (after, len(seen), trial, _changed(trial, updates, effort)))

@@ -165,20 +165,26 @@ class _Factorised:
         LinAlgError
             If one of the changed pencils is singular.
         """
-        corner, form = self._forms(labels, moves)
+        corner, after, before, side = self._sides(labels, moves)
         self._ask_for(np.unique(corner))
         place = self._place[corner]
-        inverse = self._columns[place[:, :, None], corner[:, None, :]]
-        changed = np.eye(corner.shape[1]) - self._shift * (form @ inverse.transpose(0, 2, 1))
-        rhs = form @ (self._z + self._shift * self._y)[corner][..., None]
+        inverse = (
+            self._columns[place[:, None, :], after[:, :, None]] - self._columns[place[:, None, :], before[:, :, None]]
+        )
+        changed = np.eye(corner.shape[1]) - self._shift * side[:, :, None] * inverse
+        ahead = self._z + self._shift * self._y
+        rhs = (side * (ahead[after] - ahead[before]))[..., None]
         q = np.linalg.solve(changed, rhs)[..., 0]
         scattered = sp.csr_array(
             (q.ravel(), place.ravel(), np.arange(0, q.size + 1, corner.shape[1])), shape=(len(q), len(self._columns))
         )
         return np.asarray(self._y + scattered @ self._columns)
 
-    def _forms(self, labels: NDArray[np.bool_], moves: Sequence[Move]) -> tuple[NDArray, NDArray]:
-        """Corners (moves, k) and their area forms (moves, k, k); corners that fill up a row have none."""
+    def _sides(self, labels: NDArray[np.bool_], moves: Sequence[Move]) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+        """Corners of the cells of each move (moves, k), those after and before them, and a factor of their sides.
+
+        The area form of a cell times z is side (z_after - z_before). Rows are filled up with corners of no factor.
+        """
         cell = np.concatenate(moves)
         move = np.repeat(np.arange(len(moves)), [len(one) for one in moves])
         size = self._cells.size[cell]
@@ -186,16 +192,13 @@ class _Factorised:
         start = np.cumsum(size) - size
         step = np.arange(len(owner)) - start[owner]
         row = move[owner]
-        first = np.searchsorted(row, np.arange(len(moves)))
-        slot = np.arange(len(row)) - first[row]
-        following = slot - step + (step + 1) % size[owner]
-        corner = np.zeros((len(moves), int(slot.max()) + 1), dtype=np.int64)
-        corner[row, slot] = self._cells.vertices[self._cells.offsets[cell][owner] + step]
-        form = np.zeros((*corner.shape, corner.shape[1]), dtype=np.complex128)
-        side = np.where(labels[cell], 0.25j, -0.25j)[owner]
-        form[row, slot, following] = side
-        form[row, following, slot] = -side
-        return corner, form
+        slot = np.arange(len(row)) - np.searchsorted(row, np.arange(len(moves)))[row]
+        corner, after, before = np.zeros((3, len(moves), int(slot.max()) + 1), dtype=np.int64)
+        for whose, ahead in ((corner, 0), (after, 1), (before, -1)):
+            whose[row, slot] = self._cells.vertices[self._cells.offsets[cell][owner] + (step + ahead) % size[owner]]
+        side = np.zeros(corner.shape, dtype=np.complex128)
+        side[row, slot] = np.where(labels[cell], 0.25j, -0.25j)[owner]
+        return corner, after, before, side
 
     def _ask_for(self, vertices: NDArray[np.int64]) -> None:
         new = vertices[self._place[vertices] < 0]
