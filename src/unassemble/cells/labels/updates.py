@@ -23,13 +23,13 @@ from ...linalg import factorisation
 from ...matrix.operator import row_sizes
 from ..reading import Reading
 from .neighbourhood import Neighbourhoods, adjacent_to
-from .sheet import Sheet
+from .sheet import STEEPEST, Sheet
 
 Move = tuple[int, ...]
 """Candidates whose labels are turned over together."""
 
 _WORK = 3e5  # vertices times moves that are tried at a time, as much as some tens of solves take
-_BATCH = 2e5  # triangles times moves that are computed together
+_BATCH = 5e4  # triangles times moves that are computed together
 _NEAR = 1e-3  # of the shift to the c at hand: so much nearer than to other maps, that one step tells
 _LEADERS = 60  # moves that are tried together with what they touch
 _STEEP = 5.0  # weights over row sizes beyond which they are those of flat triangles
@@ -50,8 +50,8 @@ class Updates:
         n, m = sheet.n_vertices, len(sheet.triangles)
         smaller = row_sizes(n, sheet.edges, np.abs(sheet.weights))[sheet.edges].min(axis=1)
         self._weights = sheet.weights / smaller
-        half = 0.5 / smaller[sheet.row.ravel()]
-        self._of_edge = sp.csr_array((half, (sheet.row.ravel(), np.arange(3 * m))), shape=(len(sheet.edges), 3 * m))
+        half = 0.5 / smaller[sheet.row.T.ravel()]
+        self._of_edge = sp.csr_array((half, (sheet.row.T.ravel(), np.arange(3 * m))), shape=(len(sheet.edges), 3 * m)).tocsc()
 
     def outline(self, labels: NDArray[np.bool_]) -> bytes:
         """The same for labels that make the same surface, whichever cells they put together or divide."""
@@ -112,23 +112,34 @@ class Updates:
             z = factorised.maps(labels, moves)
         except np.linalg.LinAlgError:
             return np.full(count, np.inf)
-        turned = np.tile(labels, (count, 1))
-        turned[np.repeat(np.arange(count), [len(move) for move in moves]), np.concatenate(moves)] ^= True
-        cotangent = Sheet.cotangents(z[:, sheet.triangles].reshape(-1, 3)).reshape(count, -1, 3)
-        cotangent *= turned[:, sheet.cell, None]
-        w = (self._of_edge @ cotangent.reshape(count, -1).T).T
-        misfit = np.minimum(np.abs(self._scales(w)[:, None] * w - self._weights), 1.0)
-        return np.asarray(misfit.mean(axis=1))
+        turned = np.repeat(labels[:, None], count, axis=1)
+        turned[np.concatenate(moves), np.repeat(np.arange(count), [len(move) for move in moves])] ^= True
+        cells = np.flatnonzero(turned.any(axis=1)[sheet.cell])
+        cotangent = _cotangents(z, sheet.triangles[cells]) * turned[sheet.cell[cells]]
+        w = self._of_edge[:, (cells + len(sheet.cell) * np.arange(3)[:, None]).ravel()] @ cotangent.reshape(-1, count)
+        misfit = np.abs(self._scales(w) * w - self._weights[:, None])
+        return np.asarray(np.where(misfit < 1, misfit, 1.0).mean(axis=0))
 
     def _scales(self, w: NDArray) -> NDArray[np.float64]:
-        """(k,) c for each row of weights over their row sizes, from those that it brings near the given ones."""
+        """(k,) c for each column of weights over their row sizes, from those that it brings near the given ones."""
         if not self._sheet.free_scale:
-            return np.ones(len(w))
+            return np.ones(w.shape[1])
         used = np.clip(w, -_STEEP, _STEEP)
         for _ in range(3):
-            c = (used @ self._weights) / np.maximum((used * used).sum(axis=1), np.finfo(float).tiny)
-            used = np.where(np.abs(c[:, None] * w - self._weights) < _GROSS, w, 0.0)
+            c = (self._weights @ used) / np.maximum((used * used).sum(axis=0), np.finfo(float).tiny)
+            used = np.where(np.abs(c * w - self._weights[:, None]) < _GROSS, w, 0.0)
         return np.asarray(c)
+
+
+def _cotangents(z: NDArray, triangles: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(3, m, k) at the corners of triangles (m, 3), for positions (n, k)."""
+    at = [z[corner] for corner in triangles.T]
+    sides = [at[k - 1] - at[k - 2] for k in range(3)]  # facing the corners
+    x, y = [side.real for side in sides], [side.imag for side in sides]
+    twice = x[0] * y[1] - y[0] * x[1]
+    with np.errstate(all="ignore"):
+        cotangent = np.stack([-(x[k - 1] * x[k - 2] + y[k - 1] * y[k - 2]) / twice for k in range(3)])
+    return np.asarray(np.nan_to_num(cotangent, posinf=STEEPEST, neginf=-STEEPEST))
 
 
 class _Factorised:
@@ -158,7 +169,7 @@ class _Factorised:
         self._columns = np.empty((0, self._n), dtype=np.complex128)
 
     def maps(self, labels: NDArray[np.bool_], moves: Sequence[Move]) -> NDArray[np.complex128]:
-        """(moves, n) positions after each move.
+        """(n, moves) positions after each move.
 
         Raises
         ------
@@ -178,7 +189,7 @@ class _Factorised:
         scattered = sp.csr_array(
             (q.ravel(), place.ravel(), np.arange(0, q.size + 1, corner.shape[1])), shape=(len(q), len(self._columns))
         )
-        return np.asarray(self._y + scattered @ self._columns)
+        return np.asarray(self._y[:, None] + self._columns.T @ scattered.T)
 
     def _sides(self, labels: NDArray[np.bool_], moves: Sequence[Move]) -> tuple[NDArray, NDArray, NDArray, NDArray]:
         """Corners of the cells of each move (moves, k), those after and before them, and a factor of their sides.
