@@ -14,7 +14,7 @@ from ..reading import Reading
 from .effort import Effort
 from .evidence import label_changes
 from .exchange import whole
-from .proposals import proposals
+from .leaps import clear_changes
 from .sheet import Sheet
 from .updates import Updates
 
@@ -47,9 +47,8 @@ def _leaps(reading: Reading, effort: Effort) -> Reading:
     patience = np.clip(3e4 / reading.candidates.n_vertices, 2, _PATIENCE)
     seen = {reading.labels.tobytes()}
     while reading.pieces and not reading.fits and since_best < patience and progress.suffices(best.size):
-        changes = np.nan_to_num(label_changes(reading))
-        labels = next((x for x in proposals(reading, changes) if x.tobytes() not in seen), None)
-        if labels is None:
+        labels = clear_changes(reading, np.nan_to_num(label_changes(reading)))
+        if labels.tobytes() in seen:
             break
         seen.add(labels.tobytes())
         reading = effort.reading(reading.candidates, labels)

@@ -51,7 +51,7 @@ class Updates:
         smaller = row_sizes(n, sheet.edges, np.abs(sheet.weights))[sheet.edges].min(axis=1)
         self._weights = sheet.weights / smaller
         half = 0.5 / smaller[sheet.row.T.ravel()]
-        self._of_edge = sp.csr_array((half, (sheet.row.T.ravel(), np.arange(3 * m))), shape=(len(sheet.edges), 3 * m)).tocsc()
+        self._of_edge = sp.csc_array((half, (sheet.row.T.ravel(), np.arange(3 * m))), shape=(len(sheet.edges), 3 * m))
 
     def outline(self, labels: NDArray[np.bool_]) -> bytes:
         """The same for labels that make the same surface, whichever cells they put together or divide."""
@@ -112,9 +112,9 @@ class Updates:
             z = factorised.maps(labels, moves)
         except np.linalg.LinAlgError:
             return np.full(count, np.inf)
-        turned = np.repeat(labels[:, None], count, axis=1)
+        turned = np.tile(labels[:, None], count)
         turned[np.concatenate(moves), np.repeat(np.arange(count), [len(move) for move in moves])] ^= True
-        cells = np.flatnonzero(turned.any(axis=1)[sheet.cell])
+        cells = np.flatnonzero(np.any(turned, axis=1)[sheet.cell])
         cotangent = _cotangents(z, sheet.triangles[cells]) * turned[sheet.cell[cells]]
         w = self._of_edge[:, (cells + len(sheet.cell) * np.arange(3)[:, None]).ravel()] @ cotangent.reshape(-1, count)
         misfit = np.abs(self._scales(w) * w - self._weights[:, None])
