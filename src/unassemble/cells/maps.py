@@ -50,7 +50,8 @@ def best_map(piece: Piece, weights: NDArray) -> PieceMesh | None:
     relative = weights / unit
 
     def misfit(z: NDArray, c: float) -> float:
-        return mean_misfit(piece.edges, relative, c * edge_weights(piece, z))
+        with np.errstate(all="ignore"):  # flat triangles fit nothing
+            return mean_misfit(piece.edges, relative, c * edge_weights(piece, z))
 
     if small:
         return min(maps, key=lambda one: _unfolded(misfit(one.z, one.scale / unit), first=one is maps[0]))
@@ -111,8 +112,7 @@ def mean_misfit(edges: NDArray, given: NDArray, fitted: NDArray) -> float:
     The mean of the squares is small where all fit a little, this one where all fit but for some.
     """
     smaller = row_sizes(int(edges.max()) + 1, edges, np.abs(given))[edges].min(axis=1)
-    with np.errstate(all="ignore"):
-        misfit = np.abs(fitted - given) / smaller
+    misfit = np.abs(fitted - given) / smaller
     return float(np.where(misfit < 1, misfit, 1.0).mean())
 
 

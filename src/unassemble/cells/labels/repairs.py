@@ -20,7 +20,7 @@ from .updates import Updates
 
 _log = logging.getLogger(__name__)
 
-BATCH = 8
+_BATCH = 8
 """Small changes of a reading that are tried at a time."""
 
 _IN_VAIN = 40  # small changes in all without an improvement
@@ -74,7 +74,7 @@ def descent(reading: Reading, effort: Effort) -> Reading:
     while waiting and not (best.fits or effort.spent) and in_vain < _IN_VAIN:
         value, number, reading, changed = heapq.heappop(waiting)
         asked = 0
-        for labels in islice(changed, BATCH):
+        for labels in islice(changed, _BATCH):
             asked += 1
             outline = updates.outline(labels)
             if outline in seen or effort.spent:
