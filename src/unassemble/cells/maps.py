@@ -1,8 +1,8 @@
 """The conformal map of a piece that fits its entries best, where cells may be wrong.
 
-The mesh is the map of the least quotient E / a if its cells are right. Each cell too many takes from M(c) a form of
-one positive and one negative eigenvalue, so that by interlacing up to as many maps come before it: they have their
-quotient from the cells that are none. Among the first few maps the mesh is the one that fits most entries.
+The mesh is the map of the least quotient E / a if its cells are right. The area form of a cell of three or four corners
+has one positive eigenvalue, so that by interlacing each cell too many brings at most one map of a lesser quotient: one
+of the cell that is none. Among the first few maps the mesh is the one that fits most entries.
 """
 
 from __future__ import annotations

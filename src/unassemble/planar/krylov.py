@@ -15,6 +15,8 @@ from .pencil import ConformalPencil
 
 _log = logging.getLogger(__name__)
 
+_APART = 1e-6  # of the shift from a quotient that may be a map's to all digits
+
 
 class ShiftedSearch:
     """Shift-and-invert Krylov steps on the pencil, in units in which c is near 1.
@@ -98,7 +100,7 @@ class ShiftedSearch:
 
     def nearest(self, c: float, z: NDArray) -> tuple[NDArray, float]:
         """One step of inverse iteration to the map nearest to some c, from z; and its quotient."""
-        matrix = self._pencil.matrix(c)
+        matrix = self._pencil.matrix(c * (1 - _APART))  # PARDISO does not survive singular ones
         assert self._factor is not None
         self._factor.factorise(matrix)
         self.factorisations += 1

@@ -71,7 +71,7 @@ class Updates:
         except RecoveryError:
             return
         most = max(int(_WORK / self._sheet.n_vertices), 1)
-        singles = list(dict.fromkeys(self._near.with_rivals(labels, (k,)) for k in self._suspects(reading)))[:most]
+        singles = list(dict.fromkeys(self._near.with_rivals(labels, (k,)) for k in self._suspects(reading)[:most]))
         left = self._left(factorised, labels, singles)
         leaders = [singles[k] for k in np.argsort(left, kind="stable")[:_LEADERS].tolist()]
         pairs = sorted(self._pairs(labels, leaders) - set(singles))[:most]
@@ -87,7 +87,7 @@ class Updates:
         owner = np.repeat(np.arange(cells.count), cells.size)
         nearby = np.bincount(owner, at_vertex[cells.vertices], cells.count) / cells.size
         order = np.argsort(-nearby, kind="stable")
-        return [int(k) for k in order[sheet.chosen[order]]]
+        return order[sheet.chosen[order]].tolist()
 
     def _pairs(self, labels: NDArray[np.bool_], leaders: list[Move]) -> set[Move]:
         """Leaders and another candidate that touches them, each."""
