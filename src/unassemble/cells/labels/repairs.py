@@ -27,6 +27,7 @@ _IN_VAIN = 40  # small changes in all without an improvement
 _TRIED = 0.25  # a reading with a batch tried is put off behind those with so much more misfit
 _BETTER = 0.9  # misfit, relative to the least before, that is an improvement worth its price
 _SOLVES = 10  # that telling what changes would leave is worth
+_BESIDE = 24  # small changes of a reading that fits, those that leave least, that are solved for
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 
 
@@ -105,6 +106,21 @@ def _changed(reading: Reading, updates: Updates, effort: Effort) -> Iterator[NDA
         labels = reading.labels.copy()
         labels[list(move)] ^= True
         yield whole(reading.candidates, labels)
+
+
+def beside(reading: Reading) -> Iterator[Reading]:
+    """Readings that fit as well as one that does, and differ from it by one label or two that touch."""
+    candidates = reading.candidates
+    updates = Updates(Sheet(candidates, _scale(reading)))
+    seen = {updates.outline(reading.labels)}
+    for move in islice(updates.ranked(reading, candidates.count), _BESIDE):
+        labels = reading.labels.copy()
+        labels[list(move)] ^= True
+        if (outline := updates.outline(labels)) not in seen:
+            seen.add(outline)
+            other = Reading.of(candidates, labels)
+            if other.fits:
+                yield other
 
 
 def _value(reading: Reading) -> float:

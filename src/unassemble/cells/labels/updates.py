@@ -57,13 +57,15 @@ class Updates:
         """The same for labels that make the same surface, whichever cells they put together or divide."""
         return bytes(np.rint(self._sheet.around(labels.astype(np.float64))).astype(np.int8).tobytes())
 
-    def ranked(self, reading: Reading) -> Iterator[Move]:
+    def ranked(self, reading: Reading, leaders: int = _LEADERS) -> Iterator[Move]:
         """Moves that leave least, the best first: single labels, then pairs; what is in the way of a cell goes.
 
         Parameters
         ----------
         reading : Reading
             In this drawing; with pieces.
+        leaders : int
+            Single moves, the best, that are tried with what they touch.
         """
         labels = reading.labels
         try:
@@ -73,8 +75,8 @@ class Updates:
         most = max(int(_WORK / self._sheet.n_vertices), 1)
         singles = list(dict.fromkeys(self._near.with_rivals(labels, (k,)) for k in self._suspects(reading)[:most]))
         left = self._left(factorised, labels, singles)
-        leaders = [singles[k] for k in np.argsort(left, kind="stable")[:_LEADERS].tolist()]
-        pairs = sorted(self._pairs(labels, leaders) - set(singles))[:most]
+        first = [singles[k] for k in np.argsort(left, kind="stable")[:leaders].tolist()]
+        pairs = sorted(self._pairs(labels, first) - set(singles))[:most]
         moves = singles + pairs
         left = np.append(left, self._left(factorised, labels, pairs))
         yield from (moves[k] for k in np.argsort(left, kind="stable").tolist() if np.isfinite(left[k]))
