@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from families import FAMILIES
 from meshes import largest_error, random_mesh, specimen, triangle_set
-from named_meshes import check_alternatives
+from named_meshes import cells_of, check_alternatives, explains
 from unassemble import recover
 from vanishing import forgotten, holes, polar, refined, squares, without_zeros
 
@@ -211,3 +212,18 @@ def test_right_angle_where_every_row_has_three_neighbours():
     found = recover(known.matrix)
     assert found.certified, found.reason
     assert largest_error(found.points, known.points) <= 1e-12
+
+
+@pytest.mark.parametrize("seed", [22, 426, 455])
+def test_meshes_that_differ_by_two_corners(seed):
+    """Of two meshes with the same entries and the same c, found by turning two labels over: neither is certified."""
+    rng = np.random.default_rng(seed)
+    c = float(rng.choice([1.0, -2.5, 1e-3]))  # as benchmarks/cells.py draws them
+    matrix = forgotten(specimen(*FAMILIES["integer"](rng), c=c, seed=seed)).matrix
+    found = recover(matrix)
+    assert found.status == "uncertified"
+    (other,) = found.alternatives
+    kept = [
+        cell for cell in cells_of(found) if tuple(sorted(cell)) not in {tuple(sorted(gone)) for gone in other.cells}
+    ]
+    assert explains(matrix, [*kept, *other.other_cells], c)

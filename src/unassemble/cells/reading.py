@@ -9,9 +9,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import GeometryError, SolverError
 from ..matrix.operator import row_sizes
-from ..planar.conformal import ConformalOptions, conformal_map
 from ..planar.cotangent import weights_of_all
 from ..planar.hinges import gap
 from ..planar.piece import PieceMesh
@@ -20,7 +18,7 @@ from ..topology import Piece, Topology
 from ..topology.keys import contains, pair_keys, with_sides
 from ..topology.pieces import planar_pieces
 from .candidates.cell_set import CellSet
-from .small import SMALL, small_map
+from .maps import best_map
 
 FITS = 1e-6
 """Largest misfit, relative to the row, of a conformal solve with the right cells; the polish does the rest."""
@@ -29,7 +27,6 @@ NEARLY = 1e-5
 """Misfit up to which entries of few digits may keep a reading from fitting."""
 
 _RIGHT_ANGLES = 4
-_OPTIONS = ConformalOptions(max_factorisations=4)  # what takes more has wrong cells
 
 
 C = TypeVar("C", bound=CellSet)
@@ -88,7 +85,7 @@ class Reading(Generic[C]):
             if piece not in meshes:
                 name = _key_of(piece)
                 if name not in known:
-                    known[name] = _solved(piece, weights[piece.edge_rows])
+                    known[name] = best_map(piece, weights[piece.edge_rows])
                 meshes[piece] = known[name]
         return bare.placed(tuple(meshes[piece] for piece in bare.pieces))
 
@@ -240,16 +237,6 @@ def _keys(n: int, triangles: NDArray) -> NDArray[np.int64]:
     """(m, 3) keys i n + j, i < j, of the edges facing the corners."""
     ends = triangles[:, [[1, 2], [2, 0], [0, 1]]]
     return pair_keys(n, ends[..., 0], ends[..., 1])
-
-
-def _solved(piece: Piece, weights: NDArray) -> PieceMesh | None:
-    if piece.n_vertices <= SMALL:
-        return small_map(piece, weights)
-    try:
-        found = conformal_map(piece, weights, sharp=False, options=_OPTIONS)
-    except (GeometryError, SolverError):
-        return None
-    return PieceMesh(found.z, found.scale) if np.isfinite(found.z).all() and found.scale else None
 
 
 def _key_of(piece: Piece) -> bytes:

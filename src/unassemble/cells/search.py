@@ -19,7 +19,7 @@ from .labels.effort import SMALL_GRAPH, Effort
 from .labels.evidence import FEW, entries_are_to_blame
 from .labels.mending import MOST_VERTICES, mended
 from .labels.relaxation import HopelessError
-from .labels.repairs import BATCH, better, descent, repaired
+from .labels.repairs import better, descent, repaired
 from .misfits.spoilt import without_wrong_entries
 from .reading import Reading
 from .triangles.triangles_only import read_triangles
@@ -30,6 +30,7 @@ _LAST = 60  # solves for small changes of the best reading, when all others are 
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
 _EQUAL = 1e-9  # relative difference of weights that are all the same
+_A_FEW = 24  # solves for small changes of a reading that stands, should none help
 _FEW_TURNS = 8  # solves for turning parts over in each drawing of such a graph
 _CLOSE, _SOON = 0.15, 0.3  # misfit of starts with few wrong labels, and what part of them a first repair may take more
 
@@ -127,7 +128,7 @@ def _of_equal_weights(n: int, edges: NDArray, weights: NDArray, scale: float | N
         if best is not None and best.fits:
             return best
     return read_by_cover(n, edges, weights, scale, most_cells=MOST_EQUAL_CELLS) or (
-        descent(best, Effort(BATCH, effort.known)) if best is not None and best.pieces else None
+        descent(best, Effort(_A_FEW, effort.known)) if best is not None and best.pieces else None
     )
 
 
@@ -146,8 +147,8 @@ def _carried_on(
     before, hopeless = best, False
     try:
         best = _finished(best, begun, effort)
-    except HopelessError:
-        best, hopeless = better(best, begun.starts[0]), True
+    except HopelessError:  # from afar; a few wrong labels may have bent the map
+        best, hopeless = better(best, descent(begun.starts[0], Effort(_LAST, effort.known))), True
     if best is not None and best.fits:
         return best, True
     if best is not None and best.like_noise:  # or wrong in cells that leave little
@@ -187,7 +188,7 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
     if spoilt is not None:
         nearest = starts[0]
         if nearest.candidates.n_vertices <= SMALL_GRAPH:  # one wrong corner may look like a wrong entry
-            nearest = descent(nearest, Effort(BATCH, effort.known))
+            nearest = descent(nearest, Effort(_A_FEW, effort.known))
         if nearest.fits or spoilt.fits_but_for_few:
             return Begun([nearest if nearest.fits else spoilt], settled=True)
     if starts and entries_are_to_blame(starts[0]):

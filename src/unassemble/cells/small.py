@@ -14,19 +14,25 @@ SMALL = 40
 
 
 def small_map(piece: Piece, weights: NDArray) -> PieceMesh | None:
-    """The conformal map of a small piece; None where the entries allow none.
+    """The conformal map of a small piece; None where the entries allow none."""
+    return next(iter(small_maps(piece, weights, 1)), None)
 
-    With the last vertex at zero, the greatest mu with T z = mu (c L / 2) z and its vector.
+
+def small_maps(piece: Piece, weights: NDArray, most: int) -> list[PieceMesh]:
+    """The conformal map of a small piece, and maps of the next greater quotients; none where the entries allow none.
+
+    With the last vertex at zero, the greatest mu with T z = mu (c L / 2) z and their vectors.
 
     Parameters
     ----------
     piece : Piece
     weights : (e,) float64
         -A_ij of its edges.
+    most : int
     """
     size = float(np.abs(weights).max()) * np.sign(weights.sum())
     if not size:
-        return None
+        return []
     n = piece.n_vertices
     energy = np.zeros((n, n))
     area = np.zeros((n, n), dtype=np.complex128)
@@ -36,10 +42,15 @@ def small_map(piece: Piece, weights: NDArray) -> PieceMesh | None:
     np.add.at(area, (piece.boundary[:, 0], piece.boundary[:, 1]), -0.25j)
     np.add.at(area, (piece.boundary[:, 1], piece.boundary[:, 0]), 0.25j)
     try:
-        values, vectors = scipy.linalg.eigh(area[:-1, :-1], energy[:-1, :-1], subset_by_index=[n - 2, n - 2])
+        values, vectors = scipy.linalg.eigh(
+            area[:-1, :-1], energy[:-1, :-1], subset_by_index=[max(n - 1 - most, 0), n - 2]
+        )
     except np.linalg.LinAlgError:  # the energy of a mesh is positive
-        return None
-    with np.errstate(all="ignore"):
-        scale = float(size / values[0])
-    z = np.append(vectors[:, 0], 0)
-    return PieceMesh(z, scale) if values[0] > 0 and np.isfinite(scale) and np.isfinite(z).all() else None
+        return []
+    maps = []
+    for value, vector in zip(values[::-1], vectors.T[::-1], strict=True):
+        with np.errstate(all="ignore"):
+            scale = float(size / value)
+        if value > 0 and np.isfinite(scale) and np.isfinite(vector).all():
+            maps.append(PieceMesh(np.append(vector, 0), scale))
+    return maps

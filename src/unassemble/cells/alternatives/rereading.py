@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import partial
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,9 @@ from ...topology.faces import joined
 from ...topology.keys import contains, pair_keys
 from ..agreement import SAME_SCALE
 from ..alike import ALIKE, Answers, Cells, Found
+from ..candidates.candidates import Candidates
 from ..covers.covering import read_by_cover
+from ..labels.repairs import beside
 from ..reading import Reading
 from ..search import fitting_starts, read_cells
 from ..undivided import undivided
@@ -82,14 +85,15 @@ def _other_reading(
     """Other cells that fit in some order of the vertices, and their c.
 
     Among all starts if vanished sides have been `supposed` in these cells, as they are not where something fits without
-    them; else, or where no start fits, by the search.
+    them; else, or where no start fits, by the search. Once also what differs little from what is found.
     """
-    for part in orders:
+    for number, part in enumerate(orders):
         graph = len(part.vertices), part.edges, -stored.entries[part.edge_rows], scale
         found = list(fitting_starts(*graph)) if supposed else []
         if not found and (reading := read_cells(*graph)) is not None and reading.fits:
             found = [reading]
-        for reading in found:
+        near = [beside(reading) for reading in found if isinstance(reading.candidates, Candidates) and supposed]
+        for reading in chain(found, *near if number == 0 else ()):
             if (cells := cells_of(reading, part)) != own:
                 return cells, next(solved.scale for solved in reading.meshes if solved), False
     return None, c, False

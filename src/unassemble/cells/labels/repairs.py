@@ -13,15 +13,21 @@ from numpy.typing import NDArray
 from ..reading import Reading
 from .effort import Effort
 from .evidence import label_changes
-from .proposals import proposals
+from .exchange import whole
+from .leaps import clear_changes
+from .sheet import Sheet
+from .updates import Updates
 
 _log = logging.getLogger(__name__)
 
-BATCH = 24
+_BATCH = 8
 """Small changes of a reading that are tried at a time."""
 
-_IN_VAIN = 100  # small changes in all without an improvement
+_IN_VAIN = 40  # small changes in all without an improvement
 _TRIED = 0.25  # a reading with a batch tried is put off behind those with so much more misfit
+_BETTER = 0.9  # misfit, relative to the least before, that is an improvement worth its price
+_SOLVES = 10  # that telling what changes would leave is worth
+_BESIDE = 24  # small changes of a reading that fits, those that leave least, that are solved for
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 
 
@@ -42,9 +48,8 @@ def _leaps(reading: Reading, effort: Effort) -> Reading:
     patience = np.clip(3e4 / reading.candidates.n_vertices, 2, _PATIENCE)
     seen = {reading.labels.tobytes()}
     while reading.pieces and not reading.fits and since_best < patience and progress.suffices(best.size):
-        changes = np.nan_to_num(label_changes(reading))
-        labels = next((x for x in proposals(reading, changes) if x.tobytes() not in seen), None)
-        if labels is None:
+        labels = clear_changes(reading, np.nan_to_num(label_changes(reading)))
+        if labels.tobytes() in seen:
             break
         seen.add(labels.tobytes())
         reading = effort.reading(reading.candidates, labels)
@@ -55,38 +60,77 @@ def _leaps(reading: Reading, effort: Effort) -> Reading:
 
 
 def descent(reading: Reading, effort: Effort) -> Reading:
-    """Small changes, the likeliest first, from the best of all readings that they have led to.
+    """Small changes, those that should leave least first, from the best of all readings that they have led to.
 
     The last wrong labels may have to be put right together: a change for the better can raise the misfit a little. So
     of the changes of each reading a few are tried, then a few of another that is about as good.
     """
-    best, in_vain = reading, 0
-    seen = {reading.labels.tobytes()}
+    if not reading.pieces or reading.fits:
+        return reading
+    best, least, in_vain, candidates = reading, _value(reading), 0, reading.candidates
+    updates = Updates(Sheet(candidates, _scale(reading)))
+    seen = {updates.outline(reading.labels)}
     # Misfit, more where batches have been tried, a number that settles ties, the reading and its changes.
-    waiting = [(reading.size, 0, reading, _changed(reading))]
-    while waiting and best.pieces and not (best.fits or effort.spent) and in_vain < _IN_VAIN:
+    waiting = [(least, 0, reading, _changed(reading, updates, effort))]
+    while waiting and not (best.fits or effort.spent) and in_vain < _IN_VAIN:
         value, number, reading, changed = heapq.heappop(waiting)
         asked = 0
-        for labels in islice(changed, BATCH):
+        for labels in islice(changed, _BATCH):
             asked += 1
-            if labels.tobytes() in seen or effort.spent:
+            outline = updates.outline(labels)
+            if outline in seen or effort.spent:
                 continue
-            seen.add(labels.tobytes())
-            trial = effort.reading(reading.candidates, labels)
-            in_vain = 0 if trial.size < best.size else in_vain + 1
-            best = better(best, trial)
+            seen.add(outline)
+            trial = effort.reading(candidates, labels)
+            best, after = better(best, trial), _value(trial)
+            in_vain = 0 if after < least else in_vain + 1
+            if after < _BETTER * least:  # nothing of what led here was in vain
+                effort.solves += _SOLVES
+            least = min(after, least)
             if trial.pieces:
-                heapq.heappush(waiting, (trial.size, len(seen), trial, _changed(trial)))
-            if trial.size < reading.size:
+                heapq.heappush(waiting, (after, len(seen), trial, _changed(trial, updates, effort)))
+            if after < value:
                 break
         else:
-            value += _TRIED * reading.size
+            value += _TRIED * _value(reading)
         if asked:
             heapq.heappush(waiting, (value, number, reading, changed))
     _log.debug("descent: misfit %.1e", best.size)
     return best
 
 
-def _changed(reading: Reading) -> Iterator[NDArray[np.bool_]]:
+def _changed(reading: Reading, updates: Updates, effort: Effort) -> Iterator[NDArray[np.bool_]]:
     """Small changes of the labels of a reading; nothing is computed before the first is asked for."""
-    yield from proposals(reading, np.nan_to_num(label_changes(reading)))
+    effort.solves -= _SOLVES
+    for move in updates.ranked(reading):
+        labels = reading.labels.copy()
+        labels[list(move)] ^= True
+        yield whole(reading.candidates, labels)
+
+
+def beside(reading: Reading) -> Iterator[Reading]:
+    """Readings that fit as well as one that does, and differ from it by one label or two that touch."""
+    candidates = reading.candidates
+    updates = Updates(Sheet(candidates, _scale(reading)))
+    seen = {updates.outline(reading.labels)}
+    for move in islice(updates.ranked(reading, candidates.count), _BESIDE):
+        labels = reading.labels.copy()
+        labels[list(move)] ^= True
+        if (outline := updates.outline(labels)) not in seen:
+            seen.add(outline)
+            other = Reading.of(candidates, labels)
+            if other.fits:
+                yield other
+
+
+def _value(reading: Reading) -> float:
+    """Mean misfit: where little is wrong it is smaller than where all is wrong a little."""
+    return float(reading.misfit.mean())
+
+
+def _scale(reading: Reading) -> float:
+    """The c of the largest piece."""
+    solved = [
+        (piece.n_vertices, mesh.scale) for piece, mesh in zip(reading.pieces, reading.meshes, strict=True) if mesh
+    ]
+    return reading.candidates.scale or max(solved, default=(0, 1.0))[1]

@@ -20,6 +20,7 @@ from ...planar.normal import distant_pair
 from ...planar.pencil import ConformalPencil
 from ...topology.keys import with_sides
 from ..candidates.candidates import Candidates
+from ..maps import best_of, mean_misfit
 from ..reading import fans_of
 from .evidence import LONGEST
 
@@ -102,9 +103,13 @@ class Sheet:
 
     def misfit(self, placed: Placed, strength: NDArray) -> NDArray[np.float64]:
         """(e,) what is left of the weights, divided by their spread."""
-        cotangent = strength[self.cell][:, None] * self.cotangents(placed.z[self.triangles])
-        w = np.bincount(self.row.ravel(), cotangent.ravel() / 2, len(self.weights))
+        w = self.fitted_weights(placed.z, strength)
         return np.asarray((self.weights / placed.c - w) / self.spread(placed.c))
+
+    def fitted_weights(self, z: NDArray, strength: NDArray) -> NDArray[np.float64]:
+        """(e,) half the cotangents at positions, each times the strength of its candidate."""
+        cotangent = strength[self.cell][:, None] * self.cotangents(z[self.triangles])
+        return np.asarray(np.bincount(self.row.ravel(), cotangent.ravel() / 2, len(self.weights)), dtype=np.float64)
 
     @staticmethod
     def cotangents(at: NDArray) -> NDArray[np.float64]:
@@ -125,6 +130,15 @@ class Sheet:
         gradient[:, ~(np.abs(gradient) < STEEPEST**2).all(axis=0)] = 0
         return gradient
 
+    def around(self, strength: NDArray) -> NDArray[np.float64]:
+        """(e,) the boundary of all candidates, each times its strength: as whole labels have it, so is their map."""
+        sides = (self._sense * strength[self.cell][:, None]).ravel()
+        return np.asarray(np.bincount(self.row.ravel(), sides, len(self.weights)), dtype=np.float64)
+
+    def pencil(self, strength: NDArray, unit: float = 1.0) -> ConformalPencil:
+        """The conformal pencil for fractional labels, of weights over some c."""
+        return ConformalPencil(_Graph(self.n_vertices, self.edges), self.weights / unit, self.around(strength))
+
     def mapped(self, strength: NDArray, start: Placed | None = None) -> Placed:
         """The conformal map for fractional labels.
 
@@ -133,11 +147,7 @@ class Sheet:
         RecoveryError
             If there is none.
         """
-        sides = (self._sense * strength[self.cell][:, None]).ravel()
-        around = np.bincount(self.row.ravel(), sides, len(self.weights))
-        search = ShiftedSearch(
-            ConformalPencil(_Graph(self.n_vertices, self.edges), self.weights, around), factorisation, 8
-        )
+        search = ShiftedSearch(self.pencil(strength), factorisation, 8)
         noise = np.random.default_rng(0).standard_normal((self.n_vertices, 2)).view(np.complex128).ravel()
         z, c = (start.z, start.c) if start else (noise, 1.0)
         shift = _SHIFT * c
@@ -147,6 +157,23 @@ class Sheet:
                 break
             shift = c * (1 - min(max(4 * spread, 1e-6), 0.3))
         return Placed(z, c if self.free_scale else 1.0)
+
+    def best_mapped(self, strength: NDArray) -> Placed:
+        """The map that fits best of the first few, see :mod:`unassemble.cells.maps`.
+
+        Raises
+        ------
+        RecoveryError
+            If there is none.
+        """
+        first = self.mapped(strength)
+        unit = first.c
+
+        def misfit(z: NDArray, c: float) -> float:
+            return mean_misfit(self.edges, self.weights / unit, c * self.fitted_weights(z, strength))
+
+        z, c = best_of(self.pencil(strength, unit), first.z, misfit)
+        return Placed(z, c * unit)
 
     def linearised(self, placed: Placed, strength: NDArray) -> tuple[sp.csr_array, sp.csr_array, NDArray]:
         """Derivatives of the weights over their spread.

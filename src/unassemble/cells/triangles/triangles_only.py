@@ -15,7 +15,6 @@ from ...topology.embedding import face_complexes
 from ..candidates.candidates import Candidates
 from ..candidates.cell_set import CellSet
 from ..labels.effort import Effort
-from ..labels.evidence import entries_are_to_blame
 from ..labels.mending import MOST_VERTICES
 from ..reading import Reading
 from .clusters import with_clusters
@@ -52,7 +51,7 @@ def read_triangles(n: int, edges: NDArray, weights: NDArray, scale: float | None
     start = candidates.cells.offsets[:-1][labels]
     triangles = candidates.cells.vertices[start[:, None] + np.arange(3)]
     reading = effort.reading(*_alone(n, edges, weights, c, triangles[known.state >= 0]))
-    if not (reading.fits or reading.like_noise or entries_are_to_blame(reading)):
+    if not (reading.fits or reading.like_noise or known.state.all()):
         cells = with_clusters(triangles, sides, edges, weights, c, known)
         if cells is not None:
             reading = effort.reading(*_alone(n, edges, weights, c, cells))

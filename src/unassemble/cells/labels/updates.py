@@ -1,0 +1,226 @@
+"""What small changes of the labels would leave, by low-rank updates of one factorisation.
+
+A cell f more or less changes M(s) = c L / 2 - s T by T_f, in the rows of its corners only, and the conformal map is
+linear in that. Let z be the map at hand, T' = T + T_f, and G the columns of M(s)^-1 that belong to the corners:
+
+    M'^-1 T' z = y + G q,    y = M^-1 T z,    q = (1 - s T_f G_f)^-1 T_f (z + s y)_f,
+
+z_f being the rows of z, and G_f those of G, of the corners. That is one step of inverse iteration on the changed
+pencil, and nothing in it is linearised: a change may well move vertices by more than an edge. A thousand changes cost
+as much as some tens of solves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ...errors import RecoveryError
+from ...linalg import factorisation
+from ...matrix.operator import row_sizes
+from ..reading import Reading
+from .neighbourhood import Neighbourhoods, adjacent_to
+from .sheet import STEEPEST, Sheet
+
+Move = tuple[int, ...]
+"""Candidates whose labels are turned over together."""
+
+_WORK = 3e5  # vertices times moves that are tried at a time, as much as some tens of solves take
+_BATCH = 5e4  # triangles times moves that are computed together
+_NEAR = 1e-3  # of the shift to the c at hand: so much nearer than to other maps, that one step tells
+_LEADERS = 60  # moves that are tried together with what they touch
+_STEEP = 5.0  # weights over row sizes beyond which they are those of flat triangles
+_GROSS = 0.5  # misfit above which an entry has no say in c
+
+
+class Updates:
+    """Changes of the labels in one drawing.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    """
+
+    def __init__(self, sheet: Sheet):
+        self._sheet = sheet
+        self._near = Neighbourhoods(sheet)
+        n, m = sheet.n_vertices, len(sheet.triangles)
+        smaller = row_sizes(n, sheet.edges, np.abs(sheet.weights))[sheet.edges].min(axis=1)
+        self._weights = sheet.weights / smaller
+        half = 0.5 / smaller[sheet.row.T.ravel()]
+        self._of_edge = sp.csc_array((half, (sheet.row.T.ravel(), np.arange(3 * m))), shape=(len(sheet.edges), 3 * m))
+
+    def outline(self, labels: NDArray[np.bool_]) -> bytes:
+        """The same for labels that make the same surface, whichever cells they put together or divide."""
+        return bytes(np.rint(self._sheet.around(labels.astype(np.float64))).astype(np.int8).tobytes())
+
+    def ranked(self, reading: Reading, leaders: int = _LEADERS) -> Iterator[Move]:
+        """Moves that leave least, the best first: single labels, then pairs; what is in the way of a cell goes.
+
+        Parameters
+        ----------
+        reading : Reading
+            In this drawing; with pieces.
+        leaders : int
+            Single moves, the best, that are tried with what they touch.
+        """
+        labels = reading.labels
+        try:
+            factorised = _Factorised(self._sheet, labels)
+        except RecoveryError:
+            return
+        most = max(int(_WORK / self._sheet.n_vertices), 1)
+        singles = list(dict.fromkeys(self._near.with_rivals(labels, (k,)) for k in self._suspects(reading)[:most]))
+        left = self._left(factorised, labels, singles)
+        first = [singles[k] for k in np.argsort(left, kind="stable")[:leaders].tolist()]
+        pairs = sorted(self._pairs(labels, first) - set(singles))[:most]
+        moves = singles + pairs
+        left = np.append(left, self._left(factorised, labels, pairs))
+        yield from (moves[k] for k in np.argsort(left, kind="stable").tolist() if np.isfinite(left[k]))
+
+    def _suspects(self, reading: Reading) -> list[int]:
+        """Candidates, those about the largest misfits first."""
+        sheet = self._sheet
+        at_vertex = np.bincount(reading.edges.ravel(), np.repeat(reading.misfit**2, 2), sheet.n_vertices)
+        cells = sheet.candidates.cells
+        owner = np.repeat(np.arange(cells.count), cells.size)
+        nearby = np.bincount(owner, at_vertex[cells.vertices], cells.count) / cells.size
+        order = np.argsort(-nearby, kind="stable")
+        return order[sheet.chosen[order]].tolist()
+
+    def _pairs(self, labels: NDArray[np.bool_], leaders: list[Move]) -> set[Move]:
+        """Leaders and another candidate that touches them, each."""
+        pairs = set()
+        for move in leaders:
+            turned = labels.copy()
+            turned[list(move)] ^= True
+            for other in adjacent_to(self._near.touching, np.array(move)).tolist():
+                if other not in move and self._sheet.chosen[other]:
+                    pairs.add(tuple(sorted({*move} ^ {*self._near.with_rivals(turned, (other,))})))
+        return pairs - {()}
+
+    def _left(self, factorised: _Factorised, labels: NDArray[np.bool_], moves: list[Move]) -> NDArray[np.float64]:
+        """(moves,) mean misfit after each; infinite where there is no map."""
+        batch = max(int(_BATCH / len(self._sheet.triangles)), 1)
+        parts = [moves[k : k + batch] for k in range(0, len(moves), batch)]
+        return np.concatenate([np.empty(0), *(self._left_of_few(factorised, labels, part) for part in parts)])
+
+    def _left_of_few(self, factorised: _Factorised, labels: NDArray[np.bool_], moves: list[Move]) -> NDArray:
+        sheet, count = self._sheet, len(moves)
+        try:
+            z = factorised.maps(labels, moves)
+        except np.linalg.LinAlgError:
+            return np.full(count, np.inf)
+        turned = np.tile(labels[:, None], count)
+        turned[np.concatenate(moves), np.repeat(np.arange(count), [len(move) for move in moves])] ^= True
+        cells = np.flatnonzero(np.any(turned, axis=1)[sheet.cell])
+        cotangent = _cotangents(z, sheet.triangles[cells]) * turned[sheet.cell[cells]]
+        w = self._of_edge[:, (cells + len(sheet.cell) * np.arange(3)[:, None]).ravel()] @ cotangent.reshape(-1, count)
+        misfit = np.abs(self._scales(w) * w - self._weights[:, None])
+        return np.asarray(np.where(misfit < 1, misfit, 1.0).mean(axis=0))
+
+    def _scales(self, w: NDArray) -> NDArray[np.float64]:
+        """(k,) c for each column of weights over their row sizes, from those that it brings near the given ones."""
+        if not self._sheet.free_scale:
+            return np.ones(w.shape[1])
+        used = np.clip(w, -_STEEP, _STEEP)
+        for _ in range(3):
+            c = (self._weights @ used) / np.maximum((used * used).sum(axis=0), np.finfo(float).tiny)
+            used = np.where(np.abs(c * w - self._weights[:, None]) < _GROSS, w, 0.0)
+        return np.asarray(c)
+
+
+def _cotangents(z: NDArray, triangles: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(3, m, k) at the corners of triangles (m, 3), for positions (n, k)."""
+    at = [z[corner] for corner in triangles.T]
+    sides = [at[k - 1] - at[k - 2] for k in range(3)]  # facing the corners
+    x, y = [side.real for side in sides], [side.imag for side in sides]
+    twice = x[0] * y[1] - y[0] * x[1]
+    with np.errstate(all="ignore"):
+        cotangent = np.stack([-(x[k - 1] * x[k - 2] + y[k - 1] * y[k - 2]) / twice for k in range(3)])
+    return np.asarray(np.nan_to_num(cotangent, posinf=STEEPEST, neginf=-STEEPEST))
+
+
+class _Factorised:
+    """M(s) for some labels, factorised, and the columns of its inverse that have been asked for.
+
+    Raises
+    ------
+    RecoveryError
+        If there is no conformal map.
+    """
+
+    def __init__(self, sheet: Sheet, labels: NDArray[np.bool_]):
+        strength = labels.astype(np.float64)
+        placed = sheet.best_mapped(strength)
+        pencil = sheet.pencil(strength)
+        self._cells = sheet.candidates.cells
+        self._shift = (1 - _NEAR) * placed.c
+        self._n = sheet.n_vertices
+        matrix = pencil.matrix(self._shift)
+        self._factor = factorisation(matrix)
+        self._factor.factorise(matrix)
+        z = placed.z - placed.z[-1]  # the last vertex is pinned
+        y = np.append(self._factor.solve(pencil.area_form(z)[:-1]), 0)
+        size = np.abs(y).max()
+        self._z, self._y = z / size, y / size
+        self._place = np.full(self._n, -1)
+        self._columns = np.empty((0, self._n), dtype=np.complex128)
+
+    def maps(self, labels: NDArray[np.bool_], moves: Sequence[Move]) -> NDArray[np.complex128]:
+        """(n, moves) positions after each move.
+
+        Raises
+        ------
+        LinAlgError
+            If one of the changed pencils is singular.
+        """
+        corner, after, before, side = self._sides(labels, moves)
+        self._ask_for(np.unique(corner))
+        place = self._place[corner]
+        inverse = (
+            self._columns[place[:, None, :], after[:, :, None]] - self._columns[place[:, None, :], before[:, :, None]]
+        )
+        changed = np.eye(corner.shape[1]) - self._shift * side[:, :, None] * inverse
+        ahead = self._z + self._shift * self._y
+        rhs = (side * (ahead[after] - ahead[before]))[..., None]
+        q = np.linalg.solve(changed, rhs)[..., 0]
+        scattered = sp.csr_array(
+            (q.ravel(), place.ravel(), np.arange(0, q.size + 1, corner.shape[1])), shape=(len(q), len(self._columns))
+        )
+        return np.asarray(self._y[:, None] + self._columns.T @ scattered.T)
+
+    def _sides(self, labels: NDArray[np.bool_], moves: Sequence[Move]) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+        """Corners of the cells of each move (moves, k), those after and before them, and a factor of their sides.
+
+        The area form of a cell times z is side (z_after - z_before). Rows are filled up with corners of no factor.
+        """
+        cell = np.concatenate(moves)
+        move = np.repeat(np.arange(len(moves)), [len(one) for one in moves])
+        size = self._cells.size[cell]
+        owner = np.repeat(np.arange(len(cell)), size)
+        start = np.cumsum(size) - size
+        step = np.arange(len(owner)) - start[owner]
+        row = move[owner]
+        slot = np.arange(len(row)) - np.searchsorted(row, np.arange(len(moves)))[row]
+        corner, after, before = np.zeros((3, len(moves), int(slot.max()) + 1), dtype=np.int64)
+        for whose, ahead in ((corner, 0), (after, 1), (before, -1)):
+            whose[row, slot] = self._cells.vertices[self._cells.offsets[cell][owner] + (step + ahead) % size[owner]]
+        side = np.zeros(corner.shape, dtype=np.complex128)
+        side[row, slot] = np.where(labels[cell], 0.25j, -0.25j)[owner]
+        return corner, after, before, side
+
+    def _ask_for(self, vertices: NDArray[np.int64]) -> None:
+        new = vertices[self._place[vertices] < 0]
+        if not len(new):
+            return
+        unit = np.zeros((self._n - 1, len(new)), dtype=np.complex128)
+        kept = new < self._n - 1
+        unit[new[kept], np.flatnonzero(kept)] = 1
+        columns = np.zeros((len(new), self._n), dtype=np.complex128)
+        columns[:, :-1] = self._factor.solve(unit).T
+        self._place[new] = len(self._columns) + np.arange(len(new))
+        self._columns = np.concatenate([self._columns, columns])
