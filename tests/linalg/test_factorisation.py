@@ -43,7 +43,6 @@ def test_solution_satisfies_the_system(solver, dtype, columns):
     for scale in (1.0, 3.0):  # the second uses the same analysis
         factor.factorise(matrix.with_data(scale * matrix.data))
         assert np.abs(scale * (full @ factor.solve(rhs)) - rhs).max() < 1e-12
-    assert factor.factor_entries > 200
     factor.release()
 
 

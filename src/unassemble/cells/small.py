@@ -13,11 +13,6 @@ SMALL = 40
 """Most vertices of a small piece."""
 
 
-def small_map(piece: Piece, weights: NDArray) -> PieceMesh | None:
-    """The conformal map of a small piece; None where the entries allow none."""
-    return next(iter(small_maps(piece, weights, 1)), None)
-
-
 def small_maps(piece: Piece, weights: NDArray, most: int) -> list[PieceMesh]:
     """The conformal map of a small piece, and maps of the next greater quotients; none where the entries allow none.
 

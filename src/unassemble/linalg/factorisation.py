@@ -24,10 +24,6 @@ class Factorisation(Protocol):
     def solve(self, rhs: NDArray) -> NDArray:
         """Solve for one right-hand side (n,) or several (n, k)."""
 
-    @property
-    def factor_entries(self) -> int:
-        """Stored entries of the factor."""
-
     def release(self) -> None:
         """Give the memory of the factor back."""
 

@@ -128,11 +128,6 @@ class PardisoFactorisation:
         self._call(_SOLVE, rhs, solution)
         return solution
 
-    @property
-    def factor_entries(self) -> int:
-        """Entries of the factor, as PARDISO counts them."""
-        return int(self._iparm[17])
-
     def release(self) -> None:
         """Give the memory of the factor back."""
         if self._handle.any():

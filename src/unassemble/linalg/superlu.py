@@ -38,11 +38,6 @@ class SuperLUFactorisation:
         """Solve for one right-hand side (n,) or several (n, k)."""
         return self._lu.solve(np.asfortranarray(rhs, dtype=complex if self._complex else float))
 
-    @property
-    def factor_entries(self) -> int:
-        """Entries of both factors."""
-        return int(self._lu.nnz)
-
     def release(self) -> None:
         """Give the memory of the factor back."""
         self.__dict__.pop("_lu", None)
