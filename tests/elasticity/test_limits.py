@@ -1,10 +1,25 @@
 """What the matrix does not tell is said, not guessed; and what coordinates are for."""
 
+import time
+
 import numpy as np
 import pyamg
 import pytest
 import scipy.sparse as sp
-from assembled import box, eliminated, error, on_plane, orthotropic, permuted_nodes, stiffness, vector_laplace
+from assembled import (
+    Assembled,
+    box,
+    eliminated,
+    error,
+    heterogeneous,
+    on_plane,
+    orthotropic,
+    permuted_nodes,
+    stiffness,
+    vector_laplace,
+    with_identity,
+    with_penalty,
+)
 from supported import given as held
 from supported import judged
 
@@ -15,7 +30,7 @@ from unassemble.elasticity import (
     save_petsc_vec,
     scalar_parts,
 )  # fmt: skip
-from unassemble.errors import FormatError, GeometryError
+from unassemble.errors import FormatError, GeometryError, RecoveryError
 
 
 def test_orthotropic_material_is_a_best_fit():
@@ -49,6 +64,21 @@ def test_vector_laplacian_comes_apart():
     assert len(parts.matrices) == 3
     assert abs(parts.matrices[0] - parts.matrices[2]).max() < 1e-14
     assert scalar_parts(stiffness("tet-p1", box("tet-p1", (4, 4, 4))).matrix) is None
+
+
+def test_too_few_whole_rows_are_given_up_at_once():
+    """Clamps by identity rows between penalties: the refusal does not wait for a search."""
+    shape = box("quad-q1", (3, 4), perturb=0.2, seed=80716)
+    body = stiffness("quad-q1", shape, lam=heterogeneous, mu=lambda x: 1 + x[1] + x[0] * x[1])
+    clamped = np.zeros((len(body.points), 2), dtype=bool)
+    clamped[on_plane(body, 0) | on_plane(body, 0, 1.0)] = True
+    penalty = np.zeros_like(clamped)
+    penalty[on_plane(body, 1), 1] = True
+    stiff = Assembled(with_penalty(body, penalty & ~clamped), body.points, body.cells)
+    start = time.perf_counter()
+    with pytest.raises(RecoveryError):
+        recover_elasticity(with_identity(stiff, clamped))
+    assert time.perf_counter() - start < 15
 
 
 def test_charts_agree_with_one_factorisation():

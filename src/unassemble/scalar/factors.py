@@ -41,15 +41,15 @@ class Factors:
         Label of the pieces that hang together by vertices.
     fitted : (pieces,) int64
         Label of the pieces that have one c, as far as errors explain that their own differ.
-    closings : int
-        Equations by which rings of pieces, fitted together, held these.
+    closings : (pieces,) int64
+        Equations by which rings of pieces, fitted together, hold these; at the first piece of each group.
     """
 
     own: NDArray[np.float64]
     deviation: NDArray[np.float64]
     group: NDArray[np.int64]
     fitted: NDArray[np.int64]
-    closings: int = 0
+    closings: NDArray[np.int64]
 
     @classmethod
     def of(cls, topology: Topology, meshes: Sequence[PieceMesh]) -> Factors:
@@ -57,7 +57,9 @@ class Factors:
         n = len(meshes)
         group = groups(topology) if len(topology.hinges) else np.arange(n)
         own = np.array([mesh.scale for mesh in meshes])
-        return cls(own, np.full(n, np.inf), np.asarray(group, dtype=np.int64), np.arange(n))
+        return cls(
+            own, np.full(n, np.inf), np.asarray(group, dtype=np.int64), np.arange(n), np.zeros(n, dtype=np.int64)
+        )
 
     @property
     def count(self) -> int:
@@ -113,7 +115,7 @@ def fitted_together(
     several = np.flatnonzero(np.bincount(factors.group)[factors.group] > 1)
     if scale is None:
         factors.deviation[several] = _deviations(topology, meshes, several, vanished)
-    meshes, closings = list(meshes), 0
+    meshes = list(meshes)
     for label in np.unique(factors.group[several]):
         inside = np.flatnonzero(factors.group == label)
         c, sigma = (scale, noise or 0.0) if scale else _common(topology, weights, meshes, factors, inside, noise)
@@ -127,11 +129,11 @@ def fitted_together(
         if joined is None and scale is not None:
             continue
         together = refined_together(pieces, weights, own, joined, scale, rounding=noise is None, exact=vanished)
-        closings += joined.closings if joined else 0
+        factors.closings[inside[0]] = joined.closings if joined else 0
         factors.fitted[inside] = inside[0]
         for p, mesh in zip(inside, together, strict=True):
             meshes[p] = mesh
-    return meshes, replace(factors, closings=closings)
+    return meshes, factors
 
 
 def hinged(
@@ -221,12 +223,14 @@ def discord(topology: Topology, factors: Factors, backward_error: float, noise: 
         return f"pieces that share vertices have different factors c: {_named(topology, factors, apart)}{more}"
     if not noise or not difference.max() > SAME_SCALE:
         return None
-    # The first piece of each group tells c, and others confirm it to within their errors; so do rings that close.
+    # The first piece of each group tells c, and others confirm it to within their errors; so do rings that close. What
+    # may be something else has to agree itself: neither pieces that are beyond doubt nor other groups vouch for it.
     others = together & (np.arange(len(difference)) != factors.first)
     unproved = others & _to_be_confirmed(topology, factors.group)
-    chance = np.log(np.minimum(noise * factors.deviation[others], 1.0)).sum()
+    agree = np.where(unproved, np.log(np.minimum(noise * factors.deviation, 1.0)), 0.0)
+    chance = np.bincount(factors.first, agree, len(agree))
     chance += factors.closings * np.log(min(_GAP * noise / float(np.abs(factors.own).max()), 1.0))
-    if unproved.any() and chance > np.log(_CHANCE):
+    if (chance[factors.first[unproved]] > np.log(_CHANCE)).any():
         return (
             f"noise of standard deviation {noise:.3g} explains that pieces which share vertices have different "
             f"factors c by themselves ({_named(topology, factors, difference)}), but they agree too roughly, or are "

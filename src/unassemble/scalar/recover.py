@@ -226,7 +226,7 @@ def _place(
 
 def _freedom(topology: Topology, factors: Factors, scale: float | None) -> int:
     """Entries less fitted unknowns: 2 v - 4 coordinates of each piece, as far as rings do not tie them, and each c."""
-    coordinates = sum(2 * piece.n_vertices - 4 for piece in topology.pieces) - factors.closings
+    coordinates = sum(2 * piece.n_vertices - 4 for piece in topology.pieces) - int(factors.closings.sum())
     return len(topology.edges) - coordinates - (factors.count if scale is None else 0)
 
 
@@ -257,7 +257,7 @@ def _deviations(
             spread=mesh.spread,
         )
         result[piece.vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-    for label in np.unique(factors.fitted[factors.together]) if factors.closings else ():
+    for label in np.unique(factors.fitted[factors.together]) if factors.closings.any() else ():
         inside = np.flatnonzero(factors.fitted == label)
         joined = hinged(topology, inside, [drawn[p] for p in inside])
         if joined is not None:

@@ -53,7 +53,7 @@ def verdict(
     doubt : float
         About the error of the positions, relative to the size of their piece, as far as a solver knows of one.
     apart : str, optional
-        What is wrong with the factors, see :func:`unassemble.factors.discord`.
+        What is wrong with the factors, see :func:`unassemble.scalar.factors.discord`.
     """
     good = passes(certificate, chi_square, scale)
     if good and apart:

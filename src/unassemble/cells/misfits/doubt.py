@@ -124,7 +124,7 @@ def _noise(
         if (c[inside] * c[inside][0] > 0).all():
             size = np.log(np.abs(c[inside]))
             away = np.abs(size - np.median(size))
-            if (inside.sum() / 2 - 1) * np.log(np.median(away)) < _CHANCE:
+            if (inside.sum() / 2 - 1) * np.log(max(float(np.median(away)), np.finfo(float).tiny)) < _CHANCE:
                 sigma[component] = _NORMAL_MEDIAN * np.median(away / deviation[inside])
     return np.asarray(sigma)
 

@@ -17,6 +17,7 @@ from ..rows.constants import row_sizes, with_penalty
 
 _SMALLER = 1e-9  # share by which sums are smaller, and not by rounding
 _LARGEST = 500  # rows to name beyond which it would take minutes: 100 take a second or two
+_SECONDS = 20.0  # after which directions stay as they are
 
 
 def named_by_least_sums(
@@ -50,7 +51,8 @@ def named_by_least_sums(
         b_ub=np.concatenate([-given.T.ravel(), given.T.ravel()]),
         A_eq=sp.hstack([sp.eye_array(len(rows))] * d + [sp.csr_array((len(rows), given.size))]),
         b_eq=np.ones(len(rows)),
-        method="highs-ipm",
+        method="highs-ds",  # interior point steps may go on for ever where penalties leave rows of very different size
+        options={"time_limit": _SECONDS},
     )
     if found.x is None:
         return direction
