@@ -27,10 +27,11 @@ class Corner:
 
 
 def with_corner_nodes(nodal: NodalMatrix, corners: Sequence[Corner]) -> NodalMatrix:
-    """The matrix with a node more for each corner, after all others: coupled to its neighbours by blocks of zeros."""
+    """The matrix with a node more for each corner, after all others: coupled to its neighbours by blocks of zeros.
+
+    There is at least one.
+    """
     n, d, many = nodal.n, nodal.dim, len(corners)
-    if not many:
-        return nodal
     near = np.concatenate([one.nodes for one in corners])
     new = n + np.repeat(np.arange(many), [len(one.nodes) for one in corners])
     own = n + np.arange(many)

@@ -40,6 +40,27 @@ def edge_weights(piece: Piece, z: NDArray) -> NDArray[np.float64]:
     return _halved(piece, _cotangent(*left), _cotangent(*right))
 
 
+def left_by_all(
+    pieces: Sequence[Piece], weights: NDArray, positions: Sequence[NDArray], scales: NDArray
+) -> NDArray[np.float64]:
+    """(e,) what several pieces, each with its c, leave of their weights, one after the other.
+
+    Not finite at flat triangles.
+
+    Parameters
+    ----------
+    pieces : sequence of Piece
+    weights : (edges of the whole graph,) float64
+        -A_ij of each.
+    positions : sequence of (n,) complex128
+    scales : (pieces,) float64
+    """
+    c = np.repeat(scales, [len(piece.edge_rows) for piece in pieces])
+    with np.errstate(all="ignore"):
+        fitted = c * weights_of_all(pieces, positions)
+        return np.asarray(weights[np.concatenate([piece.edge_rows for piece in pieces])] - fitted)
+
+
 def weights_of_all(pieces: Sequence[Piece], positions: Sequence[NDArray]) -> NDArray[np.float64]:
     """The weights of several pieces, each at its positions, one after the other."""
     if len(pieces) == 1:

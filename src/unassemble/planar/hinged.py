@@ -75,7 +75,7 @@ def _freedoms(owner: NDArray, local: NDArray, z: NDArray, n: int) -> tuple[NDArr
     row = np.arange(len(one))
     equations[row, p], equations[row, q] = at, -at
     equations[row, n + p], equations[row, n + q] = 1, -1
-    _, size, directions = np.linalg.svd(equations)
+    _, size, directions = np.linalg.svd(np.linalg.qr(equations, mode="r"))  # of many equations, no large left factor
     rank = int((size > _INDEPENDENT * size[0]).sum())
     return directions[rank:].conj().T, 2 * (len(one) - rank)
 

@@ -52,12 +52,12 @@ class WeightJacobian:
 
 
 class NormalEquations:
-    """Factorised J'J with two vertices held fixed, which pins the four freedoms of a similarity.
+    """Factorised J'J with some vertices held fixed, which pins the freedoms of a similarity, or of several.
 
     Parameters
     ----------
     jacobian : WeightJacobian
-    pins : (2,) int
+    pins : (k,) int
         Vertices that stay where they are; the farther apart the better.
     """
 

@@ -12,7 +12,7 @@ from scipy.special import fdtrc, gammaincc, ndtr
 
 from ..cells.agreement import SAME_SCALE, SCALE_ERROR
 from ..certify import CONFIDENCE, LARGEST_NOISE
-from ..planar.cotangent import weights_of_all
+from ..planar.cotangent import left_by_all
 from ..planar.deviations import factor_deviations
 from ..planar.hinged import Hinged
 from ..planar.hinges import CLOSED, groups, join, rings
@@ -35,8 +35,8 @@ class Factors:
     own : (pieces,) float64
         c of each piece by itself.
     deviation : (pieces,) float64
-        Standard deviation of log c for noise 1 in the entries; those that have vanished are exact. Infinite where the
-        entries of a piece do not tell c, or where it does not matter.
+        Standard deviation of log c for noise 1 in the entries; those that have vanished are exact. 1e100 where the
+        entries of a piece do not tell c, infinite where it does not matter.
     group : (pieces,) int64
         Label of the pieces that hang together by vertices.
     fitted : (pieces,) int64
@@ -189,11 +189,10 @@ def _left(
 ) -> tuple[float, int]:
     """Sum of squares of what some pieces, each with its c, leave of their entries; and how many these have to spare."""
     pieces = [topology.pieces[p] for p in inside]
-    c = np.repeat([meshes[p].scale for p in inside], [len(piece.edge_rows) for piece in pieces])
-    with np.errstate(all="ignore"):  # flat triangles leave what is not finite
-        fitted = c * weights_of_all(pieces, [meshes[p].z for p in inside])
-        left = float(np.sum((weights[np.concatenate([piece.edge_rows for piece in pieces])] - fitted) ** 2))
-    return left, sum(piece.redundancy for piece in pieces)
+    scales = np.array([meshes[p].scale for p in inside])
+    left = left_by_all(pieces, weights, [meshes[p].z for p in inside], scales)
+    with np.errstate(all="ignore"):  # not finite at flat triangles
+        return float(np.sum(left**2)), sum(piece.redundancy for piece in pieces)
 
 
 def _explained(misfit: NDArray, freedom: int) -> bool:

@@ -245,22 +245,12 @@ def _deviations(
     stretch = tensor.root if tensor else None
     drawn = [tensor.to_laplacian(z) if tensor else z for z in placed]
     result = np.full((topology.n_vertices, 2), np.nan)
-    beside = _beside(topology, meshes, factors.fitted) if free else np.zeros(len(meshes))
-    for piece, z, mesh, more in reversed(list(zip(topology.pieces, drawn, meshes, beside, strict=True))):
-        covariance = coordinate_covariances(
-            piece,
-            z,
-            sigma=sigma / abs(mesh.scale),
-            free_scale=free,
-            beside=more,
-            stretch=stretch,
-            spread=mesh.spread,
-        )
-        result[piece.vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    alone = np.ones(len(meshes), dtype=bool)
     for label in np.unique(factors.fitted[factors.together]) if factors.closings.any() else ():
         inside = np.flatnonzero(factors.fitted == label)
         joined = hinged(topology, inside, [drawn[p] for p in inside])
         if joined is not None:
+            alone[inside] = False
             z = np.empty(joined.piece.n_vertices, dtype=np.complex128)
             for p, own in zip(inside, joined.local, strict=True):
                 z[own] = drawn[p]
@@ -275,6 +265,18 @@ def _deviations(
                 pins=joined.pins,
             )
             result[joined.piece.vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    beside = _beside(topology, meshes, factors.fitted) if free and alone.any() else np.zeros(len(meshes))
+    for p in np.flatnonzero(alone)[::-1].tolist():
+        covariance = coordinate_covariances(
+            topology.pieces[p],
+            drawn[p],
+            sigma=sigma / abs(meshes[p].scale),
+            free_scale=free,
+            beside=beside[p],
+            stretch=stretch,
+            spread=meshes[p].spread,
+        )
+        result[topology.pieces[p].vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     return result
 
 

@@ -11,7 +11,7 @@ from scipy.sparse import csgraph
 
 from ...errors import RecoveryError, SolverError
 from ...matrix import OperatorMatrix
-from ...planar.cotangent import weights_of_all
+from ...planar.cotangent import left_by_all
 from ...planar.deviations import factor_deviations
 from ...planar.piece import PieceMesh
 from ...planar.polish import PolishOptions, polish
@@ -112,10 +112,9 @@ def _noise(
     this is no coincidence, and 0 otherwise.
     """
     sizes = [len(piece.edge_rows) for piece in pieces]
-    weights = -matrix.entries[np.concatenate([piece.edge_rows for piece in pieces])]
-    with np.errstate(all="ignore"):  # flat triangles
-        left = weights - np.repeat(c, sizes) * weights_of_all(pieces, [mesh.z for mesh in meshes])
-    squares = np.bincount(np.repeat(own, sizes), left**2, count)
+    left = left_by_all(pieces, -matrix.entries, [mesh.z for mesh in meshes], c)
+    with np.errstate(all="ignore"):  # not finite at flat triangles
+        squares = np.bincount(np.repeat(own, sizes), left**2, count)
     spare = np.bincount(own, [piece.redundancy for piece in pieces], count)
     with np.errstate(divide="ignore", invalid="ignore"):
         sigma = np.where(spare > 0, np.sqrt(squares / spare), 0.0)

@@ -93,12 +93,10 @@ def corners_of(
     open_rows = ~surrounded(nodal, valid) & (nodal.row_of >= 0).any(axis=1)
     found = []
     for rows, nodes in _places(nodal, corner, loose):
-        here = np.zeros(nodal.n)
-        here[nodes] = here[rows[corner[rows]]] = 1
-        near = np.asarray(nodal.graph @ here > 0)
-        held = [points[near & lacking[:, b], b] for b in range(nodal.dim)]
+        near = np.unique(nodal.graph[np.union1d(nodes, rows[corner[rows]])].indices)
+        held = [points[near[lacking[near, b]], b] for b in range(nodal.dim)]
         if all(len(level) and np.ptp(level) <= EXACT for level in held):
-            found.append(Corner(np.array([level.mean() for level in held]), np.flatnonzero(near & open_rows)))
+            found.append(Corner(np.array([level.mean() for level in held]), near[open_rows[near]].astype(np.int64)))
     return tuple(found)
 
 

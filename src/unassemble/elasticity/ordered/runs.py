@@ -106,8 +106,7 @@ def _in_equilibrium(
     other, share = extended_directions(matrix, group, np.ones(len(direction), dtype=bool), d, known=known)
     if share < WHOLE or (other != direction)[~unnamed].any():
         return direction, unnamed
-    still = ~proven_directions(matrix, other, group, d)
-    return (other, still) if np.count_nonzero(still) <= np.count_nonzero(unnamed) else (direction, unnamed)
+    return _if_no_worse(matrix, group, other, (direction, unnamed), d)
 
 
 def _with_least_sums(
@@ -119,8 +118,19 @@ def _with_least_sums(
     in equilibrium with these.
     """
     other = named_by_least_sums(matrix, direction, unnamed, d)
-    still = ~proven_directions(matrix, other, group, d)
-    return (other, still) if np.count_nonzero(still) <= np.count_nonzero(unnamed) else (direction, unnamed)
+    return _if_no_worse(matrix, group, other, (direction, unnamed), d)
+
+
+def _if_no_worse(
+    matrix: sp.csr_array,
+    group: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    before: tuple[NDArray[np.int64], NDArray[np.bool_]],
+    d: int,
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Directions, and rows without a proof; those `before` if these are fewer."""
+    unnamed = ~proven_directions(matrix, direction, group, d)
+    return (direction, unnamed) if np.count_nonzero(unnamed) <= np.count_nonzero(before[1]) else before
 
 
 def _cut_where(run: NDArray[np.int64], direction: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -44,10 +44,9 @@ def reach(matrix: sp.csr_array, steps: int = _STEPS) -> sp.csr_array:
 def alike(reached: sp.csr_array, r: NDArray, s: NDArray) -> NDArray[np.float64]:
     """(k,) cosines between the reaches of rows r and s."""
     order = reached.shape[0]
-    if _full(reached) and order**2 < _CHEAP * len(r):
-        whole = reached.toarray()
-        return np.asarray((whole @ whole.T)[r, s], dtype=np.float64)
     rows = reached.toarray() if _full(reached) else reached
+    if _full(reached) and order**2 < _CHEAP * len(r):
+        return np.asarray((rows @ rows.T)[r, s], dtype=np.float64)
     step = max(_AT_ONCE * order // max(reached.nnz, 1), 1)
     parts = [_products(rows[r[k : k + step]], rows[s[k : k + step]]) for k in range(0, len(r), step)]
     return np.concatenate([np.empty(0), *parts])
