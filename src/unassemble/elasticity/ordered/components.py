@@ -16,28 +16,31 @@ from ..rows.orders import Reading
 from ..rows.traces import shows_all
 from ..scattered.filling import filled_by_direction
 from ..scattered.row_positions import placed_together
+from .held import Places, joined_by_place
 from .matching import matched_by_likeness, matched_by_pattern
 
 _VOTES = 0.5  # share of the rows that add up to zero that has to vote for a cut: nearly all do, or a few by chance
 
 
-def by_component(matrix: sp.csr_array, d: int) -> Reading | None:
+def by_component(matrix: sp.csr_array, d: int, places: Places) -> Reading | None:
     """Nodes and directions of rows that stand direction by direction; None where no such order shows.
 
     Parameters
     ----------
     matrix : (N, N) sparse
-        Columns increasing in each row.
+        Without rows of the identity; columns increasing in each row.
     d : int
+    places : Places
+        Of the rows among those of the identity.
     """
     direction = directions_by_component(matrix, d)
     if direction is None:
         return None
-    stored = _by_pattern(matrix, direction, d)
+    stored = _by_pattern(matrix, direction, d, places)
     if _shows_nodes(matrix, stored, d):
         return stored
     whole = filled_by_direction(matrix, direction, np.ones(len(direction), dtype=bool), d)
-    put_back = _by_pattern(whole, direction, d)
+    put_back = _by_pattern(whole, direction, d, places)
     alike = Reading(matched_by_likeness(matrix, direction, d), direction)
     fewer = put_back.node.max() < alike.node.max()  # rows of one node that stay apart make two
     if not fewer or not _shows_nodes(whole, put_back, d):
@@ -52,11 +55,12 @@ def _shows_nodes(matrix: sp.csr_array, reading: Reading, d: int) -> bool:
     return bool(many) and shows_all(matrix, reading, d)
 
 
-def _by_pattern(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> Reading:
+def _by_pattern(matrix: sp.csr_array, direction: NDArray[np.int64], d: int, places: Places) -> Reading:
     """Nodes of rows of the same pattern, as far as order and positions decide."""
     everywhere = np.ones(matrix.shape[0], dtype=bool)
     group = same_pattern(matrix, ~everywhere)
     node, open_row = matched_by_pattern(group, direction, d)
+    node, open_row = joined_by_place(places, group, node, direction, d, open_row)
     if open_row.any():
         node, open_row = placed_together(matrix, everywhere, group, node, direction, d, open_row, ordered=True)
     return Reading(node, direction, open_row)

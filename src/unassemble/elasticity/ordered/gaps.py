@@ -14,6 +14,7 @@ from ..rows.grouping import by_first_row, same_pattern
 from ..rows.numbering import Numbering, measured
 from ..rows.orders import Reading
 from .components import by_component, directions_by_component
+from .held import Places
 from .runs import run_lengths, told_by_likeness, told_by_pattern
 
 
@@ -22,7 +23,7 @@ def by_component_with_gaps(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list
     live, inner = _live_part(matrix)
     found = []
     for d in sizes:
-        one = by_component(inner, d)
+        one = by_component(inner, d, Places(live, matrix.shape[0]))
         if one is not None:
             found.append(_spread(matrix, live, one, d, "by component"))
             if found[-1].settled:

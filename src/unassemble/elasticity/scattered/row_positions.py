@@ -7,6 +7,7 @@ unknowns nothing else tells which of their rows belong together.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations, permutations
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from ...errors import GeometryError
 from ..nodal import NodalMatrix, determined, nodal_matrix
 from ..nullspace.placing import placed
 from ..nullspace.planes import with_planes
+from ..rows.pieces import pieces
 from ..rows.constants import least_sums, row_sizes, with_penalty
 from ..rows.grouping import by_first_row
 from ..rows.numbering import Numbering
@@ -73,25 +75,37 @@ def placed_together(
     may = live if open_row is None else live & open_row
     sums = _sums(matrix, live, group, direction, d)
     for _ in range(_ROUNDS):
-        open_row = _open(group, node, direction, d) & may
+        piece = pieces(node, direction, d) if ordered else np.zeros((len(node), d), dtype=np.int64)
+        open_row = _open(group, node, direction, piece) & may
         if not open_row.any():
             break
         nodal = nodal_matrix(matrix, Numbering(d, node, direction, identity, "pattern", 1.0, 1.0))
         again, settled = _joined(nodal, sums, group, node, direction, open_row, ordered=ordered)
         may = may & ~settled
-        again = _remaining(group, again, direction, d, may)
+        piece = pieces(again, direction, d) if ordered else piece
+        again = _remaining(group, again, direction, piece, may)
         if again.max() == node.max():
             break
         node = again
-    return node, _open(group, node, direction, d) & may
+    piece = pieces(node, direction, d) if ordered else piece
+    return node, _open(group, node, direction, piece) & may
 
 
-def _open(group: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[np.int64], d: int) -> NDArray[np.bool_]:
-    """(N,) rows of nodes that lack a direction which others of the same pattern, that lack some too, have."""
-    absent = (by_direction(node, direction, d) == 0)[node]
-    lacks = absent.any(axis=1)
-    on_offer = by_direction(group[lacks], direction[lacks], d, int(group.max()) + 1) > 0
-    return np.asarray((absent & on_offer[group]).any(axis=1))
+def _open(
+    group: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[np.int64], piece: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """(N,) rows of nodes that lack a direction which others of the same pattern, that lack theirs, may give them.
+
+    Rows of different pieces (N, d) of the order may not; see :mod:`..rows.pieces`.
+    """
+    order, d = piece.shape
+    absent = by_direction(node, direction, d) == 0
+    found = np.zeros(len(absent), dtype=bool)
+    for c, b in permutations(range(d), 2):
+        r, s = (np.flatnonzero((direction == one) & absent[node, other]) for one, other in ((c, b), (b, c)))
+        offered = np.isin(group[r] * (order + 1) + piece[r, b], group[s] * (order + 1) + piece[s, c])
+        found[node[r[offered]]] = True
+    return found[node]
 
 
 class _Sums(NamedTuple):
@@ -199,10 +213,22 @@ def _equations(
 
 
 def _remaining(
-    group: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[np.int64], d: int, may: NDArray[np.bool_]
+    group: NDArray[np.int64],
+    node: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    piece: NDArray[np.int64],
+    may: NDArray[np.bool_],
 ) -> NDArray[np.int64]:
-    """(N,) nodes after all that is left of a pattern was joined where that is one row of each direction."""
-    left = (by_direction(node, direction, d) == 0).any(axis=1)[node] & may
+    """(N,) nodes after all that is left of a pattern was joined where that is one row of each direction, uncrossed."""
+    d = piece.shape[1]
+    left = np.flatnonzero((by_direction(node, direction, d) == 0).any(axis=1)[node] & may)
     rest = by_direction(group[left], direction[left], d, int(group.max()) + 1)
-    last = left & np.asarray((rest == 1).all(axis=1))[group]
-    return by_first_row(np.where(last, len(node) + group, node))
+    last = (rest == 1).all(axis=1)
+    row = np.zeros(rest.shape, dtype=np.int64)
+    row[group[left], direction[left]] = left
+    for c, b in combinations(range(d), 2):
+        last &= piece[row[:, c], b] == piece[row[:, b], c]
+    left = left[last[group[left]]]
+    label = node.copy()
+    label[left] = len(node) + group[left]
+    return by_first_row(label)
