@@ -6,9 +6,7 @@ unknowns nothing else tells which of their rows belong together.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import combinations, permutations
-from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,13 +16,14 @@ from scipy.spatial import cKDTree
 from ...errors import GeometryError
 from ..nodal import NodalMatrix, determined, nodal_matrix
 from ..nullspace.placing import placed
-from ..nullspace.planes import with_planes
-from ..rows.pieces import pieces
-from ..rows.constants import least_sums, row_sizes, with_penalty
+from ..nullspace.solution import Solution
 from ..rows.grouping import by_first_row
 from ..rows.numbering import Numbering
-from .patterns import by_direction, with_patterns
+from ..rows.pieces import pieces
+from .patterns import by_direction
 from .plane_rows import of_planes
+from .row_equations import Sums, equations, sums_of
+from .trials import joined_by_trial
 
 _APART = 1e-6  # of the mean edge length, up to which two positions are one
 _ROUNDS = 4
@@ -73,17 +72,23 @@ def placed_together(
     """
     identity = ~live
     may = live if open_row is None else live & open_row
-    sums = _sums(matrix, live, group, direction, d)
+    sums = sums_of(matrix, live, group, direction, d)
     for _ in range(_ROUNDS):
         piece = pieces(node, direction, d) if ordered else np.zeros((len(node), d), dtype=np.int64)
         open_row = _open(group, node, direction, piece) & may
         if not open_row.any():
             break
         nodal = nodal_matrix(matrix, Numbering(d, node, direction, identity, "pattern", 1.0, 1.0))
-        again, settled = _joined(nodal, sums, group, node, direction, open_row, ordered=ordered)
-        may = may & ~settled
+        solution = _row_by_row(nodal, sums, group, node, direction)
+        again, settled = node, np.zeros(len(node), dtype=bool)
+        if solution is not None:
+            again, settled = _joined(solution, sums, group, node, direction, open_row, ordered=ordered)
+            may = may & ~settled
         piece = pieces(again, direction, d) if ordered else piece
         again = _remaining(group, again, direction, piece, may)
+        if solution is not None and again.max() == node.max():
+            again, settled = joined_by_trial(matrix, sums, solution, group, node, direction, piece, open_row & may)
+            may = may & ~settled
         if again.max() == node.max():
             break
         node = again
@@ -108,51 +113,21 @@ def _open(
     return found[node]
 
 
-class _Sums(NamedTuple):
-    """What sums over directions say of rows, whichever of them are one node's.
-
-    Attributes
-    ----------
-    whole : (N, d) bool
-        Rows that hold every coefficient in the columns of a direction.
-    gone : (N, d) bool
-        Directions that were taken out of all nodes of the row's pattern.
-    surrounded : (N,) bool
-        Rows whose neighbours are all there, in some direction at least.
-    """
-
-    whole: NDArray[np.bool_]
-    gone: NDArray[np.bool_]
-    surrounded: NDArray[np.bool_]
-
-
-def _sums(
-    matrix: sp.csr_array, live: NDArray[np.bool_], group: NDArray[np.int64], direction: NDArray[np.int64], d: int
-) -> _Sums:
-    """Rows are whole where all of their pattern annihilate constants, and nothing near is known to lack the direction.
-
-    What was taken out leaves a trace: some row next to it does not add up to zero. Rows that touch nothing lacking some
-    direction show that no node near them is missing altogether.
-    """
-    label = np.eye(d)[direction] * live[:, None]
-    size = row_sizes(matrix)
-    least = least_sums(size)
-    excused = (label > 0) & with_penalty(matrix, size)[:, None]
-    missing = (np.abs(matrix @ label) > least[:, None]) & ~excused
-    failing = np.zeros((int(group.max()) + 1, d))
-    np.add.at(failing, group, missing)
-    count = by_direction(group, direction, d)
-    pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
-    lacking = pattern @ ((count < count.max(axis=1, keepdims=True))[group] & live[:, None]).astype(float) > 0
-    adding: NDArray[np.bool_] = failing[group] == 0
-    gone = (count[group] == 0) & (pattern @ missing.astype(float) > 0)
-    surrounded = (adding | lacking).all(axis=1) & (adding & ~lacking).any(axis=1)
-    return _Sums(adding & ~excused & ~lacking & live[:, None], gone & live[:, None], surrounded & live)
+def _row_by_row(
+    nodal: NodalMatrix, sums: Sums, group: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[np.int64]
+) -> Solution | None:
+    """Positions of nodes each of which may be some rows of one only; None where none are exact."""
+    valid: NDArray[np.bool_] = sums.whole[nodal.row_of] & (nodal.row_of >= 0)[:, :, None]
+    try:
+        solution = placed(*equations(nodal, valid, sums, group, node, direction), None)
+    except GeometryError:
+        return None
+    return solution if solution.exact and "hourglass" not in solution.freedoms else None
 
 
 def _joined(
-    nodal: NodalMatrix,
-    sums: _Sums,
+    solution: Solution,
+    sums: Sums,
     group: NDArray[np.int64],
     node: NDArray[np.int64],
     direction: NDArray[np.int64],
@@ -164,15 +139,8 @@ def _joined(
 
     And rows of unknown place, to the nodes that do not lie in the plane of those that lack their direction.
     """
-    n, d = nodal.n, nodal.dim
+    n, d = int(node.max()) + 1, sums.whole.shape[1]
     nobody = np.zeros(len(node), dtype=bool)
-    valid: NDArray[np.bool_] = sums.whole[nodal.row_of] & (nodal.row_of >= 0)[:, :, None]
-    try:
-        solution = placed(*_equations(nodal, valid, sums, group, node, direction), None)
-    except GeometryError:
-        return node, nobody
-    if not solution.exact or "hourglass" in solution.freedoms:
-        return node, nobody
     kind = np.full(n, -1)
     kind[node[open_row]] = group[open_row]
     some = np.flatnonzero(determined(solution.points[:n]) & (kind >= 0))
@@ -191,25 +159,6 @@ def _joined(
     label, settled = of_planes(points, gone, group, here, direction, open_row, ordered=ordered)
     twice = np.asarray((by_direction(label, direction, d) > 1).any(axis=1))[label]
     return by_first_row(np.where(twice, n + node, label)), settled & ~twice
-
-
-def _equations(
-    nodal: NodalMatrix,
-    valid: NDArray[np.bool_],
-    sums: _Sums,
-    group: NDArray[np.int64],
-    node: NDArray[np.int64],
-    direction: NDArray[np.int64],
-) -> tuple[NodalMatrix, NDArray[np.bool_]]:
-    """Those of rows, of patterns, and of planes that rollers hold, whichever rows are one node's."""
-    extended, full = with_patterns(nodal, valid, group, node, direction, sums.whole)
-    row = np.zeros(nodal.n, dtype=np.int64)
-    row[node] = np.arange(len(node))  # any row of the node: all have the same pattern
-    completed = with_planes(nodal, valid, sums.gone[row], sums.surrounded[row])
-    if completed is not None:
-        extended = replace(extended, data=np.concatenate([completed[0].data, extended.data[len(nodal.data) :]]))
-        full[: nodal.n] |= completed[1]
-    return extended, full
 
 
 def _remaining(
