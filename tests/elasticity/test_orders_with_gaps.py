@@ -14,6 +14,7 @@ from unassemble.elasticity.directions.directions import find_directions
 from unassemble.elasticity.doubts import with_doubts
 from unassemble.elasticity.nodal import nodal_matrix
 from unassemble.elasticity.ordered.alignment import aligned
+from unassemble.elasticity.ordered.held import Places, joined_by_place
 from unassemble.elasticity.ordered.matching import matched_by_pattern
 from unassemble.elasticity.rows.constants import proven_directions, uncoupled_rows
 from unassemble.elasticity.rows.grouping import by_first_row, same_pattern
@@ -28,7 +29,7 @@ def groups(*directions: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def quadratic(kind: str, support: str, order: str, seed: int, perturb: float = 0.2):
-    mesh = box(kind, (3, 4, 4) if kind == "tet-p2" else (4, 5, 4), perturb=perturb)
+    mesh = box(kind, {"tet-p2": (3, 4, 4), "tri-p2": (6, 7)}.get(kind, (4, 5, 4)), perturb=perturb)
     body = permuted_nodes(stiffness(kind, mesh, lam=heterogeneous, mu=lambda x: 1 + x[1] + x[0] * x[1]), seed=seed)
     return given(body, support, order, "stored")
 
@@ -62,6 +63,36 @@ def test_by_component_on_a_roller_every_node_is_found(kind):
     assert found.certified
     assert truth.error < 1e-8
     assert truth.missing == truth.split == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "support"), [("hex-s2", "symmetry"), ("hex-q2", "symmetry"), ("tri-p2", "several"), ("hex-q2", "several")]
+)
+def test_by_component_no_more_is_lost_than_with_the_numbering_given(kind, support):
+    case = quadratic(kind, support, "by component", 4, perturb=0.0)
+    known = recover_elasticity(case.matrix, numbering=given_numbering(case.matrix, case.node, case.direction))
+    assert_certified(case, 1e-8, judged(known, case).missing, 0)
+
+
+def test_rows_go_together_one_by_one_between_nodes_that_are_known_if_those_of_the_identity_count():
+    group, direction = groups("acbbd", "abd")  # between nodes a and d the second direction is c, b and one more
+    places = Places(np.array([0, 1, 2, 3, 4, 5, 7, 9]), 10)
+    node = np.array([0, 1, 2, 3, 4, 0, 6, 4])
+    open_row = group == group[2]
+    joined, still_open = joined_by_place(places, group, node, direction, 2, open_row)
+    assert joined[6] == joined[2]
+    assert joined[3] != joined[2]
+    assert not still_open.any()
+
+
+def test_rows_of_different_patterns_do_not_go_together():
+    group, direction = groups("acbbd", "abd")
+    places = Places(np.array([0, 1, 2, 3, 4, 5, 6, 9]), 10)  # the row of group b now stands where one of group c would
+    node = np.array([0, 1, 2, 3, 4, 0, 6, 4])
+    open_row = group == group[2]
+    joined, still_open = joined_by_place(places, group, node, direction, 2, open_row)
+    assert len(np.unique(joined)) == len(np.unique(node))
+    assert np.array_equal(still_open, open_row)
 
 
 @cache

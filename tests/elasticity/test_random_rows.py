@@ -60,13 +60,11 @@ def test_supports_hide_no_direction(kind, support, perturb):
     assert_certified(case, 1e-9, 0.0)
 
 
-@pytest.mark.parametrize("support", ["roller", "symmetry"])
-def test_halves_of_nodes_with_the_same_neighbours_do_not_pass_for_nodes_on_a_plane(support):
-    """Rows at the corners of quadratic triangles: whether a node lacks a row, or it is another's, nothing tells."""
+@pytest.mark.parametrize(("support", "missing"), [("roller", 0.0), ("symmetry", 0.03)])
+def test_rows_with_the_same_neighbours_are_joined_in_the_only_way_that_fits(support, missing):
+    """Rows at the corners of quadratic triangles: whether a node lacks a row, or it is another's, trial tells."""
     case = given(body("tri-p2"), support, "at random", "stored")
-    found = recover_elasticity(case.matrix)
-    truth = judged(found, case)
-    assert find_numbering(case.matrix).n_nodes > len(np.unique(case.node))
-    assert found.certified
-    assert truth.error < 1e-9
-    assert 0 < truth.missing < 0.1
+    found = find_numbering(case.matrix)
+    assert len(np.unique(found.node_of_row)) == len(np.unique(case.node))
+    assert len(np.unique(found.node_of_row * 1000 + case.node)) == len(np.unique(case.node))
+    assert_certified(case, 1e-9, missing)

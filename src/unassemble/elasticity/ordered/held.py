@@ -99,8 +99,8 @@ def _one_by_one(
         offset.append(places.at[own] - border[k, at])
     live = sum(np.bincount(at, minlength=len(equal)) for at in piece)
     good = live < 2 * (count[0] - 1)
-    keys = [at * (places.order + 1) + off for at, off in zip(piece, offset, strict=True)]
-    _, here, there = np.intersect1d(*keys, assume_unique=True, return_indices=True)
+    one, other = (at * (places.order + 1) + off for at, off in zip(piece, offset, strict=True))
+    _, here, there = np.intersect1d(one, other, assume_unique=True, return_indices=True)
     good[piece[0][here[group[rows[0][here]] != group[rows[1][there]]]]] = False
     kept = good[piece[0][here]]
     pairs = rows[0][here[kept]], rows[1][there[kept]]
@@ -113,6 +113,8 @@ def _ends(places: Places, direction: NDArray[np.int64], c: int) -> tuple[int, in
     Between the last row of one direction and the first of the next some of the identity may be either's.
     """
     rows = np.flatnonzero(direction == c)
+    if not len(rows):
+        return -2, places.order + 1
     before = -1 if rows[0] == 0 else int(places.at[rows[0] - 1])
     after = places.order if rows[-1] == len(direction) - 1 else int(places.at[rows[-1] + 1])
     unknown_first = before >= 0 and before + 1 < places.at[rows[0]]
