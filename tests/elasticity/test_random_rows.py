@@ -5,9 +5,8 @@ from itertools import permutations
 import numpy as np
 import pytest
 from assembled import box, heterogeneous, permuted_nodes, stiffness
-from supported import assert_certified, given, judged
+from supported import assert_certified, given
 
-from unassemble.elasticity import recover_elasticity
 from unassemble.elasticity.directions.sums import names_of, set_right
 from unassemble.elasticity.unknowns import find_numbering
 
