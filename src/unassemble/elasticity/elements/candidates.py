@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..nodal import NodalMatrix, determined
 from .boxes import contained, convex, without_insides
 from .cliques import Graph, shared_cliques, simplices, straight_simplices
+from .hidden import hidden_cliques
 from .kinds import KINDS, Kind
 from .ordering import ordered
 from .piercing import unpierced
@@ -72,8 +73,13 @@ def candidates(
                 more = np.unique(np.vstack([sets, straight_simplices(wider, points, kind.dim)]), axis=0)
                 if len(more) > len(sets):
                     yield (Block(kind, ordered(more, points, kind)),)
+            if not kind.simplex:
+                hidden = _convex(kind, ordered(hidden_cliques(graph, sets, kind.nodes), points, kind), points)
+                if len(hidden.cells):
+                    cells = np.vstack([cells, hidden.cells])
+                    yield (Block(kind, cells),)
         if not kind.quadratic:
-            boxes = Block(kind, cells[convex(cells, points, kind)])
+            boxes = _convex(kind, cells, points)
     if boxes is not None and simplex is not None and len(boxes.cells):
         beside = without_insides(graph, boxes.kind.base, boxes.cells, outer=True)
         if len(beside.row) + graph.n <= graph.n * _LINEAR[d]:
@@ -83,6 +89,12 @@ def candidates(
             rest = replace(rest, cells=rest.cells[~contained(rest.cells, boxes.cells)])
             if len(rest.cells):
                 yield (rest, boxes)
+
+
+def _convex(kind: Kind, cells: NDArray[np.int64], points: NDArray) -> Block:
+    """The boxes that are right side out at each corner."""
+    corners = KINDS[kind.base]
+    return Block(kind, cells[convex(cells[:, : kind.corners], points, corners)])
 
 
 def _sets(kind: Kind, graph: Graph, points: NDArray) -> NDArray[np.int64]:
