@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from .cliques import Graph
 
 _MORE = 0.5  # of a cell's nodes, that two of them may have in common besides; 1 where two boxes share a side
-_AT_ONCE = 20_000_000  # pairs of nodes in one go
+_AT_ONCE = 10_000_000  # nodes in common, or pairs of them, in one go
 
 
 def hidden_cliques(graph: Graph, sets: NDArray[np.int64], k: int) -> NDArray[np.int64]:
@@ -25,7 +25,7 @@ def hidden_cliques(graph: Graph, sets: NDArray[np.int64], k: int) -> NDArray[np.
         See :func:`.cliques.shared_cliques`.
     k : int
     """
-    n, none = graph.n, np.empty((0, k), dtype=np.int64)
+    n = graph.n
     of = sp.csr_array(
         (np.ones(sets.size, np.int32), (sets.ravel(), np.repeat(np.arange(len(sets)), k))), (n, len(sets))
     )
@@ -34,15 +34,18 @@ def hidden_cliques(graph: Graph, sets: NDArray[np.int64], k: int) -> NDArray[np.
     inside.data[:] = 1
     outside = sp.coo_array(sp.triu(closed - closed.multiply(inside), 1))
     i, j = (ends[outside.data > 0].astype(np.int64) for ends in (outside.row, outside.col))
-    common = sp.csr_array(closed[i].multiply(closed[j]))
-    common.sort_indices()
-    count = np.diff(common.indptr)
-    found = [none]
-    for size in np.unique(count[(count > k) & (count <= k * (1 + _MORE))]):
-        rows = np.flatnonzero(count == size)
-        these = np.unique(common.indices[common.indptr[rows][:, None] + np.arange(size)].astype(np.int64), axis=0)
-        for part in np.array_split(these, len(these) * int(size) ** 2 // _AT_ONCE + 1):
-            found.append(_inside(graph, part, k))
+    degree = np.diff(closed.indptr)
+    work = np.cumsum(np.minimum(degree[i], degree[j]), dtype=np.int64)
+    found = [np.empty((0, k), dtype=np.int64)]
+    for part in np.split(np.arange(len(i)), np.searchsorted(work, np.arange(_AT_ONCE, work[-1:].sum(), _AT_ONCE))):
+        common = sp.csr_array(closed[i[part]].multiply(closed[j[part]]))
+        common.sort_indices()
+        count = np.diff(common.indptr)
+        for size in np.unique(count[(count > k) & (count <= k * (1 + _MORE))]):
+            start = common.indptr[:-1][count == size]
+            sets = np.unique(common.indices[start[:, None] + np.arange(size)].astype(np.int64), axis=0)
+            for some in np.array_split(sets, len(sets) * int(size) ** 2 // _AT_ONCE + 1):
+                found.append(_inside(graph, some, k))
     return np.unique(np.vstack(found), axis=0)
 
 
