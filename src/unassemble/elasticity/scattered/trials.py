@@ -71,12 +71,13 @@ def joined_by_trial(
     open_row : (N,) bool
         Rows that may belong to one node with others of their pattern.
     """
-    d = piece.shape[1]
-    has = by_direction(node, direction, d) > 0
+    has = by_direction(node, direction, piece.shape[1]) > 0
     label, settled = np.arange(len(has)), np.zeros(len(has), dtype=bool)
-    for one in np.unique(group[open_row]):
-        part = np.unique(node[open_row & (group == one)])
-        rows = np.flatnonzero(np.isin(node, part))
+    by_node, start = np.argsort(node, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(node))])
+    some = np.flatnonzero(open_row)[np.argsort(group[open_row], kind="stable")]
+    for own in np.split(some, np.flatnonzero(np.diff(group[some])) + 1):
+        part = np.unique(node[own])
+        rows = np.concatenate([by_node[start[k] : start[k + 1]] for k in part])
         placed = solution.component[part] >= 0
         apart = _apart(np.searchsorted(part, node[rows]), direction[rows], piece[rows]) | (placed[:, None] & placed)
         every = _ways(has[part], apart)
