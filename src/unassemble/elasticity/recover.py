@@ -18,6 +18,7 @@ from .ordered.rounded import with_exact_sums
 from .positions import solve
 from .results import ElasticityRecovery, ScalarParts
 from .rows.numbering import Numbering
+from .scattered.scattered import placed_nodes
 from .unknowns import find_numbering
 from .verdict import about_made_up_nodes, about_open_rows
 
@@ -72,9 +73,36 @@ def recover_elasticity(
         whole, rounding = with_exact_sums(check_matrix(matrix).csr())
     with clock("numbering"):
         numbering = numbering or find_numbering(whole, block_size)
-        nodal = nodal_matrix(whole, numbering)
-    unproven = whole if numbering.unnamed is not None and numbering.unnamed.any() else None
-    del whole
+    if not numbering.likely:
+        return _recovered(whole, numbering, clock, cells=cells, patch=patch, rounding=rounding)
+    likely: ElasticityRecovery | None = None
+    try:
+        likely = _recovered(whole, numbering, clock, cells=cells, patch=patch, rounding=rounding)
+    except RecoveryError as error:
+        failure = error
+    if likely is not None and likely.certified:
+        return likely
+    with clock("numbering"):
+        placed = placed_nodes(whole, numbering)
+    if placed is not None:
+        try:
+            found = _recovered(whole, placed, clock, cells=cells, patch=patch, rounding=rounding)
+        except RecoveryError:
+            found = None
+        if found is not None and (likely is None or found.certified):
+            return found
+    if likely is None:
+        raise failure
+    return likely
+
+
+def _recovered(
+    matrix: sp.csr_array, numbering: Numbering, clock: Clock, *, cells: bool, patch: int | None, rounding: float
+) -> ElasticityRecovery:
+    """The recovery of a matrix that was looked at, with a numbering."""
+    with clock("numbering"):
+        nodal = nodal_matrix(matrix, numbering)
+    unproven = matrix if numbering.unnamed is not None and numbering.unnamed.any() else None
     if uncoupled(nodal):
         raise GeometryError(
             "the directions are not coupled: these are scalar matrices side by side; recover one of them by itself"
