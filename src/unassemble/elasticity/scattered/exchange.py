@@ -27,13 +27,14 @@ _CLEAR = 0.6
 _ROUNDS = 4
 
 
-def complete(
+def fullest(
     matrix: sp.csr_array, live: NDArray[np.bool_], group: NDArray[np.int64], direction: NDArray[np.int64], d: int
-) -> NDArray[np.bool_]:
-    """(g, d) directions of which each node of a pattern has a row.
+) -> NDArray[np.int64]:
+    """(g,) a direction of which each node of a pattern has a row, probably; -1 where there may be none.
 
-    They are if no pattern near, its own among them, has fewer rows of that direction than of others; and those of which
-    there are as many rows. Where planes of all directions meet none is known to be.
+    It has if no pattern near, its own among them, has fewer rows of that direction than of others. Where planes of all
+    directions meet no direction is like that; then the most numerous one is the likeliest, unless there are as many
+    rows of each: of the nodes in a corner any may lack any.
 
     Parameters
     ----------
@@ -46,12 +47,15 @@ def complete(
     d : int
     """
     count = by_direction(group[live], direction[live], d, int(group.max()) + 1)
-    fewer = (count < count.max(axis=1, keepdims=True))[group] & live[:, None]
+    most = count.max(axis=1, keepdims=True)
+    fewer = (count < most)[group] & live[:, None]
     pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
     near = np.zeros(count.shape, dtype=bool)
     near[group[live]] = (pattern @ fewer.astype(float) > 0)[live]
-    nodes = np.where(near, 0, count).max(axis=1, keepdims=True)
-    return np.asarray((count == nodes) & (nodes > 0))
+    proven = np.where(near, 0, count)
+    even = ((count == most) | (count == 0)).all(axis=1)
+    likely = np.where(even | (most[:, 0] == 0), -1, count.argmax(axis=1))
+    return np.where(proven.max(axis=1) > 0, proven.argmax(axis=1), likely)
 
 
 def exchanged(
@@ -64,8 +68,8 @@ def exchanged(
 ) -> NDArray[np.int64]:
     """(N,) nodes after rows of one pattern were joined that are clearly likest each other with directions exchanged.
 
-    Only patterns count some direction of which is :func:`complete`. Entries with whole nodes are compared; there are
-    more of them the more rows are joined.
+    Entries with whole nodes are compared; there are more of them the more rows are joined. Rows of patterns in which no
+    direction may be one of which each node has a row are taken apart, if there are patterns of several nodes at all.
 
     Parameters
     ----------
@@ -79,17 +83,19 @@ def exchanged(
         Rows of patterns with several rows of some direction stand alone.
     d : int
     """
-    count = by_direction(group[live], direction[live], d, int(group.max()) + 1)
-    full = complete(matrix, live, group, direction, d)
-    rows = np.flatnonzero(((count > 1).any(axis=1) & full.any(axis=1))[group] & live)
+    several = (by_direction(group[live], direction[live], d, int(group.max()) + 1) > 1).any(axis=1)
+    if not several.any():
+        return node
+    base = fullest(matrix, live, group, direction, d)
+    node = by_first_row(np.where((base[group] < 0) & live, len(node) + np.arange(len(node)), node))
+    rows = np.flatnonzero((several & (base >= 0))[group] & live)
     rows = rows[np.lexsort((direction[rows], group[rows]))]
     patterns = np.split(rows, np.flatnonzero(np.diff(group[rows])) + 1) if len(rows) else []
-    bases = [int(np.argmax(full[group[members[0]]])) for members in patterns]
     for _ in range(_ROUNDS):
         label = node.copy()
         costs = _costs(matrix, group, node, direction, d, patterns)
-        for members, base, cost in zip(patterns, bases, costs, strict=True):
-            label[members] = len(node) + members[_paired(direction[members], cost, base)]
+        for members, cost in zip(patterns, costs, strict=True):
+            label[members] = len(node) + members[_paired(direction[members], cost, int(base[group[members[0]]]))]
         again = by_first_row(label)
         if np.array_equal(again, node):
             break
