@@ -68,8 +68,9 @@ def exchanged(
 ) -> NDArray[np.int64]:
     """(N,) nodes after rows of one pattern were joined that are clearly likest each other with directions exchanged.
 
-    Entries with whole nodes are compared; there are more of them the more rows are joined. Rows of patterns in which no
-    direction may be one of which each node has a row are taken apart, if there are patterns of several nodes at all.
+    Entries with whole nodes are compared; there are more of them the more rows are joined. In patterns in which no
+    direction may be one of which each node has a row, pairs count that are likest both ways, and all other rows are
+    taken apart, if there are patterns of several nodes at all.
 
     Parameters
     ----------
@@ -88,14 +89,16 @@ def exchanged(
         return node
     base = fullest(matrix, live, group, direction, d)
     node = by_first_row(np.where((base[group] < 0) & live, len(node) + np.arange(len(node)), node))
-    rows = np.flatnonzero((several & (base >= 0))[group] & live)
+    rows = np.flatnonzero(several[group] & live)
     rows = rows[np.lexsort((direction[rows], group[rows]))]
     patterns = np.split(rows, np.flatnonzero(np.diff(group[rows])) + 1) if len(rows) else []
     for _ in range(_ROUNDS):
         label = node.copy()
         costs = _costs(matrix, group, node, direction, d, patterns)
         for members, cost in zip(patterns, costs, strict=True):
-            label[members] = len(node) + members[_paired(direction[members], cost, int(base[group[members[0]]]))]
+            of_all = int(base[group[members[0]]])
+            first = _mutual(direction[members], cost) if of_all < 0 else _paired(direction[members], cost, of_all)
+            label[members] = len(node) + members[first]
         again = by_first_row(label)
         if np.array_equal(again, node):
             break
@@ -170,6 +173,23 @@ def _paired(
             nodes[i][b] = j
             first[rows[b][j]] = rows[base][nodes[i][base]]
     return first
+
+
+def _mutual(direction: NDArray[np.int64], cost: dict[tuple[int, int], NDArray[np.float64]]) -> NDArray[np.int64]:
+    """The same of rows that are clearly likest both ways, where no direction tells how many nodes there are."""
+    ends = [np.empty((2, 0), np.int64)]
+    for (c, b), unlike in cost.items():
+        if c < b and min(unlike.shape) > 1 and not np.isnan(unlike).any():
+            next_b, next_c = np.partition(unlike, 1, axis=1)[:, 1], np.partition(unlike, 1, axis=0)[1]
+            found = np.nonzero(unlike < _CLEAR * np.minimum(next_b[:, None], next_c))
+            ends.append(np.stack([np.flatnonzero(direction == a)[some] for a, some in zip((c, b), found, strict=True)]))
+    r, s = np.hstack(ends)
+    link = sp.csr_array((np.ones(len(r), np.int8), (r, s)), shape=(len(direction),) * 2)
+    label = sp.csgraph.connected_components(link, directed=False)[1]
+    twice = np.asarray((by_direction(label, direction, int(direction.max()) + 1) > 1).any(axis=1))[label]
+    _, first, inverse = np.unique(np.where(twice, -1 - np.arange(len(label)), label), return_index=True,
+                                  return_inverse=True)  # fmt: skip
+    return np.asarray(first[inverse], dtype=np.int64)
 
 
 def _clear(cost: NDArray[np.float64]) -> list[tuple[int, int]]:

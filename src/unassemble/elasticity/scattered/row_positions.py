@@ -21,6 +21,7 @@ from ..nullspace.planes import with_planes
 from ..rows.constants import least_sums, row_sizes, with_penalty
 from ..rows.grouping import by_first_row
 from ..rows.numbering import Numbering
+from .exchange import fullest
 from .patterns import by_direction, with_patterns
 from .plane_rows import of_planes
 
@@ -72,6 +73,7 @@ def placed_together(
     identity = ~live
     may = live if open_row is None else live & open_row
     sums = _sums(matrix, live, group, direction, d)
+    countable = fullest(matrix, live, group, direction, d)[group] >= 0
     for _ in range(_ROUNDS):
         open_row = _open(group, node, direction, d) & may
         if not open_row.any():
@@ -79,7 +81,7 @@ def placed_together(
         nodal = nodal_matrix(matrix, Numbering(d, node, direction, identity, "pattern", 1.0, 1.0))
         again, settled = _joined(nodal, sums, group, node, direction, open_row, ordered=ordered)
         may = may & ~settled
-        again = _remaining(group, again, direction, d, may)
+        again = _remaining(group, again, direction, d, may & countable)
         if again.max() == node.max():
             break
         node = again

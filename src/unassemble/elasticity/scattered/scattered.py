@@ -26,7 +26,7 @@ from ..rows.constants import (
 from ..rows.grouping import possible_nodes, same_pattern
 from ..rows.numbering import Numbering, measured
 from ..rows.traces import unaccounted
-from .exchange import exchanged
+from .exchange import exchanged, fullest
 from .filling import filled, filled_by_direction, likest
 from .patterns import by_direction
 from .row_positions import placed_together, single_nodes
@@ -60,12 +60,30 @@ def scattered(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
             continue  # rows of one node do not show by their pattern
         direction, share = _directions(matrix, group, ~identity, d)
         if share > _SETTLED and _even_share(matrix, group, direction, ~identity, d) > _EVEN:
-            single = single_nodes(group, direction, d)
-            node = exchanged(matrix, ~identity, group, single, direction, d)
-            found = _with_nodes(matrix, matrix, group, direction, identity, d, node)
-            likely = not np.array_equal(node, single)
-            return found if found is None or not likely else replace(found, likely=True)
+            return _likely_nodes(matrix, group, direction, identity, d) or _with_nodes(
+                matrix, matrix, group, direction, identity, d
+            )
     return None
+
+
+def _likely_nodes(
+    matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], identity: NDArray[np.bool_], d: int
+) -> Numbering | None:
+    """Nodes that likeness tells, and positions only where it does not; None where it tells no more than patterns do.
+
+    Rows of a pattern are left open where some of them found no node.
+    """
+    single = single_nodes(group, direction, d)
+    node = exchanged(matrix, ~identity, group, single, direction, d)
+    if np.array_equal(node, single):
+        return None
+    base = fullest(matrix, ~identity, group, direction, d)[group]
+    found = by_direction(node, direction, d)[node, np.maximum(base, 0)] > 0
+    lost = np.bincount(group, ~found | (base < 0))[group] > 0
+    numbering = _with_nodes(matrix, matrix, group, direction, identity, d, node, lost & ~identity)
+    if numbering is None or numbering.open_row is None:
+        return None
+    return replace(numbering, likely=True, open_row=numbering.open_row & (base >= 0))
 
 
 def scattered_without_zeros(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
@@ -97,7 +115,7 @@ def scattered_without_zeros(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Num
         group = same_pattern(more, identity)
         direction = _set_right(more, group, direction, ~identity, d)
         if _even_share(more, group, direction, ~identity, d) > _EVEN:
-            return _with_nodes(matrix, more, group, direction, identity, d, single_nodes(group, direction, d))
+            return _with_nodes(matrix, more, group, direction, identity, d)
     return None
 
 
@@ -158,8 +176,7 @@ def placed_nodes(matrix: sp.csr_array, numbering: Numbering) -> Numbering | None
     """
     identity = numbering.identity_row
     group, direction = same_pattern(matrix, identity), numbering.direction_of_row
-    node = single_nodes(group, direction, numbering.block_size)
-    return _with_nodes(matrix, matrix, group, direction, identity, numbering.block_size, node)
+    return _with_nodes(matrix, matrix, group, direction, identity, numbering.block_size)
 
 
 def _with_nodes(
@@ -169,13 +186,16 @@ def _with_nodes(
     direction: NDArray[np.int64],
     identity: NDArray[np.bool_],
     d: int,
-    node: NDArray[np.int64],
+    node: NDArray[np.int64] | None = None,
+    open_row: NDArray[np.bool_] | None = None,
 ) -> Numbering | None:
     """Nodes of rows whose directions are known; `whole` is the matrix with zeros, by which rows are grouped.
 
-    None where no zeros were put back, but some node lacks a direction without a trace that no other row offers.
+    None where no zeros were put back, but some node lacks a direction without a trace that no other row offers. Nodes
+    to start from, and rows that may be joined to others, are those that patterns show where not given.
     """
-    node, open_row = placed_together(whole, ~identity, group, node, direction, d)
+    node = single_nodes(group, direction, d) if node is None else node
+    node, open_row = placed_together(whole, ~identity, group, node, direction, d, open_row)
     lost = np.asarray(unaccounted(whole, ~identity, node, direction, d).any(axis=1))[node]
     if whole is not matrix:
         open_row |= lost
