@@ -131,8 +131,8 @@ def verdict(
         )
     if numbering.likely:
         return "uncertified", (
-            "several nodes couple to the same unknowns, and which rows are theirs was inferred from how like these are; "
-            "only elements that re-assemble to the matrix would show that the inference is right"
+            "several nodes couple to the same unknowns, and which rows are theirs was inferred from how like these "
+            "are; only elements that re-assemble to the matrix would show that the inference is right"
         )
     apart = np.asarray(without_trace(nodal).any(axis=1))
     if numbering.open_row is not None and nodal.doubtful is not None:

@@ -68,9 +68,7 @@ def named_by_least_sums(
     return named if after < (1 - _SMALLER) * before else direction
 
 
-def _least(
-    matrix: sp.csr_array, given: NDArray[np.float64], weight: NDArray[np.float64]
-) -> NDArray[np.float64] | None:
+def _least(matrix: sp.csr_array, given: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """(n, d) shares, each row of which adds up to one, for which ``|matrix @ shares + given|`` weighs least."""
     n, d = matrix.shape[1], given.shape[1]
     chosen, over = sp.kron(sp.eye_array(d), matrix), sp.eye_array(given.size)

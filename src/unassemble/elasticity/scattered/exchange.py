@@ -65,8 +65,10 @@ def exchanged(
     node: NDArray[np.int64],
     direction: NDArray[np.int64],
     d: int,
+    *,
+    clearly: bool = True,
 ) -> NDArray[np.int64]:
-    """(N,) nodes after rows of one pattern were joined that are clearly likest each other with directions exchanged.
+    """(N,) nodes after rows of one pattern were joined that are likest each other with directions exchanged.
 
     Entries with whole nodes are compared; there are more of them the more rows are joined. In patterns in which no
     direction may be one of which each node has a row, pairs count that are likest both ways, and all other rows are
@@ -83,6 +85,8 @@ def exchanged(
     node, direction : (N,) int64
         Rows of patterns with several rows of some direction stand alone.
     d : int
+    clearly : bool
+        Whether to join only rows that any others would be clearly less like.
     """
     several = (by_direction(group[live], direction[live], d, int(group.max()) + 1) > 1).any(axis=1)
     if not several.any():
@@ -97,7 +101,10 @@ def exchanged(
         costs = _costs(matrix, group, node, direction, d, patterns)
         for members, cost in zip(patterns, costs, strict=True):
             of_all = int(base[group[members[0]]])
-            first = _mutual(direction[members], cost) if of_all < 0 else _paired(direction[members], cost, of_all)
+            if of_all < 0:
+                first = _mutual(direction[members], cost)
+            else:
+                first = _paired(direction[members], cost, of_all, _CLEAR if clearly else 1.0)
             label[members] = len(node) + members[first]
         again = by_first_row(label)
         if np.array_equal(again, node):
@@ -158,18 +165,19 @@ def _unlike(
 
 
 def _paired(
-    direction: NDArray[np.int64], cost: dict[tuple[int, int], NDArray[np.float64]], base: int
+    direction: NDArray[np.int64], cost: dict[tuple[int, int], NDArray[np.float64]], base: int, most: float
 ) -> NDArray[np.int64]:
     """(k,) for each row of a pattern the place of the first row of its node.
 
-    Rows of direction `base` are nodes, to which those of the other directions are added, the most numerous first.
+    Rows of direction `base` are nodes, to which those of the other directions are added, the most numerous first, where
+    that costs less than `most` times what it would cost in any other way.
     """
     rows = {int(a): np.flatnonzero(direction == a) for a in np.unique(direction)}
     first = np.arange(len(direction))
     nodes = [{base: k} for k in range(len(rows[base]))]
     for b in sorted((a for a in rows if a != base), key=lambda a: -len(rows[a])):
         unlike = np.array([np.mean([cost[c, b][k] for c, k in one.items()], axis=0) for one in nodes])
-        for i, j in _clear(unlike):
+        for i, j in _assigned(unlike, most):
             nodes[i][b] = j
             first[rows[b][j]] = rows[base][nodes[i][base]]
     return first
@@ -192,8 +200,8 @@ def _mutual(direction: NDArray[np.int64], cost: dict[tuple[int, int], NDArray[np
     return np.asarray(first[inverse], dtype=np.int64)
 
 
-def _clear(cost: NDArray[np.float64]) -> list[tuple[int, int]]:
-    """Pairs of the assignment of least cost without each of which it would cost clearly more."""
+def _assigned(cost: NDArray[np.float64], most: float) -> list[tuple[int, int]]:
+    """Pairs of the assignment of least cost, less than `most` times what it would cost without the pair."""
     if np.isnan(cost).any():
         return []
     i, j = linear_sum_assignment(cost)
@@ -202,6 +210,6 @@ def _clear(cost: NDArray[np.float64]) -> list[tuple[int, int]]:
     for k in range(len(i)):
         other = cost.copy()
         other[i[k], j[k]] = never
-        if least < _CLEAR * float(other[linear_sum_assignment(other)].sum()):
+        if least < most * float(other[linear_sum_assignment(other)].sum()):
             found.append((int(i[k]), int(j[k])))
     return found

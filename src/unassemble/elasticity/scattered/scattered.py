@@ -60,21 +60,57 @@ def scattered(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
             continue  # rows of one node do not show by their pattern
         direction, share = _directions(matrix, group, ~identity, d)
         if share > _SETTLED and _even_share(matrix, group, direction, ~identity, d) > _EVEN:
-            return _likely_nodes(matrix, group, direction, identity, d) or _with_nodes(
-                matrix, matrix, group, direction, identity, d
-            )
+            likely = _likely_nodes(matrix, group, direction, identity, d, clearly=False)
+            return likely or _with_nodes(matrix, matrix, group, direction, identity, d)
     return None
 
 
+def clearly_likely(matrix: sp.csr_array, numbering: Numbering) -> Numbering | None:
+    """The same directions with nodes that likeness tells clearly, if these are others.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+        Entries that vanish are stored.
+    numbering : Numbering
+        With nodes that likeness told, however faintly.
+    """
+    identity, direction = numbering.identity_row, numbering.direction_of_row
+    group = same_pattern(matrix, identity)
+    found = _likely_nodes(matrix, group, direction, identity, numbering.block_size, clearly=True)
+    return None if found is None or np.array_equal(found.node_of_row, numbering.node_of_row) else found
+
+
+def told_by_positions(matrix: sp.csr_array, numbering: Numbering) -> Numbering | None:
+    """The same directions with nodes that positions of rows tell, and likeness does not.
+
+    None where some node lacks a direction without a trace that no other row offers.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+        Entries that vanish are stored.
+    numbering : Numbering
+    """
+    identity, direction = numbering.identity_row, numbering.direction_of_row
+    return _with_nodes(matrix, matrix, same_pattern(matrix, identity), direction, identity, numbering.block_size)
+
+
 def _likely_nodes(
-    matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], identity: NDArray[np.bool_], d: int
+    matrix: sp.csr_array,
+    group: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    identity: NDArray[np.bool_],
+    d: int,
+    *,
+    clearly: bool,
 ) -> Numbering | None:
     """Nodes that likeness tells, and positions only where it does not; None where it tells no more than patterns do.
 
     Rows of a pattern are left open where some of them found no node.
     """
     single = single_nodes(group, direction, d)
-    node = exchanged(matrix, ~identity, group, single, direction, d)
+    node = exchanged(matrix, ~identity, group, single, direction, d, clearly=clearly)
     if np.array_equal(node, single):
         return None
     base = fullest(matrix, ~identity, group, direction, d)[group]
@@ -124,8 +160,8 @@ def _directions(
 ) -> tuple[NDArray[np.int64], float]:
     """Directions, and the share of the whole rows that annihilate translations with them.
 
-    Translations are in equilibrium no more next to supports, and where few rows are far from any, wrong directions there
-    spoil most sums. So all sums together decide on the rows whose direction nothing proves, as often as fewer are left.
+    Translations are not in equilibrium next to supports, and where few rows are far from any, wrong directions there
+    spoil most sums. So all sums together decide on the rows whose direction nothing proves, until none changes.
     """
     direction, share = extended_directions(matrix, group, live, d)
     if share < _HOPEFUL:
@@ -161,22 +197,6 @@ def _even_share(
     count = by_direction(group, direction, d)
     whole = live & (np.bincount(group, ~adds_up) == 0)[group]
     return float((count == count[:, :1]).all(axis=1)[group[whole]].mean()) if whole.any() else 0.0
-
-
-def placed_nodes(matrix: sp.csr_array, numbering: Numbering) -> Numbering | None:
-    """The same directions with nodes that positions of rows tell, where likeness had told them.
-
-    None where some node lacks a direction without a trace that no other row offers.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Entries that vanish are stored.
-    numbering : Numbering
-    """
-    identity = numbering.identity_row
-    group, direction = same_pattern(matrix, identity), numbering.direction_of_row
-    return _with_nodes(matrix, matrix, group, direction, identity, numbering.block_size)
 
 
 def _with_nodes(
