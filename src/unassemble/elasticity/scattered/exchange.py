@@ -88,7 +88,8 @@ def exchanged(
     clearly : bool
         Whether to join only rows that any others would be clearly less like.
     """
-    several = (by_direction(group[live], direction[live], d, int(group.max()) + 1) > 1).any(axis=1)
+    count = by_direction(group[live], direction[live], d, int(group.max()) + 1)
+    several: NDArray[np.bool_] = np.asarray((count > 1).any(axis=1))
     if not several.any():
         return node
     base = fullest(matrix, live, group, direction, d)
