@@ -135,11 +135,13 @@ def unconfirmed(
     row, shows that these were not. They are `shown`, (n, d). Where neither order nor patterns say which rows belong
     together, all nodes are as good as doubtful.
     """
-    if nodal.doubtful is None:
-        return np.zeros(nodal.n, dtype=bool)
     confirmed: NDArray[np.bool_] = np.zeros(nodal.n, dtype=bool)
     if shown is not None:
         confirmed = np.asarray((shown | (nodal.row_of < 0)).all(axis=1))
+    if numbering.likely:
+        return determined(points) & ~confirmed
+    if nodal.doubtful is None:
+        return np.zeros(nodal.n, dtype=bool)
     if numbering.open_row is not None and not _by_likeness(numbering):  # nothing was joined that order does not join
         # Of fellows each was placed by itself, and none was taken to lack what another has.
         return nodal.doubtful & ~confirmed if nodal.fellows is None else np.zeros(nodal.n, dtype=bool)

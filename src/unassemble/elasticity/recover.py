@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -18,6 +20,7 @@ from .ordered.rounded import with_exact_sums
 from .positions import solve
 from .results import ElasticityRecovery, ScalarParts
 from .rows.numbering import Numbering
+from .scattered.scattered import clearly_likely, told_by_positions
 from .unknowns import find_numbering
 from .verdict import about_made_up_nodes, about_open_rows
 
@@ -72,9 +75,56 @@ def recover_elasticity(
         whole, rounding = with_exact_sums(check_matrix(matrix).csr())
     with clock("numbering"):
         numbering = numbering or find_numbering(whole, block_size)
-        nodal = nodal_matrix(whole, numbering)
-    unproven = whole if numbering.unnamed is not None and numbering.unnamed.any() else None
-    del whole
+
+    def attempt(one: Numbering) -> ElasticityRecovery:
+        return _recovered(whole, one, clock, cells=cells, patch=patch, rounding=rounding)
+
+    return _likeliest(whole, numbering, clock, attempt) if numbering.likely else attempt(numbering)
+
+
+def _likeliest(
+    matrix: sp.csr_array, numbering: Numbering, clock: Clock, attempt: Callable[[Numbering], ElasticityRecovery]
+) -> ElasticityRecovery:
+    """The recovery with nodes that likeness told, however faintly, or with others, if more rows are certified then.
+
+    If rows are left out, others are those that likeness tells clearly; if nothing is certified, those of positions.
+    """
+    failures: list[RecoveryError] = []
+
+    def tried(one: Numbering | None) -> ElasticityRecovery | None:
+        try:
+            return None if one is None else attempt(one)
+        except RecoveryError as error:
+            failures.append(error)
+            return None
+
+    found = [tried(numbering)]
+    if _certified_rows(found[0]) < np.count_nonzero(~numbering.identity_row):
+        with clock("numbering"):
+            clear = clearly_likely(matrix, numbering)
+        found.append(tried(clear))
+    if not any(map(_certified_rows, found)):
+        with clock("numbering"):
+            placed = told_by_positions(matrix, numbering)
+        found.append(tried(placed))
+    some = [one for one in found if one is not None]
+    if not some:
+        raise failures[0]
+    return max(some, key=_certified_rows)
+
+
+def _certified_rows(found: ElasticityRecovery | None) -> int:
+    """How many rows belong to nodes with certified coordinates."""
+    return 0 if found is None or not found.certified else int((found.node_status[found.node_of_row] == 0).sum())
+
+
+def _recovered(
+    matrix: sp.csr_array, numbering: Numbering, clock: Clock, *, cells: bool, patch: int | None, rounding: float
+) -> ElasticityRecovery:
+    """The recovery of a matrix that was looked at, with a numbering."""
+    with clock("numbering"):
+        nodal = nodal_matrix(matrix, numbering)
+    unproven = matrix if numbering.unnamed is not None and numbering.unnamed.any() else None
     if uncoupled(nodal):
         raise GeometryError(
             "the directions are not coupled: these are scalar matrices side by side; recover one of them by itself"

@@ -129,6 +129,11 @@ def verdict(
             "the identities leave an affine map free, since the material around every valid row is homogeneous; "
             "elements determined it, but the matrix re-assembled on them is not the given one"
         )
+    if numbering.likely:
+        return "uncertified", (
+            "several nodes couple to the same unknowns, and which rows are theirs was inferred from how like these "
+            "are; only elements that re-assemble to the matrix would show that the inference is right"
+        )
     apart = np.asarray(without_trace(nodal).any(axis=1))
     if numbering.open_row is not None and nodal.doubtful is not None:
         apart &= ~nodal.doubtful  # these get no coordinates

@@ -34,6 +34,21 @@ def with_penalty(matrix: sp.csr_array, size: NDArray[np.float64]) -> NDArray[np.
     return np.asarray(np.abs(matrix.diagonal()) > PENALTY * size)
 
 
+def without_penalties(matrix: sp.csr_array) -> sp.csr_array:
+    """The same with diagonal entries that have a penalty replaced by what makes their rows add up to zero.
+
+    That is what assembly put there if the row is whole. Beside a penalty its other entries would tell nothing.
+    """
+    own, penalised = matrix.diagonal(), with_penalty(matrix, row_sizes(matrix))
+    if not penalised.any():
+        return matrix
+    given = matrix.tocoo()
+    entries = np.where((given.row == given.col) & penalised[given.row], 0.0, given.data)
+    left = np.bincount(given.row, np.where(given.row == given.col, 0.0, entries), len(own))
+    entries[given.row == given.col] = np.where(penalised, -left, own)[given.row[given.row == given.col]]
+    return sp.csr_array((entries, (given.row, given.col)), shape=matrix.shape)
+
+
 def adding_up(matrix: sp.csr_array, size: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(N,) rows of given sizes that add up to zero over all directions together."""
     return np.asarray(np.abs(np.asarray(matrix.sum(axis=1)).ravel()) <= ROUNDING * size)

@@ -48,6 +48,9 @@ class Numbering:
         Rows whose direction nothing proves.
     group : (N,) int64, optional
         Rows that couple to the same unknowns, among which open rows have their fellows.
+    likely : bool
+        Whether rows of one pattern were joined for being likest each other: only elements prove that they are one
+        node's.
     """
 
     block_size: int
@@ -61,6 +64,7 @@ class Numbering:
     open_row: NDArray[np.bool_] | None = None
     unnamed: NDArray[np.bool_] | None = None
     group: NDArray[np.int64] | None = None
+    likely: bool = False
 
     @property
     def incomplete(self) -> bool:

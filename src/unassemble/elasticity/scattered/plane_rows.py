@@ -58,7 +58,8 @@ def of_planes(
     order = np.argsort(kind, kind="stable")
     _, first = np.unique(kind[order], return_index=True)
     members = [some for some in np.split(order, first[1:]) if kind[some[0]] >= 0]
-    rows = by_direction(group, direction, d)
+    inside = kind[node] >= 0  # nodes that have all their rows are no members
+    rows = by_direction(group[inside], direction[inside], d, int(group.max()) + 1)
     label = np.arange(n)
     held = np.zeros((n, d), dtype=bool)
     for b in range(d):

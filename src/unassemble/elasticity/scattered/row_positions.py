@@ -20,6 +20,7 @@ from ..nullspace.solution import Solution
 from ..rows.grouping import by_first_row
 from ..rows.numbering import Numbering
 from ..rows.pieces import pieces
+from .exchange import fullest
 from .patterns import by_direction
 from .plane_rows import of_planes
 from .row_equations import Sums, equations, sums_of
@@ -73,6 +74,7 @@ def placed_together(
     identity = ~live
     may = live if open_row is None else live & open_row
     sums = sums_of(matrix, live, group, direction, d)
+    countable = fullest(matrix, live, group, direction, d)[group] >= 0
     for _ in range(_ROUNDS):
         piece = pieces(node, direction, d) if ordered else np.zeros((len(node), d), dtype=np.int64)
         open_row = _open(group, node, direction, piece) & may
@@ -85,7 +87,7 @@ def placed_together(
             again, settled = _joined(solution, sums, group, node, direction, open_row, ordered=ordered)
             may = may & ~settled
         piece = pieces(again, direction, d) if ordered else piece
-        again = _remaining(group, again, direction, piece, may)
+        again = _remaining(group, again, direction, piece, may & countable)
         if solution is not None and again.max() == node.max():
             again, settled = joined_by_trial(matrix, sums, solution, group, node, direction, piece, open_row & may)
             may = may & ~settled

@@ -12,17 +12,29 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..directions.extension import SETTLED, extended_directions
+from ..directions.least_sums import named_by_least_sums
 from ..directions.sums import names_of, set_right
-from ..rows.constants import adding_up, proven_directions, row_sizes, uncoupled_rows, with_penalty
+from ..rows.constants import (
+    ROUNDING,
+    adding_up,
+    proven_directions,
+    row_sizes,
+    uncoupled_rows,
+    with_penalty,
+    without_penalties,
+)
 from ..rows.grouping import possible_nodes, same_pattern
 from ..rows.numbering import Numbering, measured
 from ..rows.traces import unaccounted
+from .exchange import exchanged, fullest
 from .filling import filled, filled_by_direction, likest
 from .patterns import by_direction
 from .row_positions import placed_together, single_nodes
 
 _ORDERED = 0.3  # share of neighbouring rows with the same pattern: 2/3 node by node, some more where nodes share one
+_HOPEFUL = 0.1  # share of whole rows that annihilate translations, below which the number of directions is wrong
 _SETTLED = 0.9  # share of whole rows that have to annihilate translations
+_ROUNDS = 4
 _EVEN = 0.6  # share of rows, far from supports, in patterns with as many rows in each direction
 
 
@@ -46,11 +58,68 @@ def scattered(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
     for d in sizes:
         if 2 * np.count_nonzero(np.bincount(inner)[inner] >= d) < len(live):
             continue  # rows of one node do not show by their pattern
-        direction, share = extended_directions(matrix, group, ~identity, d)
+        direction, share = _directions(matrix, group, ~identity, d)
         if share > _SETTLED and _even_share(matrix, group, direction, ~identity, d) > _EVEN:
-            direction = _set_right(matrix, group, direction, ~identity, d)
-            return _with_nodes(matrix, matrix, group, direction, identity, d)
+            likely = _likely_nodes(matrix, group, direction, identity, d, clearly=False)
+            return likely or _with_nodes(matrix, matrix, group, direction, identity, d)
     return None
+
+
+def clearly_likely(matrix: sp.csr_array, numbering: Numbering) -> Numbering | None:
+    """The same directions with nodes that likeness tells clearly, if these are others.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+        Entries that vanish are stored.
+    numbering : Numbering
+        With nodes that likeness told, however faintly.
+    """
+    identity, direction = numbering.identity_row, numbering.direction_of_row
+    group = same_pattern(matrix, identity)
+    found = _likely_nodes(matrix, group, direction, identity, numbering.block_size, clearly=True)
+    return None if found is None or np.array_equal(found.node_of_row, numbering.node_of_row) else found
+
+
+def told_by_positions(matrix: sp.csr_array, numbering: Numbering) -> Numbering | None:
+    """The same directions with nodes that positions of rows tell, and likeness does not.
+
+    None where some node lacks a direction without a trace that no other row offers.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+        Entries that vanish are stored.
+    numbering : Numbering
+    """
+    identity, direction = numbering.identity_row, numbering.direction_of_row
+    return _with_nodes(matrix, matrix, same_pattern(matrix, identity), direction, identity, numbering.block_size)
+
+
+def _likely_nodes(
+    matrix: sp.csr_array,
+    group: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    identity: NDArray[np.bool_],
+    d: int,
+    *,
+    clearly: bool,
+) -> Numbering | None:
+    """Nodes that likeness tells, and positions only where it does not; None where it tells no more than patterns do.
+
+    Rows of a pattern are left open where some of them found no node.
+    """
+    single = single_nodes(group, direction, d)
+    node = exchanged(matrix, ~identity, group, single, direction, d, clearly=clearly)
+    if np.array_equal(node, single):
+        return None
+    base = fullest(matrix, ~identity, group, direction, d)[group]
+    found = by_direction(node, direction, d)[node, np.maximum(base, 0)] > 0
+    lost = np.bincount(group, ~found | (base < 0))[group] > 0
+    numbering = _with_nodes(matrix, matrix, group, direction, identity, d, node, lost & ~identity)
+    if numbering is None or numbering.open_row is None:
+        return None
+    return replace(numbering, likely=True, open_row=numbering.open_row & (base >= 0))
 
 
 def scattered_without_zeros(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
@@ -86,6 +155,36 @@ def scattered_without_zeros(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Num
     return None
 
 
+def _directions(
+    matrix: sp.csr_array, group: NDArray[np.int64], live: NDArray[np.bool_], d: int
+) -> tuple[NDArray[np.int64], float]:
+    """Directions, and the share of the whole rows that annihilate translations with them.
+
+    Translations are not in equilibrium next to supports, and where few rows are far from any, wrong directions there
+    spoil most sums. So all sums together decide on the rows whose direction nothing proves, until none changes.
+    """
+    direction, share = extended_directions(matrix, group, live, d)
+    if share < _HOPEFUL:
+        return direction, share
+    told = without_penalties(matrix)
+    direction = _set_right(told, group, direction, live, d)
+    for _ in range(_ROUNDS):
+        unnamed = ~proven_directions(matrix, direction, group, d) & live
+        other = named_by_least_sums(told, direction, unnamed, d, exactly=False)
+        if np.array_equal(other, direction):
+            break
+        direction = _set_right(told, group, other, live, d)
+    return direction, _share(matrix, direction, live, d)
+
+
+def _share(matrix: sp.csr_array, direction: NDArray[np.int64], live: NDArray[np.bool_], d: int) -> float:
+    """Share of the rows that add up to zero over all directions together which do so over each."""
+    size = row_sizes(matrix)
+    whole = adding_up(matrix, size) & ~with_penalty(matrix, size) & live
+    sums = np.abs(matrix @ (np.eye(d)[direction] * live[:, None]))
+    return float((sums <= ROUNDING * size[:, None]).all(axis=1)[whole].mean()) if whole.any() else 0.0
+
+
 def _even_share(
     matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], live: NDArray[np.bool_], d: int
 ) -> float:
@@ -107,13 +206,16 @@ def _with_nodes(
     direction: NDArray[np.int64],
     identity: NDArray[np.bool_],
     d: int,
+    node: NDArray[np.int64] | None = None,
+    open_row: NDArray[np.bool_] | None = None,
 ) -> Numbering | None:
     """Nodes of rows whose directions are known; `whole` is the matrix with zeros, by which rows are grouped.
 
-    None where no zeros were put back, but some node lacks a direction without a trace that no other row offers.
+    None where no zeros were put back, but some node lacks a direction without a trace that no other row offers. Nodes
+    to start from, and rows that may be joined to others, are those that patterns show where not given.
     """
-    node = single_nodes(group, direction, d)
-    node, open_row = placed_together(whole, ~identity, group, node, direction, d)
+    node = single_nodes(group, direction, d) if node is None else node
+    node, open_row = placed_together(whole, ~identity, group, node, direction, d, open_row)
     lost = np.asarray(unaccounted(whole, ~identity, node, direction, d).any(axis=1))[node]
     if whole is not matrix:
         open_row |= lost
