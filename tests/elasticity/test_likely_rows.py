@@ -114,7 +114,7 @@ def test_likely_nodes_are_certified_by_elements_only():
 
 
 def test_nodes_with_all_their_rows_are_no_members_of_what_planes_decide():
-    """Of five nodes of a pattern two have all rows, and two lie in the plane x = 0: the loose row is the fifth one's."""
+    """Of five nodes of a pattern two have all rows, two lie in the plane x = 0: the loose row is the fifth one's."""
     points = np.array([[0.0, 0.0], [0.0, 1.0], [0.3, 0.0], [np.nan, np.nan], [0.3, 1.0], [0.3, 2.0]])
     node = np.array([0, 1, 2, 3, 4, 4, 5, 5])
     direction = np.array([1, 1, 1, 0, 0, 1, 0, 1])
