@@ -20,7 +20,7 @@ from .ordered.rounded import with_exact_sums
 from .positions import solve
 from .results import ElasticityRecovery, ScalarParts
 from .rows.numbering import Numbering
-from .scattered.scattered import clearly_likely, told_by_positions
+from .scattered.scattered import more_careful, told_by_positions
 from .unknowns import find_numbering
 from .verdict import about_made_up_nodes, about_open_rows
 
@@ -87,30 +87,33 @@ def _likeliest(
 ) -> ElasticityRecovery:
     """The recovery with nodes that likeness told, however faintly, or with others, if more rows are certified then.
 
-    If rows are left out, others are those that likeness tells clearly; if nothing is certified, those of positions.
+    While rows are left out, others are those told with more care; if nothing is certified, those that positions tell.
     """
     failures: list[RecoveryError] = []
 
-    def tried(one: Numbering | None) -> ElasticityRecovery | None:
+    def better(best: ElasticityRecovery | None, one: Numbering) -> ElasticityRecovery | None:
         try:
-            return None if one is None else attempt(one)
+            found = attempt(one)
         except RecoveryError as error:
             failures.append(error)
-            return None
+            return best
+        return found if best is None or _certified_rows(found) > _certified_rows(best) else best
 
-    found = [tried(numbering)]
-    if _certified_rows(found[0]) < np.count_nonzero(~numbering.identity_row):
+    best = better(None, numbering)
+    others = more_careful(matrix, numbering)
+    while _certified_rows(best) < np.count_nonzero(~numbering.identity_row):
         with clock("numbering"):
-            clear = clearly_likely(matrix, numbering)
-        found.append(tried(clear))
-    if not any(map(_certified_rows, found)):
+            one = next(others, None)
+        if one is None:
+            break
+        best = better(best, one)
+    if not _certified_rows(best):
         with clock("numbering"):
-            placed = told_by_positions(matrix, numbering)
-        found.append(tried(placed))
-    some = [one for one in found if one is not None]
-    if not some:
+            one = told_by_positions(matrix, numbering)
+        best = best if one is None else better(best, one)
+    if best is None:
         raise failures[0]
-    return max(some, key=_certified_rows)
+    return best
 
 
 def _certified_rows(found: ElasticityRecovery | None) -> int:

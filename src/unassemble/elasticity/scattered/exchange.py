@@ -67,12 +67,13 @@ def exchanged(
     d: int,
     *,
     clearly: bool = True,
+    apart: bool = True,
 ) -> NDArray[np.int64]:
     """(N,) nodes after rows of one pattern were joined that are likest each other with directions exchanged.
 
     Entries with whole nodes are compared; there are more of them the more rows are joined. In patterns in which no
-    direction may be one of which each node has a row, pairs count that are likest both ways, and all other rows are
-    taken apart, if there are patterns of several nodes at all.
+    direction may be one of which each node has a row, pairs count that are likest both ways; there single rows of each
+    direction, too, may be several nodes'.
 
     Parameters
     ----------
@@ -87,13 +88,16 @@ def exchanged(
     d : int
     clearly : bool
         Whether to join only rows that any others would be clearly less like.
+    apart : bool
+        Whether to take rows apart that may be several nodes' though there is but one of each direction.
     """
     count = by_direction(group[live], direction[live], d, int(group.max()) + 1)
     several: NDArray[np.bool_] = np.asarray((count > 1).any(axis=1))
     if not several.any():
         return node
     base = fullest(matrix, live, group, direction, d)
-    node = by_first_row(np.where((base[group] < 0) & live, len(node) + np.arange(len(node)), node))
+    if apart:
+        node = by_first_row(np.where((base[group] < 0) & live, len(node) + np.arange(len(node)), node))
     rows = np.flatnonzero(several[group] & live)
     rows = rows[np.lexsort((direction[rows], group[rows]))]
     patterns = np.split(rows, np.flatnonzero(np.diff(group[rows])) + 1) if len(rows) else []

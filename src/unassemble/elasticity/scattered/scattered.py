@@ -5,6 +5,7 @@ Where entries that vanished are not stored they are put back first, as far as li
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -60,13 +61,13 @@ def scattered(matrix: sp.csr_array, sizes: tuple[int, ...]) -> Numbering | None:
             continue  # rows of one node do not show by their pattern
         direction, share = _directions(matrix, group, ~identity, d)
         if share > _SETTLED and _even_share(matrix, group, direction, ~identity, d) > _EVEN:
-            likely = _likely_nodes(matrix, group, direction, identity, d, clearly=False)
+            likely = _likely_nodes(matrix, group, direction, identity, d, clearly=False, apart=False)
             return likely or _with_nodes(matrix, matrix, group, direction, identity, d)
     return None
 
 
-def clearly_likely(matrix: sp.csr_array, numbering: Numbering) -> Numbering | None:
-    """The same directions with nodes that likeness tells clearly, if these are others.
+def more_careful(matrix: sp.csr_array, numbering: Numbering) -> Iterator[Numbering]:
+    """The same directions with nodes that likeness tells clearly, then with none that may be several; if these differ.
 
     Parameters
     ----------
@@ -77,8 +78,12 @@ def clearly_likely(matrix: sp.csr_array, numbering: Numbering) -> Numbering | No
     """
     identity, direction = numbering.identity_row, numbering.direction_of_row
     group = same_pattern(matrix, identity)
-    found = _likely_nodes(matrix, group, direction, identity, numbering.block_size, clearly=True)
-    return None if found is None or np.array_equal(found.node_of_row, numbering.node_of_row) else found
+    before = [numbering.node_of_row]
+    for apart in (False, True):
+        one = _likely_nodes(matrix, group, direction, identity, numbering.block_size, clearly=True, apart=apart)
+        if one is not None and not any(np.array_equal(one.node_of_row, other) for other in before):
+            before.append(one.node_of_row)
+            yield one
 
 
 def told_by_positions(matrix: sp.csr_array, numbering: Numbering) -> Numbering | None:
@@ -104,18 +109,19 @@ def _likely_nodes(
     d: int,
     *,
     clearly: bool,
+    apart: bool,
 ) -> Numbering | None:
     """Nodes that likeness tells, and positions only where it does not; None where it tells no more than patterns do.
 
     Rows of a pattern are left open where some of them found no node.
     """
     single = single_nodes(group, direction, d)
-    node = exchanged(matrix, ~identity, group, single, direction, d, clearly=clearly)
+    node = exchanged(matrix, ~identity, group, single, direction, d, clearly=clearly, apart=apart)
     if np.array_equal(node, single):
         return None
     base = fullest(matrix, ~identity, group, direction, d)[group]
     found = by_direction(node, direction, d)[node, np.maximum(base, 0)] > 0
-    lost = np.bincount(group, ~found | (base < 0))[group] > 0
+    lost = np.bincount(group, np.where(base < 0, apart, ~found))[group] > 0
     numbering = _with_nodes(matrix, matrix, group, direction, identity, d, node, lost & ~identity)
     if numbering is None or numbering.open_row is None:
         return None
