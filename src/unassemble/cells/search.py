@@ -26,7 +26,7 @@ from .triangles.triangles_only import read_triangles
 
 _STARTS = 2  # readings to begin with that are worth repairing
 _DRAWINGS = 3  # that a graph may have, about
-_LAST = 60  # solves for small changes of the best reading, when all others are spent
+_LAST = 200  # solves for small changes of the best reading, when all others are spent
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
 _EQUAL = 1e-9  # relative difference of weights that are all the same
@@ -108,7 +108,7 @@ def _searched(
                 return _settled(best, begun[-1].starts[0]), spoilt
             spoilt = spoilt or begun[-1].spoilt
         for one in begun:
-            best, done = _carried_on(best, one, effort, cover)
+            best, done = _carried_on(best, one, begun, effort, cover)
             if done:
                 return best, spoilt
     return descent(best, Effort(_LAST)) if best is not None and best.pieces else None, spoilt
@@ -138,7 +138,11 @@ def _settled(best: Reading | None, first: Reading) -> Reading:
 
 
 def _carried_on(
-    best: Reading | None, begun: Begun, effort: Effort, cover: Callable[[], Reading[CellSet] | None]
+    best: Reading | None,
+    begun: Begun,
+    drawings: list[Begun],
+    effort: Effort,
+    cover: Callable[[], Reading[CellSet] | None],
 ) -> tuple[Reading | None, bool]:
     """The best reading after repairs in one drawing, or else by a `cover`, in no drawing; and whether that is the end.
 
@@ -148,7 +152,7 @@ def _carried_on(
     try:
         best = _finished(best, begun, effort)
     except HopelessError:  # from afar; a few wrong labels may have bent the map
-        best, hopeless = better(best, descent(begun.starts[0], Effort(_LAST, effort.known))), True
+        best, hopeless = _descents(best, drawings, effort), True
     if best is not None and best.fits:
         return best, True
     if best is not None and best.like_noise:  # or wrong in cells that leave little
@@ -161,6 +165,17 @@ def _carried_on(
     if covered is not None:
         return covered, True
     return (best if best is not None and best.pieces else None), hopeless
+
+
+def _descents(best: Reading | None, drawings: list[Begun], effort: Effort) -> Reading | None:
+    """The best of what small changes make of all starts."""
+    for begun in drawings:
+        seen: set[bytes] = set()
+        for start in begun.starts:
+            best = better(best, descent(start, Effort(_LAST, effort.known), seen=seen))
+            if best.fits:
+                return best
+    return best
 
 
 def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Iterator[Candidates]:
