@@ -7,7 +7,6 @@ clusters in between. So the cost of reading these grows with their number, and n
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,13 +16,13 @@ from scipy.sparse import csgraph
 from ...topology.faces import from_cycles
 from ...topology.keys import Grouped
 from ..candidates.candidates import Candidates
+from ..labels.descent import Descent
 from ..labels.effort import Effort
-from ..labels.mending import mended
-from ..labels.relaxation import HopelessError
-from ..labels.repairs import descent, repaired
 from ..reading import Reading
 from .patches import arcs_across
 from .peeling import NOTHING, Peeled
+
+_SOLVES = 500  # for small changes of what is open in one cluster; the hardest that was read took 300
 
 
 def with_clusters(
@@ -82,15 +81,8 @@ def _read(
         return None
     candidates = Candidates.of(drawing, weights, c)
     reading = Reading.of(candidates, _labels(candidates, triangles))
-    effort = Effort.for_graph(n)
     if not reading.fits:
-        reading = descent(reading, effort, free=_labels(candidates, open_ones))
-    if not reading.fits:
-        with suppress(HopelessError):
-            reading = mended(reading, effort) or reading
-    if not reading.fits:
-        print("STILL")
-        reading = repaired(reading, effort)
+        reading = Descent(reading, free=_labels(candidates, open_ones)).run(Effort(_SOLVES))
     chosen = reading.candidates.cells.chosen(reading.labels, np.arange(n))
     return chosen.vertices.reshape(-1, 3) if reading.fits and (chosen.size == 3).all() else None
 
