@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from meshes import specimen
+from meshes import specimen, triangle_set
 from unassemble import recover
 from unassemble.cells.alternatives import other_scales
 from unassemble.cells.alternatives.exhaustion import all_readings
@@ -96,3 +96,20 @@ def test_pieces_that_are_alike_are_read_once(monkeypatch):
     found = recover(known.matrix)
     assert not found.certified
     assert 1 <= len(calls) <= 3  # rounding may tell some apart
+
+
+@pytest.mark.parametrize("corner", [(0.6, -0.7), (0.5, -np.sqrt(0.75)), (1.1, -0.4)])
+@pytest.mark.parametrize("filled", [True, False])
+def test_congruent_triangles_that_share_a_vertex_may_have_a_right_angle_between_them(corner, filled):
+    """By symmetry both have the same entries, and so the same c, in either mesh."""
+    x, y = corner
+    points = np.array([[0, 0], [1, 0], [x, y], [0, 1], [y, x]])
+    triangles = np.array([[0, 2, 1], [0, 3, 4], [0, 1, 3]][: 3 if filled else 2])
+    known = forgotten(specimen(points, triangles, seed=5))
+    found = recover(known.matrix)
+    assert found.status == "uncertified"
+    assert len(found.alternatives) == 1
+    assert "so does another" in found.reason
+    told = recover(known.matrix, scale=1.0)
+    assert told.certified, told.reason
+    assert triangle_set(told.triangles) == triangle_set(known.triangles)

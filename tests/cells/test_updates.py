@@ -6,8 +6,9 @@ import pytest
 from families import FAMILIES
 from meshes import random_mesh, specimen
 from unassemble.cells.candidates.candidates import Candidates
+from unassemble.cells.labels import updates as module
 from unassemble.cells.labels.sheet import Sheet
-from unassemble.cells.labels.updates import Updates
+from unassemble.cells.labels.updates import Updates, _Factorised
 from unassemble.cells.maps import best_map
 from unassemble.cells.reading import Reading
 from unassemble.cells.search import read_cells
@@ -78,6 +79,50 @@ def test_corners_that_hardly_matter_are_named():
     tiny = [k for k in corner.tolist() if area(known.points, cells.vertices[cells.offsets[k] :][:3][None]) < 0.02]
     assert len(tiny) >= 4
     assert sum(next(updates.ranked(without(right, k))) == (k,) for k in tiny) >= 0.75 * len(tiny)  # all of them here
+
+
+def test_a_singular_pencil_spoils_no_other_change():
+    right = fitting(forgotten(specimen(*MESHES["triangles"], c=C, seed=1)))
+    sheet = Sheet(right.candidates, C)
+    factorised = _Factorised(sheet, right.labels)
+    inside = np.flatnonzero(right.labels & (right.candidates.size == 3))
+    vertices = right.candidates.cells.vertices[right.candidates.cells.offsets[inside][:, None] + np.arange(3)]
+    far = next(k for k in range(len(inside)) if not np.isin(vertices[k], vertices[0]).any())
+    moves = [(int(inside[0]),), (int(inside[far]),)]
+    before = factorised.maps(right.labels, moves)
+    assert np.isfinite(before).all()
+    # 1 - s T_f G_f is made singular for the first: its entries are powers of two, and so exact.
+    factorised._shift = 4.0
+    factorised._columns[factorised._place[vertices[0]]] = 0
+    factorised._columns[factorised._place[vertices[0, 0]], vertices[0, 1]] = -1j
+    after = factorised.maps(right.labels, moves)
+    assert np.isnan(after[:, 0]).any()
+    assert np.isfinite(after[:, 1]).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_which_pairs_are_told_does_not_depend_on_the_order_of_rows(seed, monkeypatch):
+    """Where there are too many, the most promising are."""
+    points, triangles = triangular_holes(150, 4, 3)
+    monkeypatch.setattr(module, "_WORK", 40 * len(points))  # so many moves of each kind
+    missing = {frozenset(map(tuple, np.round(points - points.mean(axis=0), 6)[t].tolist())) for t in triangles[:90:40]}
+    named = []
+    for rows in (0, 1 + seed):
+        known = specimen(points, triangles, c=C, seed=rows)
+        right = fitting(known)
+        cells = right.candidates.cells
+        at = np.round(known.points, 6)
+        names = [
+            frozenset(map(tuple, at[cells.vertices[cells.offsets[k] : cells.offsets[k + 1]]].tolist()))
+            for k in range(right.candidates.count)
+        ]
+        labels = right.labels & ~np.array([name in missing for name in names])
+        assert labels.sum() == right.labels.sum() - 3
+        moves = Updates(Sheet(right.candidates, C)).ranked(Reading.of(right.candidates, labels), levels=2)
+        named.append([{names[k] for k in move} for move in moves if len(move) > 1])
+    first, other = named
+    assert len(first) == len(other) > 20
+    assert all(move in other for move in first[:20])
 
 
 def test_labels_of_the_same_surface_have_the_same_outline():

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache, cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +15,21 @@ from .candidates.candidates import Candidates
 from .candidates.cell_set import CellSet
 from .candidates.crosses import Crosses
 from .covers.covering import MOST_EQUAL_CELLS, read_by_cover
+from .labels.descent import Descent, better
 from .labels.effort import SMALL_GRAPH, Effort
 from .labels.evidence import FEW, entries_are_to_blame
 from .labels.mending import MOST_VERTICES, mended
 from .labels.relaxation import HopelessError
-from .labels.repairs import better, descent, repaired
+from .labels.repairs import repaired
 from .misfits.spoilt import without_wrong_entries
 from .reading import Reading
 from .triangles.triangles_only import read_triangles
 
 _STARTS = 2  # readings to begin with that are worth repairing
 _DRAWINGS = 3  # that a graph may have, about
-_LAST = 60  # solves for small changes of the best reading, when all others are spent
+_QUICK = 36  # solves for small changes of a start, those of three readings
+_SOME = 60  # the same of a reading that is nearly right
+_LAST = 200  # the same of the nearest when all else has failed
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
 _EQUAL = 1e-9  # relative difference of weights that are all the same
@@ -55,6 +58,12 @@ class Begun:
     likeliest: Reading | None = None
     settled: bool = False
     spoilt: Reading | None = None
+
+    @cached_property
+    def descents(self) -> list[Descent]:
+        """A search for small changes from each start."""
+        seen: set[bytes] = set()
+        return [Descent(start, seen=seen) for start in self.starts]
 
 
 def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = None) -> Reading | None:
@@ -99,9 +108,11 @@ def _searched(
     turning = _TURNING / (_DRAWINGS if together else 1)
     drawings = _drawings(n, edges, weights, scale)
     cover = cache(partial(read_by_cover, n, edges, weights, scale))
+    begun: list[Begun] = []
+    done = False
     # Repairs take most of the effort: small graphs are begun with in all drawings before.
     for some in [drawings] if together else ([drawing] for drawing in drawings):
-        begun = []
+        begun.clear()
         for drawing in some:
             begun.append(_begun(drawing, effort, int(turning * effort.solves)))
             if begun[-1].settled:
@@ -110,8 +121,10 @@ def _searched(
         for one in begun:
             best, done = _carried_on(best, one, effort, cover)
             if done:
-                return best, spoilt
-    return descent(best, Effort(_LAST)) if best is not None and best.pieces else None, spoilt
+                break
+        if done:
+            break
+    return _at_last(best, begun if together else []), spoilt
 
 
 def _of_equal_weights(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Reading | None:
@@ -128,7 +141,7 @@ def _of_equal_weights(n: int, edges: NDArray, weights: NDArray, scale: float | N
         if best is not None and best.fits:
             return best
     return read_by_cover(n, edges, weights, scale, most_cells=MOST_EQUAL_CELLS) or (
-        descent(best, Effort(_A_FEW, effort.known)) if best is not None and best.pieces else None
+        Descent(best).run(Effort(_A_FEW, effort.known)) if best is not None and best.pieces else None
     )
 
 
@@ -148,19 +161,46 @@ def _carried_on(
     try:
         best = _finished(best, begun, effort)
     except HopelessError:  # from afar; a few wrong labels may have bent the map
-        best, hopeless = better(best, descent(begun.starts[0], Effort(_LAST, effort.known))), True
+        best, hopeless = better(best, begun.starts[0]), True
     if best is not None and best.fits:
         return best, True
     if best is not None and best.like_noise:  # or wrong in cells that leave little
         return cover() or best, True
     if best is not None and best is not before and best.size < _CLOSE:  # covers take longer than a few small changes
-        best = descent(best, Effort(_LAST))
+        best = Descent(best).run(Effort(_SOME, effort.known))
         if best.fits:
             return best, True
     covered = cover()
     if covered is not None:
         return covered, True
     return (best if best is not None and best.pieces else None), hopeless
+
+
+def _at_last(best: Reading | None, begun: list[Begun]) -> Reading | None:
+    """The best of what small changes make of all starts and of the best reading, where no reading fits.
+
+    If that is nearly right, the same among more candidates.
+    """
+    if best is None or not best.pieces or best.fits or best.like_noise:
+        return best if best is not None and best.pieces else None
+    searches = [search for one in begun for search in one.descents]
+    best = _best_of(best, searches, _QUICK)
+    nearest = sorted(searches, key=lambda search: search.least)[:1]
+    if all(search.best is not best for search in nearest):
+        nearest.append(Descent(best))
+    best = best if best.fits else _best_of(best, nearest, _LAST)
+    if best.size > _CLOSE or best.fits or not isinstance(best.candidates, Candidates):
+        return best
+    return _best_of(best, [Descent(_widened(best))], _LAST)
+
+
+def _best_of(best: Reading, searches: Iterable[Descent], solves: int) -> Reading:
+    """The best that any search comes to with so many solves, or a former one."""
+    for search in searches:
+        best = better(best, search.run(Effort(solves)))
+        if best.fits:
+            break
+    return best
 
 
 def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Iterator[Candidates]:
@@ -188,7 +228,7 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
     if spoilt is not None:
         nearest = starts[0]
         if nearest.candidates.n_vertices <= SMALL_GRAPH:  # one wrong corner may look like a wrong entry
-            nearest = descent(nearest, Effort(_A_FEW, effort.known))
+            nearest = Descent(nearest).run(Effort(_A_FEW, effort.known))
         if nearest.fits or spoilt.fits_but_for_few:
             return Begun([nearest if nearest.fits else spoilt], settled=True)
     if starts and entries_are_to_blame(starts[0]):
@@ -198,6 +238,10 @@ def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
     for start in starts:
         if start.size > _CLOSE:
             break
+        if candidates.n_vertices < FEW:  # a few changes cost next to nothing
+            nearest = _best_of(start, map(Descent, (start, _widened(start))), _QUICK)
+            if nearest.fits:
+                return Begun([nearest], settled=True)
         soon = repaired(start, Effort(int(_SOON * effort.solves), effort.known))
         if soon.fits:
             return Begun([soon], settled=True)
@@ -281,6 +325,11 @@ def first_reading(n: int, edges: NDArray, weights: NDArray) -> Reading | None:
             if reading.pieces:
                 return reading
     return None
+
+
+def _widened(reading: Reading[Candidates]) -> Reading[Candidates]:
+    """The same among more candidates."""
+    return Reading.of(*reading.candidates.widened(reading.labels))
 
 
 def _turned_over(reading: Reading, effort: Effort, solves: int) -> Reading:

@@ -175,9 +175,11 @@ def _alternatives(
     )
     factors = stretch * mesh.scale[mesh.component]
     others = filled_holes(stored, topology, factors, agree) if known is None else []
-    if topology.method != "the numbers":
-        return others or touching(stored, oriented, factors, agree), None
     left_open = False
+    if topology.method != "the numbers":
+        if not others:
+            others, left_open = touching(stored, topology, oriented, factors, scale=known, agree=agree)
+        return others, unproved if left_open else None
     if not others:
         others, left_open = alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
     if known is None and coincident(stored, topology).any():

@@ -78,14 +78,27 @@ def alternatives(
     return _each_once(found) or other_readings(stored, mesh, factors, scale), left_open
 
 
-def touching(stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, agree: float) -> list[Alternative]:
-    """Other meshes in which right angles of cells that touch in a vertex are regrouped, as where none need be supposed.
+def touching(
+    stored: OperatorMatrix,
+    topology: Topology,
+    mesh: OrientedMesh,
+    factors: NDArray,
+    *,
+    scale: float | None,
+    agree: float,
+) -> tuple[list[Alternative], bool]:
+    """Other meshes of pieces that touch in a vertex, as where no vanished entries need be supposed.
 
-    Parameters are those of :func:`alternatives`.
+    Right angles of their cells may be regrouped; and if all have the same entries, they may be parts of larger ones.
+
+    Parameters and results are those of :func:`alternatives`.
     """
     if (np.bincount(mesh.boundary[:, 0], minlength=stored.n) < 2).all():
-        return []
-    return regrouped(stored, mesh, Corners.of(stored.n, stored.edges, mesh), factors, agree)
+        return [], False
+    found = regrouped(stored, mesh, Corners.of(stored.n, stored.edges, mesh), factors, agree)
+    if found or scale is not None:
+        return found, False
+    return other_scales(stored, topology, mesh, factors, np.zeros(stored.n, dtype=np.int64), agree)
 
 
 def _loose_pieces(

@@ -3,7 +3,9 @@
 A mesh of one loose piece, with as many entries as unknowns, fits whatever the entries are, and so do others; that
 nothing else fits can only be found out by trying everything. Where several such pieces hang together all of them have
 one c, and that is the only evidence. It is none where their entries are of a kind: crossed rhombi of any shapes, for
-instance, are pairs of right triangles as well, all of them with one other c.
+instance, are pairs of right triangles as well, all of them with one other c. Nor is it where all pieces have the same
+entries, by which they have the same c anyway: two congruent triangles that share a vertex are also a mesh of one piece,
+with a right angle of equal legs between them, and with another c.
 """
 
 from __future__ import annotations
@@ -14,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...matrix import OperatorMatrix
-from ...topology import Numbering, Topology
+from ...topology import Numbering, Piece, Topology
 from ...topology.embedding import face_complexes
+from ...topology.keys import contains, pair_keys
 from ..agreement import SAME_SCALE, common_values
-from ..alike import Answers, Cells, Found
+from ..alike import ALIKE, Answers, Cells, Found
 from ..by_component import with_pieces
 from ..candidates.angles import scales_of_faces
 from ..candidates.crosses import Crosses
@@ -66,19 +69,23 @@ def other_scales(
     open : bool
         Whether there are components of which this could not be found out.
     """
+    weights_of = np.zeros(len(topology.edges))
+    weights_of[contains(pair_keys(stored.n, *stored.edges.T), pair_keys(stored.n, *topology.edges.T))] = -stored.entries
     gone = np.zeros(stored.n, dtype=bool)
     gone[topology.edges[topology.vanished]] = True
-    loose = [
-        (part, len(pieces))
-        for part, pieces in with_pieces(stored.n, stored.edges, topology.pieces)
-        if gone[part.vertices].any() and pieces and all(is_loose(piece, closed) for piece in pieces)
-    ]
+    loose = []
+    for part, pieces in with_pieces(stored.n, stored.edges, topology.pieces):
+        if pieces and all(is_loose(piece, closed) for piece in pieces):
+            if gone[part.vertices].any():
+                loose.append((part, len(pieces) == 1))
+            elif len(pieces) > 1 and _alike(pieces, weights_of, max(ALIKE, agree)):
+                loose.append((part, True))
     found, left_open, budget = [], False, Budget()
     own_of = own_cells(stored.n, [part for part, _ in loose], mesh)
     answers = Answers()
-    for (part, count), own in zip(reversed(loose), reversed(own_of), strict=True):  # the smallest first
+    for (part, unproved), own in zip(reversed(loose), reversed(own_of), strict=True):  # the smallest first
         weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
-        ask = partial(_other, part, weights, c, own, agree, budget, single=count == 1)
+        ask = partial(_other, part, weights, c, own, agree, budget, unproved=unproved)
         cells, factor, unknown = answers.of(part, weights, own, ask)
         left_open |= unknown
         if cells is not None:
@@ -88,10 +95,21 @@ def other_scales(
     return found[::-1], left_open
 
 
+def _alike(pieces: list[Piece], weights: NDArray, agree: float) -> bool:
+    """Whether all pieces have the same entries."""
+    first, *others = (np.sort(weights[piece.edge_rows]) for piece in pieces)
+    return all(
+        len(other) == len(first) and (np.abs(other - first) <= agree * np.abs(first).max()).all() for other in others
+    )
+
+
 def _other(
-    part: Numbering, weights: NDArray, c: float, own: Cells, agree: float, budget: Budget, *, single: bool
+    part: Numbering, weights: NDArray, c: float, own: Cells, agree: float, budget: Budget, *, unproved: bool
 ) -> Found:
-    """Other cells of one component, all readings tried; where there are too many, a few factors, of several pieces."""
+    """Other cells of one component, all readings tried; where there are too many, a few factors.
+
+    With a few it is `unproved` that there are none, unless several pieces have one c that need not be the same.
+    """
     try:
         readings = all_readings(part, weights, agree, budget)
         cells, factor = next((reading for reading in readings if reading[0] != own), (None, c))
@@ -99,7 +117,7 @@ def _other(
     except TooManyError:
         pass
     # No search would settle these: what a cover finds names an example.
-    left_open = single or len(part.vertices) > MOST_VERTICES or agree > NEARLY
+    left_open = unproved or len(part.vertices) > MOST_VERTICES or agree > NEARLY
     return *(_with_common_scale(part, weights, c, searched=not left_open) or (None, c)), left_open
 
 

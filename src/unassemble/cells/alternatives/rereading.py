@@ -21,7 +21,7 @@ from ..agreement import SAME_SCALE
 from ..alike import ALIKE, Answers, Cells, Found
 from ..candidates.candidates import Candidates
 from ..covers.covering import read_by_cover
-from ..labels.repairs import beside
+from ..labels.descent import beside
 from ..reading import Reading
 from ..search import fitting_starts, read_cells
 from ..undivided import undivided

@@ -54,6 +54,8 @@ class Candidates(CellSet):
         Cells on half circles, whose diameter has vanished from the boundary.
     turns : Turns
         Parts that can be turned over; its corners are numbered after the faces.
+    crosses : Crosses or None
+        About which corners are right angles.
     """
 
     drawing: FaceComplex
@@ -66,6 +68,7 @@ class Candidates(CellSet):
     strip: NDArray[np.bool_]
     half: NDArray[np.bool_]
     turns: Turns
+    crosses: Crosses | None
 
     @classmethod
     def of(
@@ -75,10 +78,12 @@ class Candidates(CellSet):
         scale: float | None = None,
         crosses: Crosses | None = None,
         guess: float | None = None,
+        wide: bool = False,
     ) -> Candidates:
         """All candidates of one drawing of the graph; the corners about some crosses are right angles.
 
-        `guess` is a c to judge angles by, where it is not known.
+        `guess` is a c to judge angles by, where it is not known. If `wide`, there are corners in quadrilaterals, too,
+        which may be a triangle and a hole, and all half circles that do not fill more than a full turn.
         """
         blocks = drawing.split()
         relative = weights / (scale or (crosses and crosses.scale) or guess or likeliest_scale(blocks, weights))
@@ -91,9 +96,10 @@ class Candidates(CellSet):
         outside = (blocks.size > _SHORT) | outer | ~blocks.simple
         # How parts hang together at crosses is known, and at other vertices a guess.
         whole = blocks.joined(outside) if crosses is None else drawing
+        outside |= wide & (blocks.size == _SHORT)
         corners = OpenCorners.of(whole, outside[blocks.face])
         about = vertex_excess(blocks, angles)
-        paths = half_circles(whole, outside[blocks.face], angles, about)
+        paths = half_circles(whole, outside[blocks.face], angles, about, wide=wide)
         edges_on = np.concatenate([np.full(len(some), some.shape[1]) for some in paths])  # of paths
         size = np.r_[blocks.size[faces], np.full(len(corners), 3), edges_on + 1]
         open_ones, none = len(corners) + len(edges_on), np.zeros(len(size), dtype=bool)
@@ -139,7 +145,24 @@ class Candidates(CellSet):
             strip=np.r_[none[: len(faces)], corners.in_strip, none[: len(edges_on)]],
             half=np.arange(len(size)) >= len(size) - len(edges_on),
             turns=corners.turns,
+            crosses=crosses,
         )
+
+    def widened(self, labels: NDArray[np.bool_]) -> tuple[Candidates, NDArray[np.bool_]]:
+        """More candidates in the same drawing, and the labels of what there was before."""
+        wide = Candidates.of(self.drawing, self.weights, self.scale, self.crosses, wide=True)
+        number = {name: k for k, name in enumerate(self.names)}
+        same = np.array([number.get(name, -1) for name in wide.names])
+        return wide, (same >= 0) & labels[same]
+
+    @cached_property
+    def names(self) -> list[tuple[tuple[int, ...], int]]:
+        """Vertices of each candidate, and the apex of corners."""
+        apex = np.where(self.corner, self.cells.vertices[self.cells.offsets[:-1] + 1], -1).tolist()
+        return [
+            (tuple(sorted(cell.tolist())), k)
+            for cell, k in zip(np.split(self.cells.vertices, self.cells.offsets[1:-1]), apex, strict=True)
+        ]
 
     def other_scale(self) -> float | None:
         """A likely c that differs much from the one that angles are judged by; None if there is none."""

@@ -19,7 +19,7 @@ _INNER = 0.35 * np.pi  # excess of angles at its inner vertices, which look like
 
 
 def half_circles(
-    whole: FaceComplex, outside: NDArray[np.bool_], angles: NDArray, excess: NDArray
+    whole: FaceComplex, outside: NDArray[np.bool_], angles: NDArray, excess: NDArray, *, wide: bool = False
 ) -> list[NDArray[np.int64]]:
     """(k, m) half-edges of paths of m edges that may be cells on half circles, for each m.
 
@@ -33,12 +33,15 @@ def half_circles(
         Facing each half-edge, weights being shared equally.
     excess : (n,) float64
         Of the angles about each vertex over 2 pi.
+    wide : bool
+        Whether the excess may be twice as much, and inner vertices may be on another boundary or be passed twice.
     """
-    return [_paths(whole, outside, angles, excess, m) for m in _EDGES]
+    inner = (-np.inf, 2 * _INNER) if wide else (-_INNER, _INNER)
+    return [_paths(whole, outside, angles, excess, inner, m) for m in _EDGES]
 
 
 def _paths(
-    whole: FaceComplex, outside: NDArray[np.bool_], angles: NDArray, excess: NDArray, m: int
+    whole: FaceComplex, outside: NDArray[np.bool_], angles: NDArray, excess: NDArray, inner: tuple[float, float], m: int
 ) -> NDArray[np.int64]:
     """Those of m edges: nowhere else joined to themselves."""
     half = [np.flatnonzero(outside)]
@@ -46,7 +49,8 @@ def _paths(
         half.append(whole.successor[half[-1]])
     paths = np.column_stack(half)
     chosen = outside[paths].all(axis=1) & (angles[paths].sum(axis=1) < _FULL)
-    chosen &= (np.abs(excess[whole.head[paths[:, :-1]]]) < _INNER).all(axis=1)
+    about = excess[whole.head[paths[:, :-1]]]
+    chosen &= ((about > inner[0]) & (about < inner[1])).all(axis=1)
     paths = paths[chosen]
     vertices = np.column_stack([whole.tail[paths], whole.head[paths[:, -1]]])
     apart = np.ones(len(paths), dtype=bool)

@@ -42,7 +42,7 @@ class Redrawing:
     @classmethod
     def of(cls, old: Candidates, number: dict[_Name, int], new: Candidates, cycle: NDArray) -> Redrawing:
         """Candidates in a new drawing, and the `number` of each name in the old one."""
-        names = _names(new)
+        names = new.names
         same = np.array([number.get(name, -1) for name in names])
         place = {name: k for k, name in enumerate(names)}
         parts = []
@@ -72,17 +72,7 @@ def redrawings(candidates: Candidates, first: NDArray) -> Iterator[Redrawing]:
     first : (n,) float64
         Cycles at vertices of high value are taken first.
     """
-    number = {name: k for k, name in enumerate(_names(candidates))}
+    number = {name: k for k, name in enumerate(candidates.names)}
     for cycle, drawing in redrawn(candidates.drawing, first):
         others = Candidates.of(drawing, candidates.weights, candidates.scale)
         yield Redrawing.of(candidates, number, others, cycle)
-
-
-def _names(candidates: Candidates) -> list[_Name]:
-    """Vertices of each candidate, and the apex of corners."""
-    cells = candidates.cells
-    apex = np.where(candidates.corner, cells.vertices[cells.offsets[:-1] + 1], -1).tolist()
-    return [
-        (tuple(sorted(cell.tolist())), k)
-        for cell, k in zip(np.split(cells.vertices, cells.offsets[1:-1]), apex, strict=True)
-    ]

@@ -13,7 +13,7 @@ from ..reading import C, Reading
 SMALL_GRAPH = 1000
 """Vertices up to which all drawings are begun with before one is repaired, and labels relaxed first."""
 _WORK = 1.2e5  # vertices times solves that repairs may take altogether
-_SOLVES = 180
+_SOLVES = 360
 _MANY = 20  # pieces that cost as much as another solve
 
 

@@ -2,44 +2,25 @@
 
 from __future__ import annotations
 
-import heapq
 import logging
-from collections.abc import Iterator
-from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..reading import Reading
+from .descent import Descent, better
 from .effort import Effort
 from .evidence import label_changes
-from .exchange import whole
 from .leaps import clear_changes
-from .sheet import Sheet
-from .updates import Updates
 
 _log = logging.getLogger(__name__)
 
-_BATCH = 8
-"""Small changes of a reading that are tried at a time."""
-
-_IN_VAIN = 40  # small changes in all without an improvement
-_TRIED = 0.25  # a reading with a batch tried is put off behind those with so much more misfit
-_BETTER = 0.9  # misfit, relative to the least before, that is an improvement worth its price
-_SOLVES = 10  # that telling what changes would leave is worth
-_BESIDE = 24  # small changes of a reading that fits, those that leave least, that are solved for
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
-
-
-def better(one: Reading | None, other: Reading) -> Reading:
-    """The one with less misfit."""
-    return other if one is None or other.size < one.size else one
 
 
 def repaired(reading: Reading, effort: Effort) -> Reading:
     """Turn labels over as the misfit asks for it."""
     best = _leaps(reading, effort)
-    return best if best.fits else descent(best, effort)
+    return best if best.fits else Descent(best).run(effort)
 
 
 def _leaps(reading: Reading, effort: Effort) -> Reading:
@@ -57,80 +38,3 @@ def _leaps(reading: Reading, effort: Effort) -> Reading:
         best = better(best, reading)
         _log.debug("leap: misfit %.1e", reading.size)
     return best
-
-
-def descent(reading: Reading, effort: Effort) -> Reading:
-    """Small changes, those that should leave least first, from the best of all readings that they have led to.
-
-    The last wrong labels may have to be put right together: a change for the better can raise the misfit a little. So
-    of the changes of each reading a few are tried, then a few of another that is about as good.
-    """
-    if not reading.pieces or reading.fits:
-        return reading
-    best, least, in_vain, candidates = reading, _value(reading), 0, reading.candidates
-    updates = Updates(Sheet(candidates, _scale(reading)))
-    seen = {updates.outline(reading.labels)}
-    # Misfit, more where batches have been tried, a number that settles ties, the reading and its changes.
-    waiting = [(least, 0, reading, _changed(reading, updates, effort))]
-    while waiting and not (best.fits or effort.spent) and in_vain < _IN_VAIN:
-        value, number, reading, changed = heapq.heappop(waiting)
-        asked = 0
-        for labels in islice(changed, _BATCH):
-            asked += 1
-            outline = updates.outline(labels)
-            if outline in seen or effort.spent:
-                continue
-            seen.add(outline)
-            trial = effort.reading(candidates, labels)
-            best, after = better(best, trial), _value(trial)
-            in_vain = 0 if after < least else in_vain + 1
-            if after < _BETTER * least:  # nothing of what led here was in vain
-                effort.solves += _SOLVES
-            least = min(after, least)
-            if trial.pieces:
-                heapq.heappush(waiting, (after, len(seen), trial, _changed(trial, updates, effort)))
-            if after < value:
-                break
-        else:
-            value += _TRIED * _value(reading)
-        if asked:
-            heapq.heappush(waiting, (value, number, reading, changed))
-    _log.debug("descent: misfit %.1e", best.size)
-    return best
-
-
-def _changed(reading: Reading, updates: Updates, effort: Effort) -> Iterator[NDArray[np.bool_]]:
-    """Small changes of the labels of a reading; nothing is computed before the first is asked for."""
-    effort.solves -= _SOLVES
-    for move in updates.ranked(reading):
-        labels = reading.labels.copy()
-        labels[list(move)] ^= True
-        yield whole(reading.candidates, labels)
-
-
-def beside(reading: Reading) -> Iterator[Reading]:
-    """Readings that fit as well as one that does, and differ from it by one label or two that touch."""
-    candidates = reading.candidates
-    updates = Updates(Sheet(candidates, _scale(reading)))
-    seen = {updates.outline(reading.labels)}
-    for move in islice(updates.ranked(reading, candidates.count), _BESIDE):
-        labels = reading.labels.copy()
-        labels[list(move)] ^= True
-        if (outline := updates.outline(labels)) not in seen:
-            seen.add(outline)
-            other = Reading.of(candidates, labels)
-            if other.fits:
-                yield other
-
-
-def _value(reading: Reading) -> float:
-    """Mean misfit: where little is wrong it is smaller than where all is wrong a little."""
-    return float(reading.misfit.mean())
-
-
-def _scale(reading: Reading) -> float:
-    """The c of the largest piece."""
-    solved = [
-        (piece.n_vertices, mesh.scale) for piece, mesh in zip(reading.pieces, reading.meshes, strict=True) if mesh
-    ]
-    return reading.candidates.scale or max(solved, default=(0, 1.0))[1]

@@ -32,6 +32,7 @@ _WORK = 3e5  # vertices times moves that are tried at a time, as much as some te
 _BATCH = 5e4  # triangles times moves that are computed together
 _NEAR = 1e-3  # of the shift to the c at hand: so much nearer than to other maps, that one step tells
 _LEADERS = 60  # moves that are tried together with what they touch
+_AT_FIRST = 8  # moves that are given before those of three labels are told
 _STEEP = 5.0  # weights over row sizes beyond which they are those of flat triangles
 _GROSS = 0.5  # misfit above which an entry has no say in c
 
@@ -42,10 +43,13 @@ class Updates:
     Parameters
     ----------
     sheet : Sheet
+    free : (cells,) bool, optional
+        Labels that may change; all of them by default.
     """
 
-    def __init__(self, sheet: Sheet):
+    def __init__(self, sheet: Sheet, free: NDArray[np.bool_] | None = None):
         self._sheet = sheet
+        self._free = sheet.chosen if free is None else sheet.chosen & free
         self._near = Neighbourhoods(sheet)
         n, m = sheet.n_vertices, len(sheet.triangles)
         smaller = row_sizes(n, sheet.edges, np.abs(sheet.weights))[sheet.edges].min(axis=1)
@@ -57,15 +61,19 @@ class Updates:
         """The same for labels that make the same surface, whichever cells they put together or divide."""
         return bytes(np.rint(self._sheet.around(labels.astype(np.float64))).astype(np.int8).tobytes())
 
-    def ranked(self, reading: Reading, leaders: int = _LEADERS) -> Iterator[Move]:
-        """Moves that leave least, the best first: single labels, then pairs; what is in the way of a cell goes.
+    def ranked(self, reading: Reading, *, leaders: int = _LEADERS, levels: int = 3) -> Iterator[Move]:
+        """Moves that leave least, the best first; what is in the way of a new cell goes.
+
+        Single labels and pairs, then also threes: these are told after a few of the others only.
 
         Parameters
         ----------
         reading : Reading
             In this drawing; with pieces.
         leaders : int
-            Single moves, the best, that are tried with what they touch.
+            Moves, the best, that are tried with what they touch.
+        levels : int
+            Labels in one move, at most.
         """
         labels = reading.labels
         try:
@@ -73,13 +81,19 @@ class Updates:
         except RecoveryError:
             return
         most = max(int(_WORK / self._sheet.n_vertices), 1)
-        singles = list(dict.fromkeys(self._near.with_rivals(labels, (k,)) for k in self._suspects(reading)[:most]))
-        left = self._left(factorised, labels, singles)
-        first = [singles[k] for k in np.argsort(left, kind="stable")[:leaders].tolist()]
-        pairs = sorted(self._pairs(labels, first) - set(singles))[:most]
-        moves = singles + pairs
-        left = np.append(left, self._left(factorised, labels, pairs))
-        yield from (moves[k] for k in np.argsort(left, kind="stable").tolist() if np.isfinite(left[k]))
+        moves = list(dict.fromkeys(self._near.with_rivals(labels, (k,)) for k in self._suspects(reading)[:most]))
+        left = self._left(factorised, labels, moves)
+        alone, given = self._alone(moves, left), set[Move]()
+        for level in range(2, levels + 1):
+            first = np.argsort(left, kind="stable")[:leaders].tolist()
+            more = self._joined(labels, {moves[k]: float(left[k]) for k in first}, alone, set(moves))[:most]
+            left = np.append(left, self._left(factorised, labels, more))
+            moves += more
+            order = [k for k in np.argsort(left, kind="stable").tolist() if np.isfinite(left[k])]
+            for move in (moves[k] for k in order[: len(order) if level == levels else _AT_FIRST]):
+                if move not in given:
+                    given.add(move)
+                    yield move
 
     def _suspects(self, reading: Reading) -> list[int]:
         """Candidates, those about the largest misfits first."""
@@ -89,18 +103,28 @@ class Updates:
         owner = np.repeat(np.arange(cells.count), cells.size)
         nearby = np.bincount(owner, at_vertex[cells.vertices], cells.count) / cells.size
         order = np.argsort(-nearby, kind="stable")
-        return order[sheet.chosen[order]].tolist()
+        return order[self._free[order]].tolist()
 
-    def _pairs(self, labels: NDArray[np.bool_], leaders: list[Move]) -> set[Move]:
-        """Leaders and another candidate that touches them, each."""
-        pairs = set()
-        for move in leaders:
+    def _alone(self, moves: list[Move], left: NDArray) -> NDArray[np.float64]:
+        """(cells,) what is left after the change of one label, with what gives way; the most of all where not known."""
+        alone = np.full(self._sheet.candidates.count, np.max(left, initial=0.0, where=np.isfinite(left)))
+        np.minimum.at(alone, np.concatenate(moves), np.repeat(left, [len(move) for move in moves]))
+        return alone
+
+    def _joined(
+        self, labels: NDArray[np.bool_], leaders: dict[Move, float], alone: NDArray, told: set[Move]
+    ) -> list[Move]:
+        """Leaders with another candidate that touches them, by what both leave alone: the most promising first."""
+        promise: dict[Move, float] = {}
+        for move, left in leaders.items():
             turned = labels.copy()
             turned[list(move)] ^= True
             for other in adjacent_to(self._near.touching, np.array(move)).tolist():
-                if other not in move and self._sheet.chosen[other]:
-                    pairs.add(tuple(sorted({*move} ^ {*self._near.with_rivals(turned, (other,))})))
-        return pairs - {()}
+                if other not in move and self._free[other]:
+                    both = tuple(sorted({*move} ^ {*self._near.with_rivals(turned, (other,))}))
+                    promise[both] = min(promise.get(both, np.inf), left + float(alone[other]))
+        new = promise.keys() - told - {()}
+        return sorted(new, key=lambda both: (promise[both], both))
 
     def _left(self, factorised: _Factorised, labels: NDArray[np.bool_], moves: list[Move]) -> NDArray[np.float64]:
         """(moves,) mean misfit after each; infinite where there is no map."""
@@ -110,17 +134,15 @@ class Updates:
 
     def _left_of_few(self, factorised: _Factorised, labels: NDArray[np.bool_], moves: list[Move]) -> NDArray:
         sheet, count = self._sheet, len(moves)
-        try:
-            z = factorised.maps(labels, moves)
-        except np.linalg.LinAlgError:
-            return np.full(count, np.inf)
+        z = factorised.maps(labels, moves)
         turned = np.tile(labels[:, None], count)
         turned[np.concatenate(moves), np.repeat(np.arange(count), [len(move) for move in moves])] ^= True
         cells = np.flatnonzero(np.any(turned, axis=1)[sheet.cell])
         cotangent = _cotangents(z, sheet.triangles[cells]) * turned[sheet.cell[cells]]
         w = self._of_edge[:, (cells + len(sheet.cell) * np.arange(3)[:, None]).ravel()] @ cotangent.reshape(-1, count)
         misfit = np.abs(self._scales(w) * w - self._weights[:, None])
-        return np.asarray(np.where(misfit < 1, misfit, 1.0).mean(axis=0))
+        left = np.where(misfit < 1, misfit, 1.0).mean(axis=0)
+        return np.asarray(np.where(np.isfinite(z).all(axis=0), left, np.inf))
 
     def _scales(self, w: NDArray) -> NDArray[np.float64]:
         """(k,) c for each column of weights over their row sizes, from those that it brings near the given ones."""
@@ -171,13 +193,7 @@ class _Factorised:
         self._columns = np.empty((0, self._n), dtype=np.complex128)
 
     def maps(self, labels: NDArray[np.bool_], moves: Sequence[Move]) -> NDArray[np.complex128]:
-        """(n, moves) positions after each move.
-
-        Raises
-        ------
-        LinAlgError
-            If one of the changed pencils is singular.
-        """
+        """(n, moves) positions after each move; NaN where the changed pencil is singular."""
         corner, after, before, side = self._sides(labels, moves)
         self._ask_for(np.unique(corner))
         place = self._place[corner]
@@ -187,7 +203,10 @@ class _Factorised:
         changed = np.eye(corner.shape[1]) - self._shift * side[:, :, None] * inverse
         ahead = self._z + self._shift * self._y
         rhs = (side * (ahead[after] - ahead[before]))[..., None]
+        singular = np.linalg.det(changed) == 0  # which would end the solution of all others, too
+        changed[singular] = np.eye(corner.shape[1])
         q = np.linalg.solve(changed, rhs)[..., 0]
+        q[singular] = np.nan
         scattered = sp.csr_array(
             (q.ravel(), place.ravel(), np.arange(0, q.size + 1, corner.shape[1])), shape=(len(q), len(self._columns))
         )

@@ -7,7 +7,6 @@ clusters in between. So the cost of reading these grows with their number, and n
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,13 +16,13 @@ from scipy.sparse import csgraph
 from ...topology.faces import from_cycles
 from ...topology.keys import Grouped
 from ..candidates.candidates import Candidates
+from ..labels.descent import Descent
 from ..labels.effort import Effort
-from ..labels.mending import mended
-from ..labels.relaxation import HopelessError
-from ..labels.repairs import repaired
 from ..reading import Reading
 from .patches import arcs_across
 from .peeling import NOTHING, Peeled
+
+_SOLVES = 500  # for small changes of what is open in one cluster; the hardest that was read took 300
 
 
 def with_clusters(
@@ -52,7 +51,8 @@ def with_clusters(
             continue
         own = np.unique(sides[rows])
         vertices, ends = np.unique(edges[own], return_inverse=True)
-        cells = _read(len(vertices), ends.reshape(-1, 2), left[own], c, np.searchsorted(vertices, triangles[rows]))
+        cluster = np.searchsorted(vertices, triangles[rows])
+        cells = _read(len(vertices), ends.reshape(-1, 2), left[own], c, cluster, cluster[known.state[rows] == 0])
         if cells is None:
             return None
         found.append(vertices[cells])
@@ -72,19 +72,17 @@ def _clusters(sides: NDArray[np.int64], known: Peeled) -> Iterator[NDArray[np.in
         yield by_label.order[by_label.start[k] : by_label.start[k + 1]]
 
 
-def _read(n: int, edges: NDArray, weights: NDArray, c: float, triangles: NDArray[np.int64]) -> NDArray | None:
-    """(k, 3) cells of one cluster, at first all of its triangles."""
+def _read(
+    n: int, edges: NDArray, weights: NDArray, c: float, triangles: NDArray[np.int64], open_ones: NDArray[np.int64]
+) -> NDArray | None:
+    """(k, 3) cells of one cluster, at first all of its triangles: some of those that are open may be holes."""
     drawing = from_cycles(n, edges, [triangles])
     if drawing is None:
         return None
     candidates = Candidates.of(drawing, weights, c)
     reading = Reading.of(candidates, _labels(candidates, triangles))
-    effort = Effort.for_graph(n)
     if not reading.fits:
-        with suppress(HopelessError):
-            reading = mended(reading, effort) or reading
-    if not reading.fits:
-        reading = repaired(reading, effort)
+        reading = Descent(reading, free=_labels(candidates, open_ones)).run(Effort(_SOLVES))
     chosen = reading.candidates.cells.chosen(reading.labels, np.arange(n))
     return chosen.vertices.reshape(-1, 3) if reading.fits and (chosen.size == 3).all() else None
 
