@@ -28,8 +28,7 @@ from .triangles.triangles_only import read_triangles
 _STARTS = 2  # readings to begin with that are worth repairing
 _DRAWINGS = 3  # that a graph may have, about
 _QUICK = 36  # solves for small changes of a start, those of three readings
-_SOME = 60  # the same of a reading that is nearly right
-_LAST = 200  # the same of the nearest when all else has failed
+_SOME = 60  # the same of a reading that is nearly right, or the nearest when all else has failed
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
 _EQUAL = 1e-9  # relative difference of weights that are all the same
@@ -177,21 +176,21 @@ def _carried_on(
 
 
 def _at_last(best: Reading | None, begun: list[Begun]) -> Reading | None:
-    """The best of what small changes make of all starts and of the best reading, where no reading fits.
+    """The best of what small changes make of the best reading and, on small graphs, of all starts, if none fits.
 
     If that is nearly right, the same among more candidates.
     """
     if best is None or not best.pieces or best.fits or best.like_noise:
         return best if best is not None and best.pieces else None
-    searches = [search for one in begun for search in one.descents]
+    searches = [search for one in begun for search in one.descents if best.candidates.n_vertices < FEW]
     best = _best_of(best, searches, _QUICK)
     nearest = sorted(searches, key=lambda search: search.least)[:1]
     if all(search.best is not best for search in nearest):
         nearest.append(Descent(best))
-    best = best if best.fits else _best_of(best, nearest, _LAST)
+    best = best if best.fits else _best_of(best, nearest, _SOME)
     if best.size > _CLOSE or best.fits or not isinstance(best.candidates, Candidates):
         return best
-    return _best_of(best, [Descent(_widened(best))], _LAST)
+    return _best_of(best, [Descent(_widened(best))], _SOME)
 
 
 def _best_of(best: Reading, searches: Iterable[Descent], solves: int) -> Reading:
