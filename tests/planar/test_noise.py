@@ -21,18 +21,6 @@ def noisy(matrix, sigma, seed=0):
     return sp.coo_array((np.r_[value, value], ends), shape=matrix.shape)
 
 
-def rounded(matrix, form):
-    """Entries printed in that form and read again."""
-    entries = sp.coo_array(matrix)
-    data = np.array([float(form % value) for value in entries.data])
-    return sp.coo_array((data, (entries.row, entries.col)), shape=entries.shape)
-
-
-def single(matrix):
-    entries = sp.coo_array(matrix)
-    return sp.coo_array((entries.data.astype(np.float32), (entries.row, entries.col)), shape=entries.shape)
-
-
 def best_fit(points, true):
     """Complex errors after the best similarity or reflection."""
     source, target = points @ [1, 1j], true @ [1, 1j]
@@ -129,32 +117,6 @@ def test_noise_is_estimated_where_it_is_not_given(small, sigma):
     assert np.median(found.standard_deviations / told.standard_deviations) == pytest.approx(
         found.estimated_noise / sigma, rel=0.05
     )
-
-
-@pytest.mark.parametrize(("stored", "digits", "size"), [(single, "single precision", 1e-7), ("%.6g", "6 digits", 1e-5)])
-def test_entries_of_few_digits(stored, digits, size):
-    known = specimen(*random_mesh(400, seed=1), c=1.7)
-    matrix = stored(known.matrix) if callable(stored) else rounded(known.matrix, stored)
-    found = recover(matrix)
-    assert found.status == "uncertified"
-    assert f"of {digits}" in found.reason
-    assert "to have it tested give `noise=" in found.reason
-    assert largest_error(found.points, known.points) < size
-    noise = float(found.reason.split("`noise=")[1].split("`")[0])
-    tested = recover(matrix, noise=noise)
-    assert tested.certified, tested.reason
-    assert largest_error(tested.points, known.points) < size
-
-
-def test_digits_do_not_excuse_a_wrong_entry():
-    known = specimen(*random_mesh(400, seed=1))
-    matrix = sp.lil_array(single(known.matrix).astype(float))
-    i, j = known.triangles[3, :2]
-    matrix[i, j] = matrix[j, i] = float(np.float32(matrix[i, j] * 1.001))
-    found = recover(matrix.tocsr())
-    assert found.status == "uncertified"
-    assert "precision" not in found.reason
-    assert {int(i), int(j)} == set(found.worst_entries[0])
 
 
 def test_noise_that_drowns_everything_certifies_nothing():

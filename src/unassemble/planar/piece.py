@@ -78,17 +78,17 @@ def refined(
     *,
     scale: float | None,
     rounding: bool,
-    exact: NDArray[np.bool_] | None = None,
+    noise: NDArray[np.float64] | None = None,
     pins: NDArray[np.int64] | None = None,
 ) -> PieceMesh:
     """Gauss-Newton polish; where it cannot be done the mesh stays as it is, with a note.
 
-    With `rounding`, errors are taken to be those of assembly in floating-point arithmetic, unless the misfit is beyond
-    that and more likely to be noise of one size. Noise leaves the entries `exact`, (e,) bool, as they are: these have
-    vanished.
-    Without it the noise is known, and tested: entries set aside count as any other. `pins` are as for the polish.
+    `noise`, (e,), are standard deviations of the entries' errors, up to a common factor, all equal by default. With
+    `rounding`, errors are taken to be those of assembly in floating-point arithmetic, unless the misfit is beyond that
+    and more likely to be such noise. Without it the noise is known, and tested: entries set aside count as any other.
+    `pins` are as for the polish.
     """
-    noise = None if exact is None or not exact.any() else np.where(exact, EXACT, 1.0)
+    noise = None if noise is None or (noise == 1).all() else noise
     with np.errstate(divide="ignore", invalid="ignore"):
         flat = not np.isfinite(edge_weights(piece, mesh.z)).all()
     if flat:
@@ -121,7 +121,7 @@ def refined_together(
     scale: float | None,
     *,
     rounding: bool,
-    exact: NDArray[np.bool_],
+    noise: NDArray[np.float64],
 ) -> list[PieceMesh]:
     """Polish several pieces with a single c.
 
@@ -138,8 +138,8 @@ def refined_together(
         c, where it is known.
     rounding : bool
         As for :func:`refined`.
-    exact : (e,) bool
-        Entries of the whole graph that have vanished.
+    noise : (e,) float64
+        Of the entries of the whole graph, as for :func:`refined`.
     """
     beside = SideBySide.of(pieces, [mesh.z for mesh in meshes])
     union = joined or beside
@@ -148,7 +148,7 @@ def refined_together(
     start = PieceMesh(union.z, meshes[0].scale, notes, aside=np.concatenate(aside) if aside else None)
     rows = union.piece.edge_rows
     found = refined(
-        union.piece, weights[rows], start, scale=scale, rounding=rounding, exact=exact[rows], pins=union.pins
+        union.piece, weights[rows], start, scale=scale, rounding=rounding, noise=noise[rows], pins=union.pins
     )
     spreads = [None] * len(pieces) if found.spread is None else beside.split(found.spread, beside.edges)
     positions = [found.z[own] for own in joined.local] if joined else beside.split(found.z, beside.vertices)

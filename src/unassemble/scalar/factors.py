@@ -16,9 +16,10 @@ from ..planar.cotangent import left_by_all
 from ..planar.deviations import factor_deviations
 from ..planar.hinged import Hinged
 from ..planar.hinges import CLOSED, groups, join, rings
-from ..planar.piece import EXACT, PieceMesh, refined_together
+from ..planar.piece import PieceMesh, refined_together
 from ..planar.polish import PolishOptions
 from ..topology import Topology
+from .noise import Noise, with_vanished
 
 _EQUAL = 1e-12  # relative difference of factors that rounding leaves: each piece keeps its own
 _UNTOLD = 1e100  # standard deviation of log c where entries do not tell c
@@ -35,8 +36,8 @@ class Factors:
     own : (pieces,) float64
         c of each piece by itself.
     deviation : (pieces,) float64
-        Standard deviation of log c for noise 1 in the entries; those that have vanished are exact. 1e100 where the
-        entries of a piece do not tell c, infinite where it does not matter.
+        Standard deviation of log c, over that of typical errors of the entries; those that have vanished are exact.
+        1e100 where the entries of a piece do not tell c, infinite where it does not matter.
     group : (pieces,) int64
         Label of the pieces that hang together by vertices.
     fitted : (pieces,) int64
@@ -86,7 +87,7 @@ def fitted_together(
     topology: Topology,
     weights: NDArray,
     meshes: list[PieceMesh],
-    noise: float | None,
+    noise: Noise | None,
     scale: float | None,
     *,
     refine: bool,
@@ -100,8 +101,8 @@ def fitted_together(
         -A_ij of each edge.
     meshes : list of PieceMesh
         Each piece by itself.
-    noise : float, optional
-        Standard deviation of the entries' errors; without it their misfit tells how large they are.
+    noise : Noise, optional
+        Without it the misfit of the entries tells how large their errors are.
     scale : float, optional
         c, where it is known.
     refine : bool
@@ -110,15 +111,14 @@ def fitted_together(
     factors = Factors.of(topology, meshes)
     if not (len(topology.hinges) and (noise or factors.differences.max() > _EQUAL)):
         return meshes, factors
-    vanished = np.zeros(len(topology.edges), dtype=bool)
-    vanished[topology.vanished] = True
+    errors = with_vanished(topology) if noise is None else noise.on(topology)
     several = np.flatnonzero(np.bincount(factors.group)[factors.group] > 1)
     if scale is None:
-        factors.deviation[several] = _deviations(topology, meshes, several, vanished)
+        factors.deviation[several] = _deviations(topology, meshes, several, errors)
     meshes = list(meshes)
     for label in np.unique(factors.group[several]):
         inside = np.flatnonzero(factors.group == label)
-        c, sigma = (scale, noise or 0.0) if scale else _common(topology, weights, meshes, factors, inside, noise)
+        c, sigma = _common(topology, weights, meshes, factors, inside, noise, scale)
         if c is None or sum(topology.pieces[p].n_vertices for p in inside) > PolishOptions().direct_limit:
             continue
         if not refine:
@@ -128,7 +128,7 @@ def fitted_together(
         joined = hinged(topology, inside, [mesh.z for mesh in own], _GAP * sigma / abs(c))
         if joined is None and scale is not None:
             continue
-        together = refined_together(pieces, weights, own, joined, scale, rounding=noise is None, exact=vanished)
+        together = refined_together(pieces, weights, own, joined, scale, rounding=noise is None, noise=errors)
         factors.closings[inside[0]] = joined.closings if joined else 0
         factors.fitted[inside] = inside[0]
         for p, mesh in zip(inside, together, strict=True):
@@ -147,12 +147,12 @@ def hinged(
 
 
 def _deviations(
-    topology: Topology, meshes: Sequence[PieceMesh], some: NDArray[np.int64], vanished: NDArray[np.bool_]
+    topology: Topology, meshes: Sequence[PieceMesh], some: NDArray[np.int64], errors: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Of some pieces: standard deviations of log c for noise 1 in the entries; those that have vanished are exact."""
+    """Of some pieces: standard deviations of log c for `errors` (e,) of the entries."""
     pieces = [topology.pieces[p] for p in some]
-    errors = [np.where(vanished[piece.edge_rows], EXACT, 1.0) for piece in pieces]
-    deviation = factor_deviations(pieces, [meshes[p].z for p in some], errors)
+    spreads = [errors[piece.edge_rows] for piece in pieces]
+    deviation = factor_deviations(pieces, [meshes[p].z for p in some], spreads)
     return np.minimum(deviation / np.abs([meshes[p].scale for p in some]), _UNTOLD)
 
 
@@ -162,18 +162,21 @@ def _common(
     meshes: Sequence[PieceMesh],
     factors: Factors,
     inside: NDArray[np.int64],
-    noise: float | None,
+    noise: Noise | None,
+    scale: float | None,
 ) -> tuple[float | None, float]:
     """The mean of the factors of some pieces, or None where errors do not explain that they differ; and their size."""
+    if scale is not None:
+        return scale, noise.sigma if noise else 0.0
     c, deviation = factors.own[inside], factors.deviation[inside]
     if not np.isfinite(c).all() or (c * c[0] <= 0).any():
         return None, 0.0
     ratio = np.log(c / c[0])
     mean = float(np.average(ratio, weights=deviation**-2))
     misfit, freedom = (ratio - mean) / deviation, len(inside) - 1
-    sigma = noise or 0.0
+    sigma = noise.sigma if noise else 0.0
     if noise:
-        explained = _explained(misfit / noise, freedom)
+        explained = _explained(misfit / noise.sigma, freedom)
     else:
         apart = float(misfit @ misfit)
         left, spare = _left(topology, weights, meshes, inside)
@@ -201,7 +204,7 @@ def _explained(misfit: NDArray, freedom: int) -> bool:
     return min(float(gammaincc(freedom / 2, misfit @ misfit / 2)), largest) >= CONFIDENCE
 
 
-def discord(topology: Topology, factors: Factors, backward_error: float, noise: float | None = None) -> str | None:
+def discord(topology: Topology, factors: Factors, backward_error: float, noise: Noise | None = None) -> str | None:
     """What is wrong where pieces share vertices but not c, errors of the entries being allowed for.
 
     Parameters
@@ -210,15 +213,15 @@ def discord(topology: Topology, factors: Factors, backward_error: float, noise: 
     factors : Factors
     backward_error : float
         Of the entries.
-    noise : float, optional
-        Standard deviation of their errors.
+    noise : Noise, optional
+        Their errors.
     """
     difference, together = factors.differences, factors.together
     # A null vector that is not polished may be off by more than the entries; noise has been asked how much it explains.
     allowed = max(SAME_SCALE, 0.0 if noise else SCALE_ERROR * backward_error)
     apart = np.where(together, 0.0, difference)
     if apart.max() > allowed:
-        more = f", more than noise of standard deviation {noise:.3g} explains" if noise else ""
+        more = f", more than {noise} explains" if noise else ""
         return f"pieces that share vertices have different factors c: {_named(topology, factors, apart)}{more}"
     if not noise or not difference.max() > SAME_SCALE:
         return None
@@ -226,12 +229,12 @@ def discord(topology: Topology, factors: Factors, backward_error: float, noise: 
     # may be something else has to agree itself: neither pieces that are beyond doubt nor other groups vouch for it.
     others = together & (np.arange(len(difference)) != factors.first)
     unproved = others & _to_be_confirmed(topology, factors.group)
-    agree = np.where(unproved, np.log(np.minimum(noise * factors.deviation, 1.0)), 0.0)
+    agree = np.where(unproved, np.log(np.minimum(noise.sigma * factors.deviation, 1.0)), 0.0)
     chance = np.bincount(factors.first, agree, len(agree))
-    chance += factors.closings * np.log(min(_GAP * noise / float(np.abs(factors.own).max()), 1.0))
+    chance += factors.closings * np.log(min(_GAP * noise.sigma / float(np.abs(factors.own).max()), 1.0))
     if (chance[factors.first[unproved]] > np.log(_CHANCE)).any():
         return (
-            f"noise of standard deviation {noise:.3g} explains that pieces which share vertices have different "
+            f"{noise} explains that pieces which share vertices have different "
             f"factors c by themselves ({_named(topology, factors, difference)}), but they agree too roughly, or are "
             "too few, for a certificate"
         )
