@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc, gammaincc, ndtr
 
 from ..cells.agreement import SAME_SCALE, SCALE_ERROR
+from ..cells.within_errors import GAP
 from ..certify import CONFIDENCE, LARGEST_NOISE
 from ..planar.cotangent import left_by_all
 from ..planar.deviations import factor_deviations
@@ -23,7 +24,6 @@ from .noise import Noise, with_vanished
 
 _EQUAL = 1e-12  # relative difference of factors that rounding leaves: each piece keeps its own
 _UNTOLD = 1e100  # standard deviation of log c where entries do not tell c
-_GAP = 30.0  # that noise may leave in rings of pieces, in units of their size and of noise over c
 _CHANCE = 1e-6  # that factors which agree to within their errors do so by coincidence
 
 
@@ -125,7 +125,7 @@ def fitted_together(
             factors.fitted[inside] = inside[0]
             continue
         pieces, own = [topology.pieces[p] for p in inside], [replace(meshes[p], scale=c) for p in inside]
-        joined = hinged(topology, inside, [mesh.z for mesh in own], _GAP * sigma / abs(c))
+        joined = hinged(topology, inside, [mesh.z for mesh in own], GAP * sigma / abs(c))
         if joined is None and scale is not None:
             continue
         together = refined_together(pieces, weights, own, joined, scale, rounding=noise is None, noise=errors)
@@ -231,7 +231,7 @@ def discord(topology: Topology, factors: Factors, backward_error: float, noise: 
     unproved = others & _to_be_confirmed(topology, factors.group)
     agree = np.where(unproved, np.log(np.minimum(noise.sigma * factors.deviation, 1.0)), 0.0)
     chance = np.bincount(factors.first, agree, len(agree))
-    chance += factors.closings * np.log(min(_GAP * noise.sigma / float(np.abs(factors.own).max()), 1.0))
+    chance += factors.closings * np.log(min(GAP * noise.sigma / float(np.abs(factors.own).max()), 1.0))
     if (chance[factors.first[unproved]] > np.log(_CHANCE)).any():
         return (
             f"{noise} explains that pieces which share vertices have different "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +61,9 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
         if planar and triangles_everywhere(stored.n, numbering.edges):
             analyse = AnalysisAhead(pencil_pattern(stored.n, numbering.edges), options.threads)
         topology = surfaces(stored.n, stored.edges, numbering)
+    noise = Noise.known(stored, options.noise)
+    if noise is not None:
+        stored = replace(stored, errors=noise.sigma * noise.spread)
     matrix, topology, meshes, factors, noise = solve(
         topology,
         stored,
@@ -68,7 +71,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
         method=options.method,
         scale=known,
         refine=options.refine,
-        noise=Noise.known(stored, options.noise),
+        noise=noise,
         analyse=analyse or factorisation,
     )
     with clock("place"):
@@ -109,7 +112,8 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
             told = noise and (options.noise or decides(certificate, test))  # else entries that are exact
             sigma = noise.sigma if noise and told else evidence.noise or 0.0
             agree = max(AGREE, _SIGMAS * sigma / float(np.abs(scales).min()))
-            others, doubt_of_cells = _alternatives(topology, stored, placement, mesh, stretch, agree, known)
+            given = stored if told else replace(stored, errors=None)
+            others, doubt_of_cells = _alternatives(topology, given, placement, mesh, stretch, agree, known)
         if doubt_of_cells and not others:
             status, reason = doubt_of_cells(certificate)
     if others:

@@ -88,7 +88,8 @@ def _other_reading(
     them; else, or where no start fits, by the search. Once also what differs little from what is found.
     """
     for number, part in enumerate(orders):
-        graph = len(part.vertices), part.edges, -stored.entries[part.edge_rows], scale
+        errors = None if stored.errors is None else stored.errors[part.edge_rows]
+        graph = len(part.vertices), part.edges, -stored.entries[part.edge_rows], scale, errors
         found = list(fitting_starts(*graph)) if supposed else []
         if not found and (reading := read_cells(*graph)) is not None and reading.fits:
             found = [reading]
@@ -114,12 +115,18 @@ def own_cells(n: int, parts: list[Numbering], mesh: OrientedMesh) -> list[set[tu
 
 
 def with_another_scale(
-    part: Numbering, weights: NDArray, c: float, others: list[float], *, searched: bool = True
+    part: Numbering,
+    weights: NDArray,
+    errors: NDArray | None,
+    c: float,
+    others: list[float],
+    *,
+    searched: bool = True,
 ) -> Reading | None:
     """A reading that fits with the first of some factors that allows one, c left out; by a cover or a search."""
     for other in others:
         if abs(other / c - 1) > SAME_SCALE:
-            graph = len(part.vertices), part.edges, weights, other
+            graph = len(part.vertices), part.edges, weights, other, errors
             reading = read_cells(*graph) if searched else read_by_cover(*graph)
             if reading is not None and reading.fits:
                 return reading

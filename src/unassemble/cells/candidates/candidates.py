@@ -75,10 +75,11 @@ class Candidates(CellSet):
         scale: float | None = None,
         crosses: Crosses | None = None,
         guess: float | None = None,
+        errors: NDArray | None = None,
     ) -> Candidates:
         """All candidates of one drawing of the graph; the corners about some crosses are right angles.
 
-        `guess` is a c to judge angles by, where it is not known.
+        `guess` is a c to judge angles by, where it is not known; `errors` are as in the class.
         """
         blocks = drawing.split()
         relative = weights / (scale or (crosses and crosses.scale) or guess or likeliest_scale(blocks, weights))
@@ -110,6 +111,7 @@ class Candidates(CellSet):
             drawing=drawing,
             weights=weights,
             scale=scale,
+            errors=errors,
             relative=relative,
             cells=Polygons(
                 np.append(0, np.cumsum(size)),
