@@ -148,7 +148,10 @@ class Reading(Generic[C]):
 
     @property
     def like_noise(self) -> bool:
-        """Whether the misfit is that of errors in the entries, see :func:`even`."""
+        """Whether the misfit is that of errors in the entries, see :func:`even`.
+
+        If they are known and do not explain it, they are larger than is said, or it is that of wrong cells.
+        """
         return bool(len(self.pieces)) and self.size < 1e-3 and even(self.misfit)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtrc
 
 from ..errors import SolverError
 from ..matrix.operator import row_sizes
@@ -19,15 +20,16 @@ SIGMAS = 6.0
 GAP = 30.0
 """What errors may leave open in rings of pieces, in units of their size and of the errors over c."""
 
-_FAR = 1e3  # standard deviations of misfits that conformal maps with the right cells leave at most
+_FAR = 1e5  # standard deviations of misfits that conformal maps with the right cells leave, where these are slender
 _DROWNED = 0.1  # misfit, relative to the row, of which nothing is to be learnt
+_CHANCE = 1e-6  # of a misfit with the right cells: of many readings one may be improbable
 _SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 
 Solved = list[tuple[Piece, PieceMesh]]
 
 
 def polished(solved: Solved, weights: NDArray, errors: NDArray, misfit: NDArray) -> Solved | None:
-    """Pieces as the entries ask for in the mean; None where the misfit is far beyond their errors.
+    """Pieces as the entries ask for in the mean; None where their misfit is more than errors explain.
 
     Parameters
     ----------
@@ -54,7 +56,17 @@ def polished(solved: Solved, weights: NDArray, errors: NDArray, misfit: NDArray)
         if not (np.isfinite(better.z).all() and np.isfinite(better.scale)):
             return None
         found.append((piece, PieceMesh(better.z, better.scale)))
-    return found
+    return found if _likely(found, weights, spread) else None
+
+
+def _likely(solved: Solved, weights: NDArray, errors: NDArray) -> bool:
+    """Whether the sum of squares of the misfit is not improbably large; c is fitted in each piece."""
+    pieces, meshes = zip(*solved, strict=True)
+    left = left_by_all(pieces, weights, [mesh.z for mesh in meshes], np.array([mesh.scale for mesh in meshes]))
+    freedom = max(sum(piece.redundancy for piece in pieces), 1)
+    with np.errstate(all="ignore"):  # flat triangles
+        squares = float(np.sum((left / errors[np.concatenate([piece.edge_rows for piece in pieces])]) ** 2))
+    return bool(chdtrc(freedom, squares) >= _CHANCE)
 
 
 def beyond(n: int, edges: NDArray, solved: Solved, weights: NDArray, errors: NDArray) -> NDArray[np.float64]:

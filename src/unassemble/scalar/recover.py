@@ -189,7 +189,7 @@ def _alternatives(
     left_open = False
     if not others:
         others, left_open = alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
-    if known is None and coincident(stored, topology).any():
+    if known is None and coincident(stored, topology, agree).any():
         return others, all_alike
     return others, unproved if left_open else None
 
