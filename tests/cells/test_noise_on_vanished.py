@@ -133,7 +133,7 @@ def test_readings_are_held_against_the_noise(family, seed, sigma):
 
 
 @pytest.mark.parametrize("sigma", [1e-6, 1e-4])
-@pytest.mark.parametrize(("family", "seed"), [("crossed", 5), ("crossed", 10), ("kites", 2), ("kites", 3)])
+@pytest.mark.parametrize(("family", "seed"), [("crossed", 5), ("crossed", 10), ("kites", 2)])
 def test_readings_that_the_noise_does_not_tell_apart_are_named(family, seed, sigma):
     known = forgotten(specimen(*FAMILIES[family](np.random.default_rng(seed)), c=C, seed=seed))
     assert recover(known.matrix).alternatives

@@ -122,8 +122,8 @@ def refined_together(
     *,
     rounding: bool,
     noise: NDArray[np.float64],
-) -> list[PieceMesh]:
-    """Polish several pieces with a single c.
+) -> list[PieceMesh] | None:
+    """Polish several pieces with a single c; None if that does not converge.
 
     Parameters
     ----------
@@ -150,6 +150,8 @@ def refined_together(
     found = refined(
         union.piece, weights[rows], start, scale=scale, rounding=rounding, noise=noise[rows], pins=union.pins
     )
+    if found.notes != notes:
+        return None
     spreads = [None] * len(pieces) if found.spread is None else beside.split(found.spread, beside.edges)
     positions = [found.z[own] for own in joined.local] if joined else beside.split(found.z, beside.vertices)
     return [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,6 +24,7 @@ from .noise import Noise, with_vanished
 
 _EQUAL = 1e-12  # relative difference of factors that rounding leaves: each piece keeps its own
 _UNTOLD = 1e100  # standard deviation of log c where entries do not tell c
+_NOT_TOGETHER = "the polish of all pieces that share vertices did not converge, and each was fitted by itself"
 _CHANCE = 1e-6  # that factors which agree to within their errors do so by coincidence
 
 
@@ -44,6 +45,8 @@ class Factors:
         Label of the pieces that have one c, as far as errors explain that their own differ.
     closings : (pieces,) int64
         Equations by which rings of pieces, fitted together, hold these; at the first piece of each group.
+    apart : dict of int to str
+        Why groups, by the first piece of each, were not fitted together though errors explain that factors differ.
     """
 
     own: NDArray[np.float64]
@@ -51,6 +54,7 @@ class Factors:
     group: NDArray[np.int64]
     fitted: NDArray[np.int64]
     closings: NDArray[np.int64]
+    apart: dict[int, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, topology: Topology, meshes: Sequence[PieceMesh]) -> Factors:
@@ -119,7 +123,10 @@ def fitted_together(
     for label in np.unique(factors.group[several]):
         inside = np.flatnonzero(factors.group == label)
         c, sigma = _common(topology, weights, meshes, factors, inside, noise, scale)
-        if c is None or sum(topology.pieces[p].n_vertices for p in inside) > PolishOptions().direct_limit:
+        if c is None:
+            continue
+        if sum(topology.pieces[p].n_vertices for p in inside) > PolishOptions().direct_limit:
+            factors.apart[inside[0]] = "they have too many vertices to be fitted together"
             continue
         if not refine:
             factors.fitted[inside] = inside[0]
@@ -129,6 +136,11 @@ def fitted_together(
         if joined is None and scale is not None:
             continue
         together = refined_together(pieces, weights, own, joined, scale, rounding=noise is None, noise=errors)
+        if together is None:  # each by itself is a better guess than all on their way somewhere
+            factors.apart[inside[0]] = _NOT_TOGETHER
+            for p in inside:
+                meshes[p] = replace(meshes[p], notes=(*meshes[p].notes, _NOT_TOGETHER))
+            continue
         factors.closings[inside[0]] = joined.closings if joined else 0
         factors.fitted[inside] = inside[0]
         for p, mesh in zip(inside, together, strict=True):
@@ -222,6 +234,8 @@ def discord(topology: Topology, factors: Factors, backward_error: float, noise: 
     apart = np.where(together, 0.0, difference)
     if apart.max() > allowed:
         more = f", more than {noise} explains" if noise else ""
+        why = factors.apart.get(int(factors.first[apart.argmax()]))
+        more = f"; errors of the entries explain that, but {why}" if why else more
         return f"pieces that share vertices have different factors c: {_named(topology, factors, apart)}{more}"
     if not noise or not difference.max() > SAME_SCALE:
         return None
@@ -232,7 +246,11 @@ def discord(topology: Topology, factors: Factors, backward_error: float, noise: 
     agree = np.where(unproved, np.log(np.minimum(noise.sigma * factors.deviation, 1.0)), 0.0)
     chance = np.bincount(factors.first, agree, len(agree))
     chance += factors.closings * np.log(min(GAP * noise.sigma / float(np.abs(factors.own).max()), 1.0))
-    if (chance[factors.first[unproved]] > np.log(_CHANCE)).any():
+    # No loose piece vouches for another one: what may be read otherwise agrees by itself, or closes rings.
+    alone, in_ring = _readable_otherwise(topology), _shared(topology) > 1
+    own = agree + np.where(in_ring, (chance - np.bincount(factors.first, agree, len(agree)))[factors.first], 0.0)
+    rough = (unproved & alone & (own > np.log(_CHANCE))).any()
+    if rough or (chance[factors.first[unproved]] > np.log(_CHANCE)).any():
         return (
             f"{noise} explains that pieces which share vertices have different "
             f"factors c by themselves ({_named(topology, factors, difference)}), but they agree too roughly, or are "
@@ -256,16 +274,23 @@ def _to_be_confirmed(topology: Topology, group: NDArray[np.int64]) -> NDArray[np
     A piece with entries to spare tells c. One that hangs by a single vertex on pieces of which one does so can only be
     read in itself, and no other way if nothing has vanished and no triangle may be a hole.
     """
+    spare = np.array([piece.redundancy > 0 for piece in topology.pieces])
+    told = np.bincount(group, spare) > 0
+    return np.asarray(~told[group] | (_readable_otherwise(topology) | (_shared(topology) > 1)) & ~spare)
+
+
+def _readable_otherwise(topology: Topology) -> NDArray[np.bool_]:
+    """(pieces,) those without an entry to spare in which entries have vanished, or a triangle may be a hole."""
     rows = np.zeros(len(topology.edges), dtype=bool)
     rows[topology.vanished] = True
-    spare = np.array([piece.redundancy > 0 for piece in topology.pieces])
-    loose = np.array(
+    return np.array(
         [
-            rows[piece.edge_rows].any()
-            or bool(piece.enclosed.any())
-            or np.count_nonzero(topology.multiplicity[piece.vertices] > 1) > 1
+            piece.redundancy <= 0 and bool(rows[piece.edge_rows].any() or piece.enclosed.any())
             for piece in topology.pieces
         ]
     )
-    told = np.bincount(group, spare) > 0
-    return np.asarray(~told[group] | (loose & ~spare))
+
+
+def _shared(topology: Topology) -> NDArray[np.int64]:
+    """(pieces,) how many vertices each has in common with others."""
+    return np.array([np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces])
