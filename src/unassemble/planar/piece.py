@@ -179,7 +179,12 @@ def _polished(
 
     Rounding in the normal equations of long thin pieces is one reason to fail.
     """
-    found = polish(piece, weights, start, scale=scale, spread=spread, pins=pins)
+    try:
+        found = polish(piece, weights, start, scale=scale, spread=spread, pins=pins)
+    except SolverError:  # steps that led to flat triangles; small ones do not
+        if piece.n_vertices > _CAUTIOUS_LIMIT:
+            raise
+        return cautious_polish(piece, weights, start, scale=scale, spread=spread, pins=pins)
     finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
     flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
     if found.converged and not flipped:
