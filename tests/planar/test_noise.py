@@ -5,7 +5,7 @@ import pytest
 import scipy.sparse as sp
 
 from meshes import delaunay, diameter, largest_error, random_mesh, specimen
-from unassemble import recover
+from unassemble import SolverError, recover
 from unassemble.matrix import check_matrix
 from unassemble.planar.cautious import cautious_polish, count_flipped
 from unassemble.planar.conformal import conformal_map
@@ -159,6 +159,29 @@ def test_polish_that_does_not_get_there_says_so():
     else:
         assert "turned over" in found.reason or "more than noise" in found.reason
         assert "polish" in found.reason
+
+
+def test_start_without_digits_is_said_to_be_too_far_off():
+    """The null vector shrinks along the channel, here by more digits than numbers have."""
+    known, sigma = channel(200, 5), 2e-2
+    reasons = []
+    for seed in (2, 4):
+        found = recover(noisy(known.matrix, sigma, seed), noise=sigma)
+        passes = found.chi_square["p_value"] > 1e-3 and not found.warnings
+        assert found.certified == passes, found.reason
+        reasons.append(found.reason)
+    missed = [reason for reason in reasons if "explains the misfit" not in reason]
+    assert all("polish" in reason for reason in missed)
+
+
+def test_large_steps_that_fail_are_replaced_by_small_ones(monkeypatch):
+    def flat(*_, **__):
+        raise SolverError("flat triangles")
+
+    known, sigma = specimen(*random_mesh(170, seed=3)), 1e-3
+    monkeypatch.setattr("unassemble.planar.piece.polish", flat)
+    found = recover(noisy(known.matrix, sigma), noise=sigma)
+    assert found.certified, found.reason
 
 
 def test_triangles_turned_over_are_counted():

@@ -26,6 +26,8 @@ EXACT = 1e-3
 """Standard deviation of entries without noise, relative to that of the others: next to none, and safe to divide by."""
 _FAR = 0.05
 """Root mean square misfit, over c, that no rounding in the solution of a linear problem leaves."""
+_LOST = 1e-14
+"""Edges of that length, relative to the extent, have hardly a digit left."""
 _CAUTIOUS_LIMIT = 200_000
 """Most vertices for which a polish that fails is tried again with a factorisation in every step."""
 
@@ -104,7 +106,9 @@ def refined(
             spread = noise
             found = _polished(piece, weights, found.z, scale, spread, pins)
     except SolverError as error:
-        return replace(mesh, notes=(*mesh.notes, f"no polish: {error}"))
+        shortest = _shortest(piece, mesh.z)
+        too_far = f"the start is too far off, with edges of {shortest:.0e} of its size"
+        return replace(mesh, notes=(*mesh.notes, f"no polish: {too_far if shortest < _LOST else error}"))
     if not (np.isfinite(found.z).all() and np.isfinite(found.scale)):
         return replace(mesh, notes=(*mesh.notes, "the polish did not stay finite and was left out"))
     if found.converged:
@@ -197,6 +201,11 @@ def _polished(
     nearest = found.z if flipped <= count_flipped(piece, start) else start
     again = cautious_polish(piece, weights, nearest, scale=scale, spread=spread, pins=pins)
     return again if again.residual < found.residual or not finite else found
+
+
+def _shortest(piece: Piece, z: NDArray) -> float:
+    """Length of the shortest edge, relative to the extent."""
+    return float(np.abs(z[piece.edges[:, 0]] - z[piece.edges[:, 1]]).min() / np.abs(z - z.mean()).max())
 
 
 def _near(piece: Piece, weights: NDArray, found: PolishedMesh) -> bool:
