@@ -39,13 +39,16 @@ class Digits:
     def of(cls, values: NDArray[np.float64]) -> Digits | None:
         """The precision of some numbers (k,); None where they have not been rounded, or not so that it shows."""
         size = np.abs(values)
-        size = np.unique(size[size > _LEFTOVER * size.max(initial=0.0)])
+        size = size[size > _LEFTOVER * size.max(initial=0.0)]
+        sample = size[:: max(1, len(size) // _SAMPLE)]
+        if not (_are_binary(sample, _SINGLE[0]).all() or _have(sample, _DIGITS[-1]).all()):  # as in most matrices
+            return None
+        size = np.unique(size)
         told = size[~_are_binary(size, _SHORT)]
         if len(told) < _LEAST:
             return None
         if _are_binary(size, _SINGLE[0]).all() and _need_more(_are_binary(told, _SINGLE[1])):
             return cls("single precision", _last_bit(np.abs(values), _SINGLE[0]))
-        sample = size[:: max(1, len(size) // _SAMPLE)]
         digits = next((d for d in _DIGITS if _have(sample, d).all() and _have(size, d).all()), None)
         return None if digits is None else cls._decimal(np.abs(values), size, told, digits)
 
