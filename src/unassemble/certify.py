@@ -51,15 +51,15 @@ class Certificate:
     flipped: NDArray[np.int64]
 
     def worst(
-        self, count: int = 10, *, noise: float | None = None, first: NDArray | None = None
+        self, count: int = 10, *, noise: NDArray | None = None, first: NDArray | None = None
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """The entries that fit worst, worst first, and their misfits.
 
-        Those above the bound, by misfit relative to the row; or, for noise of that standard deviation, those off by
-        more than three of them, by difference. Pairs `first`, (k, 2) with i < j, come before all others.
+        Those above the bound, by misfit relative to the row; or, for noise of standard deviations (k,), those off by
+        more than three of them, by that. Pairs `first`, (k, 2) with i < j, come before all others.
         """
-        size = self.misfits if noise is None else np.abs(self.differences)
-        above = np.flatnonzero(size > (CERTIFIED if noise is None else 3 * noise))
+        size = self.misfits if noise is None else np.abs(self.differences) / noise
+        above = np.flatnonzero(size > (CERTIFIED if noise is None else 3))
         order = above[np.argsort(-size[above], kind="stable")][:count]
         if first is not None and len(first):
             n = int(self.pairs.max()) + 1
@@ -147,20 +147,24 @@ def _assemble(
     return np.repeat(np.arange(n), np.diff(summed.indptr)) * n + summed.indices, summed.data
 
 
-def chi_square_verdict(differences: NDArray, sigma: float, freedom: int) -> dict[str, float]:
-    """Tests of the misfit against independent Gaussian noise of standard deviation sigma in every entry.
+def chi_square_verdict(misfit: NDArray, freedom: int, sigma: float, *, repeats: float = 1.0) -> dict[str, float]:
+    """Tests of a misfit against independent Gaussian noise.
 
     The sum of squares has a chi-square distribution; but on a large mesh it does not notice a single wrong entry. So
     the largest misfit is tested as well. No misfit varies more than the noise itself, so that the normal tail, times
-    the number of entries, bounds its p-value.
+    the number of entries, bounds its p-value. Errors of rounding are spread evenly: there both p-values are too large.
 
     Parameters
     ----------
-    differences : (k,) float64
-        Re-assembled minus given entries.
-    sigma : float
+    misfit : (k,) float64
+        Re-assembled minus given entries, each over the standard deviation of its noise.
     freedom : int
         Entries less fitted unknowns.
+    sigma : float
+        The standard deviation of typical entries.
+    repeats : float
+        How many entries share an error: of the sum of squares, and of the degrees of freedom, only one part in so many
+        counts.
 
     Returns
     -------
@@ -169,14 +173,14 @@ def chi_square_verdict(differences: NDArray, sigma: float, freedom: int) -> dict
         ``largest_p_value``.
     """
     with np.errstate(over="ignore"):
-        statistic = float(np.sum((differences / sigma) ** 2))
-        largest = float(np.abs(differences).max(initial=0.0) / sigma)
+        statistic = float(np.sum(misfit**2)) / repeats
+        largest = float(np.abs(misfit).max(initial=0.0))
     finite = freedom > 0 and np.isfinite(statistic)
     return {
         "statistic": statistic,
-        "degrees_of_freedom": float(freedom),
-        "p_value": float(chdtrc(freedom, statistic)) if finite else 0.0,
+        "degrees_of_freedom": freedom / repeats,
+        "p_value": float(chdtrc(freedom / repeats, statistic)) if finite else 0.0,
         "sigma": sigma,
         "largest": largest,
-        "largest_p_value": min(1.0, float(2 * len(differences) * ndtr(-largest))) if finite else 0.0,
+        "largest_p_value": min(1.0, float(2 * len(misfit) * ndtr(-largest))) if finite else 0.0,
     }

@@ -78,7 +78,7 @@ def recover(
     handed : {"left", "right"}, optional
         Side of that line, or of the line between two anchors, on which the piece's centroid lies.
     standard_deviations : bool
-        Compute error bars: for `noise`, or for the noise that the misfit shows.
+        Compute error bars: for `noise`, the rounding that entries show, or the noise that the misfit shows.
     triangulate : bool
         Divide cells of more than three vertices into triangles; the vertices lie on a circle, so that every division
         is a Delaunay triangulation and the matrix does not prefer one.

@@ -74,8 +74,8 @@ class Recovery:
     standard_deviations : (n, 2) float64 or None
         One standard deviation of each coordinate, on request.
     chi_square : mapping or None
-        With noise: ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``, ``largest``, ``largest_p_value``; see
-        :func:`unassemble.certify.chi_square_verdict`.
+        With noise, or entries that were rounded: ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``,
+        ``largest``, ``largest_p_value``; see :func:`unassemble.certify.chi_square_verdict`.
     quads, tetrahedra, hexahedra : (m, 4), (m, 4), (m, 8) int64
         Further cells, in meshio's order and positively oriented; empty where there are none. Of quadratic cells these
         are the corners.

@@ -10,6 +10,7 @@ from meshes import largest_error, random_mesh, specimen, triangle_set
 from unassemble import recover
 from unassemble.planar.cotangent import edge_weights
 from unassemble.planar.deviations import factor_deviations
+from unassemble.planar.polish import PolishOptions
 from unassemble.topology import recognise
 
 C = 1.7
@@ -158,11 +159,11 @@ def test_two_triangles_agree_too_roughly():
     assert not found.certified
 
 
-def with_rings(count, seed, hole=True):
+def with_rings(count, seed, hole=True, filled=False):
     """A random mesh, and rings of three triangles about a hole that hang on it, or single triangles, by a vertex."""
     points, triangles = random_mesh(16, seed, holes=False)
     ring = np.array([[0, 0], [1, 0], [0.5, 0.8], [0.5, -0.8], [1.4, 0.7], [-0.4, 0.7]])
-    cells = np.array([(0, 3, 1), (1, 4, 2), (2, 5, 0)])
+    cells = np.array([(0, 3, 1), (1, 4, 2), (2, 5, 0), (0, 1, 2)][: 4 if filled else 3])
     if not hole:
         ring, cells = ring[:3], np.array([(0, 1, 2)])
     rng = np.random.default_rng(seed)
@@ -186,6 +187,35 @@ def test_single_triangles_on_a_mesh_that_tells_the_factor():
     known = specimen(*with_rings(2, 0, hole=False), c=C, seed=3)
     found = recover(noisy(known.matrix, 1e-4 * C, 1), noise=1e-4 * C)
     assert found.certified, found.reason
+
+
+@pytest.mark.parametrize(("sigma", "enough"), [(1e-9, True), (1e-5, False)])
+def test_loose_pieces_do_not_vouch_for_each_other(sigma, enough):
+    """Of each of five the triangle in the middle may be a hole, and that it is none has to be told by itself."""
+    known = specimen(*with_rings(5, 0, filled=True), c=C, seed=3)
+    found = recover(noisy(known.matrix, sigma * C, 1), noise=sigma * C)
+    assert triangle_set(found.triangles) == triangle_set(known.triangles)
+    assert found.certified == enough
+    assert enough or "they agree too roughly" in found.reason
+
+
+def test_common_fit_that_does_not_converge_is_left_out(monkeypatch):
+    known, sigma = specimen(*chain(8, 1), c=C, seed=3), 1e-6 * C
+    monkeypatch.setattr("unassemble.scalar.factors.refined_together", lambda *_, **__: None)
+    found = recover(noisy(known.matrix, sigma, 1), noise=sigma)
+    assert found.status == "uncertified"
+    assert "did not converge, and each was fitted by itself" in found.reason
+    assert "more than noise" not in found.reason
+    assert any("each was fitted by itself" in warning for warning in found.warnings)
+    assert max(largest_error(found.points[rows], known.points[rows]) for rows in known.triangles) < 20 * sigma
+
+
+def test_pieces_too_large_to_be_fitted_together_are_said_to_be(monkeypatch):
+    known, sigma = specimen(*chain(8, 1), c=C, seed=3), 1e-6 * C
+    monkeypatch.setattr("unassemble.scalar.factors.PolishOptions", lambda: PolishOptions(direct_limit=10))
+    found = recover(noisy(known.matrix, sigma, 1), noise=sigma)
+    assert found.status == "uncertified"
+    assert "errors of the entries explain that, but they have too many vertices to be fitted together" in found.reason
 
 
 def test_deviation_of_a_factor():

@@ -128,7 +128,8 @@ def _read_again(
     inside = without_boundary(len(numbering.vertices), numbering.edges, weights, incomplete, scale)
     if inside is not None:
         return _part(matrix, numbering, inside)
-    reading = read_cells(len(numbering.vertices), numbering.edges, weights, scale)
+    errors = None if matrix.errors is None else matrix.errors[numbering.edge_rows]
+    reading = read_cells(len(numbering.vertices), numbering.edges, weights, scale, errors)
     if reading is not None and (reading.fits or reading.has_wrong_entries):
         return _part(matrix, numbering, reading)
     before = _misfit_of_own(misfit_of_triangles(), numbering, own, attempt, scale)
@@ -199,4 +200,7 @@ def _merged(
         vanished=np.delete(np.arange(len(keys)), old),
         polygons=Polygons.joined([part.polygons for part in parts]),
     )
-    return replace(matrix, edges=edges, entries=entries), whole, [mesh for _, mesh in solved]
+    errors = None if matrix.errors is None else np.zeros(len(keys))
+    if errors is not None and matrix.errors is not None:
+        errors[old] = matrix.errors
+    return replace(matrix, edges=edges, entries=entries, errors=errors), whole, [mesh for _, mesh in solved]

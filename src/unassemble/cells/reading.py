@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..matrix.operator import row_sizes
 from ..planar.cotangent import weights_of_all
-from ..planar.hinges import gap
+from ..planar.hinges import CLOSED, gap
 from ..planar.piece import PieceMesh
 from ..planar.triangles import lone_triangles
 from ..topology import Piece, Topology
@@ -19,6 +19,7 @@ from ..topology.keys import contains, pair_keys, with_sides
 from ..topology.pieces import planar_pieces
 from .candidates.cell_set import CellSet
 from .maps import best_map
+from .within_errors import GAP, beyond, factor_tolerances, polished
 
 FITS = 1e-6
 """Largest misfit, relative to the row, of a conformal solve with the right cells; the polish does the rest."""
@@ -50,7 +51,8 @@ class Reading(Generic[C]):
     meshes : tuple of PieceMesh or None
         None where a piece has no positions.
     misfit : (e',) float64
-        |c w - a| relative to the smaller of both rows' largest entries, at most 1; 1 on edges of no piece.
+        |c w - a| relative to the smaller of both rows' largest entries, at most 1; 1 on edges of no piece. Where errors
+        of the weights are known, and it is not far beyond them, less what they explain.
     """
 
     candidates: C
@@ -94,9 +96,27 @@ class Reading(Generic[C]):
         candidates, n, edges = self.candidates, self.candidates.n_vertices, self.edges
         solved = [(piece, mesh) for piece, mesh in zip(self.pieces, meshes, strict=True) if mesh]
         misfit = misfits(n, edges, self.weights, solved)
-        _add_discord(n, edges, solved, misfit, candidates.scale)
+        errors = self._errors
+        better = None if errors is None else polished(solved, self.weights, errors, misfit)
+        if better is None or errors is None:
+            errors = None
+        else:
+            solved, meshes = better, tuple(mesh for _, mesh in better)
+            misfit = beyond(n, edges, solved, self.weights, errors)
+        _add_discord(n, edges, solved, misfit, candidates.scale, errors)
         misfit[np.isin(edges, _crowded(candidates, self.labels)).any(axis=1)] = 1.0
         return replace(self, meshes=meshes, misfit=misfit)
+
+    @cached_property
+    def _errors(self) -> NDArray[np.float64] | None:
+        """(e',) standard deviations, 0 for what has vanished; None where they are not known, or nothing is solved."""
+        given, n = self.candidates.errors, self.candidates.n_vertices
+        if given is None or not self.pieces or not given.any():
+            return None
+        errors = np.zeros(len(self.edges))
+        keys = pair_keys(n, *self.edges.T)
+        errors[np.searchsorted(keys, pair_keys(n, *self.candidates.edges.T))] = given
+        return errors
 
     @property
     def fits(self) -> bool:
@@ -128,7 +148,10 @@ class Reading(Generic[C]):
 
     @property
     def like_noise(self) -> bool:
-        """Whether the misfit is that of errors in the entries, see :func:`even`."""
+        """Whether the misfit is that of errors in the entries, see :func:`even`.
+
+        If they are known and do not explain it, they are larger than is said, or it is that of wrong cells.
+        """
         return bool(len(self.pieces)) and self.size < 1e-3 and even(self.misfit)
 
 
@@ -157,27 +180,41 @@ def misfits(n: int, edges: NDArray, weights: NDArray, solved: list[tuple[Piece, 
 
 
 def _add_discord(
-    n: int, edges: NDArray, solved: list[tuple[Piece, PieceMesh]], misfit: NDArray, scale: float | None
+    n: int,
+    edges: NDArray,
+    solved: list[tuple[Piece, PieceMesh]],
+    misfit: NDArray,
+    scale: float | None,
+    errors: NDArray | None,
 ) -> None:
     """Raise the misfit where pieces do not go together: another scale, or rings of pieces that do not close.
 
-    Small pieces by themselves fit nearly everything.
+    Small pieces by themselves fit nearly everything. What `errors` (e,) explain is left out.
     """
     if not solved or (len(solved) == 1 and scale is None):
         return
-    add_differing_factors(solved, misfit, scale)
+    tolerance = 0.0 if errors is None else factor_tolerances(solved, errors, scale)
+    add_differing_factors(solved, misfit, scale, tolerance)
     if (misfit > FITS).any():  # whether rings close is the last question, and the dearest
         return
     topology = Topology(n, edges, tuple(piece for piece, _ in solved), "")
-    left = gap(topology, [mesh.z / np.abs(mesh.z).max() for _, mesh in solved])
+    closed = 0.0 if errors is None else GAP * float(errors.max()) / min(abs(mesh.scale) for _, mesh in solved)
+    left = gap(topology, [mesh.z / np.abs(mesh.z).max() for _, mesh in solved], max(CLOSED, closed))
+    left = left if left > closed else 0.0
     at_hinges = np.isin(edges, topology.hinges).any(axis=1)
     misfit[at_hinges] = np.maximum(misfit[at_hinges], min(left, 1.0))
 
 
-def add_differing_factors(solved: list[tuple[Piece, PieceMesh]], misfit: NDArray, scale: float | None) -> None:
-    """Raise the misfit of pieces with another factor than is known, or than the largest has, by that difference."""
+def add_differing_factors(
+    solved: list[tuple[Piece, PieceMesh]], misfit: NDArray, scale: float | None, tolerance: NDArray | float = 0.0
+) -> None:
+    """Raise the misfit of pieces with another factor than is known, or than the largest has, by that difference.
+
+    Differences up to `tolerance`, (pieces,), are none.
+    """
     scale = scale or max(solved, key=lambda item: item[0].n_vertices)[1].scale
     apart = np.minimum(np.abs(np.array([mesh.scale for _, mesh in solved]) / scale - 1), 1.0)
+    apart[apart <= tolerance] = 0.0
     rows = np.concatenate([piece.edge_rows for piece, _ in solved])
     misfit[rows] = np.maximum(misfit[rows], np.repeat(apart, [len(piece.edge_rows) for piece, _ in solved]))
 

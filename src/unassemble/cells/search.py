@@ -65,7 +65,9 @@ class Begun:
         return [Descent(start, seen=seen) for start in self.starts]
 
 
-def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = None) -> Reading | None:
+def read_cells(
+    n: int, edges: NDArray, weights: NDArray, scale: float | None = None, errors: NDArray | None = None
+) -> Reading | None:
     """The reading of a connected planar graph that fits its weights, or else the one that fits best.
 
     Parameters
@@ -77,6 +79,8 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
         -A_ij of each edge.
     scale : float, optional
         c, where it is known.
+    errors : (e,) float64, optional
+        Standard deviations of the errors of the weights, where they are known.
 
     Returns
     -------
@@ -84,12 +88,12 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
         None if no reading makes a planar surface.
     """
     if np.ptp(weights) <= _EQUAL * np.abs(weights).max():
-        return _of_equal_weights(n, edges, weights, scale)
+        return _of_equal_weights(n, edges, weights, scale, errors)
     effort = Effort.for_graph(n)
     triangles = read_triangles(n, edges, weights, scale, effort)
     if triangles is not None:
         return triangles
-    best, spoilt = _searched(n, edges, weights, scale, effort)
+    best, spoilt = _searched(n, edges, weights, scale, errors, effort)
     if best is None or not best.pieces:
         return spoilt
     if spoilt is None or best.fits or best.fits_but_for_few or best.like_noise:
@@ -98,15 +102,15 @@ def read_cells(n: int, edges: NDArray, weights: NDArray, scale: float | None = N
 
 
 def _searched(
-    n: int, edges: NDArray, weights: NDArray, scale: float | None, effort: Effort
+    n: int, edges: NDArray, weights: NDArray, scale: float | None, errors: NDArray | None, effort: Effort
 ) -> tuple[Reading | None, Reading | None]:
     """The best reading, and the one with entries set aside as wrong that stands where none fits."""
     best: Reading | None = None
     spoilt: Reading | None = None
     together = n <= SMALL_GRAPH
     turning = _TURNING / (_DRAWINGS if together else 1)
-    drawings = _drawings(n, edges, weights, scale)
-    cover = cache(partial(read_by_cover, n, edges, weights, scale))
+    drawings = _drawings(n, edges, weights, scale, errors)
+    cover = cache(partial(read_by_cover, n, edges, weights, scale, errors))
     begun: list[Begun] = []
     done = False
     # Repairs take most of the effort: small graphs are begun with in all drawings before.
@@ -126,20 +130,22 @@ def _searched(
     return _at_last(best, begun if together else []), spoilt
 
 
-def _of_equal_weights(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Reading | None:
+def _of_equal_weights(
+    n: int, edges: NDArray, weights: NDArray, scale: float | None, errors: NDArray | None
+) -> Reading | None:
     """A reading that fits of a graph whose weights are all the same, or the best of those to begin with.
 
     They give the misfit no place to lead to: what is not read at once, or by a cover, most likely is a graph's
     Laplacian, and belongs to no mesh.
     """
     effort, best = Effort.for_graph(n), None
-    for drawing in _drawings(n, edges, weights, scale):
+    for drawing in _drawings(n, edges, weights, scale, errors):
         begun = _begun(drawing, effort, _FEW_TURNS)
         for start in begun.starts:
             best = better(best, start)
         if best is not None and best.fits:
             return best
-    return read_by_cover(n, edges, weights, scale, most_cells=MOST_EQUAL_CELLS) or (
+    return read_by_cover(n, edges, weights, scale, errors, most_cells=MOST_EQUAL_CELLS) or (
         Descent(best).run(Effort(_A_FEW, effort.known)) if best is not None and best.pieces else None
     )
 
@@ -202,15 +208,17 @@ def _best_of(best: Reading, searches: Iterable[Descent], solves: int) -> Reading
     return best
 
 
-def _drawings(n: int, edges: NDArray, weights: NDArray, scale: float | None) -> Iterator[Candidates]:
+def _drawings(
+    n: int, edges: NDArray, weights: NDArray, scale: float | None, errors: NDArray | None
+) -> Iterator[Candidates]:
     """What may be cells in each drawing; first in one about the vertices that their numbers make crosses."""
     if n <= MOST_VERTICES:
-        crosses = Crosses.of(n, edges, weights, scale)
+        crosses = Crosses.of(n, edges, weights, scale, errors)
         drawing = drawing_with_corners(n, edges, crosses.wedges) if crosses.unique.any() else None
         if drawing is not None:
-            yield Candidates.of(drawing, weights, scale, crosses)
+            yield Candidates.of(drawing, weights, scale, crosses, errors=errors)
     for drawing in face_complexes(n, edges):
-        yield Candidates.of(drawing, weights, scale)
+        yield Candidates.of(drawing, weights, scale, errors=errors)
 
 
 def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
@@ -256,7 +264,7 @@ def _tiling(candidates: Candidates, effort: Effort) -> Reading | None:
     either = [candidates]
     guess = candidates.other_scale() if candidates.scale is None else None
     if guess is not None:
-        either.append(Candidates.of(candidates.drawing, candidates.weights, guess=guess))
+        either.append(Candidates.of(candidates.drawing, candidates.weights, guess=guess, errors=candidates.errors))
     for one in either:
         for labels in one.tilings():
             reading = Reading.of(one, labels, effort.known)
@@ -302,13 +310,15 @@ def _with_mended(starts: list[Reading], likeliest: Reading, effort: Effort, plac
     return [found] if found.fits else [*starts[:place], found, *starts[place:]]
 
 
-def fitting_starts(n: int, edges: NDArray, weights: NDArray, scale: float | None = None) -> Iterator[Reading]:
+def fitting_starts(
+    n: int, edges: NDArray, weights: NDArray, scale: float | None = None, errors: NDArray | None = None
+) -> Iterator[Reading]:
     """All readings to begin with that fit as they are, in all drawings.
 
     Parameters are those of :func:`read_cells`.
     """
     known: dict[bytes, PieceMesh | None] = {}
-    for candidates in _drawings(n, edges, weights, scale):
+    for candidates in _drawings(n, edges, weights, scale, errors):
         for labels in candidates.starts():
             reading = Reading.of(candidates, labels, known)
             if reading.fits:

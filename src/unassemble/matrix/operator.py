@@ -29,6 +29,8 @@ class OperatorMatrix:
         of the two rows; at rounding level.
     warnings : tuple of str
         What was changed on the way, in sentences.
+    errors : (e,) float64 or None
+        Standard deviations of the errors of the entries, where they are known; 0 for those that have vanished.
     """
 
     n: int
@@ -37,6 +39,7 @@ class OperatorMatrix:
     diagonal: NDArray[np.float64]
     asymmetry: float = 0.0
     warnings: tuple[str, ...] = ()
+    errors: NDArray[np.float64] | None = None
 
     @property
     def row_size(self) -> NDArray[np.float64]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..topology import Piece
 from ..topology.together import united
+from .normal import distant_pair
 
 _INDEPENDENT = 1e-9  # singular values of equations at hinges, over the largest, above which they are independent
 _MOST_PIECES = 300
@@ -58,12 +59,9 @@ class Hinged:
         null, closings = _freedoms(owner, local, z, len(pieces))
         if not closings:
             return None
-        _, first = np.unique(local, return_index=True)
-        moves = null[owner[first]] * z[:, None] + null[len(pieces) + owner[first]]
-        pins = la.qr(moves.T, mode="r", pivoting=True)[1][: null.shape[1]]
-        whole = _turned(union, vertices, local, z)
         split = np.split(local, np.cumsum([piece.n_vertices for piece in pieces])[:-1])
-        return cls(whole, z, pins.astype(np.int64), split, closings)
+        whole = _turned(union, vertices, local, z)
+        return cls(whole, z, _pins(split, z, null), split, closings)
 
 
 def _freedoms(owner: NDArray, local: NDArray, z: NDArray, n: int) -> tuple[NDArray[np.complex128], int]:
@@ -78,6 +76,17 @@ def _freedoms(owner: NDArray, local: NDArray, z: NDArray, n: int) -> tuple[NDArr
     _, size, directions = np.linalg.svd(np.linalg.qr(equations, mode="r"))  # of many equations, no large left factor
     rank = int((size > _INDEPENDENT * size[0]).sum())
     return directions[rank:].conj().T, 2 * (len(one) - rank)
+
+
+def _pins(local: list[NDArray[np.int64]], z: NDArray, null: NDArray) -> NDArray[np.int64]:
+    """As many vertices as there are freedoms (2 n, k), on which these act independently.
+
+    Two vertices of a piece tell how it is moved: others need not be asked.
+    """
+    ends = np.concatenate([own[distant_pair(z[own])] for own in local])
+    owner = np.repeat(np.arange(len(local)), 2)
+    moves = null[owner] * z[ends, None] + null[len(local) + owner]
+    return np.asarray(ends[la.qr(moves.T, mode="r", pivoting=True)[1][: null.shape[1]]])
 
 
 def _turned(union: Piece, vertices: NDArray, local: NDArray, z: NDArray) -> Piece:

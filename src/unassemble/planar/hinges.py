@@ -78,12 +78,15 @@ def free_images(topology: Topology, joined: list[NDArray]) -> NDArray[np.int64]:
     return np.array(free, dtype=np.int64)
 
 
-def gap(topology: Topology, positions: list[NDArray]) -> float:
-    """How far apart the pieces stay at shared vertices when they are joined, relative to the largest piece."""
+def gap(topology: Topology, positions: list[NDArray], closed: float = CLOSED) -> float:
+    """How far apart the pieces stay at shared vertices when they are joined, relative to the largest piece.
+
+    Rings count as closed below `closed`, where no other images are tried.
+    """
     if rings(topology) <= 0:
         return 0.0
     held = _held(groups(topology), np.zeros(len(positions), dtype=np.int64))
-    return _joined(topology, _matching_images(topology, positions, held, CLOSED), held)[1]
+    return _joined(topology, _matching_images(topology, positions, held, closed), held)[1]
 
 
 def _matching_images(

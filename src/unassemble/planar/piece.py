@@ -26,6 +26,8 @@ EXACT = 1e-3
 """Standard deviation of entries without noise, relative to that of the others: next to none, and safe to divide by."""
 _FAR = 0.05
 """Root mean square misfit, over c, that no rounding in the solution of a linear problem leaves."""
+_LOST = 1e-14
+"""Edges of that length, relative to the extent, have hardly a digit left."""
 _CAUTIOUS_LIMIT = 200_000
 """Most vertices for which a polish that fails is tried again with a factorisation in every step."""
 
@@ -78,17 +80,17 @@ def refined(
     *,
     scale: float | None,
     rounding: bool,
-    exact: NDArray[np.bool_] | None = None,
+    noise: NDArray[np.float64] | None = None,
     pins: NDArray[np.int64] | None = None,
 ) -> PieceMesh:
     """Gauss-Newton polish; where it cannot be done the mesh stays as it is, with a note.
 
-    With `rounding`, errors are taken to be those of assembly in floating-point arithmetic, unless the misfit is beyond
-    that and more likely to be noise of one size. Noise leaves the entries `exact`, (e,) bool, as they are: these have
-    vanished.
-    Without it the noise is known, and tested: entries set aside count as any other. `pins` are as for the polish.
+    `noise`, (e,), are standard deviations of the entries' errors, up to a common factor, all equal by default. With
+    `rounding`, errors are taken to be those of assembly in floating-point arithmetic, unless the misfit is beyond that
+    and more likely to be such noise. Without it the noise is known, and tested: entries set aside count as any other.
+    `pins` are as for the polish.
     """
-    noise = None if exact is None or not exact.any() else np.where(exact, EXACT, 1.0)
+    noise = None if noise is None or (noise == 1).all() else noise
     with np.errstate(divide="ignore", invalid="ignore"):
         flat = not np.isfinite(edge_weights(piece, mesh.z)).all()
     if flat:
@@ -104,7 +106,9 @@ def refined(
             spread = noise
             found = _polished(piece, weights, found.z, scale, spread, pins)
     except SolverError as error:
-        return replace(mesh, notes=(*mesh.notes, f"no polish: {error}"))
+        shortest = _shortest(piece, mesh.z)
+        too_far = f"the start is too far off, with edges of {shortest:.0e} of its size"
+        return replace(mesh, notes=(*mesh.notes, f"no polish: {too_far if shortest < _LOST else error}"))
     if not (np.isfinite(found.z).all() and np.isfinite(found.scale)):
         return replace(mesh, notes=(*mesh.notes, "the polish did not stay finite and was left out"))
     if found.converged:
@@ -121,9 +125,9 @@ def refined_together(
     scale: float | None,
     *,
     rounding: bool,
-    exact: NDArray[np.bool_],
-) -> list[PieceMesh]:
-    """Polish several pieces with a single c.
+    noise: NDArray[np.float64],
+) -> list[PieceMesh] | None:
+    """Polish several pieces with a single c; None if that does not converge.
 
     Parameters
     ----------
@@ -138,8 +142,8 @@ def refined_together(
         c, where it is known.
     rounding : bool
         As for :func:`refined`.
-    exact : (e,) bool
-        Entries of the whole graph that have vanished.
+    noise : (e,) float64
+        Of the entries of the whole graph, as for :func:`refined`.
     """
     beside = SideBySide.of(pieces, [mesh.z for mesh in meshes])
     union = joined or beside
@@ -148,8 +152,10 @@ def refined_together(
     start = PieceMesh(union.z, meshes[0].scale, notes, aside=np.concatenate(aside) if aside else None)
     rows = union.piece.edge_rows
     found = refined(
-        union.piece, weights[rows], start, scale=scale, rounding=rounding, exact=exact[rows], pins=union.pins
+        union.piece, weights[rows], start, scale=scale, rounding=rounding, noise=noise[rows], pins=union.pins
     )
+    if found.notes != notes:
+        return None
     spreads = [None] * len(pieces) if found.spread is None else beside.split(found.spread, beside.edges)
     positions = [found.z[own] for own in joined.local] if joined else beside.split(found.z, beside.vertices)
     return [
@@ -177,7 +183,12 @@ def _polished(
 
     Rounding in the normal equations of long thin pieces is one reason to fail.
     """
-    found = polish(piece, weights, start, scale=scale, spread=spread, pins=pins)
+    try:
+        found = polish(piece, weights, start, scale=scale, spread=spread, pins=pins)
+    except SolverError:  # steps that led to flat triangles; small ones do not
+        if piece.n_vertices > _CAUTIOUS_LIMIT:
+            raise
+        return cautious_polish(piece, weights, start, scale=scale, spread=spread, pins=pins)
     finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
     flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
     if found.converged and not flipped:
@@ -190,6 +201,11 @@ def _polished(
     nearest = found.z if flipped <= count_flipped(piece, start) else start
     again = cautious_polish(piece, weights, nearest, scale=scale, spread=spread, pins=pins)
     return again if again.residual < found.residual or not finite else found
+
+
+def _shortest(piece: Piece, z: NDArray) -> float:
+    """Length of the shortest edge, relative to the extent."""
+    return float(np.abs(z[piece.edges[:, 0]] - z[piece.edges[:, 1]]).min() / np.abs(z - z.mean()).max())
 
 
 def _near(piece: Piece, weights: NDArray, found: PolishedMesh) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,18 +11,20 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc, gammaincc, ndtr
 
 from ..cells.agreement import SAME_SCALE, SCALE_ERROR
+from ..cells.within_errors import GAP
 from ..certify import CONFIDENCE, LARGEST_NOISE
 from ..planar.cotangent import left_by_all
 from ..planar.deviations import factor_deviations
 from ..planar.hinged import Hinged
 from ..planar.hinges import CLOSED, groups, join, rings
-from ..planar.piece import EXACT, PieceMesh, refined_together
+from ..planar.piece import PieceMesh, refined_together
 from ..planar.polish import PolishOptions
 from ..topology import Topology
+from .noise import Noise, with_vanished
 
 _EQUAL = 1e-12  # relative difference of factors that rounding leaves: each piece keeps its own
 _UNTOLD = 1e100  # standard deviation of log c where entries do not tell c
-_GAP = 30.0  # that noise may leave in rings of pieces, in units of their size and of noise over c
+_NOT_TOGETHER = "the polish of all pieces that share vertices did not converge, and each was fitted by itself"
 _CHANCE = 1e-6  # that factors which agree to within their errors do so by coincidence
 
 
@@ -35,14 +37,16 @@ class Factors:
     own : (pieces,) float64
         c of each piece by itself.
     deviation : (pieces,) float64
-        Standard deviation of log c for noise 1 in the entries; those that have vanished are exact. 1e100 where the
-        entries of a piece do not tell c, infinite where it does not matter.
+        Standard deviation of log c, over that of typical errors of the entries; those that have vanished are exact.
+        1e100 where the entries of a piece do not tell c, infinite where it does not matter.
     group : (pieces,) int64
         Label of the pieces that hang together by vertices.
     fitted : (pieces,) int64
         Label of the pieces that have one c, as far as errors explain that their own differ.
     closings : (pieces,) int64
         Equations by which rings of pieces, fitted together, hold these; at the first piece of each group.
+    apart : dict of int to str
+        Why groups, by the first piece of each, were not fitted together though errors explain that factors differ.
     """
 
     own: NDArray[np.float64]
@@ -50,6 +54,7 @@ class Factors:
     group: NDArray[np.int64]
     fitted: NDArray[np.int64]
     closings: NDArray[np.int64]
+    apart: dict[int, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, topology: Topology, meshes: Sequence[PieceMesh]) -> Factors:
@@ -86,7 +91,7 @@ def fitted_together(
     topology: Topology,
     weights: NDArray,
     meshes: list[PieceMesh],
-    noise: float | None,
+    noise: Noise | None,
     scale: float | None,
     *,
     refine: bool,
@@ -100,8 +105,8 @@ def fitted_together(
         -A_ij of each edge.
     meshes : list of PieceMesh
         Each piece by itself.
-    noise : float, optional
-        Standard deviation of the entries' errors; without it their misfit tells how large they are.
+    noise : Noise, optional
+        Without it the misfit of the entries tells how large their errors are.
     scale : float, optional
         c, where it is known.
     refine : bool
@@ -110,25 +115,32 @@ def fitted_together(
     factors = Factors.of(topology, meshes)
     if not (len(topology.hinges) and (noise or factors.differences.max() > _EQUAL)):
         return meshes, factors
-    vanished = np.zeros(len(topology.edges), dtype=bool)
-    vanished[topology.vanished] = True
+    errors = with_vanished(topology) if noise is None else noise.on(topology)
     several = np.flatnonzero(np.bincount(factors.group)[factors.group] > 1)
     if scale is None:
-        factors.deviation[several] = _deviations(topology, meshes, several, vanished)
+        factors.deviation[several] = _deviations(topology, meshes, several, errors)
     meshes = list(meshes)
     for label in np.unique(factors.group[several]):
         inside = np.flatnonzero(factors.group == label)
-        c, sigma = (scale, noise or 0.0) if scale else _common(topology, weights, meshes, factors, inside, noise)
-        if c is None or sum(topology.pieces[p].n_vertices for p in inside) > PolishOptions().direct_limit:
+        c, sigma = _common(topology, weights, meshes, factors, inside, noise, scale)
+        if c is None:
+            continue
+        if sum(topology.pieces[p].n_vertices for p in inside) > PolishOptions().direct_limit:
+            factors.apart[inside[0]] = "they have too many vertices to be fitted together"
             continue
         if not refine:
             factors.fitted[inside] = inside[0]
             continue
         pieces, own = [topology.pieces[p] for p in inside], [replace(meshes[p], scale=c) for p in inside]
-        joined = hinged(topology, inside, [mesh.z for mesh in own], _GAP * sigma / abs(c))
+        joined = hinged(topology, inside, [mesh.z for mesh in own], GAP * sigma / abs(c))
         if joined is None and scale is not None:
             continue
-        together = refined_together(pieces, weights, own, joined, scale, rounding=noise is None, exact=vanished)
+        together = refined_together(pieces, weights, own, joined, scale, rounding=noise is None, noise=errors)
+        if together is None:  # each by itself is a better guess than all on their way somewhere
+            factors.apart[inside[0]] = _NOT_TOGETHER
+            for p in inside:
+                meshes[p] = replace(meshes[p], notes=(*meshes[p].notes, _NOT_TOGETHER))
+            continue
         factors.closings[inside[0]] = joined.closings if joined else 0
         factors.fitted[inside] = inside[0]
         for p, mesh in zip(inside, together, strict=True):
@@ -147,12 +159,12 @@ def hinged(
 
 
 def _deviations(
-    topology: Topology, meshes: Sequence[PieceMesh], some: NDArray[np.int64], vanished: NDArray[np.bool_]
+    topology: Topology, meshes: Sequence[PieceMesh], some: NDArray[np.int64], errors: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Of some pieces: standard deviations of log c for noise 1 in the entries; those that have vanished are exact."""
+    """Of some pieces: standard deviations of log c for `errors` (e,) of the entries."""
     pieces = [topology.pieces[p] for p in some]
-    errors = [np.where(vanished[piece.edge_rows], EXACT, 1.0) for piece in pieces]
-    deviation = factor_deviations(pieces, [meshes[p].z for p in some], errors)
+    spreads = [errors[piece.edge_rows] for piece in pieces]
+    deviation = factor_deviations(pieces, [meshes[p].z for p in some], spreads)
     return np.minimum(deviation / np.abs([meshes[p].scale for p in some]), _UNTOLD)
 
 
@@ -162,18 +174,21 @@ def _common(
     meshes: Sequence[PieceMesh],
     factors: Factors,
     inside: NDArray[np.int64],
-    noise: float | None,
+    noise: Noise | None,
+    scale: float | None,
 ) -> tuple[float | None, float]:
     """The mean of the factors of some pieces, or None where errors do not explain that they differ; and their size."""
+    if scale is not None:
+        return scale, noise.sigma if noise else 0.0
     c, deviation = factors.own[inside], factors.deviation[inside]
     if not np.isfinite(c).all() or (c * c[0] <= 0).any():
         return None, 0.0
     ratio = np.log(c / c[0])
     mean = float(np.average(ratio, weights=deviation**-2))
     misfit, freedom = (ratio - mean) / deviation, len(inside) - 1
-    sigma = noise or 0.0
+    sigma = noise.sigma if noise else 0.0
     if noise:
-        explained = _explained(misfit / noise, freedom)
+        explained = _explained(misfit / noise.sigma, freedom)
     else:
         apart = float(misfit @ misfit)
         left, spare = _left(topology, weights, meshes, inside)
@@ -201,7 +216,7 @@ def _explained(misfit: NDArray, freedom: int) -> bool:
     return min(float(gammaincc(freedom / 2, misfit @ misfit / 2)), largest) >= CONFIDENCE
 
 
-def discord(topology: Topology, factors: Factors, backward_error: float, noise: float | None = None) -> str | None:
+def discord(topology: Topology, factors: Factors, backward_error: float, noise: Noise | None = None) -> str | None:
     """What is wrong where pieces share vertices but not c, errors of the entries being allowed for.
 
     Parameters
@@ -210,15 +225,17 @@ def discord(topology: Topology, factors: Factors, backward_error: float, noise: 
     factors : Factors
     backward_error : float
         Of the entries.
-    noise : float, optional
-        Standard deviation of their errors.
+    noise : Noise, optional
+        Their errors.
     """
     difference, together = factors.differences, factors.together
     # A null vector that is not polished may be off by more than the entries; noise has been asked how much it explains.
     allowed = max(SAME_SCALE, 0.0 if noise else SCALE_ERROR * backward_error)
     apart = np.where(together, 0.0, difference)
     if apart.max() > allowed:
-        more = f", more than noise of standard deviation {noise:.3g} explains" if noise else ""
+        more = f", more than {noise} explains" if noise else ""
+        why = factors.apart.get(int(factors.first[apart.argmax()]))
+        more = f"; errors of the entries explain that, but {why}" if why else more
         return f"pieces that share vertices have different factors c: {_named(topology, factors, apart)}{more}"
     if not noise or not difference.max() > SAME_SCALE:
         return None
@@ -226,12 +243,16 @@ def discord(topology: Topology, factors: Factors, backward_error: float, noise: 
     # may be something else has to agree itself: neither pieces that are beyond doubt nor other groups vouch for it.
     others = together & (np.arange(len(difference)) != factors.first)
     unproved = others & _to_be_confirmed(topology, factors.group)
-    agree = np.where(unproved, np.log(np.minimum(noise * factors.deviation, 1.0)), 0.0)
+    agree = np.where(unproved, np.log(np.minimum(noise.sigma * factors.deviation, 1.0)), 0.0)
     chance = np.bincount(factors.first, agree, len(agree))
-    chance += factors.closings * np.log(min(_GAP * noise / float(np.abs(factors.own).max()), 1.0))
-    if (chance[factors.first[unproved]] > np.log(_CHANCE)).any():
+    chance += factors.closings * np.log(min(GAP * noise.sigma / float(np.abs(factors.own).max()), 1.0))
+    # No loose piece vouches for another one: what may be read otherwise agrees by itself, or closes rings.
+    alone, in_ring = _readable_otherwise(topology), _shared(topology) > 1
+    own = agree + np.where(in_ring, (chance - np.bincount(factors.first, agree, len(agree)))[factors.first], 0.0)
+    rough = (unproved & alone & (own > np.log(_CHANCE))).any()
+    if rough or (chance[factors.first[unproved]] > np.log(_CHANCE)).any():
         return (
-            f"noise of standard deviation {noise:.3g} explains that pieces which share vertices have different "
+            f"{noise} explains that pieces which share vertices have different "
             f"factors c by themselves ({_named(topology, factors, difference)}), but they agree too roughly, or are "
             "too few, for a certificate"
         )
@@ -253,16 +274,23 @@ def _to_be_confirmed(topology: Topology, group: NDArray[np.int64]) -> NDArray[np
     A piece with entries to spare tells c. One that hangs by a single vertex on pieces of which one does so can only be
     read in itself, and no other way if nothing has vanished and no triangle may be a hole.
     """
+    spare = np.array([piece.redundancy > 0 for piece in topology.pieces])
+    told = np.bincount(group, spare) > 0
+    return np.asarray(~told[group] | (_readable_otherwise(topology) | (_shared(topology) > 1)) & ~spare)
+
+
+def _readable_otherwise(topology: Topology) -> NDArray[np.bool_]:
+    """(pieces,) those without an entry to spare in which entries have vanished, or a triangle may be a hole."""
     rows = np.zeros(len(topology.edges), dtype=bool)
     rows[topology.vanished] = True
-    spare = np.array([piece.redundancy > 0 for piece in topology.pieces])
-    loose = np.array(
+    return np.array(
         [
-            rows[piece.edge_rows].any()
-            or bool(piece.enclosed.any())
-            or np.count_nonzero(topology.multiplicity[piece.vertices] > 1) > 1
+            piece.redundancy <= 0 and bool(rows[piece.edge_rows].any() or piece.enclosed.any())
             for piece in topology.pieces
         ]
     )
-    told = np.bincount(group, spare) > 0
-    return np.asarray(~told[group] | (loose & ~spare))
+
+
+def _shared(topology: Topology) -> NDArray[np.int64]:
+    """(pieces,) how many vertices each has in common with others."""
+    return np.array([np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces])

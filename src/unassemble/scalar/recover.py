@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +23,11 @@ from ..topology import Polygons, Topology, local_numbering, surfaces, triangles_
 from .evidence import pooled_noise, weigh
 from .factors import Factors, discord, hinged
 from .joined import JoinedMesh
+from .noise import Noise, NoiseTest
 from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
 from .placement import Placement
 from .solving import solve
-from .verdict import all_alike, ambiguous, far_away, passes, unproved, verdict
+from .verdict import all_alike, ambiguous, decides, far_away, passes, unproved, verdict
 
 _SMALL = 1e-3
 _SIGMAS = 10.0  # noise by which numbers that a reading takes for equal may differ
@@ -47,7 +48,7 @@ class ScalarOptions:
 
 def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, options: ScalarOptions) -> Recovery:
     """The mesh of a checked scalar matrix."""
-    scale, noise = options.scale, options.noise
+    scale = options.scale
     # With a tensor, c L is what is left of c div(K grad): its factor is c sqrt(det K).
     stretch = placement.tensor.root_determinant if placement.tensor else 1.0
     known = None if scale is None else scale * stretch
@@ -60,7 +61,10 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
         if planar and triangles_everywhere(stored.n, numbering.edges):
             analyse = AnalysisAhead(pencil_pattern(stored.n, numbering.edges), options.threads)
         topology = surfaces(stored.n, stored.edges, numbering)
-    matrix, topology, meshes, factors = solve(
+    noise = Noise.known(stored, options.noise)
+    if noise is not None:
+        stored = replace(stored, errors=noise.sigma * noise.spread)
+    matrix, topology, meshes, factors, noise = solve(
         topology,
         stored,
         clock,
@@ -78,11 +82,11 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
         points = mesh.points + np.column_stack([shift.real, shift.imag])
     with clock("certify"):
         freedom = _freedom(topology, factors, scale)
-        certificate, chi_square = _held_against(stored, mesh, mesh.points, placement, noise, freedom)
         scales = np.array([m.scale for m in meshes])
+        certificate, test = _held_against(stored, mesh, mesh.points, placement, noise, freedom, scales)
         # A misfit at rounding level, or one that noise explains, hides no wrong entry.
-        search = not passes(certificate, chi_square, scales)
-        search |= (noise is None or freedom <= 0) and certificate.backward_error > certificates.SUSPICIOUS
+        search = not passes(certificate, test)
+        search |= not decides(certificate, test) and certificate.backward_error > certificates.SUSPICIOUS
         evidence = weigh(
             topology,
             matrix,
@@ -96,35 +100,40 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     deviations = None
     if options.standard_deviations:
         with clock("deviations"):
-            sigma = noise or pooled_noise(topology, matrix, meshes, freedom)
+            sigma = noise.sigma if noise else pooled_noise(topology, matrix, meshes, freedom)
             deviations = _deviations(topology, placement, placed, meshes, sigma, factors, free=scale is None)
     trouble = [note for m in meshes for note in m.notes]
     doubt = max(m.doubt for m in meshes)
     apart = discord(topology, factors, certificate.backward_error, noise)
-    status, reason = verdict(topology, certificate, chi_square, matrix, evidence, scales, trouble, doubt, apart)
+    status, reason = verdict(topology, certificate, test, matrix, evidence, scales, trouble, doubt, apart)
     others: list[Alternative] = []
     if status == "certified":
         with clock("ambiguity") if topology.method == "the numbers" else nullcontext():  # else next to nothing
-            sigma = (evidence.noise or 0.0) if noise is None else noise
+            told = noise and (options.noise or decides(certificate, test))  # else entries that are exact
+            sigma = noise.sigma if noise and told else evidence.noise or 0.0
             agree = max(AGREE, _SIGMAS * sigma / float(np.abs(scales).min()))
-            others, doubt_of_cells = _alternatives(topology, stored, placement, mesh, stretch, agree, known)
+            given = stored if told else replace(stored, errors=None)
+            others, doubt_of_cells = _alternatives(topology, given, placement, mesh, stretch, agree, known)
         if doubt_of_cells and not others:
             status, reason = doubt_of_cells(certificate)
     if others:
         status, reason = ambiguous(others, certificate)
     distant = False
     if origins.any():
-        near, (certificate, chi_square) = certificate, _held_against(stored, mesh, points, placement, noise, freedom)
-        distant = status == "certified" and not passes(certificate, chi_square, scales)
+        near = certificate
+        certificate, test = _held_against(stored, mesh, points, placement, noise, freedom, scales)
+        distant = status == "certified" and not passes(certificate, test)
         if distant:
             status, reason = far_away(origins, certificate, near)
     worst, misfits = certificate.worst(
-        10 if status == "uncertified" and not distant else 0, noise=noise, first=evidence.suspects
+        10 if status == "uncertified" and not distant else 0,
+        noise=noise.at(certificate.pairs, stored) if noise else None,
+        first=evidence.suspects,
     )
-    if chi_square and evidence.noise is not None and evidence.noise < 0.5 * chi_square["sigma"]:
+    if options.noise and evidence.noise is not None and evidence.noise < 0.5 * options.noise:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
     # What a misfit that small lacks is digits, and not triangles.
-    if status == "uncertified" and not (others or chi_square or distant or certificate.backward_error < _SMALL):
+    if status == "uncertified" and not (others or noise or distant or certificate.backward_error < _SMALL):
         notes += origin_notes(stored, evidence.suspects)
     polygons = Polygons.none() if options.triangulate else mesh.polygons
     return Recovery(
@@ -148,7 +157,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
         worst_entries=worst,
         worst_misfits=misfits,
         standard_deviations=deviations,
-        chi_square=chi_square,
+        chi_square=test.figures if test else None,
         estimated_noise=evidence.noise,
         suspects=evidence.suspects,
         alternatives=tuple(others),
@@ -182,7 +191,7 @@ def _alternatives(
         return others, unproved if left_open else None
     if not others:
         others, left_open = alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
-    if known is None and coincident(stored, topology).any():
+    if known is None and coincident(stored, topology, agree).any():
         return others, all_alike
     return others, unproved if left_open else None
 
@@ -192,9 +201,10 @@ def _held_against(
     mesh: JoinedMesh,
     points: NDArray,
     placement: Placement,
-    noise: float | None,
+    noise: Noise | None,
     freedom: int,
-) -> tuple[certificates.Certificate, dict[str, float] | None]:
+    scales: NDArray,
+) -> tuple[certificates.Certificate, NoiseTest | None]:
     """The certificate of a mesh with these points, and the test against noise."""
     tensor = placement.tensor
     certificate = certificates.certify(
@@ -205,7 +215,10 @@ def _held_against(
         mesh.scale[mesh.triangle_piece],
         (tensor.kxx, tensor.kxy, tensor.kyy) if tensor else None,
     )
-    return certificate, certificates.chi_square_verdict(certificate.differences, noise, freedom) if noise else None
+    if noise is None:
+        return certificate, None
+    misfit = certificate.differences / noise.at(certificate.pairs, stored)
+    return certificate, NoiseTest.of(noise, misfit, freedom, scales)
 
 
 def _place(

@@ -14,12 +14,16 @@ from ..cells import Outcome, completed, in_doubt, wrong_entries
 from ..errors import GeometryError, RecoveryError, SolverError
 from ..linalg import Factorisation, UpperTriangle, factorisation
 from ..matrix import OperatorMatrix
-from ..planar.piece import EXACT, PieceMesh, positions, refined
+from ..planar.cotangent import left_by_all
+from ..planar.piece import PieceMesh, positions, refined
 from ..planar.triangles import lone_triangles
 from ..topology import Piece, Polygons, Topology
 from .factors import Factors, fitted_together
+from .noise import Noise, with_vanished
 
 Clock = Callable[[str], AbstractContextManager[None]]
+
+_BEYOND = 2.0  # root mean square of a misfit, over errors of rounding, that are not all
 
 
 def solve(
@@ -30,12 +34,12 @@ def solve(
     method: str,
     scale: float | None,
     refine: bool,
-    noise: float | None,
+    noise: Noise | None,
     analyse: Callable[[UpperTriangle], Factorisation] = factorisation,
-) -> tuple[OperatorMatrix, Topology, list[PieceMesh], Factors]:
+) -> tuple[OperatorMatrix, Topology, list[PieceMesh], Factors, Noise | None]:
     """Positions and scale of each piece, in no particular frame; `analyse` as for the conformal map.
 
-    Entries have errors of the standard deviation `noise`, or of rounding.
+    Entries have errors of the sizes `noise`, or those of assembly.
 
     Returns
     -------
@@ -46,6 +50,8 @@ def solve(
     meshes : list of PieceMesh
     factors : Factors
         What each piece by itself says of c.
+    noise : Noise or None
+        Without that of rounding, if the misfit is far beyond it.
 
     Raises
     ------
@@ -65,7 +71,7 @@ def solve(
             return error
 
     with clock(method):
-        doubtful = in_doubt(matrix, topology, start, scale, noise)
+        doubtful = in_doubt(matrix, topology, start, scale, noise.sigma if noise and not noise.digits else None)
         spoilt: dict[Piece, PieceMesh] = {}
         if doubtful.any():
             spoilt, doubtful = wrong_entries(matrix, topology, start, doubtful, scale)
@@ -84,19 +90,30 @@ def solve(
         outcomes = [attempt(piece) for piece in topology.pieces]
     topology, meshes = _successes(topology, outcomes)
     with clock("polish") if refine else nullcontext():
-        meshes = _polished(topology, matrix, meshes, scale, noise) if refine else meshes
+        starts = meshes
+        meshes = _polished(topology, matrix, starts, scale, noise) if refine else starts
+        if noise and noise.digits and not _is_rounding(topology, matrix, meshes, noise):
+            noise = None
+            meshes = _polished(topology, matrix, starts, scale, noise) if refine else starts
         meshes, factors = fitted_together(topology, -matrix.entries, meshes, noise, scale, refine=refine)
-    return matrix, topology, meshes, factors
+    return matrix, topology, meshes, factors, noise
+
+
+def _is_rounding(topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], noise: Noise) -> bool:
+    """Whether a misfit has about the size of errors of rounding; with others, sizes that these have are no guide."""
+    scales = np.array([mesh.scale for mesh in meshes])
+    left = left_by_all(topology.pieces, -matrix.entries, [mesh.z for mesh in meshes], scales)
+    error = noise.sigma * noise.on(topology)[np.concatenate([piece.edge_rows for piece in topology.pieces])]
+    with np.errstate(all="ignore"):  # flat triangles
+        return bool(np.sqrt(np.mean((left / error) ** 2)) <= _BEYOND)
 
 
 def _polished(
-    topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], scale: float | None, noise: float | None
+    topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], scale: float | None, noise: Noise | None
 ) -> list[PieceMesh]:
     """Each piece by itself."""
-    vanished = np.zeros(len(matrix.edges), dtype=bool)
-    vanished[topology.vanished] = True
-    errors = None if noise is None else np.where(vanished, EXACT, 1.0)
-    exact = lone_triangles(topology.pieces, -matrix.entries, scale, errors)
+    errors = with_vanished(topology) if noise is None else noise.on(topology)
+    exact = lone_triangles(topology.pieces, -matrix.entries, scale, None if noise is None else errors)
     return [
         exact.get(piece)
         or refined(
@@ -105,7 +122,7 @@ def _polished(
             mesh,
             scale=scale,
             rounding=noise is None,
-            exact=vanished[piece.edge_rows],
+            noise=errors[piece.edge_rows],
         )
         for piece, mesh in zip(topology.pieces, meshes, strict=True)
     ]

@@ -2,38 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import Alternative
 from ..cells.reading import FITS
-from ..certify import CERTIFIED, CONFIDENCE, LARGEST_NOISE, Certificate
+from ..certify import CERTIFIED, CONFIDENCE, LARGEST_NOISE, SUSPICIOUS, Certificate
 from ..matrix import OperatorMatrix
 from ..topology import Topology
 from ..words import count_of
 from .evidence import Evidence
+from .noise import NoiseTest
 
 _MOST, _ROWS = 0.9, 6  # part of the squared misfit whose rows are named, and how many of them at most
 _MANY = 50  # entries, of which it can be said what their misfit looks like
 _SURE = 1e-8  # of a piece's size: how far off certified positions may be
 
 
-def passes(certificate: Certificate, chi_square: Mapping[str, float] | None, scale: NDArray) -> bool:
+def passes(certificate: Certificate, test: NoiseTest | None) -> bool:
     """Whether the numbers alone would do for a certificate."""
     if len(certificate.flipped):
         return False
-    if not _tested(certificate, chi_square, scale):
-        return certificate.backward_error <= CERTIFIED
-    assert chi_square is not None
-    return min(chi_square["p_value"], chi_square["largest_p_value"]) >= CONFIDENCE and not _drowned(chi_square, scale)
+    if test and decides(certificate, test):
+        return test.passed
+    return certificate.backward_error <= CERTIFIED
 
 
 def verdict(
     topology: Topology,
     certificate: Certificate,
-    chi_square: Mapping[str, float] | None,
+    test: NoiseTest | None,
     matrix: OperatorMatrix,
     evidence: Evidence,
     scale: NDArray,
@@ -45,7 +45,7 @@ def verdict(
 
     Parameters
     ----------
-    topology, certificate, chi_square, matrix, evidence
+    topology, certificate, test, matrix, evidence
     scale : (number of pieces,) float64
         c of each piece, the factor of the Laplacian.
     notes : sequence of str
@@ -55,13 +55,14 @@ def verdict(
     apart : str, optional
         What is wrong with the factors, see :func:`unassemble.scalar.factors.discord`.
     """
-    good = passes(certificate, chi_square, scale)
+    good = passes(certificate, test)
     if good and apart:
         return "uncertified", f"the matrix is given back to {certificate.backward_error:.1e}, but {apart}"
-    if chi_square and _tested(certificate, chi_square, scale):
-        return ("certified" if good else "uncertified"), _with_noise(
-            chi_square, certificate, topology, evidence, scale, notes
-        )
+    if test and decides(certificate, test):
+        if test.noise.digits and not (test.drowned or test.likely):
+            more = (*notes, _unlikely(test, certificate))
+            return "uncertified", _misfit(topology, certificate, matrix, evidence, scale, more)
+        return ("certified" if good else "uncertified"), _with_noise(test, certificate, topology, evidence, notes)
     error = certificate.backward_error
     if good and not evidence.certain and not doubt <= _SURE:
         return "uncertified", (
@@ -98,12 +99,6 @@ def _misfit(
     if len(certificate.flipped):
         return _turned_over(topology, certificate) + _because(notes)
     (i, j), misfit = certificate.pairs[certificate.misfits.argmax()], certificate.misfits.max()
-    if evidence.digits and not evidence.certain:
-        return (
-            f"the entries are {evidence.digits}, and the re-assembled matrix differs by no more than that, at most by "
-            f"{misfit:.1e} of a row's largest ({CERTIFIED:g} is allowed): to have it tested give "
-            f"`noise={evidence.rounding:.2g}`, the size of the rounding errors of the largest entries"
-        )
     differs = (
         f"the re-assembled matrix differs, most in the entry of rows {i} and {j} (by {misfit:.1e} of the row's "
         f"largest; {CERTIFIED:g} is allowed)"
@@ -172,12 +167,6 @@ def _words(rows: tuple[int, ...]) -> str:
     return ", ".join(map(str, rows))
 
 
-def _rounded(evidence: Evidence) -> str:
-    if not evidence.digits:
-        return ""
-    return f"; the entries are {evidence.digits}, and the largest have rounding errors of {evidence.rounding:.2g}"
-
-
 def _culprits(evidence: Evidence) -> str:
     """The beginning of a sentence where entries are to blame."""
     if not len(evidence.suspects):
@@ -232,46 +221,44 @@ def _turned_over(topology: Topology, certificate: Certificate) -> str:
     return f"{which} flat or turned over, the first that of rows {rows}"
 
 
-def _tested(certificate: Certificate, chi_square: Mapping[str, float] | None, scale: NDArray) -> bool:
-    """Whether noise is what decides: there is something to test, and no exact fit makes too large a noise harmless."""
-    if not chi_square or not chi_square["degrees_of_freedom"] > 0:
+def decides(certificate: Certificate, test: NoiseTest | None) -> bool:
+    """Whether noise is what decides: there is something to test, and no exact fit makes too large a noise harmless.
+
+    Entries of few digits that a mesh has exactly may be no rounded ones.
+    """
+    if test is None or not test.possible:
         return False
-    return not (_drowned(chi_square, scale) and certificate.backward_error <= CERTIFIED)
-
-
-def _drowned(test: Mapping[str, float], scale: NDArray) -> bool:
-    return test["sigma"] > LARGEST_NOISE * float(np.abs(scale).min())
+    exact = certificate.backward_error <= CERTIFIED
+    short = certificate.backward_error <= SUSPICIOUS or not test.passed
+    return not (exact and (test.drowned or (test.noise.digits is not None and short)))
 
 
 def _with_noise(
-    test: Mapping[str, float],
-    certificate: Certificate,
-    topology: Topology,
-    evidence: Evidence,
-    scale: NDArray,
-    notes: Sequence[str],
+    test: NoiseTest, certificate: Certificate, topology: Topology, evidence: Evidence, notes: Sequence[str]
 ) -> str:
-    sigma = test["sigma"]
-    figures = (
-        f"(chi-square {test['statistic']:.4g} with {test['degrees_of_freedom']:.0f} degrees of freedom, "
-        f"p = {test['p_value']:.3g})"
-    )
-    if _drowned(test, scale):
-        limit = LARGEST_NOISE * float(np.abs(scale).min())
+    if test.drowned:
         return (
-            f"noise of standard deviation {sigma:.3g} drowns the cotangents, and almost any mesh would pass: the "
-            f"test is worth something up to {limit:.2g}, {LARGEST_NOISE:g} times the scale"
+            f"{test.noise} drowns the cotangents, and almost any mesh would pass: the test is worth something up to "
+            f"{test.limit:.2g}, {LARGEST_NOISE:g} times the scale"
         )
     if len(certificate.flipped):
         return _turned_over(topology, certificate) + _because(notes)
-    if test["p_value"] < CONFIDENCE:
-        more = f"the misfit is more than noise of standard deviation {sigma:.3g} explains {figures}"
-        return _culprits(evidence) + more + _because(notes)
-    if test["largest_p_value"] < CONFIDENCE:
-        i, j = certificate.pairs[np.abs(certificate.differences).argmax()]
-        more = (
-            f"the entry of rows {i} and {j} is off by {test['largest']:.1f} standard deviations of the noise, "
-            f"{sigma:.3g}, more than the largest of {len(certificate.pairs)} would be"
-        )
-        return _culprits(evidence) + more + _rounded(evidence)
-    return f"noise of standard deviation {sigma:.3g} explains the misfit {figures}"
+    if not test.likely:
+        return _culprits(evidence) + _unlikely(test, certificate) + _because(notes)
+    chance = ", but there are too few different entries beyond the unknowns to tell that from chance"
+    return f"{test.noise} explains the misfit {_figures(test)}" + (chance if test.coincidence else "")
+
+
+def _unlikely(test: NoiseTest, certificate: Certificate) -> str:
+    if test.figures["p_value"] < CONFIDENCE:
+        return f"the misfit is more than {test.noise} explains {_figures(test)}"
+    i, j = certificate.pairs[test.worst]
+    return (
+        f"the entry of rows {i} and {j} is off by {test.figures['largest']:.1f} standard deviations of {test.noise}, "
+        f"more than the largest of {len(certificate.pairs)} would be"
+    )
+
+
+def _figures(test: NoiseTest) -> str:
+    statistic, freedom, p_value = (test.figures[name] for name in ("statistic", "degrees_of_freedom", "p_value"))
+    return f"(chi-square {statistic:.4g} with {freedom:.4g} degrees of freedom, p = {p_value:.3g})"

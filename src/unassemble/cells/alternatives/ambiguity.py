@@ -75,7 +75,7 @@ def alternatives(
     found = found or regrouped(stored, mesh, corners, factors, agree)
     if not found and scale is None:
         found, left_open = other_scales(stored, topology, mesh, factors, closed, agree)
-    return _each_once(found) or other_readings(stored, mesh, factors, scale), left_open
+    return _each_once(found) or other_readings(stored, mesh, factors, scale, agree), left_open
 
 
 def touching(

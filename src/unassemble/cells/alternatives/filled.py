@@ -90,7 +90,8 @@ def _holes(
     first = suspects[0][1]
     if len(part.vertices) > MOST_VERTICES:
         return [_without([first], tested=False)] if others else []
-    whole = with_another_scale(part, weights, c, others)
+    errors = None if stored.errors is None else stored.errors[part.edge_rows]
+    whole = with_another_scale(part, weights, errors, c, others)
     if whole is None:  # with noise no reading fits as it is
         return [_without([first])] if len(common) and agree > NEARLY else []
     kept = cells_of(whole, part)

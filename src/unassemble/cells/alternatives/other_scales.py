@@ -85,7 +85,8 @@ def other_scales(
     answers = Answers()
     for (part, unproved), own in zip(reversed(loose), reversed(own_of), strict=True):  # the smallest first
         weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
-        ask = partial(_other, part, weights, c, own, agree, budget, unproved=unproved)
+        errors = None if stored.errors is None else stored.errors[part.edge_rows]
+        ask = partial(_other, part, weights, errors, c, own, agree, budget, unproved=unproved)
         cells, factor, unknown = answers.of(part, weights, own, ask)
         left_open |= unknown
         if cells is not None:
@@ -104,7 +105,15 @@ def _alike(pieces: list[Piece], weights: NDArray, agree: float) -> bool:
 
 
 def _other(
-    part: Numbering, weights: NDArray, c: float, own: Cells, agree: float, budget: Budget, *, unproved: bool
+    part: Numbering,
+    weights: NDArray,
+    errors: NDArray | None,
+    c: float,
+    own: Cells,
+    agree: float,
+    budget: Budget,
+    *,
+    unproved: bool,
 ) -> Found:
     """Other cells of one component, all readings tried; where there are too many, a few factors.
 
@@ -118,16 +127,18 @@ def _other(
         pass
     # No search would settle these: what a cover finds names an example.
     left_open = unproved or len(part.vertices) > MOST_VERTICES or agree > NEARLY
-    return *(_with_common_scale(part, weights, c, searched=not left_open) or (None, c)), left_open
+    return *(_with_common_scale(part, weights, errors, c, searched=not left_open) or (None, c)), left_open
 
 
-def _with_common_scale(part: Numbering, weights: NDArray, c: float, *, searched: bool) -> tuple[Cells, float] | None:
+def _with_common_scale(
+    part: Numbering, weights: NDArray, errors: NDArray | None, c: float, *, searched: bool
+) -> tuple[Cells, float] | None:
     """A mesh with another c in which several cells agree that border no other; by a cover, or `searched` for."""
     n = len(part.vertices)
     shapes = Shapes.of(n, part.edges, _MOST_SHAPES) if n <= MOST_VERTICES else None
     if shapes is None or not len(shapes):
         return None
-    reading = with_another_scale(part, weights, c, _of_lone_cells(shapes, weights), searched=searched)
+    reading = with_another_scale(part, weights, errors, c, _of_lone_cells(shapes, weights), searched=searched)
     if reading is None:
         return None
     return cells_of(reading, part), next(mesh.scale for mesh in reading.meshes if mesh)

@@ -22,18 +22,19 @@ from ..alike import ALIKE, Answers, Cells, Found
 from ..candidates.candidates import Candidates
 from ..covers.covering import read_by_cover
 from ..labels.descent import beside
-from ..reading import Reading
+from ..reading import NEARLY, Reading
 from ..search import fitting_starts, read_cells
 from ..undivided import undivided
 from .corners import Alternative, OrientedMesh
 
 _MOST_VERTICES = 60
+_MOST_NOISY = 400  # where errors of the entries may hide a difference; these are read once
 _ORDERS = 5
 _WORK = 3000  # vertices, those of components that are alike once, times orders; each is read once again at least
 
 
 def other_readings(
-    stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, scale: float | None
+    stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, scale: float | None, agree: float
 ) -> list[Alternative]:
     """Readings of small components that fit, but have other cells; at most one for each.
 
@@ -41,19 +42,23 @@ def other_readings(
     """
     rng = np.random.default_rng(0)
     others = []
-    small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= _MOST_VERTICES]
+    noisy = stored.errors is not None and agree > NEARLY
+    most = _MOST_NOISY if noisy else _MOST_VERTICES
+    small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= most]
     n_orders = int(np.clip(_WORK // max(_distinct_vertices(stored, small), 1), 1, _ORDERS))
     half = _with_vanished_sides(stored, mesh)
     answers = Answers()
     for part, own in zip(small, own_cells(stored.n, small, mesh), strict=True):
         supposed = bool(half[part.vertices].any())
         weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
-        shuffled = (part.then(_shuffled(part, rng)) for _ in range(n_orders))
-        ask = partial(_other_reading, shuffled, stored, own, scale, c, supposed=supposed)
+        orders = n_orders if len(part.vertices) <= _MOST_VERTICES else 1
+        shuffled = (part.then(_shuffled(part, rng)) for _ in range(orders))
+        ask = partial(_other_reading, shuffled, stored, own, scale, c, supposed=supposed, noisy=noisy)
         cells, factor, _ = answers.of(part, weights, own, ask)
         if cells is not None:
             gone, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
-            others.append(Alternative((), (), (), gone, new, same_scale=abs(factor / c - 1) < SAME_SCALE))
+            same = abs(factor / c - 1) < max(SAME_SCALE, agree)
+            others.append(Alternative((), (), (), gone, new, same_scale=same))
     return others
 
 
@@ -80,19 +85,28 @@ def _with_vanished_sides(stored: OperatorMatrix, mesh: OrientedMesh) -> NDArray[
 
 
 def _other_reading(
-    orders: Iterable[Numbering], stored: OperatorMatrix, own: Cells, scale: float | None, c: float, *, supposed: bool
+    orders: Iterable[Numbering],
+    stored: OperatorMatrix,
+    own: Cells,
+    scale: float | None,
+    c: float,
+    *,
+    supposed: bool,
+    noisy: bool,
 ) -> Found:
     """Other cells that fit in some order of the vertices, and their c.
 
     Among all starts if vanished sides have been `supposed` in these cells, as they are not where something fits without
-    them; else, or where no start fits, by the search. Once also what differs little from what is found.
+    them; else, or where no start fits, by the search. Once also what differs little from what is found, where that may
+    make little difference.
     """
     for number, part in enumerate(orders):
-        graph = len(part.vertices), part.edges, -stored.entries[part.edge_rows], scale
+        errors = None if stored.errors is None else stored.errors[part.edge_rows]
+        graph = len(part.vertices), part.edges, -stored.entries[part.edge_rows], scale, errors
         found = list(fitting_starts(*graph)) if supposed else []
         if not found and (reading := read_cells(*graph)) is not None and reading.fits:
             found = [reading]
-        near = [beside(reading) for reading in found if isinstance(reading.candidates, Candidates) and supposed]
+        near = [beside(one) for one in found if isinstance(one.candidates, Candidates) and (supposed or noisy)]
         for reading in chain(found, *near if number == 0 else ()):
             if (cells := cells_of(reading, part)) != own:
                 return cells, next(solved.scale for solved in reading.meshes if solved), False
@@ -114,12 +128,18 @@ def own_cells(n: int, parts: list[Numbering], mesh: OrientedMesh) -> list[set[tu
 
 
 def with_another_scale(
-    part: Numbering, weights: NDArray, c: float, others: list[float], *, searched: bool = True
+    part: Numbering,
+    weights: NDArray,
+    errors: NDArray | None,
+    c: float,
+    others: list[float],
+    *,
+    searched: bool = True,
 ) -> Reading | None:
     """A reading that fits with the first of some factors that allows one, c left out; by a cover or a search."""
     for other in others:
         if abs(other / c - 1) > SAME_SCALE:
-            graph = len(part.vertices), part.edges, weights, other
+            graph = len(part.vertices), part.edges, weights, other, errors
             reading = read_cells(*graph) if searched else read_by_cover(*graph)
             if reading is not None and reading.fits:
                 return reading

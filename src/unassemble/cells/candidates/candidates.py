@@ -78,12 +78,14 @@ class Candidates(CellSet):
         scale: float | None = None,
         crosses: Crosses | None = None,
         guess: float | None = None,
+        errors: NDArray | None = None,
         wide: bool = False,
     ) -> Candidates:
         """All candidates of one drawing of the graph; the corners about some crosses are right angles.
 
-        `guess` is a c to judge angles by, where it is not known. If `wide`, there are corners in quadrilaterals, too,
-        which may be a triangle and a hole, and all half circles that do not fill more than a full turn.
+        `guess` is a c to judge angles by, where it is not known; `errors` are as in the class. If `wide`, there are
+        corners in quadrilaterals, too, which may be a triangle and a hole, and all half circles that do not fill more
+        than a full turn.
         """
         blocks = drawing.split()
         relative = weights / (scale or (crosses and crosses.scale) or guess or likeliest_scale(blocks, weights))
@@ -116,6 +118,7 @@ class Candidates(CellSet):
             drawing=drawing,
             weights=weights,
             scale=scale,
+            errors=errors,
             relative=relative,
             cells=Polygons(
                 np.append(0, np.cumsum(size)),
@@ -150,7 +153,7 @@ class Candidates(CellSet):
 
     def widened(self, labels: NDArray[np.bool_]) -> tuple[Candidates, NDArray[np.bool_]]:
         """More candidates in the same drawing, and the labels of what there was before."""
-        wide = Candidates.of(self.drawing, self.weights, self.scale, self.crosses, wide=True)
+        wide = Candidates.of(self.drawing, self.weights, self.scale, self.crosses, errors=self.errors, wide=True)
         number = {name: k for k, name in enumerate(self.names)}
         same = np.array([number.get(name, -1) for name in wide.names])
         return wide, (same >= 0) & labels[same]

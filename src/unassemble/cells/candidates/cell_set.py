@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,8 @@ class CellSet:
     corner : (cells,) bool
         Triangles a-b-c of two edges a-b, b-c; the third has vanished from the boundary, which it does if the angle at b
         is a right one.
+    errors : (e,) float64 or None
+        Standard deviations of the errors of the weights, where they are known.
     """
 
     n_vertices: int
@@ -35,6 +37,7 @@ class CellSet:
     scale: float | None
     cells: Polygons
     corner: NDArray[np.bool_]
+    errors: NDArray[np.float64] | None = field(default=None, kw_only=True)
 
     @property
     def count(self) -> int:

@@ -21,6 +21,7 @@ from ...topology.keys import pair_keys
 from ..agreement import common_values
 
 _AGREE = 1e-7
+_SIGMAS = 6.0  # errors of c by which crosses may differ
 _OPPOSITE = np.array([[0, 1, 2, 3], [0, 1, 3, 2], [0, 2, 1, 3]])
 """Cyclic orders of four neighbours: first opposite third, second opposite fourth."""
 
@@ -46,7 +47,14 @@ class Crosses:
     unique: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, n: int, edges: NDArray, weights: NDArray, scale: float | None = None) -> Crosses:
+    def of(
+        cls,
+        n: int,
+        edges: NDArray,
+        weights: NDArray,
+        scale: float | None = None,
+        errors: NDArray | None = None,
+    ) -> Crosses:
         """Find them all.
 
         Parameters
@@ -58,23 +66,32 @@ class Crosses:
             -A_ij of each edge.
         scale : float, optional
             c, where it is known.
+        errors : (e,) float64, optional
+            Standard deviations of the errors of the weights, where they are known.
         """
         graph = adjacency(n, edges)
         hub = np.flatnonzero(np.diff(graph.indptr) == 4)
         near = graph.indices[graph.indptr[hub][:, None] + np.arange(4)].astype(np.int64)
         key = np.minimum(near, hub[:, None]) * n + np.maximum(near, hub[:, None])
-        w = weights[np.searchsorted(edges[:, 0] * n + edges[:, 1], key)]
+        row = np.searchsorted(edges[:, 0] * n + edges[:, 1], key)
+        w = weights[row]
         sign = np.sign(weights.sum())
         usable = (w * sign > 0).all(axis=1)
-        hub, near, w = hub[usable], near[usable], w[usable]
+        hub, near, row, w = hub[usable], near[usable], row[usable], w[usable]
         u = (1 / w)[:, _OPPOSITE]
-        factors = 2 * sign / np.sqrt((u[..., 0] + u[..., 2]) * (u[..., 1] + u[..., 3]))
+        sums = u[..., :2] + u[..., 2:]
+        factors = 2 * sign / np.sqrt(sums.prod(axis=-1))
+        agree = np.full(factors.shape, _AGREE)
+        if errors is not None:
+            of_sums = np.hypot(*np.split(u**2 * errors[row][:, _OPPOSITE], 2, axis=-1)) / sums
+            agree = np.maximum(agree, _SIGMAS / 2 * np.hypot(*np.moveaxis(of_sums, -1, 0)))
         if scale is None:
-            common = common_values(factors.ravel(), np.repeat(np.arange(len(factors)), 3), _AGREE)
+            typical = float(np.median(agree)) if agree.size else _AGREE
+            common = common_values(factors.ravel(), np.repeat(np.arange(len(factors)), 3), typical)
             if not len(common):
                 return cls(None, np.empty(0, np.int64), np.empty((0, 4), np.int64), np.empty(0, bool))
             scale = float(common[0])
-        fits = np.abs(factors / scale - 1) < _AGREE
+        fits = np.abs(factors / scale - 1) < agree
         kept = fits.any(axis=1)
         order = np.take_along_axis(near[kept], _OPPOSITE[fits[kept].argmax(axis=1)], axis=1)
         return cls(scale, hub[kept], order, fits[kept].sum(axis=1) == 1)

@@ -18,7 +18,9 @@ from ...topology.keys import with_sides
 from ...topology.pieces import planar_pieces
 from .numbered import Numbered
 
-_FITS = 1e-6
+FITS = 1e-6
+"""Misfit of weights in units of c, and of positions in units of the largest piece, that rounding leaves."""
+
 _NO_EDGES = np.empty((0, 2), np.int64)
 
 
@@ -35,10 +37,12 @@ class Assembly:
     Parameters
     ----------
     cells : Numbered
+    fits : float
+        Misfit of weights, and what rings of pieces may leave open.
     """
 
-    def __init__(self, cells: Numbered):
-        self._cells = cells
+    def __init__(self, cells: Numbered, fits: float = FITS):
+        self._cells, self._fits = cells, fits
         self._known: dict[bytes, NDArray | None] = {}
 
     def conflict(self, chosen: NDArray[np.int64]) -> NDArray[np.int64] | None:
@@ -76,7 +80,10 @@ class Assembly:
         solved = self._positions(chosen)
         if solved is None:
             return False
-        return gap(Topology(self._cells.shapes.n_vertices, solved.edges, solved.pieces, ""), solved.positions) <= _FITS
+        return (
+            gap(Topology(self._cells.shapes.n_vertices, solved.edges, solved.pieces, ""), solved.positions, self._fits)
+            <= self._fits
+        )
 
     def _seem_open(self, parts: list[NDArray], numbers: NDArray) -> bool:
         """Whether no mirror images were found with which rings of some parts close."""
@@ -86,7 +93,9 @@ class Assembly:
         count = np.bincount(np.concatenate([piece.vertices for piece in solved.pieces]))
         shared = [count[piece.vertices] > 1 for piece in solved.pieces]
         vertices = [piece.vertices[own] for piece, own in zip(solved.pieces, shared, strict=True)]
-        return not growing_images(vertices, [z[own] for z, own in zip(solved.positions, shared, strict=True)], _FITS)
+        return not growing_images(
+            vertices, [z[own] for z, own in zip(solved.positions, shared, strict=True)], self._fits
+        )
 
     def _positions(self, chosen: NDArray) -> _Solved | None:
         """Pieces and positions; None if the cells do not make planar surfaces with these cotangents."""
@@ -106,7 +115,7 @@ class Assembly:
         for piece in pieces:
             name = piece.vertices[piece.triangles].tobytes() + np.round(weights[piece.edge_rows], 6).tobytes()
             if name not in self._known:
-                self._known[name] = _laid_out(piece, weights[piece.edge_rows])
+                self._known[name] = _laid_out(piece, weights[piece.edge_rows], self._fits)
             z = self._known[name]
             if z is None:
                 return None
@@ -133,7 +142,7 @@ def _least(items: NDArray, bad: Callable[[NDArray], bool]) -> NDArray:
     return needed(items[:0], False, items)
 
 
-def _laid_out(piece: Piece, weights: NDArray) -> NDArray | None:
+def _laid_out(piece: Piece, weights: NDArray, fits: float) -> NDArray | None:
     """The conformal map of a piece whose c is 1, with two vertices held; None if there is none."""
     n = piece.n_vertices
     form = np.zeros((n, n), dtype=np.complex128)
@@ -152,4 +161,4 @@ def _laid_out(piece: Piece, weights: NDArray) -> NDArray | None:
         return None
     with np.errstate(all="ignore"):
         misfit = np.abs(edge_weights(piece, z) - weights)
-    return z / np.abs(z).max() if (misfit <= _FITS).all() else None
+    return z / np.abs(z).max() if (misfit <= fits).all() else None

@@ -17,7 +17,9 @@ from ...topology.keys import contains, distinct
 from ..candidates.angles import facing_angles
 from .shapes import Shapes
 
-_AGREE = 1e-7  # relative difference of equal numbers, and of sums of angles
+AGREE = 1e-7
+"""Relative difference of equal numbers, and of sums of angles, if entries have no errors."""
+
 _MOST_CHOICES = 4_000_000
 
 
@@ -45,7 +47,7 @@ class Numbered:
     far: NDArray[np.int64]
 
     @classmethod
-    def of(cls, shapes: Shapes, cotangents: NDArray, numbers: NDArray) -> Numbered | None:
+    def of(cls, shapes: Shapes, cotangents: NDArray, numbers: NDArray, agree: float = AGREE) -> Numbered | None:
         """All that fit; None if some edge is left without a cell, or there are too many.
 
         Parameters
@@ -55,8 +57,10 @@ class Numbered:
             Sums of the cotangents of the angles facing each edge, 2 w.
         numbers : (e, p) float64
             What a side of each edge may have, beside all of the sum; NaN for none.
+        agree : float
+            Relative difference of equal numbers, and of sums of angles.
         """
-        value = _values(cotangents, numbers)
+        value = _values(cotangents, numbers, agree)
         p = value.shape[1]
         if len(shapes) * p**4 > _MOST_CHOICES:
             return None
@@ -66,10 +70,10 @@ class Numbered:
         a, b, c, d = (angle[:, k] for k in range(4))
         two, other = a[:, :, None] + b[:, None, :], c[:, :, None] + d[:, None, :]
         sums = two[:, :, :, None, None] + other[:, None, None, :, :]
-        cell, *columns = np.nonzero(np.abs(sums - np.pi) < _AGREE)
+        cell, *columns = np.nonzero(np.abs(sums - np.pi) < agree)
         column = np.column_stack(columns)
         chosen = angle[cell[:, None], np.arange(4), column]
-        far = _partners(cotangents, value)
+        far = _partners(cotangents, value, agree)
         found = cls(shapes, cell, chosen, np.where(shapes.stored[cell], column, -1), far)._met()
         bare = np.bincount(found.edge[found.slot >= 0], minlength=len(cotangents)) == 0
         return None if bare.any() else found
@@ -113,7 +117,7 @@ class Numbered:
             found = replace(found, cell=cell[kept], angles=found.angles[kept], column=found.column[kept])
 
 
-def frequent_numbers(shapes: Shapes, cotangents: NDArray, most: int) -> NDArray[np.float64]:
+def frequent_numbers(shapes: Shapes, cotangents: NDArray, most: int, agree: float = AGREE) -> NDArray[np.float64]:
     """Cotangents that many edges would have if all others bordered one cell only, the most frequent first.
 
     Parameters
@@ -122,11 +126,13 @@ def frequent_numbers(shapes: Shapes, cotangents: NDArray, most: int) -> NDArray[
     cotangents : (e,) float64
         Sums of the cotangents of the angles facing each edge.
     most : int
+    agree : float
+        As for :meth:`Numbered.of`.
     """
     angle = np.where(shapes.stored, facing_angles(cotangents)[shapes.sides], 0.0)
     angle[shapes.corner, 2] = np.pi / 2
     rest = np.pi - angle.sum(axis=1, keepdims=True) + angle
-    usable = shapes.stored & (rest > _AGREE) & (rest < np.pi - _AGREE)
+    usable = shapes.stored & (rest > agree) & (rest < np.pi - agree)
     edge = shapes.sides[usable]
     near = 1 / np.tan(rest[usable])
     every = np.arange(len(cotangents))
@@ -134,25 +140,25 @@ def frequent_numbers(shapes: Shapes, cotangents: NDArray, most: int) -> NDArray[
     edge = np.concatenate([every, every, edge, edge])
     order = np.argsort(value)
     value, edge = value[order], edge[order]
-    run = np.cumsum(np.diff(value, prepend=value[:1]) > _AGREE * (1 + np.abs(value)))
+    run = np.cumsum(np.diff(value, prepend=value[:1]) > agree * (1 + np.abs(value)))
     count = np.bincount(distinct(run * len(cotangents) + edge) // len(cotangents))
     first = np.flatnonzero(np.diff(run, prepend=-1))
     return np.asarray(value[first[np.argsort(-count, kind="stable")[:most]]])
 
 
-def _values(cotangents: NDArray, numbers: NDArray) -> NDArray[np.float64]:
+def _values(cotangents: NDArray, numbers: NDArray, agree: float) -> NDArray[np.float64]:
     """(e, 1 + p) what a side of each edge may have: all of it, or a number, if the rest is another one."""
     rest = cotangents[:, None] - numbers
-    bound = _AGREE * (1 + np.abs(numbers))
+    bound = agree * (1 + np.abs(numbers))
     known = (np.abs(rest[:, :, None] - numbers[:, None, :]) < bound[:, None, :]).any(axis=2)
-    known |= np.abs(numbers) < _AGREE  # a right angle, across which another cell has all of the sum
+    known |= np.abs(numbers) < agree  # a right angle, across which another cell has all of the sum
     first = np.triu(np.abs(numbers[:, :, None] - numbers[:, None, :]) < bound[:, None, :], 1).any(axis=1)
     known &= ~first & ~(np.abs(rest) < bound)
     return np.column_stack([cotangents, np.where(known, numbers, np.nan)])
 
 
-def _partners(cotangents: NDArray, value: NDArray) -> NDArray[np.int64]:
+def _partners(cotangents: NDArray, value: NDArray, agree: float) -> NDArray[np.int64]:
     """(e, p) column of what is left of the sum by each value; -1 where none of them is."""
     rest = cotangents[:, None] - value
-    same = np.abs(rest[:, :, None] - value[:, None, :]) < _AGREE * (1 + np.abs(rest[:, :, None]))
+    same = np.abs(rest[:, :, None] - value[:, None, :]) < agree * (1 + np.abs(rest[:, :, None]))
     return np.where(same.any(axis=2), same.argmax(axis=2), -1)

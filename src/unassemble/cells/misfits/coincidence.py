@@ -12,7 +12,7 @@ from .doubt import components_of
 _EQUAL = 1e-9
 
 
-def coincident(stored: OperatorMatrix, topology: Topology) -> NDArray[np.bool_]:
+def coincident(stored: OperatorMatrix, topology: Topology, agree: float = 0.0) -> NDArray[np.bool_]:
     """(pieces,) pieces whose cells other cells may replace, since all entries are equal.
 
     A piece with no more entries, vanished ones counted, than coordinates and c fits by itself. That several hang
@@ -25,6 +25,8 @@ def coincident(stored: OperatorMatrix, topology: Topology) -> NDArray[np.bool_]:
         Without the vanished entries.
     topology : Topology
         Of the mesh that was found.
+    agree : float
+        Relative difference of equal entries that noise may cause.
     """
     label = components_of(stored)
     count = int(label.max()) + 1
@@ -34,7 +36,7 @@ def coincident(stored: OperatorMatrix, topology: Topology) -> NDArray[np.bool_]:
     np.maximum.at(highest, owner, stored.entries)
     part = np.array([label[piece.vertices[0]] for piece in topology.pieces], dtype=np.int64)
     loose = np.array([piece.redundancy <= 0 for piece in topology.pieces], dtype=bool)
-    alike = (highest - lowest)[part] <= _EQUAL * np.abs(highest[part])
+    alike = (highest - lowest)[part] <= max(_EQUAL, agree) * np.abs(highest[part])
     several = np.bincount(part, minlength=count) > 1
     all_loose = np.bincount(part, ~loose, count) == 0
     return np.asarray(alike & several[part] & all_loose[part])

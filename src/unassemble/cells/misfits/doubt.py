@@ -11,6 +11,7 @@ from scipy.sparse import csgraph
 
 from ...errors import RecoveryError, SolverError
 from ...matrix import OperatorMatrix
+from ...planar.cautious import cautious_polish, count_flipped
 from ...planar.cotangent import left_by_all
 from ...planar.deviations import factor_deviations
 from ...planar.piece import PieceMesh
@@ -59,7 +60,9 @@ def in_doubt(
     wrong = misfit > FITS
     if not wrong.any() or _like_noise(misfit, matrix.n):
         return doubtful
-    if _like_noise(misfits_of(matrix, _shortly_polished(matrix, solved, scale))[rest], matrix.n):
+    if _like_noise(
+        misfits_of(matrix, _shortly_polished(matrix, solved, scale, small_steps=bool(noise)))[rest], matrix.n
+    ):
         return doubtful
     return doubtful | _components_of(matrix, rest[wrong])
 
@@ -133,16 +136,22 @@ def _like_noise(misfit: NDArray, n: int) -> bool:
     return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < SURE)
 
 
-def _shortly_polished(matrix: OperatorMatrix, solved: Solved, scale: float | None) -> Solved:
+def _shortly_polished(matrix: OperatorMatrix, solved: Solved, scale: float | None, *, small_steps: bool) -> Solved:
+    """By a few large steps; where these lead to flat triangles by as many `small_steps` as it takes, if at all."""
     polished: Solved = []
     for piece, mesh in solved:
         if isinstance(mesh, PieceMesh):
+            weights, failure = -matrix.entries[piece.edge_rows], None
             try:
-                found = polish(piece, -matrix.entries[piece.edge_rows], mesh.z, scale=scale, options=_SHORT)
+                found = polish(piece, weights, mesh.z, scale=scale, options=_SHORT)
             except SolverError as error:
-                polished.append((piece, error))
-                continue
-            polished.append((piece, PieceMesh(found.z, found.scale)))
+                failure = error
+            try:
+                if small_steps and (failure or count_flipped(piece, found.z)):
+                    found, failure = cautious_polish(piece, weights, mesh.z, scale=scale), None
+            except SolverError as error:
+                failure = error
+            polished.append((piece, failure or PieceMesh(found.z, found.scale)))
         else:
             polished.append((piece, mesh))
     return polished

@@ -1,0 +1,96 @@
+"""Numbers that were rounded: to decimal digits, to decimals, or to single precision.
+
+Nearly all doubles have more digits than that, so that a matrix all of whose entries have few was rounded, and by how
+much can be read off it. Whole numbers, halves and quarters have few digits by nature and say nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+_LEFTOVER = 1e-14  # of the largest number: less is what cancelling leaves, in no few digits
+_DIGITS = range(3, 13)  # decimal ones to look for; fewer do not tell what is rounded from what is exact
+_SHORT = 12  # binary digits of numbers that are exact by nature
+_SINGLE = 24, 20  # binary digits of single precision, and what nearly all of its numbers need
+_LEAST = 2  # different numbers that need the last digit: one may be a factor that somebody chose
+_SAMPLE = 2000
+_EXACT = 8 * float(np.finfo(float).eps)  # relative error of a number scaled by a power of ten
+
+
+@dataclass(frozen=True, eq=False)
+class Digits:
+    """The precision that numbers were rounded to.
+
+    Attributes
+    ----------
+    name : str
+        ``"6 digits"``, ``"6 decimals"`` or ``"single precision"``.
+    unit : (k,) float64
+        Of the last place of each number. That of zeros is 0, unless they were rounded to decimals as well.
+    """
+
+    name: str
+    unit: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, values: NDArray[np.float64]) -> Digits | None:
+        """The precision of some numbers (k,); None where they have not been rounded, or not so that it shows."""
+        size = np.abs(values)
+        size = size[size > _LEFTOVER * size.max(initial=0.0)]
+        sample = size[:: max(1, len(size) // _SAMPLE)]
+        if not (_are_binary(sample, _SINGLE[0]).all() or _have(sample, _DIGITS[-1]).all()):  # as in most matrices
+            return None
+        size = np.unique(size)
+        told = size[~_are_binary(size, _SHORT)]
+        if len(told) < _LEAST:
+            return None
+        if _are_binary(size, _SINGLE[0]).all() and _need_more(_are_binary(told, _SINGLE[1])):
+            return cls("single precision", _last_bit(np.abs(values), _SINGLE[0]))
+        digits = next((d for d in _DIGITS if _have(sample, d).all() and _have(size, d).all()), None)
+        return None if digits is None else cls._decimal(np.abs(values), size, told, digits)
+
+    @classmethod
+    def _decimal(cls, values: NDArray, size: NDArray, told: NDArray, digits: int) -> Digits | None:
+        """Decimals if all numbers are multiples of one power of ten, the coarser of both, and otherwise digits."""
+        exponent = _exponent(size.max()) - digits + 1
+        if _are_multiples(size, exponent).all():
+            rounded = exponent != 0 and _need_more(_are_multiples(told, exponent + 1))
+            name = f"{-exponent:.0f} decimals" if exponent < 0 else f"{digits} digits"
+            return cls(name, np.full(len(values), 10.0**exponent)) if rounded else None
+        unit = np.where(values > 0, 10.0 ** (_exponent(values) - digits + 1), 0.0)
+        whole = (size == np.rint(size)).all() and unit[values > 0].min() <= 1.0
+        return cls(f"{digits} digits", unit) if not whole and _need_more(_have(told, digits - 1)) else None
+
+
+def _need_more(coarse: NDArray[np.bool_]) -> bool:
+    """Whether most of some numbers, and more than one, are not among those with a digit less."""
+    return bool(np.count_nonzero(~coarse) >= max(_LEAST, len(coarse) / 2))
+
+
+def _exponent(size: NDArray) -> NDArray[np.float64]:
+    """Of the leading digit; 0 for zeros."""
+    return np.asarray(np.floor(np.log10(np.where(size > 0, size, 1.0))))
+
+
+def _have(size: NDArray, digits: int) -> NDArray[np.bool_]:
+    return _are_multiples(size, _exponent(size) - digits + 1)
+
+
+def _are_multiples(size: NDArray, exponent: NDArray) -> NDArray[np.bool_]:
+    """Whether numbers are the doubles next to whole multiples of powers of ten."""
+    # Powers of ten are exact up to 10^22: dividing by one, or multiplying, errs by a last place.
+    with np.errstate(over="ignore", under="ignore"):
+        count = np.where(exponent < 0, size * 10.0 ** np.abs(exponent), size / 10.0 ** np.abs(exponent))
+        return np.asarray(np.abs(count - np.rint(count)) <= _EXACT * count)
+
+
+def _are_binary(size: NDArray, digits: int) -> NDArray[np.bool_]:
+    scaled = np.ldexp(np.frexp(size)[0], digits)
+    return np.asarray(scaled == np.rint(scaled))
+
+
+def _last_bit(size: NDArray, digits: int) -> NDArray[np.float64]:
+    return np.where(size > 0, np.ldexp(1.0, np.frexp(size)[1] - digits), 0.0)

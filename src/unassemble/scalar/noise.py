@@ -1,0 +1,146 @@
+"""Errors of the entries, where their size is known: it is given, or the entries show to what they were rounded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..certify import CONFIDENCE, LARGEST_NOISE, chi_square_verdict
+from ..matrix import OperatorMatrix
+from ..matrix.digits import Digits
+from ..matrix.operator import row_sizes
+from ..planar.piece import EXACT
+from ..topology import Topology
+from ..topology.keys import pair_keys
+
+_CHANCE = np.log(1e-6)  # that entries without a mesh are fitted to within their rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Independent errors of known size in the stored entries.
+
+    Attributes
+    ----------
+    sigma : float
+        Standard deviation of those of typical entries.
+    spread : (e,) float64
+        Standard deviations, over `sigma`.
+    digits : str or None
+        What the entries were rounded to; None where the noise was given.
+    repeats : float
+        How often an error occurs, in the mean over the entries: entries that are equal were rounded alike.
+    different : float
+        Share of the entries that are not equal to others.
+    """
+
+    sigma: float
+    spread: NDArray[np.float64]
+    digits: str | None = None
+    repeats: float = 1.0
+    different: float = 1.0
+
+    @classmethod
+    def known(cls, matrix: OperatorMatrix, sigma: float | None) -> Noise | None:
+        """That of a given standard deviation, or else of entries that have been rounded."""
+        if sigma is not None:
+            return cls(sigma, np.ones(len(matrix.edges)))
+        digits = Digits.of(matrix.entries)
+        return None if digits is None else cls._of_rounding(matrix, digits)
+
+    @classmethod
+    def _of_rounding(cls, matrix: OperatorMatrix, digits: Digits) -> Noise:
+        # Zeros, and what cancelling leaves, are exact to the rounding of assembly, which that of larger entries tells.
+        unit = digits.unit
+        largest = row_sizes(matrix.n, matrix.edges, unit)[matrix.edges].min(axis=1)
+        # An error between -u / 2 and u / 2, evenly distributed, has the standard deviation u / sqrt(12).
+        error = np.maximum(unit, EXACT * largest) / np.sqrt(12)
+        rounded = unit > 0
+        sigma = float(np.median(error[rounded]))
+        count = np.unique(np.abs(matrix.entries[rounded]), return_counts=True)[1]
+        repeats, different = np.sum(count**2) / np.sum(count), len(count) / np.sum(count)
+        return cls(sigma, error / sigma, digits.name, float(repeats), float(different))
+
+    def __str__(self) -> str:
+        return f"rounding to {self.digits}" if self.digits else f"noise of standard deviation {self.sigma:.3g}"
+
+    def on(self, topology: Topology) -> NDArray[np.float64]:
+        """(e',) standard deviations over `sigma` of all entries, those included that have vanished and are exact."""
+        return with_vanished(topology, self.spread)
+
+    def at(self, pairs: NDArray[np.int64], stored: OperatorMatrix) -> NDArray[np.float64]:
+        """(k,) standard deviations of entries at `pairs` (k, 2), those that are stored among them."""
+        if len(pairs) == len(self.spread):
+            return self.sigma * self.spread
+        spread = np.ones(len(pairs))
+        keys = pair_keys(stored.n, *pairs.T)
+        spread[np.searchsorted(keys, pair_keys(stored.n, *stored.edges.T))] = self.spread
+        return self.sigma * spread
+
+
+@dataclass(frozen=True)
+class NoiseTest:
+    """A misfit held against the errors that entries have.
+
+    Attributes
+    ----------
+    noise : Noise
+    freedom : int
+        Entries less fitted unknowns.
+    figures : dict
+        See :func:`unassemble.certify.chi_square_verdict`.
+    limit : float
+        Standard deviation of noise that drowns the cotangents.
+    worst : int
+        Where the misfit is largest.
+    """
+
+    noise: Noise
+    freedom: int
+    figures: dict[str, float]
+    limit: float
+    worst: int
+
+    @classmethod
+    def of(cls, noise: Noise, misfit: NDArray[np.float64], freedom: int, factors: NDArray[np.float64]) -> NoiseTest:
+        """Test the misfit (k,) of all entries, in standard deviations, of pieces with `factors` c."""
+        figures = chi_square_verdict(misfit, freedom, noise.sigma, repeats=noise.repeats)
+        return cls(noise, freedom, figures, LARGEST_NOISE * float(np.abs(factors).min()), int(np.abs(misfit).argmax()))
+
+    @property
+    def possible(self) -> bool:
+        """Whether there are more entries than unknowns."""
+        return self.freedom > 0
+
+    @property
+    def drowned(self) -> bool:
+        """Whether almost any mesh would pass."""
+        return self.noise.sigma > self.limit
+
+    @property
+    def coincidence(self) -> bool:
+        """Whether entries without a mesh may be fitted to within their rounding by chance; noise given is believed."""
+        equations = self.freedom * self.noise.different
+        chance = equations * np.log(self.noise.sigma * LARGEST_NOISE / self.limit)
+        return self.noise.digits is not None and chance > _CHANCE
+
+    @property
+    def likely(self) -> bool:
+        """Whether the misfit is not improbably large."""
+        return min(self.figures["p_value"], self.figures["largest_p_value"]) >= CONFIDENCE
+
+    @property
+    def passed(self) -> bool:
+        """Whether that says something."""
+        return self.likely and not (self.drowned or self.coincidence)
+
+
+def with_vanished(topology: Topology, spread: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    """(e',) standard deviations of all entries over a common factor; of those stored given, or of one size."""
+    result = np.full(len(topology.edges), EXACT)
+    stored = np.ones(len(topology.edges), dtype=bool)
+    stored[topology.vanished] = False
+    result[stored] = 1.0 if spread is None else spread
+    return result
