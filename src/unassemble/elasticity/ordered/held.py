@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..rows.grouping import by_first_row
+from ..rows.grouping import without_doubles
 from .matching import Pairs
 
 
@@ -127,6 +127,4 @@ def _linked(node: NDArray[np.int64], direction: NDArray[np.int64], d: int, pairs
     n = int(node.max()) + 1
     link = sp.csr_array((np.ones(pairs.shape[1], np.int8), (node[pairs[0]], node[pairs[1]])), shape=(n, n))
     label = sp.csgraph.connected_components(link, directed=False)[1][node].astype(np.int64)
-    key = label * d + direction
-    twice = np.bincount(label, np.bincount(key)[key] > 1) > 0
-    return by_first_row(np.where(twice[label], n + node, label))
+    return without_doubles(label, node, direction, d)[0]

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..rows.grouping import by_first_row
+from ..rows.grouping import without_doubles
 from ..rows.likeness import compared, doubtful, reach
 from .alignment import aligned
 
@@ -118,11 +118,8 @@ def _joined(pairs: list[Pairs], direction: NDArray[np.int64], d: int) -> tuple[N
     none = np.empty(0, np.int64)
     first, second = (np.concatenate([none, *some]) for some in zip((none, none), *pairs, strict=True))
     link = sp.csr_array((np.ones(len(first), np.int8), (first, second)), shape=(order, order))
-    label = sp.csgraph.connected_components(link, directed=False)[1]
-    key = label.astype(np.int64) * d + direction
-    twice = np.bincount(key)[key] > 1
-    torn = np.bincount(label, twice)[label] > 0
-    return by_first_row(np.where(torn, order + np.arange(order), label)), torn
+    label = sp.csgraph.connected_components(link, directed=False)[1].astype(np.int64)
+    return without_doubles(label, np.arange(order), direction, d)
 
 
 def _paired(pattern: sp.csr_array, reached: sp.csr_array, rows_c: NDArray, rows_b: NDArray) -> Pairs:

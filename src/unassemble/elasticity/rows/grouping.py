@@ -27,6 +27,15 @@ def by_first_row(label: NDArray) -> NDArray[np.int64]:
     return rank[inverse]
 
 
+def without_doubles(
+    label: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[np.int64], d: int
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """(N,) labels as nodes, and which rows would make one with two rows of a direction: these keep their `node`."""
+    key = label * d + direction
+    torn = np.bincount(label, np.bincount(key)[key] > 1)[label] > 0
+    return by_first_row(np.where(torn, len(label) + node, label)), torn
+
+
 def possible_nodes(group: NDArray[np.int64], d: int) -> list[NDArray[np.int64]]:
     """Labels of rows to start a search from: rows of the same pattern as nodes, each row of larger groups by itself.
 

@@ -59,13 +59,13 @@ def sums_of(
 
 def equations(
     nodal: NodalMatrix,
-    valid: NDArray[np.bool_],
     sums: Sums,
     group: NDArray[np.int64],
     node: NDArray[np.int64],
     direction: NDArray[np.int64],
 ) -> tuple[NodalMatrix, NDArray[np.bool_]]:
     """Those of rows, of patterns, and of planes that rollers hold, whichever rows are one node's."""
+    valid: NDArray[np.bool_] = sums.whole[nodal.row_of] & (nodal.row_of >= 0)[:, :, None]
     extended, full = with_patterns(nodal, valid, group, node, direction, sums.whole)
     row = np.zeros(nodal.n, dtype=np.int64)
     row[node] = np.arange(len(node))  # any row of the node: all have the same pattern

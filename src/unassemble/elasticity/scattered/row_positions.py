@@ -17,7 +17,7 @@ from ...errors import GeometryError
 from ..nodal import NodalMatrix, determined, nodal_matrix
 from ..nullspace.placing import placed
 from ..nullspace.solution import Solution
-from ..rows.grouping import by_first_row
+from ..rows.grouping import by_first_row, without_doubles
 from ..rows.numbering import Numbering
 from ..rows.pieces import pieces
 from .exchange import fullest
@@ -75,9 +75,13 @@ def placed_together(
     may = live if open_row is None else live & open_row
     sums = sums_of(matrix, live, group, direction, d)
     countable = fullest(matrix, live, group, direction, d)[group] >= 0
+    everywhere = np.zeros((len(node), d), dtype=np.int64)
+
+    def piece_of(node: NDArray[np.int64]) -> NDArray[np.int64]:
+        return pieces(node, direction, d) if ordered else everywhere
+
     for _ in range(_ROUNDS):
-        piece = pieces(node, direction, d) if ordered else np.zeros((len(node), d), dtype=np.int64)
-        open_row = _open(group, node, direction, piece) & may
+        open_row = _open(group, node, direction, piece_of(node)) & may
         if not open_row.any():
             break
         nodal = nodal_matrix(matrix, Numbering(d, node, direction, identity, "pattern", 1.0, 1.0))
@@ -86,7 +90,7 @@ def placed_together(
         if solution is not None:
             again, settled = _joined(solution, sums, group, node, direction, open_row, ordered=ordered)
             may = may & ~settled
-        piece = pieces(again, direction, d) if ordered else piece
+        piece = piece_of(again)
         again = _remaining(group, again, direction, piece, may & countable)
         if solution is not None and again.max() == node.max():
             again, settled = joined_by_trial(matrix, sums, solution, group, node, direction, piece, open_row & may)
@@ -94,8 +98,7 @@ def placed_together(
         if again.max() == node.max():
             break
         node = again
-    piece = pieces(node, direction, d) if ordered else piece
-    return node, _open(group, node, direction, piece) & may
+    return node, _open(group, node, direction, piece_of(node)) & may
 
 
 def _open(
@@ -119,9 +122,8 @@ def _row_by_row(
     nodal: NodalMatrix, sums: Sums, group: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[np.int64]
 ) -> Solution | None:
     """Positions of nodes each of which may be some rows of one only; None where none are exact."""
-    valid: NDArray[np.bool_] = sums.whole[nodal.row_of] & (nodal.row_of >= 0)[:, :, None]
     try:
-        solution = placed(*equations(nodal, valid, sums, group, node, direction), None)
+        solution = placed(*equations(nodal, sums, group, node, direction), None)
     except GeometryError:
         return None
     return solution if solution.exact and "hourglass" not in solution.freedoms else None
@@ -159,8 +161,8 @@ def _joined(
     points[place[known]] = solution.points[:n][known]
     gone[here] = sums.gone
     label, settled = of_planes(points, gone, group, here, direction, open_row, ordered=ordered)
-    twice = np.asarray((by_direction(label, direction, d) > 1).any(axis=1))[label]
-    return by_first_row(np.where(twice, n + node, label)), settled & ~twice
+    joined, torn = without_doubles(label, node, direction, d)
+    return joined, settled & ~torn
 
 
 def _remaining(

@@ -173,11 +173,10 @@ class _Patch:
         sums = self.sums._replace(gone=np.where(self.own[:, None], lacks[node], self.sums.gone))
         identity = np.zeros(len(node), dtype=bool)
         nodal = nodal_matrix(self.matrix, Numbering(d, node, self.direction, identity, "pattern", 1.0, 1.0))
-        valid = sums.whole[nodal.row_of] & (nodal.row_of >= 0)[:, :, None]
         points = np.full((n, d), np.nan)
         known = determined(self.points)
         points[node[known]] = self.points[known]
-        misfit, free = _least(*equations(nodal, valid, sums, self.group, node, self.direction), points)
+        misfit, free = _least(*equations(nodal, sums, self.group, node, self.direction), points)
         return misfit, free[node]
 
 
