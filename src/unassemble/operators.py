@@ -10,9 +10,11 @@ import scipy.sparse as sp
 
 from .errors import GeometryError, InputError, RecoveryError
 from .matrix import OperatorMatrix
+from .matrix.digits import Digits
 
 if TYPE_CHECKING:
     from .elasticity import Numbering
+    from .elasticity.ordered.rounded import Rounding
     from .structures import StructuralNumbering
 
 OPERATORS = ("auto", "laplacian", "elasticity")
@@ -31,14 +33,14 @@ class VectorReading:
         Of solids, or of frames, shells and plates, whose nodes have rotations too.
     why : str
         What speaks for it; empty where the caller asked for it.
-    exact : ((N, N) sparse, float), optional
+    exact : ((N, N) sparse, Rounding), optional
         Of entries with few digits: the matrix, whose rows annihilate translations exactly where they did up to
         rounding, and that rounding.
     """
 
     numbering: Numbering | StructuralNumbering
     why: str
-    exact: tuple[sp.csr_array, float] | None = None
+    exact: tuple[sp.csr_array, Rounding] | None = None
 
 
 def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) -> VectorReading:
@@ -137,20 +139,19 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
 
 def about_translations(matrix: OperatorMatrix) -> str:
     """Why a matrix that is no planar mesh is no stiffness matrix either though its rows form nodes; empty if not so."""
-    from .elasticity.ordered.rounded import rounding_of
     from .elasticity.unknowns import MORE_THAN_STIFFNESS, nodes_of_pattern
 
-    nodes, rounding = nodes_of_pattern(matrix.csr()), rounding_of(matrix.csr().data)
+    nodes, rounded = nodes_of_pattern(matrix.csr()), Digits.of(matrix.csr().data)
     if nodes is None:
         return ""
-    digits = f", or what shows it is lost in the entries, which are rounded to {rounding:.0e} of themselves"
+    digits = f", or what shows it is lost in the entries, which are rounded to {rounded.name}" if rounded else ""
     return (
         f"its rows form {nodes[0]} nodes with {nodes[1]} unknowns each, as those of an elasticity matrix, but do not "
-        f"annihilate translations: perhaps {MORE_THAN_STIFFNESS}{digits if rounding else ''}"
+        f"annihilate translations: perhaps {MORE_THAN_STIFFNESS}{digits}"
     )
 
 
-def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, tuple[sp.csr_array, float] | None]:
+def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, tuple[sp.csr_array, Rounding] | None]:
     """The matrix to look at, and of entries with few digits what a reading keeps of it."""
     from .elasticity.ordered.rounded import with_exact_sums
 
@@ -158,7 +159,7 @@ def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, tuple[sp.csr_array, fl
     return whole, (whole, rounding) if rounding else None
 
 
-def _truss(whole: sp.csr_array, exact: tuple[sp.csr_array, float] | None, reason: str) -> VectorReading | None:
+def _truss(whole: sp.csr_array, exact: tuple[sp.csr_array, Rounding] | None, reason: str) -> VectorReading | None:
     from .structures import truss_numbering
 
     found = truss_numbering(whole)

@@ -52,7 +52,7 @@ def recover_vector(
     if isinstance(numbering, StructuralNumbering):
         return serve_structure(matrix, numbering, clock, anchors=anchors, choice=choice, cells=cells)
     with clock("numbering"):
-        whole, rounding = reading.exact or (matrix.csr(), 0.0)
+        whole, rounding = reading.exact or (matrix.csr(), None)
         nodal = nodal_matrix(whole, numbering)
     if uncoupled(nodal):
         found = recover_directions(parts_of(whole, nodal, numbering), matrix, anchors, scalar)

@@ -24,6 +24,11 @@ def test_decimal(form, factor):
     assert (found.unit[-1] == 0) == form.endswith("g")
 
 
+def test_regular_meshes_have_exact_numbers_too():
+    sides = np.array([0.0, 1 / 3, 0.5, 0.6, 1 / 1.2, 1.0, 1.2, 1.25, 1.8, 1.85, 2.0, 2.66 / 1.2, 3.6, 3.7, 7.4])
+    assert Digits.of(np.array([float(f"{x:.6g}") for x in sides])).name == "6 digits"
+
+
 def test_single_precision():
     rounded = GENERIC.astype(np.float32).astype(float)
     found = Digits.of(np.append(rounded, [0.0, 1e-300]))

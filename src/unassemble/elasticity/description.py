@@ -11,7 +11,7 @@ from .nodal import NodalMatrix, determined
 from .nullspace.certificate import largest_residual
 from .nullspace.material import lame_ratio, poisson_ratio
 from .nullspace.solution import Solution
-from .ordered.rounded import SPREADS
+from .ordered.rounded import Rounding
 from .remarks import about_assumptions, about_cells, about_directions, about_nodes
 from .results import ElasticityRecovery
 from .rows.numbering import Numbering
@@ -22,7 +22,13 @@ _NEAR = 1e-6  # residual up to which positions are good enough to look for eleme
 
 
 def described(
-    nodal: NodalMatrix, numbering: Numbering, solution: Solution, clock: Clock, *, cells: bool, rounding: float
+    nodal: NodalMatrix,
+    numbering: Numbering,
+    solution: Solution,
+    clock: Clock,
+    *,
+    cells: bool,
+    rounding: Rounding | None,
 ) -> ElasticityRecovery:
     """The recovery, with its certificate, material and cells, and the sentences that go with them.
 
@@ -34,12 +40,12 @@ def described(
     clock : Clock
     cells : bool
         Look for elements too.
-    rounding : float
-        Of the entries, relative, where they have few digits; else 0.
+    rounding : Rounding, optional
+        Of the entries, where they have few digits.
     """
     with clock("certify"):
         error = largest_residual(nodal, solution.valid, solution.points, solution.ratio)
-        near = not error >= max(_NEAR, SPREADS * rounding)  # NaN where only elements can tell
+        near = not error >= max(_NEAR, rounding.spread if rounding else 0.0)  # NaN where only elements can tell
         ratio = _lame_ratio(nodal, solution) if near else None
     found = no_cells()
     if (cells or solution.straight or solution.hanging is not None) and near:
@@ -52,7 +58,7 @@ def described(
     if rounding and near and not any(solution.freedoms):
         status, reason = "uncertified", of_few_digits(rounding, error)
     elif rounding:
-        reason = f"{reason}; the entries are rounded to {rounding:.0e} of themselves, which may hide what rows lack"
+        reason = f"{reason}; the entries are rounded to {rounding.name}, which may hide what rows lack"
     withheld = np.zeros(nodal.n, dtype=bool)
     if status == "certified" and (found.certified or numbering.open_row is not None or not numbering.incomplete):
         withheld = unconfirmed(nodal, numbering, solution.points, found.shown)

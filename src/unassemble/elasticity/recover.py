@@ -16,7 +16,7 @@ from .doubts import with_doubts
 from .halves import joined, taken_apart
 from .nodal import NodalMatrix, nodal_matrix, uncoupled
 from .nullspace.solution import Solution
-from .ordered.rounded import with_exact_sums
+from .ordered.rounded import Rounding, with_exact_sums
 from .positions import solve
 from .results import ElasticityRecovery, ScalarParts
 from .rows.numbering import Numbering
@@ -122,7 +122,13 @@ def _certified_rows(found: ElasticityRecovery | None) -> int:
 
 
 def _recovered(
-    matrix: sp.csr_array, numbering: Numbering, clock: Clock, *, cells: bool, patch: int | None, rounding: float
+    matrix: sp.csr_array,
+    numbering: Numbering,
+    clock: Clock,
+    *,
+    cells: bool,
+    patch: int | None,
+    rounding: Rounding | None,
 ) -> ElasticityRecovery:
     """The recovery of a matrix that was looked at, with a numbering."""
     with clock("numbering"):
@@ -142,7 +148,7 @@ def place_nodes(
     *,
     cells: bool = True,
     patch: int | None = None,
-    rounding: float = 0.0,
+    rounding: Rounding | None = None,
     whole: sp.csr_array | None = None,
 ) -> ElasticityRecovery:
     """The recovery once the nodes are known: null space, certificate, cells; see :func:`recover_elasticity`.
@@ -170,7 +176,7 @@ def place_nodes(
                 raise GeometryError(f"no positions were found: {why}")
         if (
             not solution.exact
-            and not rounding
+            and rounding is None
             and numbering.kind != "given"
             and (numbering.odd or numbering.common < 1)
             and numbering.incomplete

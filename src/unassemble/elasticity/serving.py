@@ -17,6 +17,7 @@ from .elements.cells import Cells
 from .elements.kinds import KINDS
 from .elements.surface import boundary_loops
 from .nodal import NodalMatrix
+from .ordered.rounded import Rounding
 from .recover import place_nodes
 from .results import ElasticityRecovery
 from .rows.numbering import Numbering
@@ -30,7 +31,7 @@ def serve_body(
     numbering: Numbering,
     clock: Clock,
     *,
-    rounding: float,
+    rounding: Rounding | None,
     whole: sp.csr_array | None,
     anchors: Sequence[Any] | None,
     cells: bool,
@@ -44,8 +45,8 @@ def serve_body(
     nodal : NodalMatrix
     numbering : Numbering
     clock : Clock
-    rounding : float
-        Of the entries, relative, where they have few digits; else 0.
+    rounding : Rounding, optional
+        Of the entries, where they have few digits.
     whole : (N, N) sparse, optional
         The matrix, where some rows have no name for their direction yet.
     anchors : sequence of (row, x, y) or (row, x, y, z), optional

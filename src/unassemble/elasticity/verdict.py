@@ -10,6 +10,7 @@ from .elements.cells import Cells
 from .nodal import NodalMatrix, without_trace
 from .nullspace.shape import SOFT
 from .nullspace.solution import Solution
+from .ordered.rounded import Rounding
 from .rows.numbering import Numbering
 
 CERTIFIED = 1e-9
@@ -61,11 +62,11 @@ def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solu
     )
 
 
-def of_few_digits(rounding: float, error: float) -> str:
+def of_few_digits(rounding: Rounding, error: float) -> str:
     """Why a matrix whose entries are rounded is not certified though all is well."""
     return (
-        f"the entries are rounded to {rounding:.0e} of themselves, and the identities hold to {error:.1e}, which is "
-        "what that leaves; rows away from supports were made to annihilate translations exactly"
+        f"the entries are rounded to {rounding.name}, and the identities hold to {error:.1e}, which is what that "
+        "leaves; rows away from supports were made to annihilate translations exactly"
     )
 
 

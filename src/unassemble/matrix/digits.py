@@ -16,6 +16,7 @@ _DIGITS = range(3, 13)  # decimal ones to look for; fewer do not tell what is ro
 _SHORT = 12  # binary digits of numbers that are exact by nature
 _SINGLE = 24, 20  # binary digits of single precision, and what nearly all of its numbers need
 _LEAST = 2  # different numbers that need the last digit: one may be a factor that somebody chose
+_MANY = 0.25  # of the different numbers: those of regular meshes have few digits by nature, up to half of them
 _SAMPLE = 2000
 _EXACT = 8 * float(np.finfo(float).eps)  # relative error of a number scaled by a power of ten
 
@@ -66,8 +67,8 @@ class Digits:
 
 
 def _need_more(coarse: NDArray[np.bool_]) -> bool:
-    """Whether most of some numbers, and more than one, are not among those with a digit less."""
-    return bool(np.count_nonzero(~coarse) >= max(_LEAST, len(coarse) / 2))
+    """Whether many of some numbers, and more than one, are not among those with a digit less."""
+    return bool(np.count_nonzero(~coarse) >= max(_LEAST, _MANY * len(coarse)))
 
 
 def _exponent(size: NDArray) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..clock import Clock
 from ..elasticity.anchoring import checked_anchors, digits_lost, near_enough
 from ..elasticity.nodal import determined
-from ..elasticity.ordered.rounded import SPREADS, with_exact_sums
+from ..elasticity.ordered.rounded import Rounding, with_exact_sums
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..recovery import Recovery
@@ -139,7 +139,7 @@ def _moved(
     return points, notes
 
 
-def _verdict(error: float, found: Placed, d: int, rounding: float) -> tuple[str, str]:
+def _verdict(error: float, found: Placed, d: int, rounding: Rounding | None) -> tuple[str, str]:
     evidence = found.evidence
     free = [one.null_dimension for one in evidence if one.null_dimension > d]
     if free:
@@ -147,10 +147,10 @@ def _verdict(error: float, found: Placed, d: int, rounding: float) -> tuple[str,
             f"the null space has dimension {free[0]} where {d} translations are expected: supports leave too few whole "
             "rows"
         )
-    if error < SPREADS * rounding:
+    if rounding and error < rounding.spread:
         return "uncertified", (
-            f"the entries are rounded to {rounding:.0e} of themselves, and rigid rotations cause forces of {error:.1e} "
-            "of those that make them up, which is what that leaves"
+            f"the entries are rounded to {rounding.name}, and rigid rotations cause forces of {error:.1e} of those "
+            "that make them up, which is what that leaves"
         )
     loosest = min(evidence, key=lambda one: one.gap / np.sqrt(one.rows))
     doubt = error * np.sqrt(loosest.rows) / loosest.gap  # each equation may be off by as much

@@ -17,7 +17,11 @@ from ..rows.constants import ROUNDING, least_sums, row_sizes, with_penalty
 
 
 def named_by_sums(
-    matrix: sp.csr_array, run: NDArray[np.int64], direction: NDArray[np.int64], d: int, rounding: float = ROUNDING
+    matrix: sp.csr_array,
+    run: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    d: int,
+    rounding: float | NDArray[np.float64] = ROUNDING,
 ) -> NDArray[np.int64]:
     """Directions of rows that stand node by node, those that sums tell set right.
 
@@ -32,7 +36,7 @@ def named_by_sums(
     direction : (N,) int64
         The likeliest.
     d : int
-    rounding : float
+    rounding : float or (N,) float64
         Of its size: what entries of a row add up to that make up zero.
     """
     direction = direction.copy()
@@ -57,7 +61,13 @@ def named_by_sums(
 class _Sums:
     """Which guesses make sums vanish in whole nodes."""
 
-    def __init__(self, matrix: sp.csr_array, run: NDArray[np.int64], whole: NDArray[np.bool_], rounding: float):
+    def __init__(
+        self,
+        matrix: sp.csr_array,
+        run: NDArray[np.int64],
+        whole: NDArray[np.bool_],
+        rounding: float | NDArray[np.float64],
+    ):
         self._matrix, self._run, self._whole = matrix, run, whole
         size = row_sizes(matrix)
         self._least, self._penalised = least_sums(size, rounding), with_penalty(matrix, size)

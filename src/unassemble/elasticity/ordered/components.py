@@ -66,26 +66,28 @@ def _by_pattern(matrix: sp.csr_array, direction: NDArray[np.int64], d: int, plac
     return Reading(node, direction, open_row)
 
 
-def directions_by_component(matrix: sp.csr_array, d: int, rounding: float = ROUNDING) -> NDArray[np.int64] | None:
+def directions_by_component(
+    matrix: sp.csr_array, d: int, rounding: float | NDArray[np.float64] = ROUNDING
+) -> NDArray[np.int64] | None:
     """(N,) directions that increase; None where no cuts between them show, with sums relative to rows rounded so."""
     cuts = _cuts(matrix, d, rounding)
     return None if cuts is None else np.searchsorted(cuts, np.arange(matrix.shape[0]), side="right")
 
 
-def _cuts(matrix: sp.csr_array, d: int, rounding: float) -> NDArray[np.int64] | None:
+def _cuts(matrix: sp.csr_array, d: int, rounding: float | NDArray[np.float64]) -> NDArray[np.int64] | None:
     """(d - 1,) first rows of all directions but the first.
 
     A row that annihilates constants direction by direction does so up to each cut: sums over its first columns vanish
     there. Each row votes for all places between two of its columns where they do.
     """
     order = matrix.shape[0]
-    size = np.add.reduceat(np.abs(matrix.data), matrix.indptr[:-1])
+    least = rounding * np.add.reduceat(np.abs(matrix.data), matrix.indptr[:-1])
     row = np.repeat(np.arange(order), np.diff(matrix.indptr))
     partial = _running_sums(matrix)
     inner = np.ones(matrix.nnz, dtype=bool)
     inner[matrix.indptr[1:] - 1] = False
-    whole = np.abs(partial[matrix.indptr[1:] - 1]) <= rounding * size
-    place = np.flatnonzero(inner & whole[row] & (np.abs(partial) <= rounding * size[row]))
+    whole = np.abs(partial[matrix.indptr[1:] - 1]) <= least
+    place = np.flatnonzero(inner & whole[row] & (np.abs(partial) <= least[row]))
     first, last = matrix.indices[place] + 1, matrix.indices[place + 1] + 1
     cuts: list[int] = []
     for _ in range(d - 1):

@@ -55,7 +55,7 @@ def _likely_nodes(run: NDArray[np.int64], d: int) -> NDArray[np.int64]:
     return by_first_row(np.where(np.bincount(run)[run] <= d, run, order + np.arange(order)))
 
 
-def directions_node_by_node(matrix: sp.csr_array, d: int, rounding: float) -> NDArray[np.int64] | None:
+def directions_node_by_node(matrix: sp.csr_array, d: int, rounding: NDArray[np.float64]) -> NDArray[np.int64] | None:
     """(N,) the likeliest directions of rows that stand node by node, their sums rounded; None where no nodes show."""
     order = matrix.shape[0]
     nobody = np.zeros(order, dtype=bool)

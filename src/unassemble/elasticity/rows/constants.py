@@ -24,7 +24,7 @@ def row_sizes(matrix: sp.csr_array) -> NDArray[np.float64]:
     return np.asarray(np.bincount(entry.row, off, matrix.shape[0]), dtype=np.float64)
 
 
-def least_sums(size: NDArray[np.float64], rounding: float = ROUNDING) -> NDArray[np.float64]:
+def least_sums(size: NDArray[np.float64], rounding: float | NDArray[np.float64] = ROUNDING) -> NDArray[np.float64]:
     """(N,) sums that are not zero in rows of given sizes: infinite where a row has no size."""
     return np.asarray(rounding * np.where(size > 0, size, np.inf))
 
