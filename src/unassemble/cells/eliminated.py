@@ -7,6 +7,7 @@ fit stays there.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -16,15 +17,18 @@ from ..errors import GeometryError, SolverError
 from ..matrix import OperatorMatrix
 from ..planar.conformal import conformal_map
 from ..planar.cotangent import edge_weights
+from ..planar.inside import fit_inside
 from ..planar.piece import PieceMesh
 from ..planar.polish import PolishOptions, polish
-from ..planar.robust import ASIDE
+from ..planar.robust import ASIDE, RobustFit
 from ..topology import Piece
+from ..words import count_of
 from .misfits.spoilt import without_wrong_entries
 from .reading import FITS, Reading
 from .search import first_reading
 
 _SUM = 1e-10  # sum of a row, relative to its entries, that is rounding
+_FEW = 0.1  # of the entries on the boundary
 _SHORT = PolishOptions(max_steps=20, max_factorisations=3)
 _NOTE = (
     "these are entries between rows that do not add up to zero, as next to unknowns that were eliminated, which still "
@@ -120,18 +124,35 @@ def _on_boundary(reading: Reading) -> NDArray[np.bool_]:
 
 
 def _without(piece: Piece, weights: NDArray, aside: NDArray[np.int64], scale: float | None) -> PieceMesh | None:
-    """Positions that fit all weights but some, with half of which they begin; None where there are none."""
-    weights = weights.copy()
-    weights[aside] /= 2
-    try:
-        start = conformal_map(piece, weights, sharp=False)
-        spread = np.ones(len(weights))
-        spread[aside] = ASIDE
-        found = polish(piece, weights, start.z, scale=scale, spread=spread, options=_SHORT)
-    except (GeometryError, SolverError):
+    """Positions that fit all weights but some; None where there are none.
+
+    With half of these grids are right to begin with, and stay so. Elsewhere more of them may be left out, near the
+    boundary.
+    """
+    halved = weights.copy()
+    halved[aside] /= 2
+    spread = np.ones(len(weights))
+    spread[aside] = ASIDE
+    with suppress(GeometryError, SolverError):
+        start = conformal_map(piece, halved, sharp=False)
+        found = polish(piece, halved, start.z, scale=scale, spread=spread, options=_SHORT)
+        misfit = np.delete(np.abs(edge_weights(piece, found.z) - weights / found.scale), aside)
+        if (misfit <= FITS * np.abs(weights / found.scale).max()).all():
+            return PieceMesh(found.z, found.scale, (_NOTE,), aside=aside)
+    inner = fit_inside(piece, weights, aside, scale=scale)
+    if inner is None or piece.redundancy <= len(inner.aside) or _may_be_whole(piece, weights, aside, inner):
         return None
-    rest = np.ones(len(weights), dtype=bool)
-    rest[aside] = False
-    misfit = np.abs(edge_weights(piece, found.z) - weights / found.scale)[rest]
-    fits = bool((misfit <= FITS * np.abs(weights / found.scale).max()).all())
-    return PieceMesh(found.z, found.scale, (_NOTE,), aside=aside) if fits else None
+    return PieceMesh(inner.z, inner.scale, (_NOTE, *_more(len(inner.aside) - len(aside))), aside=inner.aside)
+
+
+def _may_be_whole(piece: Piece, weights: NDArray, unknown: NDArray[np.int64], found: RobustFit) -> bool:
+    """Whether entries on the boundary fit as well, as they cannot where cells beyond them are gone."""
+    misfit = np.abs(edge_weights(piece, found.z) - weights / found.scale)[unknown]
+    return bool(np.count_nonzero(misfit <= FITS * np.abs(weights / found.scale).max()) > _FEW * len(unknown))
+
+
+def _more(count: int) -> tuple[str, ...]:
+    """What to say of entries near the boundary that have been set aside."""
+    if not count:
+        return ()
+    return (f"{count_of(count, 'more entry', 'more entries')} near them did not fit, and points there may be wrong",)
