@@ -162,7 +162,7 @@ def test_eliminated_boundary_is_suspected():
     inside = np.setdiff1d(np.arange(len(points)), found.boundary)
     taken = recover(known.matrix[inside][:, inside])
     assert taken.status == "uncertified"
-    assert any("seem to have been eliminated" in note for note in taken.warnings)
+    assert "unknowns that were eliminated" in taken.reason
     assert not any("eliminated" in note for note in found.warnings)
 
 

@@ -74,11 +74,14 @@ def cautious_polish(
     problem = Problem(piece, weights, spread, scale)
     fit, steps, length, converged = problem.at(z), 0, np.inf, False
     history: list[tuple[float, float]] = []
+    held: Equations | None = None
     while steps < options.max_steps and not converged:
         jacobian = WeightJacobian(piece, fit.z, spread)
-        system = GaussNewton(jacobian, equations(jacobian, pins), fit.weights if scale is None else None)
-        move = system(jacobian, fit.misfit)
-        system.release()
+        if held is None:
+            held = equations(jacobian, pins)
+        else:
+            held.renew(jacobian)
+        move = GaussNewton(jacobian, held, fit.weights if scale is None else None)(jacobian, fit.misfit)
         steps += 1
         length = float(np.abs(move).max())
         change = float(np.linalg.norm(jacobian.forward(move)))
@@ -90,6 +93,8 @@ def cautious_polish(
         if better is None or (not converged and _stalled(history)):
             break
         fit = better
+    if held is not None:
+        held.release()
     return PolishedMesh(fit.z * extent, fit.scale, fit.norm, steps, steps, converged, length)
 
 

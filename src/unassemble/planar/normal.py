@@ -67,6 +67,15 @@ class NormalEquations:
         matrix = _upper_blocks(jacobian.matrix, self._free)
         self._factor = _factorised(matrix)
 
+    def renew(self, jacobian: WeightJacobian) -> None:
+        """Factorise anew for other positions; that the pattern was analysed still counts."""
+        matrix = _upper_blocks(jacobian.matrix, self._free)
+        try:
+            self._factor.factorise(matrix)
+        except SolverError:
+            self._factor.release()
+            self._factor = _factorised(matrix)
+
     def solve(self, rhs: NDArray) -> NDArray:
         """Least displacement equation J'J d = rhs, both (n,) or (n, k) complex."""
         free = np.ascontiguousarray(rhs[self._free].T)  # each right-hand side x0, y0, x1, y1, ...

@@ -17,7 +17,7 @@ _WORK = 2e7  # vertices times the square of the width: about a second per factor
 
 
 class PivotedEquations:
-    """The interface of :class:`~unassemble.planar.normal.NormalEquations`, for one Jacobian.
+    """The interface of :class:`~unassemble.planar.normal.NormalEquations`, which serves one Jacobian at a time.
 
     Parameters
     ----------
@@ -34,8 +34,12 @@ class PivotedEquations:
         free = np.ones(jacobian.n, dtype=bool)
         free[pins] = False
         self._columns = np.flatnonzero(np.repeat(free, 2))
-        self._system = AugmentedSystem(sp.csr_array(jacobian.matrix.tocsc()[:, self._columns]))
         self._n = jacobian.n
+        self.renew(jacobian)
+
+    def renew(self, jacobian: WeightJacobian) -> None:
+        """Factorise anew for other positions."""
+        self._system = AugmentedSystem(sp.csr_array(jacobian.matrix.tocsc()[:, self._columns]))
 
     def fitted(self, _: WeightJacobian, change: NDArray) -> NDArray:
         """Displacement d (n,) complex that explains a change (e,) of the weights best: least |J d - r|."""

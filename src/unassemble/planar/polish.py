@@ -116,6 +116,7 @@ def polish(
     spread = np.ones(len(weights)) if spread is None else spread
     problem = Problem(piece, weights, spread, scale)
     fit = problem.at(z)
+    equations: NormalEquations | None = None
     system: GaussNewton | IterativeGaussNewton | None = None
     factorisations, steps, length, converged = 0, 0, np.inf, False
     while steps < options.max_steps and not converged:
@@ -124,7 +125,11 @@ def polish(
         if system is None:
             fitted = fit.weights if scale is None else None
             if len(z) <= options.direct_limit:
-                system = GaussNewton(jacobian, NormalEquations(jacobian, pins), fitted)
+                if equations is None:
+                    equations = NormalEquations(jacobian, pins)
+                else:
+                    equations.renew(jacobian)
+                system = GaussNewton(jacobian, equations, fitted)
             else:
                 system = IterativeGaussNewton(IterativeNormalEquations(piece, jacobian, fit.z, fitted))
             factorisations += 1
@@ -134,7 +139,8 @@ def polish(
         if slow and length > options.rounding and not fresh:
             if factorisations == options.max_factorisations:
                 break
-            system.release()
+            if isinstance(system, IterativeGaussNewton):
+                system.release()
             system, length = None, np.inf
             continue
         better = downhill(problem, fit, move)
@@ -202,6 +208,9 @@ def downhill(problem: Problem, fit: Fit, move: NDArray) -> Fit | None:
 
 class Equations(Protocol):
     """The linearised problem without the scale."""
+
+    def renew(self, jacobian: WeightJacobian) -> None:
+        """Factorise anew for other positions."""
 
     def fitted(self, jacobian: WeightJacobian, change: NDArray) -> NDArray:
         """Displacement d (n,) complex that explains a change (e,) of the weights best: least |J d - r|."""
