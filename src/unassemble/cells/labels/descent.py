@@ -15,6 +15,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from ..candidates.candidates import Candidates
 from ..reading import Reading
 from .effort import Effort
 from .evidence import label_changes
@@ -144,6 +145,19 @@ def beside(reading: Reading) -> Iterator[Reading]:
             other = Reading.of(candidates, labels)
             if other.fits:
                 yield other
+
+
+def as_good(reading: Reading[Candidates], about: NDArray[np.bool_]) -> Iterator[Reading]:
+    """Readings that fit as well as one that does, with the same c, and differ by one label or two that touch.
+
+    One of them is among those, (cells,) bool, that this is `about`.
+    """
+    for move in Updates(Sheet(reading.candidates, _scale(reading))).as_good(reading, about):
+        labels = reading.labels.copy()
+        labels[list(move)] ^= True
+        other = Reading.of(reading.candidates, labels)
+        if other.fits:
+            yield other
 
 
 def _value(reading: Reading) -> float:
