@@ -16,11 +16,12 @@ from ...topology import Numbering, components
 from ...topology.embedding import face_complexes
 from ...topology.faces import FaceComplex, from_rotation
 from ..agreement import SAME_SCALE
+from ..alike import Cells
 from ..candidates.candidates import Candidates
 from ..labels.descent import as_good
 from ..reading import NEARLY, Reading
 from .corners import Alternative, OrientedMesh
-from .rereading import Cells, cells_of, own_cells, with_vanished_sides
+from .rereading import cells_of, own_cells, with_vanished_sides
 
 _MOST_VERTICES = 1000  # the cost grows like the square
 

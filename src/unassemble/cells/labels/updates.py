@@ -146,13 +146,14 @@ class Updates:
     ) -> list[Move]:
         """Leaders with another candidate that touches them, by what both leave alone: the most promising first."""
         promise: dict[Move, float] = {}
+        free, value = self._free.tolist(), alone.tolist()
         for move, left in leaders.items():
             turned = labels.copy()
             turned[list(move)] ^= True
             for other in adjacent_to(self._near.touching, np.array(move)).tolist():
-                if other not in move and self._free[other]:
+                if other not in move and free[other]:
                     both = tuple(sorted({*move} ^ {*self._near.with_rivals(turned, (other,))}))
-                    promise[both] = min(promise.get(both, np.inf), left + float(alone[other]))
+                    promise[both] = min(promise.get(both, np.inf), left + value[other])
         new = promise.keys() - told - {()}
         return sorted(new, key=lambda both: (promise[both], both))
 
@@ -194,6 +195,16 @@ def _cotangents(z: NDArray, triangles: NDArray[np.int64]) -> NDArray[np.float64]
     with np.errstate(all="ignore"):
         cotangent = np.stack([-(x[k - 1] * x[k - 2] + y[k - 1] * y[k - 2]) / twice for k in range(3)])
     return np.asarray(np.nan_to_num(cotangent, posinf=STEEPEST, neginf=-STEEPEST))
+
+
+def _solved(matrices: NDArray, rhs: NDArray) -> NDArray[np.complex128]:
+    """Solutions of many small systems; NaN where one is singular."""
+    try:
+        return np.asarray(np.linalg.solve(matrices, rhs))
+    except np.linalg.LinAlgError:  # the end of all others, too
+        singular = np.linalg.det(matrices) == 0
+        matrices = np.where(singular[:, None, None], np.eye(matrices.shape[1]), matrices)
+        return np.where(singular[:, None, None], np.nan, np.linalg.solve(matrices, rhs))
 
 
 class _Factorised:
@@ -240,10 +251,7 @@ class _Factorised:
         changed = np.eye(corner.shape[1]) - self._shift * side[:, :, None] * inverse
         ahead = self._z + self._shift * self._y
         rhs = (side * (ahead[after] - ahead[before]))[..., None]
-        singular = np.linalg.det(changed) == 0  # which would end the solution of all others, too
-        changed[singular] = np.eye(corner.shape[1])
-        q = np.linalg.solve(changed, rhs)[..., 0]
-        q[singular] = np.nan
+        q = _solved(changed, rhs)[..., 0]
         scattered = sp.csr_array(
             (q.ravel(), place.ravel(), np.arange(0, q.size + 1, corner.shape[1])), shape=(len(q), len(self._columns))
         )
