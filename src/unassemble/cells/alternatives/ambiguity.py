@@ -22,6 +22,7 @@ from .other_scales import other_scales
 from .regrouped import fitting, regrouped
 from .rereading import other_readings
 from .twins import twins
+from .two_places import two_places
 
 AGREE = 1e-9
 """Relative difference of numbers that count as equal."""
@@ -73,6 +74,7 @@ def alternatives(
         if scale is None:
             found += _loose_pieces(stored, topology, corners, around, closed)
             found += as_one_piece(stored, topology, corners, closed)
+    found += two_places(stored, mesh, factors, agree)
     found = found or regrouped(stored, mesh, corners, factors, agree)
     if not found and scale is None:
         found, left_open = other_scales(stored, topology, mesh, factors, closed, agree)
