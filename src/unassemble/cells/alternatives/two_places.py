@@ -20,6 +20,7 @@ from ...matrix import OperatorMatrix
 from ...topology.faces import joined
 from .corners import Alternative, OrientedMesh
 
+_NEARLY_RIGHT = 1e-3  # cosine of an angle that is worth a closer look
 _FLAT = 1e-9  # twice the area of a triangle over the square of its longest side
 
 Cell = tuple[int, ...]
@@ -65,33 +66,40 @@ def two_places(stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, agr
 
 def _moved(h: int, here: _Place, free: list[Pair], z: NDArray, c: float, agree: float) -> Iterator[Alternative]:
     """Each way to move a vertex, into one of some openings."""
-    before = _entries(here.cells, h, z[h], z)
-    if not before:
-        return
-    size = max(map(abs, before.values()))
-    weights = np.array(here.weights) / c
+    weights = [w / c for w in here.weights]
+    pulled = sum(w * complex(z[v]) for w, v in zip(weights, here.ends, strict=True))
     for cell in here.cells:
         if not _is_right_angled(cell, z, agree):
             continue
-        rest = [other for other in here.cells if other != cell]
-        rest += [cell[1:]] if len(cell) > 3 else []
         for p, q in free:
             if (q, p) == (cell[1], cell[-1]):  # the same cell from behind
                 continue
             # (L z)_h = -i / 2 times what the boundary leaves open about h.
-            ends = np.array([pair for pair in here.openings if pair != (p, q)] + [(cell[1], cell[-1])])
-            opened = (z[ends[:, 1]] - z[ends[:, 0]]).sum()
-            after = _entries([*rest, (h, p, q)], h, (weights @ z[here.ends] - 0.5j * opened) / weights.sum(), z)
-            sides = before.keys() | after.keys()
-            if after and all(abs(before.get(side, 0.0) - after.get(side, 0.0)) <= agree * size for side in sides):
-                new = [tuple(sorted(one)) for one in ((h, p, q), *([cell[1:]] if len(cell) > 3 else []))]
-                yield Alternative((), (), (), (tuple(sorted(cell)),), tuple(sorted(new)))
+            openings = [pair for pair in here.openings if pair != (p, q)] + [(cell[1], cell[-1])]
+            opened = sum(complex(z[after]) - complex(z[before]) for before, after in openings)
+            place = (pulled - 0.5j * opened) / sum(weights)
+            one, other = complex(z[p]) - place, complex(z[q]) - place
+            if abs((one.conjugate() * other).real) > _NEARLY_RIGHT * abs(one) * abs(other):
+                continue
+            new = [(h, p, q), *([cell[1:]] if len(cell) > 3 else [])]
+            if _alike(here.cells, [*(old for old in here.cells if old != cell), *new], h, place, z, agree):
+                yield Alternative((), (), (), (tuple(sorted(cell)),), tuple(sorted(tuple(sorted(n)) for n in new)))
+
+
+def _alike(cells: list[Cell], others: list[Cell], h: int, place: complex, z: NDArray, agree: float) -> bool:
+    """Whether cells, and others with h in another place, give the same to all edges."""
+    before, after = _entries(cells, h, complex(z[h]), z), _entries(others, h, place, z)
+    if not (before and after):
+        return False
+    size = max(map(abs, before.values()))
+    sides = before.keys() | after.keys()
+    return all(abs(before.get(side, 0.0) - after.get(side, 0.0)) <= agree * size for side in sides)
 
 
 def _is_right_angled(cell: Cell, z: NDArray, agree: float) -> bool:
     """Whether it is at its first vertex."""
-    one, other = z[cell[1]] - z[cell[0]], z[cell[-1]] - z[cell[0]]
-    return bool(abs((np.conj(one) * other).real) <= agree * abs(one) * abs(other))
+    one, other = complex(z[cell[1]] - z[cell[0]]), complex(z[cell[-1]] - z[cell[0]])
+    return abs((one.conjugate() * other).real) <= agree * abs(one) * abs(other)
 
 
 def _places(stored: OperatorMatrix, mesh: OrientedMesh, agree: float) -> dict[int, _Place]:
@@ -124,16 +132,14 @@ def _places(stored: OperatorMatrix, mesh: OrientedMesh, agree: float) -> dict[in
 def _borders_a_cell(mesh: OrientedMesh, ways: NDArray) -> NDArray[np.bool_]:
     """Whether there is a cell on the left of each way (k, 2) from a vertex to another."""
     n, polygons = len(mesh.z), mesh.polygons
-    ends = polygons.offsets[1:] - 1
     following = np.arange(1, len(polygons.vertices) + 1)
-    following[ends] = polygons.offsets[:-1]
-    keys = np.concatenate(
-        [
-            (mesh.triangles * n + np.roll(mesh.triangles, -1, axis=1)).ravel(),
-            polygons.vertices * n + polygons.vertices[following],
-        ]
-    )
-    return np.isin(ways @ [n, 1], keys)
+    following[polygons.offsets[1:] - 1] = polygons.offsets[:-1]
+    tail = np.concatenate([mesh.triangles.ravel(), polygons.vertices])
+    head = np.concatenate([np.roll(mesh.triangles, -1, axis=1).ravel(), polygons.vertices[following]])
+    begun = np.zeros(n, dtype=bool)
+    begun[ways[:, 0]] = True
+    sides = begun[tail]
+    return np.isin(ways @ [n, 1], tail[sides] * n + head[sides])
 
 
 def _cells_at(mesh: OrientedMesh, wanted: NDArray[np.bool_]) -> Iterator[Cell]:
