@@ -33,7 +33,7 @@ _IN_VAIN = 40  # changes in all without an improvement
 _TRIED = 0.25  # a reading with a batch tried is put off behind those with so much more misfit
 _BETTER = 0.9  # misfit, relative to the least before, that is an improvement worth its price
 _SOLVES = 10  # that telling what changes would leave is worth
-_AT_LEAST, _AT_MOST = 2, 30  # readings whose changes are told before progress is asked for, and that may be worth it
+_AT_LEAST, _AT_MOST = 1, 15  # readings whose changes are told before progress is asked for, and that may be worth it
 _BESIDE = 24  # small changes of a reading that fits, those that leave least, that are solved for
 
 _Waiting = tuple[float, int, Reading, Iterator[NDArray[np.bool_]] | None]
