@@ -24,8 +24,9 @@ from ..topology import Piece
 from .small import SMALL, small_maps
 
 _OPTIONS = ConformalOptions(max_factorisations=4)  # what takes more has wrong cells
-_MAPS = 5  # that are looked at
-_STEPS, _SHIFTS = 24, (0.9, 0.99)  # of Krylov spaces that have them to some digits
+_MAPS = 5  # that are looked at in small pieces
+_STEPS, _SHIFTS = 24, (0.9, 0.9, 0.99)  # of Krylov spaces that have the next maps to some digits
+_NEAR = 0.8  # of c, above which a shift shows the maps about it as they are
 _REFINED = 2  # steps to the map itself
 _FITS = 1e-3  # mean misfit of a map that need not be compared with others
 _EXACT = 1e-9  # and of one that fits
@@ -48,10 +49,11 @@ def best_map(piece: Piece, weights: NDArray) -> PieceMesh | None:
         return next(iter(maps), None)
     unit = maps[0].scale
     relative = weights / unit
+    mean = mean_misfit(piece.edges, relative)
 
     def misfit(z: NDArray, c: float) -> float:
         with np.errstate(all="ignore"):  # flat triangles fit nothing
-            return mean_misfit(piece.edges, relative, c * edge_weights(piece, z))
+            return mean(c * edge_weights(piece, z))
 
     if small:
         return min(maps, key=lambda one: _unfolded(misfit(one.z, one.scale / unit), first=one is maps[0]))
@@ -87,11 +89,14 @@ def best_of(
     search = ShiftedSearch(pencil, factorisation, _STEPS)
     best = least, z, 1.0
     z = np.random.default_rng(0).standard_normal((len(z), 2)).view(np.complex128).ravel()
+    shift = 0.0
     try:
-        for nearer in _SHIFTS:  # from a distance maps that have nearly the same c are mixed
+        for nearer in _SHIFTS:  # from a distance maps that have nearly the same c are mixed, and theirs is too great
+            if nearer == _SHIFTS[0] and _NEAR * best[2] < shift < best[2]:
+                continue
             shift = nearer * best[2]
             search.at(shift, z)
-            maps = [(_unfolded(misfit(*one), first=False), *one) for one in search.maps(shift, _MAPS)]
+            maps = [(_unfolded(misfit(*one), first=False), *one) for one in search.maps()]
             best = min([best, *maps], key=lambda one: one[0])
             z = best[1]
             if best[0] == least:
@@ -106,14 +111,18 @@ def best_of(
     return best[1], best[2]
 
 
-def mean_misfit(edges: NDArray, given: NDArray, fitted: NDArray) -> float:
-    """Mean misfit of weights (e,) relative to the smaller of both rows' largest ones, at most 1.
+def mean_misfit(edges: NDArray, given: NDArray) -> Callable[[NDArray], float]:
+    """The mean misfit of weights (e,) relative to the smaller of both rows' largest ones, at most 1.
 
     The mean of the squares is small where all fit a little, this one where all fit but for some.
     """
     smaller = row_sizes(int(edges.max()) + 1, edges, np.abs(given))[edges].min(axis=1)
-    misfit = np.abs(fitted - given) / smaller
-    return float(np.where(misfit < 1, misfit, 1.0).mean())
+
+    def mean(fitted: NDArray) -> float:
+        misfit = np.abs(fitted - given) / smaller
+        return float(np.where(misfit < 1, misfit, 1.0).mean())
+
+    return mean
 
 
 def _unfolded(misfit: float, *, first: bool) -> float:

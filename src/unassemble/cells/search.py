@@ -14,6 +14,7 @@ from ..topology.embedding import drawing_with_corners, face_complexes
 from .candidates.candidates import Candidates
 from .candidates.cell_set import CellSet
 from .candidates.crosses import Crosses
+from .candidates.turned_over import with_less_strain
 from .covers.covering import MOST_EQUAL_CELLS, read_by_cover
 from .labels.descent import Descent, better
 from .labels.effort import SMALL_GRAPH, Effort
@@ -127,7 +128,8 @@ def _searched(
                 break
         if done:
             break
-    return _at_last(best, begun if together else []), spoilt
+    best = _at_last(best, begun if together else [])
+    return (_redrawn(best, effort) if best is not None and together else best), spoilt
 
 
 def _of_equal_weights(
@@ -197,6 +199,20 @@ def _at_last(best: Reading | None, begun: list[Begun]) -> Reading | None:
     if best.size > _CLOSE or best.fits or not isinstance(best.candidates, Candidates):
         return best
     return _best_of(best, [Descent(_widened(best))], _SOME)
+
+
+def _redrawn(best: Reading, effort: Effort) -> Reading:
+    """A reading, or, if it is nearly right, what small changes make of its drawing's starts with parts turned over."""
+    if best.fits or best.size > _CLOSE or not isinstance(best.candidates, Candidates):
+        return best
+    candidates = with_less_strain(best.candidates)
+    if candidates is None:
+        return best
+    share = Effort(_SOME, effort.known)
+    begun = _begun(candidates, share, _FEW_TURNS)
+    if begun.settled:
+        return _settled(best, begun.starts[0])
+    return _best_of(best, begun.descents, _SOME)
 
 
 def _best_of(best: Reading, searches: Iterable[Descent], solves: int) -> Reading:

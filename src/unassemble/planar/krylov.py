@@ -88,15 +88,12 @@ class ShiftedSearch:
         _log.debug("shift %.12g: c = %.16g, last change %.1e", shift, c, spread)
         return _combination(basis[: len(y)], y), c, spread
 
-    def maps(self, shift: float, most: int) -> list[tuple[NDArray, float]]:
-        """Maps z (n,) complex of the last Krylov space and their quotients c, those nearest to some c first."""
+    def maps(self) -> list[tuple[NDArray, float]]:
+        """Maps z (n,) complex of the last Krylov space and their quotients c, positive ones, the least first."""
         assert self._space is not None
         basis, energy, area = self._space
         inverse, vectors = scipy.linalg.eigh(area, energy, lower=False)
-        with np.errstate(divide="ignore"):
-            c = np.where(inverse > 0, 1 / inverse, np.inf)
-        places = np.argsort(np.abs(c - shift), kind="stable")[:most]
-        return [(_combination(basis, vectors[:, k]), float(c[k])) for k in places if np.isfinite(c[k])]
+        return [(_combination(basis, vectors[:, k]), 1 / float(inverse[k])) for k in np.flatnonzero(inverse > 0)[::-1]]
 
     def nearest(self, c: float, z: NDArray) -> tuple[NDArray, float]:
         """One step of inverse iteration to the map nearest to some c, from z; and its quotient."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .. import certify as certificates
 from ..cells import AGREE, Alternative, OrientedMesh, alternatives, coincident, filled_holes, touching
 from ..clock import Clock
-from ..linalg import AnalysisAhead, factorisation
+from ..linalg import AnalysisAhead, blas_threads, factorisation
 from ..matrix import OperatorMatrix
 from ..planar.deviations import coordinate_covariances, factor_deviations
 from ..planar.hinges import free_images, join
@@ -190,7 +190,8 @@ def _alternatives(
             others, left_open = touching(stored, topology, oriented, factors, scale=known, agree=agree)
         return others, unproved if left_open else None
     if not others:
-        others, left_open = alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
+        with blas_threads(1):  # many small readings
+            others, left_open = alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
     if known is None and coincident(stored, topology, agree).any():
         return others, all_alike
     return others, unproved if left_open else None

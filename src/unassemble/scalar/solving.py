@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..cells import Outcome, completed, in_doubt, wrong_entries
 from ..errors import GeometryError, RecoveryError, SolverError
-from ..linalg import Factorisation, UpperTriangle, factorisation
+from ..linalg import Factorisation, UpperTriangle, blas_threads, factorisation
 from ..matrix import OperatorMatrix
 from ..planar.cotangent import left_by_all
 from ..planar.piece import PieceMesh, positions, refined
@@ -80,7 +80,7 @@ def solve(
         return spoilt.get(piece) or start(piece)
 
     if doubtful.any():
-        with clock("faces"):
+        with clock("faces"), blas_threads(1):  # hundreds of small readings
             matrix, topology, outcomes = completed(matrix, topology, attempt, doubtful, scale)
             # The search leaves c free in its solves, stops early and knows one method.
             if scale is not None or not refine or method != "conformal":

@@ -17,10 +17,12 @@ from .flips import turned_over
 from .hinged import as_one_piece
 from .hubs import Hub, closed_at, hubs, rearranged
 from .loose import is_loose, other_reading
+from .nearby import nearby_readings
 from .other_scales import other_scales
 from .regrouped import fitting, regrouped
 from .rereading import other_readings
 from .twins import twins
+from .two_places import two_places
 
 AGREE = 1e-9
 """Relative difference of numbers that count as equal."""
@@ -72,10 +74,12 @@ def alternatives(
         if scale is None:
             found += _loose_pieces(stored, topology, corners, around, closed)
             found += as_one_piece(stored, topology, corners, closed)
+    found += two_places(stored, mesh, factors, agree)
     found = found or regrouped(stored, mesh, corners, factors, agree)
     if not found and scale is None:
         found, left_open = other_scales(stored, topology, mesh, factors, closed, agree)
-    return _each_once(found) or other_readings(stored, mesh, factors, scale, agree), left_open
+    found = _each_once(found) or other_readings(stored, mesh, factors, scale, agree)
+    return found or nearby_readings(stored, mesh, factors, scale, agree), left_open
 
 
 def touching(

@@ -46,7 +46,7 @@ def other_readings(
     most = _MOST_NOISY if noisy else _MOST_VERTICES
     small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= most]
     n_orders = int(np.clip(_WORK // max(_distinct_vertices(stored, small), 1), 1, _ORDERS))
-    half = _with_vanished_sides(stored, mesh)
+    half = with_vanished_sides(stored, mesh)
     answers = Answers()
     for part, own in zip(small, own_cells(stored.n, small, mesh), strict=True):
         supposed = bool(half[part.vertices].any())
@@ -75,7 +75,7 @@ def _distinct_vertices(stored: OperatorMatrix, parts: list[Numbering]) -> int:
     return int(size[order][new].sum())
 
 
-def _with_vanished_sides(stored: OperatorMatrix, mesh: OrientedMesh) -> NDArray[np.bool_]:
+def with_vanished_sides(stored: OperatorMatrix, mesh: OrientedMesh) -> NDArray[np.bool_]:
     """(n,) rows of triangles with a side that has no entry."""
     rows = np.zeros(stored.n, dtype=bool)
     for k in range(3):

@@ -208,7 +208,7 @@ class Candidates(CellSet):
         corners += [chosen | self.half for chosen in (*corners, none)] if self.half.any() else []
         tried = {(chosen | extra).tobytes(): chosen | extra for chosen in faces for extra in (*corners, none)}
         seen = set()
-        for chosen in sorted(tried.values(), key=self._strain):
+        for chosen in sorted(tried.values(), key=self.strain):
             labels = self.covering(self.compatible(np.where(chosen, 1 + self.belief, -np.inf)), self.belief)
             if labels.any() and labels.tobytes() not in seen:
                 seen.add(labels.tobytes())
@@ -232,7 +232,7 @@ class Candidates(CellSet):
             chosen = longer & ((self.size == 3) | (np.bincount(cell, angle, self.count) < _FULL))
             yield self.covering(self.compatible(np.where(chosen, 1.0, -np.inf)), self.belief)
 
-    def _strain(self, labels: NDArray[np.bool_]) -> float:
+    def strain(self, labels: NDArray[np.bool_]) -> float:
         """How far the angles of some cells are from adding up to pi, edges between two of them shared equally.
 
         Short faces left out add a little, or no cells would be best.

@@ -15,6 +15,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from ..candidates.candidates import Candidates
 from ..reading import Reading
 from .effort import Effort
 from .evidence import label_changes
@@ -32,7 +33,7 @@ _IN_VAIN = 40  # changes in all without an improvement
 _TRIED = 0.25  # a reading with a batch tried is put off behind those with so much more misfit
 _BETTER = 0.9  # misfit, relative to the least before, that is an improvement worth its price
 _SOLVES = 10  # that telling what changes would leave is worth
-_AT_LEAST, _AT_MOST = 2, 30  # readings whose changes are told before progress is asked for, and that may be worth it
+_AT_LEAST, _AT_MOST = 1, 15  # readings whose changes are told before progress is asked for, and that may be worth it
 _BESIDE = 24  # small changes of a reading that fits, those that leave least, that are solved for
 
 _Waiting = tuple[float, int, Reading, Iterator[NDArray[np.bool_]] | None]
@@ -144,6 +145,19 @@ def beside(reading: Reading) -> Iterator[Reading]:
             other = Reading.of(candidates, labels)
             if other.fits:
                 yield other
+
+
+def as_good(reading: Reading[Candidates], about: NDArray[np.bool_]) -> Iterator[Reading]:
+    """Readings that fit as well as one that does, with the same c, and differ by one label or two that touch.
+
+    One of them is among those, (cells,) bool, that this is `about`.
+    """
+    for move in Updates(Sheet(reading.candidates, _scale(reading))).as_good(reading, about):
+        labels = reading.labels.copy()
+        labels[list(move)] ^= True
+        other = Reading.of(reading.candidates, labels)
+        if other.fits:
+            yield other
 
 
 def _value(reading: Reading) -> float:

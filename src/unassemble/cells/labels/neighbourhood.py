@@ -68,15 +68,14 @@ class Neighbourhoods:
         self.touching = (corner @ corner.T).tocsr()
         cell, half = sheet.candidates.sides.T
         taken = _incidence(cell, half, (count, 2 * len(sheet.candidates.edges)))
-        self._rivals = (taken @ taken.T).tocsr()
+        rivals = (taken @ taken.T).tocsr()
+        self._rivals = [own.tolist() for own in np.split(rivals.indices, rivals.indptr[1:-1])]
         self._local = np.full(max(n, e), -1)
 
     def with_rivals(self, labels: NDArray[np.bool_], cells: Sequence[int]) -> tuple[int, ...]:
         """The cells, and those that have to give way to the new ones among them."""
-        new = [k for k in cells if not labels[k]]
-        rivals = adjacent_to(self._rivals, np.array(new, dtype=np.int64)) if new else np.empty(0, np.int64)
-        gone = rivals[labels[rivals]]
-        return tuple(sorted({*cells, *gone.tolist()}))
+        gone = {other for k in cells if not labels[k] for other in self._rivals[k] if labels[other]}
+        return tuple(sorted({*cells} | gone))
 
     def trial(self, fit: Fitted, cells: tuple[int, ...], *, rings: int = 1, redrawn: bool = False) -> Trial:
         """Turn labels over and place the vertices within some rings about them anew.

@@ -168,9 +168,10 @@ class Sheet:
         """
         first = self.mapped(strength)
         unit = first.c
+        mean = mean_misfit(self.edges, self.weights / unit)
 
         def misfit(z: NDArray, c: float) -> float:
-            return mean_misfit(self.edges, self.weights / unit, c * self.fitted_weights(z, strength))
+            return mean(c * self.fitted_weights(z, strength))
 
         z, c = best_of(self.pencil(strength, unit), first.z, misfit)
         return Placed(z, c * unit)

@@ -33,6 +33,8 @@ _BATCH = 5e4  # triangles times moves that are computed together
 _NEAR = 1e-3  # of the shift to the c at hand: so much nearer than to other maps, that one step tells
 _LEADERS = 60  # moves that are tried together with what they touch
 _AT_FIRST = 8  # moves that are given before those of three labels are told
+_NEAREST = 1e-6  # the same where the c is that of the mesh: maps that fit are told to about so much over their gap
+_FAINT = 1e-4  # mean misfit that they may leave then; some that do not fit leave 1e-5, and are to be solved for
 _STEEP = 5.0  # weights over row sizes beyond which they are those of flat triangles
 _GROSS = 0.5  # misfit above which an entry has no say in c
 
@@ -95,6 +97,34 @@ class Updates:
                     given.add(move)
                     yield move
 
+    def as_good(self, reading: Reading, about: NDArray[np.bool_]) -> Iterator[Move]:
+        """Moves after which a reading that fits seems to fit with the same c, those to the same surface left out.
+
+        Single labels and pairs that touch; one of each is among those, (cells,) bool, that this is `about`.
+        """
+        labels = reading.labels
+        try:
+            factorised = _Factorised(self._sheet, labels, _NEAREST)
+        except RecoveryError:
+            return
+        first = np.flatnonzero(self._free & about).tolist()
+        moves = list(dict.fromkeys(self._near.with_rivals(labels, (k,)) for k in first))
+        left = self._left(factorised, labels, moves)
+        if not moves:
+            return
+        alone = self._alone(moves, left)
+        more = self._joined(labels, dict(zip(moves, left.tolist(), strict=True)), alone, set(moves))
+        moves, left = moves + more, np.append(left, self._left(factorised, labels, more))
+        seen = {self.outline(labels)}
+        for k in np.argsort(left, kind="stable").tolist():
+            if not left[k] <= _FAINT:
+                return
+            turned = labels.copy()
+            turned[list(moves[k])] ^= True
+            if (outline := self.outline(turned)) not in seen:
+                seen.add(outline)
+                yield moves[k]
+
     def _suspects(self, reading: Reading) -> list[int]:
         """Candidates, those about the largest misfits first."""
         sheet = self._sheet
@@ -116,13 +146,14 @@ class Updates:
     ) -> list[Move]:
         """Leaders with another candidate that touches them, by what both leave alone: the most promising first."""
         promise: dict[Move, float] = {}
+        free, value = self._free.tolist(), alone.tolist()
         for move, left in leaders.items():
             turned = labels.copy()
             turned[list(move)] ^= True
             for other in adjacent_to(self._near.touching, np.array(move)).tolist():
-                if other not in move and self._free[other]:
+                if other not in move and free[other]:
                     both = tuple(sorted({*move} ^ {*self._near.with_rivals(turned, (other,))}))
-                    promise[both] = min(promise.get(both, np.inf), left + float(alone[other]))
+                    promise[both] = min(promise.get(both, np.inf), left + value[other])
         new = promise.keys() - told - {()}
         return sorted(new, key=lambda both: (promise[both], both))
 
@@ -166,8 +197,25 @@ def _cotangents(z: NDArray, triangles: NDArray[np.int64]) -> NDArray[np.float64]
     return np.asarray(np.nan_to_num(cotangent, posinf=STEEPEST, neginf=-STEEPEST))
 
 
+def _solved(matrices: NDArray, rhs: NDArray) -> NDArray[np.complex128]:
+    """Solutions of many small systems; NaN where one is singular."""
+    try:
+        return np.asarray(np.linalg.solve(matrices, rhs))
+    except np.linalg.LinAlgError:  # the end of all others, too
+        singular = np.linalg.det(matrices) == 0
+        matrices = np.where(singular[:, None, None], np.eye(matrices.shape[1]), matrices)
+        return np.where(singular[:, None, None], np.nan, np.linalg.solve(matrices, rhs))
+
+
 class _Factorised:
     """M(s) for some labels, factorised, and the columns of its inverse that have been asked for.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    labels : (cells,) bool
+    near : float
+        Of the shift, relative, to the c of their map.
 
     Raises
     ------
@@ -175,12 +223,12 @@ class _Factorised:
         If there is no conformal map.
     """
 
-    def __init__(self, sheet: Sheet, labels: NDArray[np.bool_]):
+    def __init__(self, sheet: Sheet, labels: NDArray[np.bool_], near: float = _NEAR):
         strength = labels.astype(np.float64)
         placed = sheet.best_mapped(strength)
         pencil = sheet.pencil(strength)
         self._cells = sheet.candidates.cells
-        self._shift = (1 - _NEAR) * placed.c
+        self._shift = (1 - near) * placed.c
         self._n = sheet.n_vertices
         matrix = pencil.matrix(self._shift)
         self._factor = factorisation(matrix)
@@ -203,10 +251,7 @@ class _Factorised:
         changed = np.eye(corner.shape[1]) - self._shift * side[:, :, None] * inverse
         ahead = self._z + self._shift * self._y
         rhs = (side * (ahead[after] - ahead[before]))[..., None]
-        singular = np.linalg.det(changed) == 0  # which would end the solution of all others, too
-        changed[singular] = np.eye(corner.shape[1])
-        q = np.linalg.solve(changed, rhs)[..., 0]
-        q[singular] = np.nan
+        q = _solved(changed, rhs)[..., 0]
         scattered = sp.csr_array(
             (q.ravel(), place.ravel(), np.arange(0, q.size + 1, corner.shape[1])), shape=(len(q), len(self._columns))
         )

@@ -1,0 +1,166 @@
+"""Vertices that have two places between neighbours that stay.
+
+Let h have a right angle in a cell, from a to b, and lie on the boundary elsewhere, between p and q. That right angle
+gives nothing to ab. Without it, and with one between p and q instead, which gives nothing to pq, the conformal equation
+of row h puts it somewhere else, or nowhere. If its cells have the same entries from there, both are meshes. On grids
+such places are frequent.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...matrix import OperatorMatrix
+from ...topology.faces import joined
+from .corners import Alternative, OrientedMesh
+
+_NEARLY_RIGHT = 1e-3  # cosine of an angle that is worth a closer look
+_FLAT = 1e-9  # twice the area of a triangle over the square of its longest side
+
+Cell = tuple[int, ...]
+Pair = tuple[int, int]
+
+
+@dataclass
+class _Place:
+    """What is around a vertex.
+
+    Attributes
+    ----------
+    openings : list of (int, int)
+        The vertices before and after it along the boundary, each time that it passes.
+    cells : list of tuple of int
+        Counter-clockwise, each beginning with the vertex.
+    ends : list of int
+        Far ends of its edges.
+    weights : list of float
+        Theirs.
+    """
+
+    openings: list[Pair]
+    cells: list[Cell]
+    ends: list[int]
+    weights: list[float]
+
+
+def two_places(stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, agree: float) -> list[Alternative]:
+    """All vertices that can move with a right angle to where that leaves all entries as they are.
+
+    Parameters are those of :func:`unassemble.cells.alternatives.ambiguity.alternatives`.
+    """
+    places = _places(stored, mesh, agree)
+    across = np.array([pair for here in places.values() for pair in here.openings], dtype=np.int64).reshape(-1, 2)
+    taken = set(map(tuple, across[_borders_a_cell(mesh, across)].tolist()))
+    return [
+        other
+        for h, here in places.items()
+        for other in _moved(h, here, [pair for pair in here.openings if pair not in taken], mesh.z, factors[h], agree)
+    ]
+
+
+def _moved(h: int, here: _Place, free: list[Pair], z: NDArray, c: float, agree: float) -> Iterator[Alternative]:
+    """Each way to move a vertex, into one of some openings."""
+    weights = [w / c for w in here.weights]
+    pulled = sum(w * complex(z[v]) for w, v in zip(weights, here.ends, strict=True))
+    for cell in here.cells:
+        if not _is_right_angled(cell, z, agree):
+            continue
+        for p, q in free:
+            if (q, p) == (cell[1], cell[-1]):  # the same cell from behind
+                continue
+            # (L z)_h = -i / 2 times what the boundary leaves open about h.
+            openings = [pair for pair in here.openings if pair != (p, q)] + [(cell[1], cell[-1])]
+            opened = sum(complex(z[after]) - complex(z[before]) for before, after in openings)
+            place = (pulled - 0.5j * opened) / sum(weights)
+            one, other = complex(z[p]) - place, complex(z[q]) - place
+            if abs((one.conjugate() * other).real) > _NEARLY_RIGHT * abs(one) * abs(other):
+                continue
+            new = [(h, p, q), *([cell[1:]] if len(cell) > 3 else [])]
+            if _alike(here.cells, [*(old for old in here.cells if old != cell), *new], h, place, z, agree):
+                yield Alternative((), (), (), (tuple(sorted(cell)),), tuple(sorted(tuple(sorted(n)) for n in new)))
+
+
+def _alike(cells: list[Cell], others: list[Cell], h: int, place: complex, z: NDArray, agree: float) -> bool:
+    """Whether cells, and others with h in another place, give the same to all edges."""
+    before, after = _entries(cells, h, complex(z[h]), z), _entries(others, h, place, z)
+    if not (before and after):
+        return False
+    size = max(map(abs, before.values()))
+    sides = before.keys() | after.keys()
+    return all(abs(before.get(side, 0.0) - after.get(side, 0.0)) <= agree * size for side in sides)
+
+
+def _is_right_angled(cell: Cell, z: NDArray, agree: float) -> bool:
+    """Whether it is at its first vertex."""
+    one, other = complex(z[cell[1]] - z[cell[0]]), complex(z[cell[-1]] - z[cell[0]])
+    return abs((one.conjugate() * other).real) <= agree * abs(one) * abs(other)
+
+
+def _places(stored: OperatorMatrix, mesh: OrientedMesh, agree: float) -> dict[int, _Place]:
+    """Vertices on the boundary with a right angle, of openings those between stored edges."""
+    tail, head = mesh.boundary.T
+    before = np.arange(len(tail)) - 1
+    before[mesh.boundary_offsets[:-1]] = mesh.boundary_offsets[1:] - 1
+    previous = tail[before]
+    n, edges = stored.n, stored.edges
+    free = joined(n, edges, tail, head) & joined(n, edges, tail, previous) & (head != previous)
+    at = np.unique(tail[free])
+    # Vertices all of whose openings are such: others have corners at their neighbours.
+    at = np.setdiff1d(at, tail[~free])
+    wanted = np.zeros(n, dtype=bool)
+    wanted[at] = True
+    places = {h: _Place([], [], [], []) for h in at.tolist()}
+    for k in np.flatnonzero(wanted[tail]).tolist():
+        places[int(tail[k])].openings.append((int(previous[k]), int(head[k])))
+    for cell in _cells_at(mesh, wanted):
+        for turn, vertex in enumerate(cell):
+            if wanted[vertex]:
+                places[vertex].cells.append((*cell[turn:], *cell[:turn]))
+    for k, turn in zip(*(index.tolist() for index in np.nonzero(wanted[edges])), strict=True):
+        here = places[int(edges[k, turn])]
+        here.ends.append(int(edges[k, 1 - turn]))
+        here.weights.append(-float(stored.entries[k]))
+    return {h: here for h, here in places.items() if any(_is_right_angled(cell, mesh.z, agree) for cell in here.cells)}
+
+
+def _borders_a_cell(mesh: OrientedMesh, ways: NDArray) -> NDArray[np.bool_]:
+    """Whether there is a cell on the left of each way (k, 2) from a vertex to another."""
+    n, polygons = len(mesh.z), mesh.polygons
+    following = np.arange(1, len(polygons.vertices) + 1)
+    following[polygons.offsets[1:] - 1] = polygons.offsets[:-1]
+    tail = np.concatenate([mesh.triangles.ravel(), polygons.vertices])
+    head = np.concatenate([np.roll(mesh.triangles, -1, axis=1).ravel(), polygons.vertices[following]])
+    begun = np.zeros(n, dtype=bool)
+    begun[ways[:, 0]] = True
+    sides = begun[tail]
+    return np.isin(ways @ [n, 1], tail[sides] * n + head[sides])
+
+
+def _cells_at(mesh: OrientedMesh, wanted: NDArray[np.bool_]) -> Iterator[Cell]:
+    """The cells that have one of the wanted vertices."""
+    yield from map(tuple, mesh.triangles[wanted[mesh.triangles].any(axis=1)].tolist())
+    polygons = mesh.polygons
+    owner = np.repeat(np.arange(polygons.count), polygons.size)
+    for k in np.unique(owner[wanted[polygons.vertices]]).tolist():
+        yield tuple(polygons.vertices[polygons.offsets[k] : polygons.offsets[k + 1]].tolist())
+
+
+def _entries(cells: list[Cell], h: int, place: complex, z: NDArray) -> dict[Pair, float]:
+    """What cells give to edges, with h in some place; nothing if one is turned over or flat."""
+    found: dict[Pair, float] = defaultdict(float)
+    for three in ((cell[0], *pair) for cell in cells for pair in pairwise(cell[1:])):
+        at = [place if v == h else complex(z[v]) for v in three]
+        sides = [at[k - 1] - at[k - 2] for k in range(3)]  # facing the corners
+        twice = (sides[0].conjugate() * sides[1]).imag
+        if not twice > _FLAT * max(abs(side) for side in sides) ** 2:
+            return {}
+        for k in range(3):
+            one, other = three[k - 1], three[k - 2]
+            found[min(one, other), max(one, other)] -= (sides[k - 1].conjugate() * sides[k - 2]).real / (2 * twice)
+    return found

@@ -1,0 +1,45 @@
+"""Drawings whose faces have the angles of cells, by parts of the graph turned over.
+
+A part that hangs on two vertices can be drawn in two ways, and the faces on both sides of it are cells in one of them
+only. Their angles tell which before anything is solved.
+"""
+
+from __future__ import annotations
+
+from itertools import islice
+
+import numpy as np
+
+from ...topology.faces import FaceComplex
+from ...topology.turning_over import turned_over, turns
+from .candidates import Candidates
+
+_MOST_TURNS = 40  # that are looked at in one drawing
+_MOST_ROUNDS = 8  # parts that are turned over at most
+_LESS = 1e-6  # strain, relative, of drawings that are not the same
+
+
+def with_less_strain(candidates: Candidates) -> Candidates | None:
+    """Candidates of the drawing that turning parts over, each for less strain, leads to; None where none does."""
+
+    def drawn(drawing: FaceComplex) -> Candidates:
+        return Candidates.of(drawing, candidates.weights, candidates.scale, errors=candidates.errors)
+
+    drawing = candidates.drawing.split()
+    first = best = drawn(drawing)
+    least = _strain(best)
+    for _ in range(_MOST_ROUNDS):
+        drawing = best.drawing
+        others = [drawn(turned_over(drawing, turn)) for turn in islice(turns(drawing), _MOST_TURNS)]
+        strains = [_strain(other) for other in others]
+        if not others or min(strains) >= (1 - _LESS) * least:
+            break
+        least = min(strains)
+        best = others[int(np.argmin(strains))]
+    return None if best is first else best
+
+
+def _strain(candidates: Candidates) -> float:
+    """Of the first choice of cells."""
+    labels = next(candidates.starts(), None)
+    return np.inf if labels is None else candidates.strain(labels)
