@@ -37,7 +37,7 @@ def check_alternatives(matrix, **options):
         assert len(kept) == len(cells) - len(gone)
         stored, fans = with_structure(matrix, [*kept, *other.other_cells])
         again = recover(stored)
-        assert again.certified, again.reason
+        assert again.certified or again.alternatives, again.reason  # a right angle may close what is left
         assert triangle_set(again.triangles) == triangle_set(fans)
         if other.same_scale:
             assert again.scale == pytest.approx(found.scale, rel=1e-9)

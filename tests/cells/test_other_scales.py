@@ -113,3 +113,10 @@ def test_congruent_triangles_that_share_a_vertex_may_have_a_right_angle_between_
     told = recover(known.matrix, scale=1.0)
     assert told.certified, told.reason
     assert triangle_set(told.triangles) == triangle_set(known.triangles)
+
+
+def test_stored_zeros_are_no_doubles_of_others():
+    """A ring of six edges, one of them with a stored zero."""
+    edges = np.array([[0, 1], [0, 5], [1, 2], [2, 3], [3, 4], [4, 5]])
+    with np.errstate(all="raise"):
+        other_scales._of_tiles(6, edges, np.array([1.0, 2.0, 0.0, 1.0, 2.0, 1.0]))

@@ -24,6 +24,7 @@ from .labels.relaxation import HopelessError
 from .labels.repairs import repaired
 from .misfits.spoilt import without_wrong_entries
 from .reading import Reading
+from .triangles.drawings import read_in_drawings
 from .triangles.triangles_only import read_triangles
 
 _STARTS = 2  # readings to begin with that are worth repairing
@@ -92,6 +93,8 @@ def read_cells(
         return _of_equal_weights(n, edges, weights, scale, errors)
     effort = Effort.for_graph(n)
     triangles = read_triangles(n, edges, weights, scale, effort)
+    if triangles is None:
+        triangles = read_in_drawings(n, edges, weights, scale, errors)
     if triangles is not None:
         return triangles
     best, spoilt = _searched(n, edges, weights, scale, errors, effort)

@@ -77,7 +77,10 @@ class ShiftedSearch:
             m = k + 1
             energy[:m, k] = _products(basis[:m], self._pencil.energy_form(z))
             area[:m, k] = _products(basis[:m], self._pencil.area_form(z))
-            previous, (c, y) = c, _ritz(energy[:m, :m], area[:m, :m])
+            previous, found = c, _ritz(energy[:m, :m], area[:m, :m])
+            if found is None:  # the map that is sought has a part in the next vectors only
+                continue
+            c, y = found
             spread = abs(previous / c - 1) if np.isfinite(previous) else 1.0
             if spread < 1e-15:
                 break
@@ -138,8 +141,8 @@ def _combination(basis: NDArray, coefficients: NDArray) -> NDArray:
     return np.einsum("kn,k->n", basis, coefficients)
 
 
-def _ritz(energy: NDArray, area: NDArray) -> tuple[float, NDArray]:
-    """Least quotient energy / area, over positive areas, for the upper triangles of Hermitian (k, k) forms."""
+def _ritz(energy: NDArray, area: NDArray) -> tuple[float, NDArray] | None:
+    """Least quotient energy / area for the upper triangles of Hermitian (k, k) forms; None if no area is positive."""
     # With its indefinite side on the left the pencil is regular: 1/c is the greatest eigenvalue.
     try:
         inverse, vectors = scipy.linalg.eigh(area, energy, lower=False)
@@ -147,5 +150,5 @@ def _ritz(energy: NDArray, area: NDArray) -> tuple[float, NDArray]:
         # Not positive definite, or not even finite: the Dirichlet energy of a mesh is neither.
         raise GeometryError("the entries do not make a positive energy: they belong to no planar mesh") from error
     if inverse[-1] <= 0:
-        raise GeometryError("no map has positive area: the entries, or the given scale, fit no mesh on this graph")
+        return None
     return float(1 / inverse[-1]), vectors[:, -1]

@@ -56,10 +56,11 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
     if n >= 3 and len(edges) > 3 * n - 6:  # not planar, and may have very many cycles
         return
     cycles = short_faces(n, edges)
-    seen: list[FaceComplex] = []
+    seen: set[bytes] = set()
     for drawing in _drawings(n, edges, cycles):
-        if not any(np.array_equal(_fingerprint(drawing), _fingerprint(other)) for other in seen):
-            seen.append(drawing)
+        name = fingerprint(drawing)
+        if name not in seen:
+            seen.add(name)
             yield drawing
 
 
@@ -142,11 +143,12 @@ def drawing_with_corners(n: int, edges: NDArray, corners: NDArray) -> FaceComple
     return from_rotation(n, edges, tail[kept], head[kept])
 
 
-def _fingerprint(drawing: FaceComplex) -> NDArray[np.float64]:
+def fingerprint(drawing: FaceComplex) -> bytes:
     """The same for drawings with the same faces, mirrored or not: sums over each face of a number for each edge."""
-    number = np.random.default_rng(0).random(len(drawing.edges))
-    blocks = drawing.split()
-    return np.sort(np.round(np.bincount(blocks.face, number[np.arange(len(blocks.face)) >> 1]), 9))
+    number = np.random.default_rng(0).integers(1 << 62, size=len(drawing.edges)).astype(np.uint64)
+    sums = np.zeros(len(drawing.split().size), dtype=np.uint64)
+    np.add.at(sums, drawing.split().face, np.repeat(number, 2))
+    return np.sort(sums).tobytes()
 
 
 def triangular_faces(n: int, edges: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

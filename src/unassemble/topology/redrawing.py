@@ -17,7 +17,7 @@ from .faces import FaceComplex, around
 
 
 def redrawn(drawing: FaceComplex, first: NDArray) -> Iterator[tuple[NDArray[np.int64], FaceComplex]]:
-    """Drawings in which one more 3-cycle is a face, and as many as possible of those that were are.
+    """Drawings in which one more 3-cycle is a face, and as many as possible of the short cycles that were are.
 
     Parameters
     ----------
@@ -37,16 +37,20 @@ def redrawn(drawing: FaceComplex, first: NDArray) -> Iterator[tuple[NDArray[np.i
     triangles, quads = cycles[0], cycles[1][present[1]]
     sides = around(n, edges, triangles) >> 1
     full = crowded(n, edges, triangles)
-    missing = np.flatnonzero(~present[0] & full.any(axis=1))
+    missing = np.flatnonzero(~present[0])
     for k in missing[np.argsort(-first[triangles[missing]].sum(axis=1), kind="stable")].tolist():
         # On each crowded side one of two faces gives way.
         rivals = [np.flatnonzero(present[0] & (sides == side).any(axis=1)) for side in sides[k, full[k]]]
         for gone in product(*rivals):
             kept = present[0].copy()
             kept[list(gone)], kept[k] = False, True
-            other = drawing_with_faces(n, edges, [triangles[kept], quads])
-            if other is not None:
-                yield triangles[k], other
+            sure = kept & ~full.any(axis=1)
+            sure[k] = True
+            for faces in ([triangles[kept], quads], [triangles[kept]], [triangles[sure]]):
+                other = drawing_with_faces(n, edges, faces)
+                if other is not None:
+                    yield triangles[k], other
+                    break
 
 
 def _are_faces(drawing: FaceComplex, cycles: NDArray) -> NDArray[np.bool_]:

@@ -18,7 +18,8 @@ def not_faces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> 
 
     A cycle abc has something on both sides exactly if at least two parts of the rest of the graph
     touch all of a, b and c. Nearly always one of these is a single vertex of degree three inside; such vertices
-    are peeled off, round by round. What is then left is tested cycle by cycle.
+    are peeled off, round by round. Whether there is a second part, which there is not if a, b, c and this vertex are
+    all that does not hang on two vertices, and what is then left are tested cycle by cycle.
 
     Parameters
     ----------
@@ -32,6 +33,7 @@ def not_faces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> 
     (m,) bool
     """
     false = _peel_inner_vertices(n, edges, triangles, opposite)
+    false[false] = _separating(n, edges, triangles[false], otherwise=True)
     count = np.bincount(opposite[~false].ravel(), minlength=len(edges))
     doubtful = np.flatnonzero((count[opposite] > 2).any(axis=1) & ~false)
     false[doubtful] = _separating(n, edges, triangles[doubtful])
@@ -78,11 +80,11 @@ def _by_edges(n_edges: int, opposite: NDArray) -> tuple[NDArray, NDArray]:
     return order, key[order]
 
 
-def _separating(n: int, edges: NDArray, cycles: NDArray) -> NDArray[np.bool_]:
+def _separating(n: int, edges: NDArray, cycles: NDArray, *, otherwise: bool = False) -> NDArray[np.bool_]:
     """(m,) whether at least two components of the graph without a cycle have neighbours at all of its vertices.
 
     Looked for in balls about all cycles at once, which grow until they tell: nearly always one of the components is
-    small. Cycles that would take too long are said to be faces.
+    small. What would take too long is `otherwise`.
     """
     graph = adjacency(n, edges)
     separating = np.zeros(len(cycles), dtype=bool)
@@ -90,6 +92,7 @@ def _separating(n: int, edges: NDArray, cycles: NDArray) -> NDArray[np.bool_]:
     while len(left):
         parts = _parts_nearby(graph, cycles[left], radius)
         if parts is None:
+            separating[left] = otherwise
             break
         separating[left] = parts > 1
         left, radius = left[parts < 0], 2 * radius

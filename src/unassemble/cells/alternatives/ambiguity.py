@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...matrix import OperatorMatrix
 from ...topology import Topology
 from ...topology.keys import Grouped
+from .closings import closed_by_right_angles
 from .corners import Alternative, Corners, OrientedMesh
 from .flips import turned_over
 from .hinged import as_one_piece
@@ -91,18 +92,21 @@ def touching(
     scale: float | None,
     agree: float,
 ) -> tuple[list[Alternative], bool]:
-    """Other meshes of pieces that touch in a vertex, as where no vanished entries need be supposed.
+    """Other meshes where no vanished entries need be supposed, of pieces that touch in a vertex, and of loose ones.
 
     Right angles of their cells may be regrouped; and if all have the same entries, they may be parts of larger ones.
+    Vertices on the boundary of loose pieces may lie inside of a mesh with another c.
 
     Parameters and results are those of :func:`alternatives`.
     """
-    if (np.bincount(mesh.boundary[:, 0], minlength=stored.n) < 2).all():
-        return [], False
+    closed, left_open = closed_by_right_angles(stored, topology, mesh, factors) if scale is None else ([], False)
+    if closed or (np.bincount(mesh.boundary[:, 0], minlength=stored.n) < 2).all():
+        return closed, left_open
     found = regrouped(stored, mesh, Corners.of(stored.n, stored.edges, mesh), factors, agree)
     if found or scale is not None:
-        return found, False
-    return other_scales(stored, topology, mesh, factors, np.zeros(stored.n, dtype=np.int64), agree)
+        return found, left_open
+    found, unknown = other_scales(stored, topology, mesh, factors, np.zeros(stored.n, dtype=np.int64), agree)
+    return found, left_open or unknown
 
 
 def _loose_pieces(

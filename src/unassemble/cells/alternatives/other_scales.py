@@ -167,7 +167,7 @@ def _of_tiles(n: int, edges: NDArray, weights: NDArray) -> list[float]:
     """
     size = np.sort(weights)
     near = size[np.minimum(np.searchsorted(size, weights / 2 * (1 - _AGREE)), len(size) - 1)]
-    share = np.where(np.abs(near / (weights / 2) - 1) < _AGREE, weights / 2, weights)
+    share = np.where(np.abs(2 * near - weights) < _AGREE * np.abs(weights), weights / 2, weights)  # stored zeros, too
     found = []
     for drawing in face_complexes(n, edges):
         blocks = drawing.split()

@@ -16,6 +16,7 @@ from .cell_set import CellSet
 from .crosses import Crosses
 from .half_circles import half_circles
 from .open_corners import OpenCorners
+from .outer_faces import outer_faces
 from .turning import Turns
 
 _SHORT = 4  # faces of so many edges are cells unless the numbers say otherwise
@@ -91,7 +92,7 @@ class Candidates(CellSet):
         relative = weights / (scale or (crosses and crosses.scale) or guess or likeliest_scale(blocks, weights))
         angles = np.repeat(facing_angles(relative), 2)
         sums = face_sums(blocks, angles)
-        outer = _longest(blocks, sums)
+        outer = outer_faces(blocks, sums, relative)
         faces = np.flatnonzero(blocks.simple)
         rim = outer[blocks.face[np.arange(len(angles)) ^ 1]]
         rim_sums = face_sums(blocks, facing_angles(np.repeat(relative, 2) * np.where(rim, 2, 1)))
@@ -171,7 +172,7 @@ class Candidates(CellSet):
         """A likely c that differs much from the one that angles are judged by; None if there is none."""
         blocks = self.drawing.split()
         angles = np.repeat(facing_angles(self.relative), 2)
-        ratio = overall_scale(blocks, self.relative, _longest(blocks, face_sums(blocks, angles)))
+        ratio = overall_scale(blocks, self.relative, outer_faces(blocks, face_sums(blocks, angles), self.relative))
         given = np.flatnonzero(self.weights)[0]
         return None if abs(np.log(ratio)) < _APART else ratio * float(self.weights[given] / self.relative[given])
 
@@ -296,13 +297,3 @@ class Candidates(CellSet):
             chosen = np.zeros(self.count, dtype=bool)
             chosen[cell[best]] = True
             labels |= self.compatible(np.where(chosen, value, -np.inf))
-
-
-def _longest(blocks: FaceComplex, sums: NDArray) -> NDArray[np.bool_]:
-    """One face of each block: its longest, among equals that of the largest angle sum; it is never a cell."""
-    block = blocks.block[blocks.order[blocks.offsets[:-1]]]
-    order = np.lexsort((sums, blocks.size, block))
-    last = order[np.append(np.flatnonzero(np.diff(block[order])), len(order) - 1)]
-    longest = np.zeros(len(sums), dtype=bool)
-    longest[last] = True
-    return longest
