@@ -15,6 +15,7 @@ from .cautious import cautious_polish, count_flipped
 from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
 from .hinged import Hinged
+from .patches import from_patches
 from .pivoted import PivotedEquations, affordable
 from .polish import PolishedMesh, polish
 from .robust import ASIDE
@@ -25,9 +26,11 @@ _ROUNDING = 1e-12
 EXACT = 1e-3
 """Standard deviation of entries without noise, relative to that of the others: next to none, and safe to divide by."""
 _FAR = 0.05
-"""Root mean square misfit, over c, that no rounding in the solution of a linear problem leaves."""
+"""Root mean square misfit, over c, that no rounding in the solution of a linear problem leaves, and no noise tested."""
 _LOST = 1e-14
 """Edges of that length, relative to the extent, have hardly a digit left."""
+_PATCHES_LIMIT = 50_000
+"""Most vertices of a piece for which patches are tried: they take some 5 ms a vertex."""
 _CAUTIOUS_LIMIT = 200_000
 """Most vertices for which a polish that fails is tried again with a factorisation in every step."""
 
@@ -71,6 +74,35 @@ def positions(
     found = conformal_map(piece, weights, scale=scale, sharp=sharp, analyse=analyse)
     notes = () if found.converged else ("the conformal solve did not converge",)
     return PieceMesh(found.z, found.scale, notes)
+
+
+def brought_near(piece: Piece, weights: NDArray, mesh: PieceMesh, *, scale: float | None) -> PieceMesh:
+    """A start for the polish in place of one that noise has bent too far; the same mesh where there is none.
+
+    That is a first polish from there or, where this leads nowhere, from patches: up to `_PATCHES_LIMIT` vertices.
+    """
+    if _fits_roughly(piece, weights, mesh.z, mesh.scale):
+        return mesh
+    try:
+        found = _polished(piece, weights, mesh.z, scale, None, None)
+        if found.converged and _fits_roughly(piece, weights, found.z, found.scale):
+            return replace(mesh, z=found.z, scale=found.scale)
+    except SolverError:
+        pass
+    if piece.n_vertices > _PATCHES_LIMIT:
+        return mesh
+    try:
+        found = cautious_polish(piece, weights, from_patches(piece, weights), scale=scale)
+    except SolverError:
+        return mesh
+    return replace(mesh, z=found.z, scale=found.scale) if _fits_roughly(piece, weights, found.z, found.scale) else mesh
+
+
+def _fits_roughly(piece: Piece, weights: NDArray, z: NDArray, scale: float) -> bool:
+    """Whether all triangles are the right way round, and no more is left than the largest noise that is tested."""
+    with np.errstate(all="ignore"):
+        misfit = weights / scale - edge_weights(piece, z)
+        return not count_flipped(piece, z) and bool(np.sqrt(np.mean(misfit**2)) < _FAR)
 
 
 def refined(
@@ -193,7 +225,7 @@ def _polished(
     flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
     if found.converged and not flipped:
         return found
-    if not flipped and _near(piece, weights, found) and affordable(piece.edges, found.z):
+    if _fits_roughly(piece, weights, found.z, found.scale) and affordable(piece.edges, found.z):
         pivoted = PivotedEquations
         return cautious_polish(piece, weights, found.z, scale=scale, spread=spread, pins=pins, equations=pivoted)
     if piece.n_vertices > _CAUTIOUS_LIMIT:
@@ -206,12 +238,6 @@ def _polished(
 def _shortest(piece: Piece, z: NDArray) -> float:
     """Length of the shortest edge, relative to the extent."""
     return float(np.abs(z[piece.edges[:, 0]] - z[piece.edges[:, 1]]).min() / np.abs(z - z.mean()).max())
-
-
-def _near(piece: Piece, weights: NDArray, found: PolishedMesh) -> bool:
-    """Whether the misfit is so small that rounding may be what is left to mend."""
-    misfit = weights / found.scale - edge_weights(piece, found.z)
-    return bool(np.sqrt(np.mean(misfit**2)) < _FAR)
 
 
 def _is_uniform_noise(piece: Piece, weights: NDArray, found: PolishedMesh, spread: NDArray) -> bool:

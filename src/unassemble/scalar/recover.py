@@ -105,7 +105,9 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     trouble = [note for m in meshes for note in m.notes]
     doubt = max(m.doubt for m in meshes)
     apart = discord(topology, factors, certificate.backward_error, noise)
-    status, reason = verdict(topology, certificate, test, matrix, evidence, scales, trouble, doubt, apart)
+    status, reason = verdict(
+        topology, certificate, test, matrix, evidence, scales, trouble, doubt, apart, polished=options.refine
+    )
     others: list[Alternative] = []
     if status == "certified":
         with clock("ambiguity") if topology.method == "the numbers" else nullcontext():  # else next to nothing
