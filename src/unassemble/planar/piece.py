@@ -27,6 +27,7 @@ EXACT = 1e-3
 """Standard deviation of entries without noise, relative to that of the others: next to none, and safe to divide by."""
 _FAR = 0.05
 """Root mean square misfit, over c, that no rounding in the solution of a linear problem leaves, and no noise tested."""
+_OUTLIER = 10.0  # standard deviations that no entry is off by
 _LOST = 1e-14
 """Edges of that length, relative to the extent, have hardly a digit left."""
 _PATCHES_LIMIT = 50_000
@@ -99,10 +100,10 @@ def brought_near(piece: Piece, weights: NDArray, mesh: PieceMesh, *, scale: floa
 
 
 def _fits_roughly(piece: Piece, weights: NDArray, z: NDArray, scale: float) -> bool:
-    """Whether all triangles are the right way round, and no more is left than the largest noise that is tested."""
+    """Whether no triangle is turned over, and no more is left than the largest noise that is tested leaves anywhere."""
     with np.errstate(all="ignore"):
-        misfit = weights / scale - edge_weights(piece, z)
-        return not count_flipped(piece, z) and bool(np.sqrt(np.mean(misfit**2)) < _FAR)
+        misfit = np.abs(weights / scale - edge_weights(piece, z))
+    return not count_flipped(piece, z) and bool(np.sqrt(np.mean(misfit**2)) < _FAR and misfit.max() < _OUTLIER * _FAR)
 
 
 def refined(
@@ -225,7 +226,7 @@ def _polished(
     flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
     if found.converged and not flipped:
         return found
-    if _fits_roughly(piece, weights, found.z, found.scale) and affordable(piece.edges, found.z):
+    if not flipped and _near(piece, weights, found) and affordable(piece.edges, found.z):
         pivoted = PivotedEquations
         return cautious_polish(piece, weights, found.z, scale=scale, spread=spread, pins=pins, equations=pivoted)
     if piece.n_vertices > _CAUTIOUS_LIMIT:
@@ -238,6 +239,12 @@ def _polished(
 def _shortest(piece: Piece, z: NDArray) -> float:
     """Length of the shortest edge, relative to the extent."""
     return float(np.abs(z[piece.edges[:, 0]] - z[piece.edges[:, 1]]).min() / np.abs(z - z.mean()).max())
+
+
+def _near(piece: Piece, weights: NDArray, found: PolishedMesh) -> bool:
+    """Whether the misfit is so small that rounding may be what is left to mend."""
+    misfit = weights / found.scale - edge_weights(piece, found.z)
+    return bool(np.sqrt(np.mean(misfit**2)) < _FAR)
 
 
 def _is_uniform_noise(piece: Piece, weights: NDArray, found: PolishedMesh, spread: NDArray) -> bool:
