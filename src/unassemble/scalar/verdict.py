@@ -158,8 +158,8 @@ def hidden_by_errors(certificate: Certificate) -> tuple[str, str]:
     """The status and reason of large meshes that errors explain, as they may others."""
     return "uncertified", (
         f"the mesh gives the matrix back to {certificate.backward_error:.1e}, within the errors of the entries, but "
-        "these may hide other cells where sides of triangles have vanished from the boundary, which is not looked for "
-        "in components of more than 400 rows"
+        "where sides of triangles may have vanished from the boundary these may hide other cells, which is not looked "
+        "for in components of more than 400 rows"
     )
 
 

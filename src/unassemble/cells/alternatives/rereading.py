@@ -72,15 +72,19 @@ def _may_hide(stored: OperatorMatrix, agree: float) -> bool:
 def hidden(stored: OperatorMatrix, mesh: OrientedMesh, agree: float) -> bool:
     """Whether errors may hide cells of components that are too large for that to be looked for.
 
-    Those with triangles that have lost a side: one more, or one elsewhere, may make no more difference than the errors.
+    Those with triangles where anything has vanished: one more that has lost a side, or one elsewhere, may make no more
+    difference than the errors.
     Other parameters are those of :func:`unassemble.cells.alternatives.ambiguity.alternatives`.
     """
     if not _may_hide(stored, agree):
         return False
     graph = sp.coo_array((np.ones(len(stored.edges), np.int8), stored.edges.T), shape=(stored.n, stored.n))
     label = csgraph.connected_components(graph, directed=False)[1]
-    large = np.bincount(label)[label] > _MOST_NOISY
-    return bool((large & _with_vanished_sides(stored, mesh)).any())
+    incomplete = np.zeros(stored.n, dtype=bool)
+    incomplete[label[_with_vanished_sides(stored, mesh)]] = True
+    incomplete[label[mesh.polygons.vertices]] = True
+    large = np.bincount(label, minlength=stored.n) > _MOST_NOISY
+    return bool((large & incomplete)[label[mesh.triangles]].any())
 
 
 def _distinct_vertices(stored: OperatorMatrix, parts: list[Numbering]) -> int:
