@@ -6,6 +6,7 @@ Where entries vanish the graph alone does not tell: see the page on theory in th
 from .alternatives.ambiguity import AGREE, alternatives, touching
 from .alternatives.corners import Alternative, OrientedMesh
 from .alternatives.filled import filled_holes
+from .alternatives.rereading import hidden
 from .completion import completed, guessed
 from .eliminated import incomplete_rows
 from .misfits.coincidence import coincident
@@ -24,6 +25,7 @@ __all__ = [
     "completed",
     "filled_holes",
     "guessed",
+    "hidden",
     "in_doubt",
     "incomplete_rows",
     "read_cells",

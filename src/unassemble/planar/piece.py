@@ -15,6 +15,7 @@ from .cautious import cautious_polish, count_flipped
 from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
 from .hinged import Hinged
+from .patches import from_patches
 from .pivoted import PivotedEquations, affordable
 from .polish import PolishedMesh, polish
 from .robust import ASIDE
@@ -25,9 +26,12 @@ _ROUNDING = 1e-12
 EXACT = 1e-3
 """Standard deviation of entries without noise, relative to that of the others: next to none, and safe to divide by."""
 _FAR = 0.05
-"""Root mean square misfit, over c, that no rounding in the solution of a linear problem leaves."""
+"""Root mean square misfit, over c, that no rounding in the solution of a linear problem leaves, and no noise tested."""
+_OUTLIER = 10.0  # standard deviations that no entry is off by
 _LOST = 1e-14
 """Edges of that length, relative to the extent, have hardly a digit left."""
+_PATCHES_LIMIT = 50_000
+"""Most vertices of a piece for which patches are tried: they take some 5 ms a vertex."""
 _CAUTIOUS_LIMIT = 200_000
 """Most vertices for which a polish that fails is tried again with a factorisation in every step."""
 
@@ -71,6 +75,35 @@ def positions(
     found = conformal_map(piece, weights, scale=scale, sharp=sharp, analyse=analyse)
     notes = () if found.converged else ("the conformal solve did not converge",)
     return PieceMesh(found.z, found.scale, notes)
+
+
+def brought_near(piece: Piece, weights: NDArray, mesh: PieceMesh, *, scale: float | None) -> PieceMesh:
+    """A start for the polish in place of one that noise has bent too far; the same mesh where there is none.
+
+    That is a first polish from there or, where this leads nowhere, from patches: up to `_PATCHES_LIMIT` vertices.
+    """
+    if _fits_roughly(piece, weights, mesh.z, mesh.scale):
+        return mesh
+    try:
+        found = _polished(piece, weights, mesh.z, scale, None, None)
+        if found.converged and _fits_roughly(piece, weights, found.z, found.scale):
+            return replace(mesh, z=found.z, scale=found.scale)
+    except SolverError:
+        pass
+    if piece.n_vertices > _PATCHES_LIMIT:
+        return mesh
+    try:
+        found = cautious_polish(piece, weights, from_patches(piece, weights), scale=scale)
+    except SolverError:
+        return mesh
+    return replace(mesh, z=found.z, scale=found.scale) if _fits_roughly(piece, weights, found.z, found.scale) else mesh
+
+
+def _fits_roughly(piece: Piece, weights: NDArray, z: NDArray, scale: float) -> bool:
+    """Whether no triangle is turned over, and no more is left than the largest noise that is tested leaves anywhere."""
+    with np.errstate(all="ignore"):
+        misfit = np.abs(weights / scale - edge_weights(piece, z))
+    return not count_flipped(piece, z) and bool(np.sqrt(np.mean(misfit**2)) < _FAR and misfit.max() < _OUTLIER * _FAR)
 
 
 def refined(

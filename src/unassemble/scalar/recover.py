@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import certify as certificates
-from ..cells import AGREE, Alternative, OrientedMesh, alternatives, coincident, filled_holes, touching
+from ..cells import AGREE, Alternative, OrientedMesh, alternatives, coincident, filled_holes, hidden, touching
 from ..clock import Clock
 from ..linalg import AnalysisAhead, blas_threads, factorisation
 from ..matrix import OperatorMatrix
@@ -27,7 +27,7 @@ from .noise import Noise, NoiseTest
 from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
 from .placement import Placement
 from .solving import solve
-from .verdict import all_alike, ambiguous, decides, far_away, passes, unproved, verdict
+from .verdict import all_alike, ambiguous, decides, far_away, hidden_by_errors, passes, unproved, verdict
 
 _SMALL = 1e-3
 _SIGMAS = 10.0  # noise by which numbers that a reading takes for equal may differ
@@ -105,7 +105,9 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     trouble = [note for m in meshes for note in m.notes]
     doubt = max(m.doubt for m in meshes)
     apart = discord(topology, factors, certificate.backward_error, noise)
-    status, reason = verdict(topology, certificate, test, matrix, evidence, scales, trouble, doubt, apart)
+    status, reason = verdict(
+        topology, certificate, test, matrix, evidence, scales, trouble, doubt, apart, polished=options.refine
+    )
     others: list[Alternative] = []
     if status == "certified":
         with clock("ambiguity") if topology.method == "the numbers" else nullcontext():  # else next to nothing
@@ -194,6 +196,8 @@ def _alternatives(
             others, left_open = alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
     if known is None and coincident(stored, topology, agree).any():
         return others, all_alike
+    if hidden(stored, oriented, agree):
+        return others, hidden_by_errors
     return others, unproved if left_open else None
 
 

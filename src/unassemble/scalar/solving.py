@@ -15,7 +15,7 @@ from ..errors import GeometryError, RecoveryError, SolverError
 from ..linalg import Factorisation, UpperTriangle, blas_threads, factorisation
 from ..matrix import OperatorMatrix
 from ..planar.cotangent import left_by_all
-from ..planar.piece import PieceMesh, positions, refined
+from ..planar.piece import PieceMesh, brought_near, positions, refined
 from ..planar.triangles import lone_triangles
 from ..topology import Piece, Polygons, Topology
 from .factors import Factors, fitted_together
@@ -60,13 +60,16 @@ def solve(
     """
     lone = lone_triangles(topology.pieces, -matrix.entries, scale) if method == "conformal" else {}
 
+    drowning = refine and noise is not None and not noise.digits  # rounding to a few digits does not
+
     @cache
     def start(piece: Piece) -> Outcome:
         if piece in lone:
             return lone[piece]
         try:
             weights = -matrix.entries[piece.edge_rows]
-            return _start(piece, weights, method, scale, sharp=not refine, analyse=analyse)
+            mesh = _start(piece, weights, method, scale, sharp=not refine, analyse=analyse)
+            return brought_near(piece, weights, mesh, scale=scale) if drowning else mesh
         except (GeometryError, SolverError) as error:
             return error
 

@@ -40,6 +40,8 @@ def verdict(
     notes: Sequence[str] = (),
     doubt: float = 0.0,
     apart: str | None = None,
+    *,
+    polished: bool = True,
 ) -> tuple[str, str]:
     """``"certified"`` or ``"uncertified"``, and why.
 
@@ -54,6 +56,8 @@ def verdict(
         About the error of the positions, relative to the size of their piece, as far as a solver knows of one.
     apart : str, optional
         What is wrong with the factors, see :func:`unassemble.scalar.factors.discord`.
+    polished : bool
+        Whether a polish was asked for.
     """
     good = passes(certificate, test)
     if good and apart:
@@ -61,8 +65,10 @@ def verdict(
     if test and decides(certificate, test):
         if test.noise.digits and not (test.drowned or test.likely):
             more = (*notes, _unlikely(test, certificate))
-            return "uncertified", _misfit(topology, certificate, matrix, evidence, scale, more)
-        return ("certified" if good else "uncertified"), _with_noise(test, certificate, topology, evidence, notes)
+            reason = _misfit(topology, certificate, matrix, evidence, scale, more)
+            return "uncertified", reason + _astray(evidence, (), polished=polished)
+        reason = _with_noise(test, certificate, topology, evidence, notes, polished=polished)
+        return ("certified" if good else "uncertified"), reason
     error = certificate.backward_error
     if good and not evidence.certain and not doubt <= _SURE:
         return "uncertified", (
@@ -145,6 +151,15 @@ def unproved(certificate: Certificate) -> tuple[str, str]:
         f"the mesh gives the matrix back to {certificate.backward_error:.1e}, but it has hardly more entries than "
         "unknowns, and not all other cells that may have the same ones, with another factor c, could be tried: known, "
         "it decides"
+    )
+
+
+def hidden_by_errors(certificate: Certificate) -> tuple[str, str]:
+    """The status and reason of large meshes that errors explain, as they may others."""
+    return "uncertified", (
+        f"the mesh gives the matrix back to {certificate.backward_error:.1e}, within the errors of the entries, but "
+        "where sides of triangles may have vanished from the boundary these may hide other cells, which is not looked "
+        "for in components of more than 400 rows"
     )
 
 
@@ -234,7 +249,13 @@ def decides(certificate: Certificate, test: NoiseTest | None) -> bool:
 
 
 def _with_noise(
-    test: NoiseTest, certificate: Certificate, topology: Topology, evidence: Evidence, notes: Sequence[str]
+    test: NoiseTest,
+    certificate: Certificate,
+    topology: Topology,
+    evidence: Evidence,
+    notes: Sequence[str],
+    *,
+    polished: bool,
 ) -> str:
     if test.drowned:
         return (
@@ -242,11 +263,23 @@ def _with_noise(
             f"{test.limit:.2g}, {LARGEST_NOISE:g} times the scale"
         )
     if len(certificate.flipped):
-        return _turned_over(topology, certificate) + _because(notes)
+        return _turned_over(topology, certificate) + _astray(evidence, notes, polished=polished)
     if not test.likely:
-        return _culprits(evidence) + _unlikely(test, certificate) + _because(notes)
+        return _culprits(evidence) + _unlikely(test, certificate) + _astray(evidence, notes, polished=polished)
     chance = ", but there are too few different entries beyond the unknowns to tell that from chance"
     return f"{test.noise} explains the misfit {_figures(test)}" + (chance if test.coincidence else "")
+
+
+def _astray(evidence: Evidence, notes: Sequence[str], *, polished: bool) -> str:
+    """The end of the sentence on a mesh that is not the one of known noise: where the polish has ended."""
+    if len(evidence.suspects):
+        return _because(notes)
+    if not polished:
+        return "; the mesh was not polished" + _because(notes)
+    return (
+        "; the polish has not come to a mesh that explains the matrix, and whether that is because of the start, "
+        "wrong entries or wrong cells cannot be told"
+    ) + _because(notes)
 
 
 def _unlikely(test: NoiseTest, certificate: Certificate) -> str:

@@ -11,7 +11,9 @@ from functools import partial
 from itertools import chain
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse import csgraph
 
 from ...matrix import OperatorMatrix
 from ...topology import Numbering, components
@@ -42,7 +44,7 @@ def other_readings(
     """
     rng = np.random.default_rng(0)
     others = []
-    noisy = stored.errors is not None and agree > NEARLY
+    noisy = _may_hide(stored, agree)
     most = _MOST_NOISY if noisy else _MOST_VERTICES
     small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= most]
     n_orders = int(np.clip(_WORK // max(_distinct_vertices(stored, small), 1), 1, _ORDERS))
@@ -60,6 +62,29 @@ def other_readings(
             same = abs(factor / c - 1) < max(SAME_SCALE, agree)
             others.append(Alternative((), (), (), gone, new, same_scale=same))
     return others
+
+
+def _may_hide(stored: OperatorMatrix, agree: float) -> bool:
+    """Whether errors are known, and beyond those with which readings fit or do not."""
+    return stored.errors is not None and agree > NEARLY
+
+
+def hidden(stored: OperatorMatrix, mesh: OrientedMesh, agree: float) -> bool:
+    """Whether errors may hide cells of components that are too large for that to be looked for.
+
+    Those with triangles where anything has vanished: one more that has lost a side, or one elsewhere, may make no more
+    difference than the errors.
+    Other parameters are those of :func:`unassemble.cells.alternatives.ambiguity.alternatives`.
+    """
+    if not _may_hide(stored, agree):
+        return False
+    graph = sp.coo_array((np.ones(len(stored.edges), np.int8), stored.edges.T), shape=(stored.n, stored.n))
+    label = csgraph.connected_components(graph, directed=False)[1]
+    incomplete = np.zeros(stored.n, dtype=bool)
+    incomplete[label[_with_vanished_sides(stored, mesh)]] = True
+    incomplete[label[mesh.polygons.vertices]] = True
+    large = np.bincount(label, minlength=stored.n) > _MOST_NOISY
+    return bool((large & incomplete)[label[mesh.triangles]].any())
 
 
 def _distinct_vertices(stored: OperatorMatrix, parts: list[Numbering]) -> int:
