@@ -81,7 +81,7 @@ def hidden(stored: OperatorMatrix, mesh: OrientedMesh, agree: float) -> bool:
     graph = sp.coo_array((np.ones(len(stored.edges), np.int8), stored.edges.T), shape=(stored.n, stored.n))
     label = csgraph.connected_components(graph, directed=False)[1]
     incomplete = np.zeros(stored.n, dtype=bool)
-    incomplete[label[_with_vanished_sides(stored, mesh)]] = True
+    incomplete[label[with_vanished_sides(stored, mesh)]] = True
     incomplete[label[mesh.polygons.vertices]] = True
     large = np.bincount(label, minlength=stored.n) > _MOST_NOISY
     return bool((large & incomplete)[label[mesh.triangles]].any())
