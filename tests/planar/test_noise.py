@@ -1,5 +1,7 @@
 """Noisy entries: the maximum-likelihood mesh, its error bars, the tests that it has to pass."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -7,6 +9,7 @@ import scipy.sparse as sp
 from meshes import delaunay, diameter, largest_error, random_mesh, specimen
 from unassemble import SolverError, recover
 from unassemble.matrix import check_matrix
+from unassemble.planar import piece as pieces
 from unassemble.planar.cautious import cautious_polish, count_flipped
 from unassemble.planar.conformal import conformal_map
 from unassemble.planar.patches import from_patches
@@ -234,3 +237,14 @@ def test_rings_of_very_different_loops_are_not_hidden_by_their_inversion():
     found = recover((known := specimen(points[used], triangles.reshape(-1, 3), c=7.0)).matrix)
     assert found.certified, found.reason
     assert largest_error(found.points, known.points) < 1e-10
+
+
+def test_a_polish_without_end_is_not_certified(monkeypatch):
+    """Entries may be explained by a mesh that is far from the likeliest one."""
+    matrix = noisy(specimen(*random_mesh(300)).matrix, 1e-4)
+    assert recover(matrix, noise=1e-4).certified
+    to_the_end = pieces._polished
+    monkeypatch.setattr(pieces, "_polished", lambda *a: replace(to_the_end(*a), converged=False, last_step=0.1))
+    found = recover(matrix, noise=1e-4)
+    assert not found.certified
+    assert "did not converge" in found.reason

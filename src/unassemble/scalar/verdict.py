@@ -68,6 +68,8 @@ def verdict(
             reason = _misfit(topology, certificate, matrix, evidence, scale, more)
             return "uncertified", reason + _astray(evidence, (), polished=polished)
         reason = _with_noise(test, certificate, topology, evidence, notes, polished=polished)
+        if good and not doubt <= max(_SURE, test.noise.sigma / float(np.abs(scale).min())):
+            return "uncertified", f"{reason}, but that mesh need not be the likeliest{_because(notes)}"
         return ("certified" if good else "uncertified"), reason
     error = certificate.backward_error
     if good and not evidence.certain and not doubt <= _SURE:
