@@ -222,7 +222,7 @@ def test_meshes_that_differ_by_two_corners(seed):
     matrix = forgotten(specimen(*FAMILIES["integer"](rng), c=c, seed=seed)).matrix
     found = recover(matrix)
     assert found.status == "uncertified"
-    assert len(found.alternatives) >= (3 if seed == 208 else 1)
+    assert found.alternatives
     for other in found.alternatives:
         gone = {tuple(sorted(cell)) for cell in other.cells}
         kept = [cell for cell in cells_of(found) if tuple(sorted(cell)) not in gone]

@@ -31,8 +31,8 @@ _SUM = 1e-10  # sum of a row, relative to its entries, that is rounding
 _FEW = 0.1  # of the entries on the boundary
 _SHORT = PolishOptions(max_steps=20, max_factorisations=3)
 _NOTE = (
-    "these are entries between rows that do not add up to zero, as next to unknowns that were eliminated, which still "
-    "contain cells that are gone; all others fit"
+    "entries between rows that do not add up to zero, as next to unknowns that were eliminated, still contain cells "
+    "that are gone"
 )
 
 

@@ -31,6 +31,7 @@ _SHORT = CautiousOptions(max_steps=10)
 _ROUNDS = 24
 _GAIN = 0.5  # part of the misfit to which a round must lower it for no more entries to be set aside
 _FITS = 1e-9  # of a typical entry: a misfit that is none
+_FITS_AGAIN = 1e-7  # and one of an entry that had been set aside, which may have held nothing since
 _OUT = 10.0, 0.2  # times the median misfit, and the largest one: what stands out
 
 
@@ -53,6 +54,9 @@ def fit_inside(
     scale : float, optional
         c, where it is known.
     """
+    # What is done does not depend on the size of c then, but for rounding.
+    unit = float(np.exp2(np.round(np.log2(np.median(np.abs(weights))))))
+    weights, scale = weights / unit, None if scale is None else scale / unit
     for guess in _GUESSES:
         guessed = weights.copy()
         guessed[unknown] *= guess
@@ -62,7 +66,8 @@ def fit_inside(
         except (GeometryError, SolverError):
             continue
         if found is not None:
-            return found
+            aside = _still_aside(piece, weights, unknown, found)
+            return RobustFit(found.z, found.scale * unit, aside)
     return None
 
 
@@ -94,6 +99,16 @@ def _in_rounds(
         before = left
         weights = np.where(aside, c * fitted, weights)  # held where it is, and no further
     return None
+
+
+def _still_aside(piece: Piece, weights: NDArray, unknown: NDArray[np.int64], found: RobustFit) -> NDArray[np.int64]:
+    """Those set aside that are unknown, or do not fit in the end."""
+    fitted = edge_weights(piece, found.z)
+    off = np.abs(fitted - weights / found.scale) > _FITS_AGAIN * np.median(np.abs(fitted))
+    off[unknown] = True
+    aside = np.zeros(len(weights), dtype=bool)
+    aside[found.aside] = True
+    return np.flatnonzero(aside & off)
 
 
 def _near_boundary(piece: Piece) -> NDArray[np.bool_]:

@@ -35,6 +35,7 @@ _CORE = 6  # up to here edges of a patch count: what is supposed of the rim does
 _RIM = 30.0  # error of what is supposed, in units of that of the entries: noise that drowns null vectors is about 1%
 _NEAR = 0.05**-2  # as for the polish of a whole piece: inverse mean square of a misfit that noise may leave
 _FEW = 5  # patches that may fail: their neighbours cover most of them
+_EXACT = 1e-100  # of c: a residual that is none
 _SHORT = CautiousOptions(max_steps=60, settled=0.1)
 _ORDINARY = (0.3, 2.0), (0.1, np.inf)
 """Bounds of the weights that patches begin with, over the median: positive ones always have a conformal map."""
@@ -137,7 +138,8 @@ def _nearest(part: Piece, weights: NDArray, rim: NDArray[np.bool_]) -> PolishedM
 
 def _trust(part: Piece, found: PolishedMesh) -> float:
     """Inverse mean square of the misfit over c."""
-    return len(part.edges) * found.scale**2 / max(found.residual**2, np.finfo(float).tiny)
+    size = abs(found.scale)
+    return len(part.edges) * (size / max(found.residual, _EXACT * size)) ** 2
 
 
 def _turns(owner: NDArray, row: NDArray, drawn: NDArray, trust: NDArray, edges: int) -> NDArray[np.complex128]:

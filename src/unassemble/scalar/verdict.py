@@ -160,8 +160,8 @@ def hidden_by_errors(certificate: Certificate) -> tuple[str, str]:
     """The status and reason of large meshes that errors explain, as they may others."""
     return "uncertified", (
         f"the mesh gives the matrix back to {certificate.backward_error:.1e}, within the errors of the entries, but "
-        "where sides of triangles may have vanished from the boundary these may hide other cells, which is not looked "
-        "for in components of more than 400 rows"
+        "where sides of triangles have vanished these may hide other cells, which is not looked for in components of "
+        "more than 400 rows"
     )
 
 

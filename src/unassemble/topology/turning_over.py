@@ -47,6 +47,8 @@ def turns(drawing: FaceComplex) -> Iterator[Turn]:
         arriving[vertex][face] = half
     common: dict[tuple[int, int], list[int]] = defaultdict(list)
     for vertex, faces in arriving.items():
+        if len(faces) < 3:
+            continue  # inside a path, which may as well be longer
         for pair in combinations(sorted(faces), 2):
             common[pair].append(vertex)
     walks = [walk.tolist() for walk in np.split(drawing.order, drawing.offsets[1:-1])]

@@ -94,11 +94,15 @@ def touching(
 ) -> tuple[list[Alternative], bool]:
     """Other meshes where no vanished entries need be supposed, of pieces that touch in a vertex, and of loose ones.
 
-    Right angles of their cells may be regrouped; and if all have the same entries, they may be parts of larger ones.
+    Single vertices may have two places. Right angles of their cells may be regrouped; and if all have the same entries,
+    they may be parts of larger ones.
     Vertices on the boundary of loose pieces may lie inside of a mesh with another c.
 
     Parameters and results are those of :func:`alternatives`.
     """
+    moved = two_places(stored, mesh, factors, min(agree, AGREE))  # errors do not make entries vanish
+    if moved:
+        return moved, False
     closed, left_open = closed_by_right_angles(stored, topology, mesh, factors) if scale is None else ([], False)
     if closed or (np.bincount(mesh.boundary[:, 0], minlength=stored.n) < 2).all():
         return closed, left_open

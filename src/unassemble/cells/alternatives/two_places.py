@@ -55,17 +55,16 @@ def two_places(stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, agr
     Parameters are those of :func:`unassemble.cells.alternatives.ambiguity.alternatives`.
     """
     places = _places(stored, mesh, agree)
-    across = np.array([pair for here in places.values() for pair in here.openings], dtype=np.int64).reshape(-1, 2)
-    taken = set(map(tuple, across[_borders_a_cell(mesh, across)].tolist()))
-    return [
-        other
-        for h, here in places.items()
-        for other in _moved(h, here, [pair for pair in here.openings if pair not in taken], mesh.z, factors[h], agree)
-    ]
+    across = [pair for here in places.values() for pair in here.openings]
+    across += [(cell[-1], cell[1]) for here in places.values() for cell in here.cells]
+    ways = np.array(across, dtype=np.int64).reshape(-1, 2)
+    taken = set(map(tuple, ways[_borders_a_cell(mesh, ways)].tolist()))
+    return [other for h, here in places.items() for other in _moved(h, here, taken, mesh.z, float(factors[h]), agree)]
 
 
-def _moved(h: int, here: _Place, free: list[Pair], z: NDArray, c: float, agree: float) -> Iterator[Alternative]:
-    """Each way to move a vertex, into one of some openings."""
+def _moved(h: int, here: _Place, taken: set[Pair], z: NDArray, c: float, agree: float) -> Iterator[Alternative]:
+    """Each way to move a vertex, into one of its openings; `taken` are sides with a cell on the left."""
+    free = [pair for pair in here.openings if pair not in taken]
     weights = [w / c for w in here.weights]
     pulled = sum(w * complex(z[v]) for w, v in zip(weights, here.ends, strict=True))
     for cell in here.cells:
@@ -79,8 +78,10 @@ def _moved(h: int, here: _Place, free: list[Pair], z: NDArray, c: float, agree: 
             opened = sum(complex(z[after]) - complex(z[before]) for before, after in openings)
             place = (pulled - 0.5j * opened) / sum(weights)
             one, other = complex(z[p]) - place, complex(z[q]) - place
-            if abs((one.conjugate() * other).real) > _NEARLY_RIGHT * abs(one) * abs(other):
+            if abs((one.conjugate() * other).real) > max(_NEARLY_RIGHT, agree) * abs(one) * abs(other):
                 continue
+            if (cell[-1], cell[1]) in taken and _is_between(place, complex(z[cell[1]]), complex(z[cell[-1]])):
+                continue  # on a side of the cell beyond: no mesh
             new = [(h, p, q), *([cell[1:]] if len(cell) > 3 else [])]
             if _alike(here.cells, [*(old for old in here.cells if old != cell), *new], h, place, z, agree):
                 yield Alternative((), (), (), (tuple(sorted(cell)),), tuple(sorted(tuple(sorted(n)) for n in new)))
@@ -94,6 +95,12 @@ def _alike(cells: list[Cell], others: list[Cell], h: int, place: complex, z: NDA
     size = max(map(abs, before.values()))
     sides = before.keys() | after.keys()
     return all(abs(before.get(side, 0.0) - after.get(side, 0.0)) <= agree * size for side in sides)
+
+
+def _is_between(place: complex, one: complex, other: complex) -> bool:
+    """Whether it lies on the segment between two points."""
+    turned = (one - place).conjugate() * (other - place)
+    return abs(turned.imag) <= _FLAT * abs(one - other) ** 2 and turned.real < 0
 
 
 def _is_right_angled(cell: Cell, z: NDArray, agree: float) -> bool:
