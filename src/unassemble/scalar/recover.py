@@ -14,14 +14,14 @@ from ..cells import AGREE, Alternative, OrientedMesh, alternatives, coincident, 
 from ..clock import Clock
 from ..linalg import AnalysisAhead, blas_threads, factorisation
 from ..matrix import OperatorMatrix
-from ..planar.deviations import coordinate_covariances, factor_deviations
 from ..planar.hinges import free_images, join
 from ..planar.pencil import pencil_pattern
 from ..planar.piece import PieceMesh
 from ..recovery import Recovery
 from ..topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
+from .deviations import coordinate_deviations
 from .evidence import pooled_noise, weigh
-from .factors import Factors, discord, hinged
+from .factors import Factors, discord
 from .joined import JoinedMesh
 from .noise import Noise, NoiseTest
 from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
@@ -101,7 +101,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     if options.standard_deviations:
         with clock("deviations"):
             sigma = noise.sigma if noise else pooled_noise(topology, matrix, meshes, freedom)
-            deviations = _deviations(topology, placement, placed, meshes, sigma, factors, free=scale is None)
+            deviations = coordinate_deviations(topology, placement, placed, meshes, sigma, factors, free=scale is None)
     trouble = [note for m in meshes for note in m.notes]
     doubt = max(m.doubt for m in meshes)
     apart = discord(topology, factors, certificate.backward_error, noise)
@@ -248,63 +248,3 @@ def _freedom(topology: Topology, factors: Factors, scale: float | None) -> int:
     """Entries less fitted unknowns: 2 v - 4 coordinates of each piece, as far as rings do not tie them, and each c."""
     coordinates = sum(2 * piece.n_vertices - 4 for piece in topology.pieces) - int(factors.closings.sum())
     return len(topology.edges) - coordinates - (factors.count if scale is None else 0)
-
-
-def _deviations(
-    topology: Topology,
-    placement: Placement,
-    placed: list[NDArray],
-    meshes: list[PieceMesh],
-    sigma: float,
-    factors: Factors,
-    *,
-    free: bool,
-) -> NDArray:
-    """(n, 2) standard deviations in the final frame."""
-    tensor = placement.tensor
-    stretch = tensor.root if tensor else None
-    drawn = [tensor.to_laplacian(z) if tensor else z for z in placed]
-    result = np.full((topology.n_vertices, 2), np.nan)
-    alone = np.ones(len(meshes), dtype=bool)
-    for label in np.unique(factors.fitted[factors.together]) if factors.closings.any() else ():
-        inside = np.flatnonzero(factors.fitted == label)
-        joined = hinged(topology, inside, [drawn[p] for p in inside])
-        if joined is not None:
-            alone[inside] = False
-            z = np.empty(joined.piece.n_vertices, dtype=np.complex128)
-            for p, own in zip(inside, joined.local, strict=True):
-                z[own] = drawn[p]
-            spreads = [spread for p in inside if (spread := meshes[p].spread) is not None]
-            covariance = coordinate_covariances(
-                joined.piece,
-                z,
-                sigma=sigma / abs(meshes[inside[0]].scale),
-                free_scale=free,
-                stretch=stretch,
-                spread=np.concatenate(spreads) if spreads else None,
-                pins=joined.pins,
-            )
-            result[joined.piece.vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-    beside = _beside(topology, meshes, factors.fitted) if free and alone.any() else np.zeros(len(meshes))
-    for p in np.flatnonzero(alone)[::-1].tolist():
-        covariance = coordinate_covariances(
-            topology.pieces[p],
-            drawn[p],
-            sigma=sigma / abs(meshes[p].scale),
-            free_scale=free,
-            beside=beside[p],
-            stretch=stretch,
-            spread=meshes[p].spread,
-        )
-        result[topology.pieces[p].vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-    return result
-
-
-def _beside(topology: Topology, meshes: list[PieceMesh], fitted: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(pieces,) what the others with the same label say of c, for noise 1 in the weights."""
-    told = np.zeros(len(meshes))
-    several = np.flatnonzero(np.bincount(fitted)[fitted] > 1)
-    if len(several):
-        pieces, some = [topology.pieces[p] for p in several], [meshes[p] for p in several]
-        told[several] = factor_deviations(pieces, [m.z for m in some], [m.spread for m in some]) ** -2
-    return np.asarray(np.bincount(fitted, told)[fitted] - told)
