@@ -19,7 +19,7 @@ from ..planar.conformal import conformal_map
 from ..planar.cotangent import edge_weights
 from ..planar.inside import fit_inside
 from ..planar.piece import PieceMesh
-from ..planar.polish import PolishOptions, polish
+from ..planar.polish import PolishedMesh, PolishOptions, polish
 from ..planar.robust import ASIDE, RobustFit
 from ..topology import Piece
 from ..words import count_of
@@ -136,8 +136,7 @@ def _without(piece: Piece, weights: NDArray, aside: NDArray[np.int64], scale: fl
     with suppress(GeometryError, SolverError):
         start = conformal_map(piece, halved, sharp=False)
         found = polish(piece, halved, start.z, scale=scale, spread=spread, options=_SHORT)
-        misfit = np.delete(np.abs(edge_weights(piece, found.z) - weights / found.scale), aside)
-        if (misfit <= FITS * np.abs(weights / found.scale).max()).all():
+        if np.delete(_fit(piece, weights, found), aside).all():
             return PieceMesh(found.z, found.scale, (_NOTE,), aside=aside)
     inner = fit_inside(piece, weights, aside, scale=scale)
     if inner is None or piece.redundancy <= len(inner.aside) or _may_be_whole(piece, weights, aside, inner):
@@ -147,8 +146,13 @@ def _without(piece: Piece, weights: NDArray, aside: NDArray[np.int64], scale: fl
 
 def _may_be_whole(piece: Piece, weights: NDArray, unknown: NDArray[np.int64], found: RobustFit) -> bool:
     """Whether entries on the boundary fit as well, as they cannot where cells beyond them are gone."""
-    misfit = np.abs(edge_weights(piece, found.z) - weights / found.scale)[unknown]
-    return bool(np.count_nonzero(misfit <= FITS * np.abs(weights / found.scale).max()) > _FEW * len(unknown))
+    return bool(np.count_nonzero(_fit(piece, weights, found)[unknown]) > _FEW * len(unknown))
+
+
+def _fit(piece: Piece, weights: NDArray, found: PolishedMesh | RobustFit) -> NDArray[np.bool_]:
+    """(e,) entries that a mesh has."""
+    given = weights / found.scale
+    return np.asarray(np.abs(edge_weights(piece, found.z) - given) <= FITS * np.abs(given).max())
 
 
 def _more(count: int) -> tuple[str, ...]:

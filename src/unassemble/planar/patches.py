@@ -65,8 +65,9 @@ def from_patches(piece: Piece, weights: NDArray) -> NDArray[np.complex128]:
         If too few patches can be fitted, or these do not hang together.
     """
     patches: list[_Patch] = []
+    keys = pair_keys(piece.n_vertices, *piece.edges.T)
     for ball, core in _balls(piece):
-        patches.extend(_fitted(piece, weights, ball, core))
+        patches.extend(_fitted(piece, keys, weights, ball, core))
         far = sum(patch.trust < _NEAR for patch in patches)
         if far > _FEW + len(patches) / 4:  # it is not the length of the mesh that is in the way
             raise SolverError("patches of the mesh do not fit either")
@@ -99,13 +100,14 @@ def _balls(piece: Piece) -> Iterator[tuple[NDArray[np.int64], NDArray[np.bool_]]
             yield ball, distance[ball] <= _CORE
 
 
-def _fitted(piece: Piece, weights: NDArray, ball: NDArray, core: NDArray[np.bool_]) -> Iterator[_Patch]:
-    """The patches that the triangles in a ball make, as far as they can be fitted."""
+def _fitted(
+    piece: Piece, keys: NDArray[np.int64], weights: NDArray, ball: NDArray, core: NDArray[np.bool_]
+) -> Iterator[_Patch]:
+    """The patches that the triangles in a ball make, as far as they can be fitted; `keys` are those of all edges."""
     inside = np.zeros(piece.n_vertices, dtype=bool)
     inside[ball] = True
     triangles = np.searchsorted(ball, piece.triangles[inside[piece.triangles].all(axis=1)])
     edges, _, opposite = with_sides(len(ball), np.empty((0, 2), np.int64), triangles)
-    keys = pair_keys(piece.n_vertices, *piece.edges.T)
     for part in planar_pieces(len(ball), edges, triangles, opposite) or ():
         ends = ball[part.vertices[part.edges]]
         rows = np.searchsorted(keys, pair_keys(piece.n_vertices, *ends.T))

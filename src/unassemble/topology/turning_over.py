@@ -40,8 +40,6 @@ class Turn:
 
 def turns(drawing: FaceComplex) -> Iterator[Turn]:
     """All that change a face, of a drawing none of whose faces passes a vertex twice (see FaceComplex.split)."""
-    rank = np.empty(len(drawing.order), dtype=np.int64)
-    rank[drawing.order] = np.arange(len(rank))
     arriving: dict[int, dict[int, int]] = defaultdict(dict)  # half-edges by the vertex at their heads and their face
     for half, (vertex, face) in enumerate(zip(drawing.head.tolist(), drawing.face.tolist(), strict=True)):
         arriving[vertex][face] = half

@@ -69,8 +69,7 @@ def closed_by_right_angles(
         left_open |= unknown
         if cells is not None:
             same = abs(c / float(factors[part.vertices[0]]) - 1) < SAME_SCALE
-            gone, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
-            found.append(Alternative((), (), (), gone, new, same_scale=same))
+            found.append(Alternative.of(own, cells, same_scale=same))
     return found, left_open
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...topology import Polygons
+from ..alike import Cells
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,12 @@ class Alternative:
     other_cells: tuple[tuple[int, ...], ...]
     same_scale: bool = True
     tested: bool = True
+
+    @classmethod
+    def of(cls, cells: Cells, others: Cells, *, same_scale: bool) -> Alternative:
+        """Another mesh with other cells, solved, anywhere in a component."""
+        gone, new = tuple(sorted(cells - others)), tuple(sorted(others - cells))
+        return cls((), (), (), gone, new, same_scale=same_scale)
 
     def renumbered(self, number: NDArray[np.int64]) -> Alternative:
         """The same with row v called ``number[v]``."""

@@ -51,8 +51,7 @@ def nearby_readings(
             if (cells := cells_of(other, part)) != own:
                 factor = next(solved.scale for solved in other.meshes if solved)
                 same = abs(factor / c - 1) < max(SAME_SCALE, agree)
-                gone, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
-                others.append(Alternative((), (), (), gone, new, same_scale=same))
+                others.append(Alternative.of(own, cells, same_scale=same))
                 break
     return others
 

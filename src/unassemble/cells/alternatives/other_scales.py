@@ -90,9 +90,8 @@ def other_scales(
         cells, factor, unknown = answers.of(part, weights, own, ask)
         left_open |= unknown
         if cells is not None:
-            gone_cells, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
             same = abs(factor / c - 1) < SAME_SCALE
-            found.append(Alternative((), (), (), gone_cells, new, same_scale=same))
+            found.append(Alternative.of(own, cells, same_scale=same))
     return found[::-1], left_open
 
 

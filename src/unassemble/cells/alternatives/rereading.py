@@ -11,9 +11,7 @@ from functools import partial
 from itertools import chain
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from ...matrix import OperatorMatrix
 from ...topology import Numbering, components
@@ -58,9 +56,8 @@ def other_readings(
         ask = partial(_other_reading, shuffled, stored, own, scale, c, supposed=supposed, noisy=noisy)
         cells, factor, _ = answers.of(part, weights, own, ask)
         if cells is not None:
-            gone, new = tuple(sorted(own - cells)), tuple(sorted(cells - own))
             same = abs(factor / c - 1) < max(SAME_SCALE, agree)
-            others.append(Alternative((), (), (), gone, new, same_scale=same))
+            others.append(Alternative.of(own, cells, same_scale=same))
     return others
 
 
@@ -78,13 +75,14 @@ def hidden(stored: OperatorMatrix, mesh: OrientedMesh, agree: float) -> bool:
     """
     if not _may_hide(stored, agree):
         return False
-    graph = sp.coo_array((np.ones(len(stored.edges), np.int8), stored.edges.T), shape=(stored.n, stored.n))
-    label = csgraph.connected_components(graph, directed=False)[1]
-    incomplete = np.zeros(stored.n, dtype=bool)
-    incomplete[label[with_vanished_sides(stored, mesh)]] = True
-    incomplete[label[mesh.polygons.vertices]] = True
-    large = np.bincount(label, minlength=stored.n) > _MOST_NOISY
-    return bool((large & incomplete)[label[mesh.triangles]].any())
+    vanished, triangular = with_vanished_sides(stored, mesh), np.zeros(stored.n, dtype=bool)
+    vanished[mesh.polygons.vertices] = True
+    triangular[mesh.triangles] = True
+    return any(
+        bool(vanished[part.vertices].any() and triangular[part.vertices].any())
+        for part in components(stored.n, stored.edges)
+        if len(part.vertices) > _MOST_NOISY
+    )
 
 
 def _distinct_vertices(stored: OperatorMatrix, parts: list[Numbering]) -> int:
