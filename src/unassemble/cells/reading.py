@@ -147,6 +147,11 @@ class Reading(Generic[C]):
         return float(np.sqrt(np.mean(self.misfit**2))) if self.pieces else np.inf
 
     @property
+    def mean_misfit(self) -> float:
+        """Where little is wrong this is smaller than where all is wrong a little."""
+        return float(self.misfit.mean())
+
+    @property
     def like_noise(self) -> bool:
         """Whether the misfit is that of errors in the entries, see :func:`even`.
 

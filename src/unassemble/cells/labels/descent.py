@@ -22,7 +22,7 @@ from .evidence import label_changes
 from .exchange import whole
 from .leaps import clear_changes
 from .sheet import Sheet
-from .updates import Updates
+from .updates import Updates, turned
 
 _log = logging.getLogger(__name__)
 
@@ -68,7 +68,7 @@ class Descent:
         self._scale = _scale(start)
         self._free = np.ones(start.candidates.count, dtype=bool) if free is None else free
         self._seen = set() if seen is None else seen
-        self._first = self.least = _value(start)
+        self._first = self.least = start.mean_misfit
         self._told = self._in_vain = 0
         # Misfit, more where batches have been tried, a number that settles ties, the reading and its changes.
         self._waiting: list[_Waiting] = [(self.least, -1, start, None)] if start.pieces else []
@@ -95,7 +95,7 @@ class Descent:
                 if effort.spent or self._tried(labels, reading, effort) < value:
                     break
             else:
-                value += _TRIED * _value(reading)
+                value += _TRIED * reading.mean_misfit
             if asked:
                 heapq.heappush(self._waiting, (value, number, reading, changed))
         _log.debug("descent: misfit %.1e, %d readings", self.best.size, self._told)
@@ -113,7 +113,7 @@ class Descent:
             return np.inf
         self._seen.add(outline)
         trial = effort.reading(self._candidates, labels)
-        self.best, value = better(self.best, trial), _value(trial)
+        self.best, value = better(self.best, trial), trial.mean_misfit
         self._in_vain = 0 if value < self.least else self._in_vain + 1
         if value < _BETTER * self.least:  # what led here was not in vain
             effort.solves += _SOLVES
@@ -127,9 +127,7 @@ class Descent:
         for k, move in enumerate(self._updates.ranked(reading)):
             if k == _BATCH:
                 yield clear_changes(reading, np.nan_to_num(label_changes(reading)))
-            labels = reading.labels.copy()
-            labels[list(move)] ^= True
-            yield whole(reading.candidates, labels)
+            yield whole(reading.candidates, turned(reading.labels, move))
 
 
 def beside(reading: Reading) -> Iterator[Reading]:
@@ -138,8 +136,7 @@ def beside(reading: Reading) -> Iterator[Reading]:
     updates = Updates(Sheet(candidates, _scale(reading)))
     seen = {updates.outline(reading.labels)}
     for move in islice(updates.ranked(reading, leaders=candidates.count, levels=2), _BESIDE):
-        labels = reading.labels.copy()
-        labels[list(move)] ^= True
+        labels = turned(reading.labels, move)
         if (outline := updates.outline(labels)) not in seen:
             seen.add(outline)
             other = Reading.of(candidates, labels)
@@ -153,16 +150,9 @@ def as_good(reading: Reading[Candidates], about: NDArray[np.bool_]) -> Iterator[
     One of them is among those, (cells,) bool, that this is `about`.
     """
     for move in Updates(Sheet(reading.candidates, _scale(reading))).as_good(reading, about):
-        labels = reading.labels.copy()
-        labels[list(move)] ^= True
-        other = Reading.of(reading.candidates, labels)
+        other = Reading.of(reading.candidates, turned(reading.labels, move))
         if other.fits:
             yield other
-
-
-def _value(reading: Reading) -> float:
-    """Mean misfit: where little is wrong it is smaller than where all is wrong a little."""
-    return float(reading.misfit.mean())
 
 
 def _scale(reading: Reading) -> float:

@@ -28,6 +28,14 @@ from .sheet import STEEPEST, Sheet
 Move = tuple[int, ...]
 """Candidates whose labels are turned over together."""
 
+
+def turned(labels: NDArray[np.bool_], move: Move) -> NDArray[np.bool_]:
+    """The labels (cells,) after a move."""
+    after = labels.copy()
+    after[list(move)] ^= True
+    return after
+
+
 _WORK = 3e5  # vertices times moves that are tried at a time, as much as some tens of solves take
 _BATCH = 5e4  # triangles times moves that are computed together
 _NEAR = 1e-3  # of the shift to the c at hand: so much nearer than to other maps, that one step tells
@@ -119,9 +127,7 @@ class Updates:
         for k in np.argsort(left, kind="stable").tolist():
             if not left[k] <= _FAINT:
                 return
-            turned = labels.copy()
-            turned[list(moves[k])] ^= True
-            if (outline := self.outline(turned)) not in seen:
+            if (outline := self.outline(turned(labels, moves[k]))) not in seen:
                 seen.add(outline)
                 yield moves[k]
 
@@ -148,11 +154,10 @@ class Updates:
         promise: dict[Move, float] = {}
         free, value = self._free.tolist(), alone.tolist()
         for move, left in leaders.items():
-            turned = labels.copy()
-            turned[list(move)] ^= True
+            after = turned(labels, move)
             for other in adjacent_to(self._near.touching, np.array(move)).tolist():
                 if other not in move and free[other]:
-                    both = tuple(sorted({*move} ^ {*self._near.with_rivals(turned, (other,))}))
+                    both = tuple(sorted({*move} ^ {*self._near.with_rivals(after, (other,))}))
                     promise[both] = min(promise.get(both, np.inf), left + value[other])
         new = promise.keys() - told - {()}
         return sorted(new, key=lambda both: (promise[both], both))

@@ -11,6 +11,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterator
 from itertools import islice
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +48,7 @@ def read_in_drawings(
         found += [reading] if reading.pieces else []
     if weights[count == 0].any():
         return None
-    for reading in sorted(found, key=_misfit)[:_SEARCHES]:
+    for reading in sorted(found, key=attrgetter("mean_misfit"))[:_SEARCHES]:
         nearest = Descent(reading, free=_faces(reading.candidates, 3)).run(Effort(_SOLVES, effort.known))
         if nearest.fits:
             return nearest
@@ -70,19 +71,15 @@ def _readings(
         labels = {chosen.tobytes(): chosen for chosen in (_faces(candidates, 3), _faces(candidates, 4))}
         readings = [effort.reading(candidates, chosen) for chosen in labels.values()]
         yield from readings
-        best = min(readings, key=_misfit)
+        best = min(readings, key=attrgetter("mean_misfit"))
         at_vertex = np.bincount(best.edges.ravel(), np.repeat(best.misfit, 2), n)
         for _, other in islice(redrawn(drawing, at_vertex), _NEXT):
             name = fingerprint(other)
             if name not in seen:
                 seen.add(name)
-                heapq.heappush(waiting, (_misfit(best), len(seen), other))
+                heapq.heappush(waiting, (best.mean_misfit, len(seen), other))
 
 
 def _faces(candidates: Candidates, longest: int) -> NDArray[np.bool_]:
     """(cells,) faces of at most so many edges, but for outer ones."""
     return candidates.first & (candidates.size <= longest)
-
-
-def _misfit(reading: Reading) -> float:
-    return float(reading.misfit.mean())
