@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from ..planar.piece import PieceMesh
 from ..topology.embedding import drawing_with_corners, face_complexes
-from .candidates.candidates import Candidates
+from .candidates.candidates import FEW, Candidates
 from .candidates.cell_set import CellSet
 from .candidates.crosses import Crosses
 from .candidates.turned_over import with_less_strain
 from .covers.covering import MOST_EQUAL_CELLS, read_by_cover
 from .labels.descent import Descent, better
 from .labels.effort import SMALL_GRAPH, Effort
-from .labels.evidence import FEW, entries_are_to_blame
+from .labels.evidence import entries_are_to_blame
 from .labels.mending import MOST_VERTICES, mended
 from .labels.relaxation import HopelessError
 from .labels.repairs import repaired
@@ -357,7 +357,7 @@ def first_reading(n: int, edges: NDArray, weights: NDArray) -> Reading | None:
 
 def _widened(reading: Reading[Candidates]) -> Reading[Candidates]:
     """The same among more candidates."""
-    return Reading.of(*reading.candidates.widened(reading.labels))
+    return Reading.of(*reading.candidates.widened(reading.labels, reading.scale))
 
 
 def _turned_over(reading: Reading, effort: Effort, solves: int) -> Reading:

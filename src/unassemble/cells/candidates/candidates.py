@@ -14,11 +14,13 @@ from ...topology.faces import FaceComplex, joined
 from .angles import face_sums, facing_angles, likeliest_scale, overall_scale, vertex_excess
 from .cell_set import CellSet
 from .crosses import Crosses
-from .half_circles import half_circles
+from .half_circles import HalfCircles
 from .open_corners import OpenCorners
 from .outer_faces import outer_faces
 from .turning import Turns
 
+FEW = 100
+"""Vertices below which all is tried before the entries are blamed."""
 _SHORT = 4  # faces of so many edges are cells unless the numbers say otherwise
 _FULL = 1.3 * np.pi  # angle sum below which a face may be a cell
 _TURNED = 0.01  # belief that a corner loses by not being as drawn
@@ -84,9 +86,9 @@ class Candidates(CellSet):
     ) -> Candidates:
         """All candidates of one drawing of the graph; the corners about some crosses are right angles.
 
-        `guess` is a c to judge angles by, where it is not known; `errors` are as in the class. If `wide`, there are
-        corners in quadrilaterals, too, which may be a triangle and a hole, and all half circles that do not fill more
-        than a full turn.
+        `guess` is a c to judge angles by, where it is not known; `errors` are as in the class. On small graphs, and if
+        `wide`, there are corners in quadrilaterals, too, which may be a triangle and a hole, and all half circles that
+        do not fill more than a full turn; if `wide`, also what is possible where many parts meet in a vertex.
         """
         blocks = drawing.split()
         relative = weights / (scale or (crosses and crosses.scale) or guess or likeliest_scale(blocks, weights))
@@ -99,13 +101,13 @@ class Candidates(CellSet):
         outside = (blocks.size > _SHORT) | outer | ~blocks.simple
         # How parts hang together at crosses is known, and at other vertices a guess.
         whole = blocks.joined(outside) if crosses is None else drawing
-        outside |= wide & (blocks.size == _SHORT)
-        corners = OpenCorners.of(whole, outside[blocks.face])
+        many = wide or drawing.n_vertices < FEW
+        outside |= many & (blocks.size == _SHORT)
+        corners = OpenCorners.of(whole, outside[blocks.face], wide=wide)
         about = vertex_excess(blocks, angles)
-        paths = half_circles(whole, outside[blocks.face], angles, about, wide=wide)
-        edges_on = np.concatenate([np.full(len(some), some.shape[1]) for some in paths])  # of paths
-        size = np.r_[blocks.size[faces], np.full(len(corners), 3), edges_on + 1]
-        open_ones, none = len(corners) + len(edges_on), np.zeros(len(size), dtype=bool)
+        halves = HalfCircles.of(whole, outside[blocks.face], corners, relative, about, wide=many)
+        size = np.r_[blocks.size[faces], np.full(len(corners), 3), halves.size]
+        open_ones, none = len(corners) + len(halves), np.zeros(len(size), dtype=bool)
         chosen = np.isin(blocks.face[blocks.order], faces)
         number = np.full(len(blocks.size), -1)
         number[faces] = np.arange(len(faces))
@@ -126,35 +128,30 @@ class Candidates(CellSet):
                 np.r_[
                     blocks.tail[blocks.order[chosen]],
                     corners.vertices.ravel(),
-                    *(np.column_stack([whole.tail[some], whole.head[some[:, -1]]]).ravel() for some in paths),
+                    halves.vertices,
                 ],
             ),
             sides=np.concatenate(
                 [
                     np.column_stack([number[blocks.face[blocks.order[chosen]]], blocks.order[chosen]]),
                     corners.sides + [len(faces), 0],
-                    np.column_stack(
-                        [
-                            np.repeat(np.arange(len(size) - len(edges_on), len(size)), edges_on),
-                            np.concatenate([some.ravel() for some in paths]),
-                        ]
-                    ),
+                    halves.sides + [len(faces) + len(corners), 0],
                 ]
             ),
-            belief=np.r_[1 - np.abs(sums[faces] / np.pi - 1), belief, np.full(len(edges_on), 0.5)],
+            belief=np.r_[1 - np.abs(sums[faces] / np.pi - 1), belief, 0.5 - _TURNED * halves.turned],
             rim_sum=np.r_[rim_sums[faces], np.zeros(open_ones)],
             first=np.r_[(blocks.size <= _SHORT)[faces] & ~outer[faces], none[:open_ones]],
             outer=np.r_[outer[faces], none[:open_ones]],
-            corner=np.r_[none[: len(faces)], np.ones(len(corners), bool), none[: len(edges_on)]],
-            strip=np.r_[none[: len(faces)], corners.in_strip, none[: len(edges_on)]],
-            half=np.arange(len(size)) >= len(size) - len(edges_on),
+            corner=np.r_[none[: len(faces)], np.ones(len(corners), bool), none[: len(halves)]],
+            strip=np.r_[none[: len(faces)], corners.in_strip, none[: len(halves)]],
+            half=np.arange(len(size)) >= len(size) - len(halves),
             turns=corners.turns,
             crosses=crosses,
         )
 
-    def widened(self, labels: NDArray[np.bool_]) -> tuple[Candidates, NDArray[np.bool_]]:
-        """More candidates in the same drawing, and the labels of what there was before."""
-        wide = Candidates.of(self.drawing, self.weights, self.scale, self.crosses, errors=self.errors, wide=True)
+    def widened(self, labels: NDArray[np.bool_], guess: float | None = None) -> tuple[Candidates, NDArray[np.bool_]]:
+        """More candidates in the same drawing, for a likelier c, and the labels of what there was before."""
+        wide = Candidates.of(self.drawing, self.weights, self.scale, self.crosses, guess, self.errors, wide=True)
         number = {name: k for k, name in enumerate(self.names)}
         same = np.array([number.get(name, -1) for name in wide.names])
         return wide, (same >= 0) & labels[same]

@@ -12,6 +12,9 @@ from scipy.sparse import csgraph
 from ...topology.faces import FaceComplex, joined
 from .turning import Turns
 
+_MOST_PASSES = 4
+"""Of empty faces at a vertex where everything may be next to everything: pairs are as many as squares of passes."""
+
 
 @dataclass(frozen=True, eq=False)
 class OpenCorners:
@@ -21,6 +24,8 @@ class OpenCorners:
     ----------
     vertices : (k, 3) int64
         a, b, c.
+    ends : (k, 2) int64
+        Half-edges between a and b, and between b and c.
     sides : (s, 2) int64
         Pairs (corner, half-edge) of what each takes up.
     in_strip : (k,) bool
@@ -31,13 +36,14 @@ class OpenCorners:
     """
 
     vertices: NDArray[np.int64]
+    ends: NDArray[np.int64]
     sides: NDArray[np.int64]
     in_strip: NDArray[np.bool_]
     turned: NDArray[np.bool_]
     turns: Turns
 
     @classmethod
-    def of(cls, whole: FaceComplex, outside: NDArray[np.bool_]) -> OpenCorners:
+    def of(cls, whole: FaceComplex, outside: NDArray[np.bool_], *, wide: bool = False) -> OpenCorners:
         """Find them all in a drawing.
 
         Parameters
@@ -46,6 +52,8 @@ class OpenCorners:
             With blocks hung into each other's empty faces.
         outside : (2 e,) bool
             Half-edges of empty faces.
+        wide : bool
+            Whether any two parts that meet in a vertex may be next to each other there.
         """
         half = np.flatnonzero(outside)
         drawn = _Wedges.of(whole, half, whole.successor[half])
@@ -57,7 +65,9 @@ class OpenCorners:
         leaving = whole.successor[arriving]
         crossed = [_Wedges.of(whole, *pair.T) for pair in (arriving, leaving)]
         possible = np.column_stack([wedges.open for wedges in crossed])
-        wedges = _Wedges.concatenated([drawn, *crossed]).chosen()
+        others = _between_fans(whole, outside) if wide else np.empty((0, 2), np.int64)
+        apart = _Wedges.of(whole, *others.T).chosen()
+        wedges = _Wedges.concatenated([_Wedges.concatenated([drawn, *crossed]).chosen(), apart])
         rank = np.empty(len(whole.order), dtype=np.int64)
         rank[whole.order] = np.arange(len(rank))
         turned = np.arange(len(wedges.apex)) >= len(half)
@@ -65,8 +75,9 @@ class OpenCorners:
         columns[:, 1] += possible[:, 0].sum()
         return cls(
             vertices=np.column_stack([wedges.far[:, 0], wedges.apex, wedges.far[:, 1]]),
+            ends=wedges.ends,
             sides=_sides(whole, wedges, outside, turned),
-            in_strip=np.r_[_in_strips(whole, half), np.zeros(int(possible.sum()), dtype=bool)],
+            in_strip=np.r_[_in_strips(whole, half), np.zeros(int(possible.sum()) + len(apart.apex), dtype=bool)],
             turned=turned,
             turns=Turns(
                 drawn=number[arriving],
@@ -124,6 +135,28 @@ def _passed_twice(whole: FaceComplex, outside: NDArray[np.bool_]) -> tuple[NDArr
     arriving = np.column_stack([half[twice], half[twice + 1]])
     far = np.column_stack([whole.tail[arriving], whole.head[whole.successor[arriving]]])
     return arriving, np.asarray((np.diff(np.sort(far, axis=1), axis=1) == 0).any(axis=1))
+
+
+def _between_fans(whole: FaceComplex, outside: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(k, 2) half-edges at vertices that empty faces pass more than twice, but not too often, which are not as drawn.
+
+    What lies between two passes is a fan; nothing tells in which order fans lie about a vertex, nor which of them are
+    turned over, so that either end of one may be next to either end of another.
+    """
+    leaving = whole.successor[np.flatnonzero(outside)]
+    passes = np.bincount(whole.tail[leaving], minlength=whole.n_vertices)[whole.tail[leaving]]
+    leaving = leaving[(passes > 2) & (passes <= _MOST_PASSES)]
+    leaving = leaving[np.argsort(whole.tail[leaving], kind="stable")]
+    last = leaving ^ 1  # that arrives at the end of the fan
+    while (inside := ~outside[last]).any():
+        last[inside] = whole.successor[last[inside]] ^ 1
+    fans, pairs = np.column_stack([leaving, last]), []
+    for step in range(1, _MOST_PASSES):
+        i = np.flatnonzero(whole.tail[leaving[step:]] == whole.tail[leaving[:-step]])
+        pairs += [np.column_stack([fans[i, a], fans[i + step, b]]) for a in (0, 1) for b in (0, 1)]
+    found = np.concatenate([np.empty((0, 2), np.int64), *pairs])
+    drawn = (whole.successor[found[:, 0]] == found[:, 1]) | (whole.successor[found[:, 1]] == found[:, 0])
+    return found[~drawn]
 
 
 def _same_rows(pairs: NDArray, others: NDArray) -> NDArray[np.bool_]:

@@ -65,7 +65,7 @@ class Descent:
     def __init__(self, start: Reading, *, seen: set[bytes] | None = None, free: NDArray[np.bool_] | None = None):
         self.best = start
         self._candidates = start.candidates
-        self._scale = _scale(start)
+        self._scale = start.scale
         self._free = np.ones(start.candidates.count, dtype=bool) if free is None else free
         self._seen = set() if seen is None else seen
         self._first = self.least = start.mean_misfit
@@ -133,7 +133,7 @@ class Descent:
 def beside(reading: Reading) -> Iterator[Reading]:
     """Readings that fit as well as one that does, and differ from it by one label or two that touch."""
     candidates = reading.candidates
-    updates = Updates(Sheet(candidates, _scale(reading)))
+    updates = Updates(Sheet(candidates, reading.scale))
     seen = {updates.outline(reading.labels)}
     for move in islice(updates.ranked(reading, leaders=candidates.count, levels=2), _BESIDE):
         labels = turned(reading.labels, move)
@@ -149,15 +149,7 @@ def as_good(reading: Reading[Candidates], about: NDArray[np.bool_]) -> Iterator[
 
     One of them is among those, (cells,) bool, that this is `about`.
     """
-    for move in Updates(Sheet(reading.candidates, _scale(reading))).as_good(reading, about):
+    for move in Updates(Sheet(reading.candidates, reading.scale)).as_good(reading, about):
         other = Reading.of(reading.candidates, turned(reading.labels, move))
         if other.fits:
             yield other
-
-
-def _scale(reading: Reading) -> float:
-    """The c of the largest piece."""
-    solved = [
-        (piece.n_vertices, mesh.scale) for piece, mesh in zip(reading.pieces, reading.meshes, strict=True) if mesh
-    ]
-    return reading.candidates.scale or max(solved, default=(0, 1.0))[1]

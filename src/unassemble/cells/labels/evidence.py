@@ -24,10 +24,9 @@ from ...planar.cotangent import edge_weights
 from ...planar.normal import WeightJacobian, distant_pair
 from ...planar.piece import PieceMesh
 from ...topology import Piece
+from ..candidates.candidates import FEW
 from ..reading import FITS, Reading, fans_of
 
-FEW = 100
-"""Vertices below which all is tried before the entries are blamed."""
 _SUSPECT = 0.3  # change of the label of a lone triangular hole: it was 0.4 or more in all that were tried
 _RIDGE = 0.1
 _FAR = 1e8
