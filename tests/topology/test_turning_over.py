@@ -44,4 +44,7 @@ def test_faces_in_the_place_of_others(seed):
                 faces.remove(tuple(sorted(old)))
             assert _faces(other) == sorted(faces + [tuple(sorted(new)) for new in turn.new])
             assert set(turn.new) != set(turn.old)
+            for new, halves in zip(turn.new, turn.halves, strict=True):
+                ends = {frozenset(pair) for pair in pairwise((*new, new[0]))}
+                assert {frozenset(drawing.edges[half >> 1].tolist()) for half in halves} == ends
     assert count or seed != 49

@@ -154,9 +154,7 @@ class Reading(Generic[C]):
     @property
     def scale(self) -> float:
         """The c that is known, or that of the largest piece; 1 where nothing is solved."""
-        solved = [
-            (piece.n_vertices, mesh.scale) for piece, mesh in zip(self.pieces, self.meshes, strict=True) if mesh
-        ]
+        solved = [(piece.n_vertices, mesh.scale) for piece, mesh in zip(self.pieces, self.meshes, strict=True) if mesh]
         return self.candidates.scale or max(solved, default=(0, 1.0))[1]
 
     @property

@@ -14,7 +14,7 @@ from ..topology.embedding import drawing_with_corners, face_complexes
 from .candidates.candidates import FEW, Candidates
 from .candidates.cell_set import CellSet
 from .candidates.crosses import Crosses
-from .candidates.turned_over import with_less_strain
+from .candidates.turned_over import with_a_part_turned_over, with_less_strain
 from .covers.covering import MOST_EQUAL_CELLS, read_by_cover
 from .labels.descent import Descent, better
 from .labels.effort import SMALL_GRAPH, Effort
@@ -33,6 +33,10 @@ _QUICK = 36  # solves for small changes of a start, those of three readings
 _SOME = 60  # the same of a reading that is nearly right, or the nearest when all else has failed
 _TURNING = 0.5  # part of them for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of them for the likeliest reading
+_MOST_ROUNDS, _LIKELIEST = (
+    4,
+    3,
+)  # parts turned over in a reading one after the other, and how many of them are gone on with
 _EQUAL = 1e-9  # relative difference of weights that are all the same
 _A_FEW = 24  # solves for small changes of a reading that stands, should none help
 _FEW_TURNS = 8  # solves for turning parts over in each drawing of such a graph
@@ -98,6 +102,10 @@ def read_cells(
     if triangles is not None:
         return triangles
     best, spoilt = _searched(n, edges, weights, scale, errors, effort)
+    if best is not None and n < FEW and best.size < _CLOSE and not (best.fits or best.like_noise):
+        # Angles are judged by a guess of c, and that of a reading with few wrong cells is better than the first.
+        again, _ = _searched(n, edges, weights, scale, errors, Effort.for_graph(n), best.scale, wide=True)
+        best = best if again is None else better(best, again)
     if best is None or not best.pieces:
         return spoilt
     if spoilt is None or best.fits or best.fits_but_for_few or best.like_noise:
@@ -106,14 +114,22 @@ def read_cells(
 
 
 def _searched(
-    n: int, edges: NDArray, weights: NDArray, scale: float | None, errors: NDArray | None, effort: Effort
+    n: int,
+    edges: NDArray,
+    weights: NDArray,
+    scale: float | None,
+    errors: NDArray | None,
+    effort: Effort,
+    guess: float | None = None,
+    *,
+    wide: bool = False,
 ) -> tuple[Reading | None, Reading | None]:
     """The best reading, and the one with entries set aside as wrong that stands where none fits."""
     best: Reading | None = None
     spoilt: Reading | None = None
     together = n <= SMALL_GRAPH
     turning = _TURNING / (_DRAWINGS if together else 1)
-    drawings = _drawings(n, edges, weights, scale, errors)
+    drawings = _drawings(n, edges, weights, scale, errors, guess, wide=wide)
     cover = cache(partial(read_by_cover, n, edges, weights, scale, errors))
     begun: list[Begun] = []
     done = False
@@ -205,8 +221,11 @@ def _at_last(best: Reading | None, begun: list[Begun]) -> Reading | None:
 
 
 def _redrawn(best: Reading, effort: Effort) -> Reading:
-    """A reading, or, if it is nearly right, what small changes make of its drawing's starts with parts turned over."""
+    """A reading, or, if it is nearly right, what small changes make of it with parts turned over, or of new starts."""
     if best.fits or best.size > _CLOSE or not isinstance(best.candidates, Candidates):
+        return best
+    best = _with_parts_turned_over(best, effort)
+    if best.fits:
         return best
     candidates = with_less_strain(best.candidates)
     if candidates is None:
@@ -216,6 +235,21 @@ def _redrawn(best: Reading, effort: Effort) -> Reading:
     if begun.settled:
         return _settled(best, begun.starts[0])
     return _best_of(best, begun.descents, _SOME)
+
+
+def _with_parts_turned_over(best: Reading[Candidates], effort: Effort) -> Reading[Candidates]:
+    """What small changes make of a reading with parts of its drawing turned over, one after the other."""
+    for _ in range(_MOST_ROUNDS):
+        before = best
+        trials = [
+            Reading.of(*turned, effort.known)
+            for turned in with_a_part_turned_over(best.candidates, best.labels, best.scale)
+        ]
+        trials = sorted(trials, key=lambda trial: trial.mean_misfit)[:_LIKELIEST]
+        best = _best_of(best, map(Descent, trials), _QUICK)
+        if best is before or best.fits:
+            break
+    return best
 
 
 def _best_of(best: Reading, searches: Iterable[Descent], solves: int) -> Reading:
@@ -228,16 +262,23 @@ def _best_of(best: Reading, searches: Iterable[Descent], solves: int) -> Reading
 
 
 def _drawings(
-    n: int, edges: NDArray, weights: NDArray, scale: float | None, errors: NDArray | None
+    n: int,
+    edges: NDArray,
+    weights: NDArray,
+    scale: float | None,
+    errors: NDArray | None,
+    guess: float | None = None,
+    *,
+    wide: bool = False,
 ) -> Iterator[Candidates]:
     """What may be cells in each drawing; first in one about the vertices that their numbers make crosses."""
     if n <= MOST_VERTICES:
         crosses = Crosses.of(n, edges, weights, scale, errors)
         drawing = drawing_with_corners(n, edges, crosses.wedges) if crosses.unique.any() else None
         if drawing is not None:
-            yield Candidates.of(drawing, weights, scale, crosses, errors=errors)
+            yield Candidates.of(drawing, weights, scale, crosses, guess, errors, wide)
     for drawing in face_complexes(n, edges):
-        yield Candidates.of(drawing, weights, scale, errors=errors)
+        yield Candidates.of(drawing, weights, scale, None, guess, errors, wide)
 
 
 def _begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:

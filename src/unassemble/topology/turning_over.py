@@ -30,12 +30,15 @@ class Turn:
         Half-edges of f and of g that arrive at u, and at v.
     old, new : tuple of tuple of int
         Vertices of f and g, and of the faces in their place, in running order.
+    halves : tuple of tuple of int
+        Half-edges of f and g on the way round each of the new faces, in any order.
     """
 
     at_u: NDArray[np.int64]
     at_v: NDArray[np.int64]
     old: tuple[tuple[int, ...], tuple[int, ...]]
     new: tuple[tuple[int, ...], tuple[int, ...]]
+    halves: tuple[tuple[int, ...], tuple[int, ...]]
 
 
 def turns(drawing: FaceComplex) -> Iterator[Turn]:
@@ -63,6 +66,7 @@ def turns(drawing: FaceComplex) -> Iterator[Turn]:
                 np.array(at_v),
                 (tuple(inside + outside), tuple(back + forth)),
                 ((*outside, u, *back[:0:-1]), (*forth, v, *inside[:0:-1])),
+                ((*sides[1], *sides[2]), (*sides[3], *sides[0])),
             )
 
 

@@ -13,6 +13,7 @@ from ...topology import Polygons
 from ...topology.faces import FaceComplex, joined
 from .angles import face_sums, facing_angles, likeliest_scale, overall_scale, vertex_excess
 from .cell_set import CellSet
+from .crossed_faces import CrossedFaces
 from .crosses import Crosses
 from .half_circles import HalfCircles
 from .open_corners import OpenCorners
@@ -55,6 +56,8 @@ class Candidates(CellSet):
         Corners inside paths, all of them right angles if the path is a strip, none if pieces hang together there.
     half : (cells,) bool
         Cells on half circles, whose diameter has vanished from the boundary.
+    crossed : (cells,) bool
+        Faces of drawings with one part turned over.
     turns : Turns
         Parts that can be turned over; its corners are numbered after the faces.
     crosses : Crosses or None
@@ -70,6 +73,7 @@ class Candidates(CellSet):
     outer: NDArray[np.bool_]
     strip: NDArray[np.bool_]
     half: NDArray[np.bool_]
+    crossed: NDArray[np.bool_]
     turns: Turns
     crosses: Crosses | None
 
@@ -106,8 +110,10 @@ class Candidates(CellSet):
         corners = OpenCorners.of(whole, outside[blocks.face], wide=wide)
         about = vertex_excess(blocks, angles)
         halves = HalfCircles.of(whole, outside[blocks.face], corners, relative, about, wide=many)
-        size = np.r_[blocks.size[faces], np.full(len(corners), 3), halves.size]
-        open_ones, none = len(corners) + len(halves), np.zeros(len(size), dtype=bool)
+        crossed = CrossedFaces.of(blocks) if many else CrossedFaces.none()
+        crossed_sums = np.bincount(crossed.sides[:, 0], angles[crossed.sides[:, 1]], len(crossed))
+        size = np.r_[blocks.size[faces], np.full(len(corners), 3), halves.size, crossed.size]
+        others, none = len(corners) + len(halves) + len(crossed), np.zeros(len(size), dtype=bool)
         chosen = np.isin(blocks.face[blocks.order], faces)
         number = np.full(len(blocks.size), -1)
         number[faces] = np.arange(len(faces))
@@ -129,6 +135,7 @@ class Candidates(CellSet):
                     blocks.tail[blocks.order[chosen]],
                     corners.vertices.ravel(),
                     halves.vertices,
+                    crossed.vertices,
                 ],
             ),
             sides=np.concatenate(
@@ -136,15 +143,22 @@ class Candidates(CellSet):
                     np.column_stack([number[blocks.face[blocks.order[chosen]]], blocks.order[chosen]]),
                     corners.sides + [len(faces), 0],
                     halves.sides + [len(faces) + len(corners), 0],
+                    crossed.sides + [len(size) - len(crossed), 0],
                 ]
             ),
-            belief=np.r_[1 - np.abs(sums[faces] / np.pi - 1), belief, 0.5 - _TURNED * halves.turned],
-            rim_sum=np.r_[rim_sums[faces], np.zeros(open_ones)],
-            first=np.r_[(blocks.size <= _SHORT)[faces] & ~outer[faces], none[:open_ones]],
-            outer=np.r_[outer[faces], none[:open_ones]],
-            corner=np.r_[none[: len(faces)], np.ones(len(corners), bool), none[: len(halves)]],
-            strip=np.r_[none[: len(faces)], corners.in_strip, none[: len(halves)]],
-            half=np.arange(len(size)) >= len(size) - len(halves),
+            belief=np.r_[
+                1 - np.abs(sums[faces] / np.pi - 1),
+                belief,
+                0.5 - _TURNED * halves.turned,
+                1 - np.abs(crossed_sums / np.pi - 1) - _TURNED,
+            ],
+            rim_sum=np.r_[rim_sums[faces], np.zeros(others)],
+            first=np.r_[(blocks.size <= _SHORT)[faces] & ~outer[faces], none[:others]],
+            outer=np.r_[outer[faces], none[:others]],
+            corner=np.r_[none[: len(faces)], np.ones(len(corners), bool), none[: len(halves) + len(crossed)]],
+            strip=np.r_[none[: len(faces)], corners.in_strip, none[: len(halves) + len(crossed)]],
+            half=np.r_[none[: len(faces) + len(corners)], np.ones(len(halves), bool), none[: len(crossed)]],
+            crossed=np.arange(len(size)) >= len(size) - len(crossed),
             turns=corners.turns,
             crosses=crosses,
         )
@@ -170,8 +184,13 @@ class Candidates(CellSet):
         blocks = self.drawing.split()
         angles = np.repeat(facing_angles(self.relative), 2)
         ratio = overall_scale(blocks, self.relative, outer_faces(blocks, face_sums(blocks, angles), self.relative))
+        return None if abs(np.log(ratio)) < _APART else ratio * self.judged_by
+
+    @property
+    def judged_by(self) -> float:
+        """The c that angles are judged by."""
         given = np.flatnonzero(self.weights)[0]
-        return None if abs(np.log(ratio)) < _APART else ratio * float(self.weights[given] / self.relative[given])
+        return float(self.weights[given] / self.relative[given])
 
     @cached_property
     def chorded(self) -> NDArray[np.bool_]:
@@ -198,7 +217,7 @@ class Candidates(CellSet):
 
     def starts(self) -> Iterator[NDArray[np.bool_]]:
         """Readings to begin with, the likeliest first."""
-        by_angles = ~self.corner & ~self.half & (self.belief > 2 - _FULL / np.pi) & (self.size > 3)
+        by_angles = ~self.corner & ~self.half & ~self.crossed & (self.belief > 2 - _FULL / np.pi) & (self.size > 3)
         corners = [self.corner & (self.belief > 0.5 + excess / np.pi) for excess in _INNER]
         faces = (self.first, (self.first & (self.size == 3)) | (by_angles & ~self.outer))
         none = np.zeros_like(self.corner)
@@ -218,7 +237,7 @@ class Candidates(CellSet):
         All faces but the outer ones, then the longer ones only where these border every edge: in tilings all that lie
         between them may be holes.
         """
-        inner = ~self.corner & ~self.half & ~self.outer
+        inner = ~self.corner & ~self.half & ~self.crossed & ~self.outer
         for least in (0, *np.unique(self.size[inner])[1:].tolist()):
             longer = inner & (self.size >= least)
             cell, half = self.sides[longer[self.sides[:, 0]]].T
