@@ -106,8 +106,9 @@ class Candidates(CellSet):
         # How parts hang together at crosses is known, and at other vertices a guess.
         whole = blocks.joined(outside) if crosses is None else drawing
         many = wide or drawing.n_vertices < FEW
+        long = outside[blocks.face]
         outside |= many & (blocks.size == _SHORT)
-        corners = OpenCorners.of(whole, outside[blocks.face], wide=wide)
+        corners = OpenCorners.of(whole, outside[blocks.face], long if wide else None)
         about = vertex_excess(blocks, angles)
         halves = HalfCircles.of(whole, outside[blocks.face], corners, relative, about, wide=many)
         crossed = CrossedFaces.of(blocks) if many else CrossedFaces.none()

@@ -43,7 +43,9 @@ class OpenCorners:
     turns: Turns
 
     @classmethod
-    def of(cls, whole: FaceComplex, outside: NDArray[np.bool_], *, wide: bool = False) -> OpenCorners:
+    def of(
+        cls, whole: FaceComplex, outside: NDArray[np.bool_], between: NDArray[np.bool_] | None = None
+    ) -> OpenCorners:
         """Find them all in a drawing.
 
         Parameters
@@ -52,8 +54,8 @@ class OpenCorners:
             With blocks hung into each other's empty faces.
         outside : (2 e,) bool
             Half-edges of empty faces.
-        wide : bool
-            Whether any two parts that meet in a vertex may be next to each other there.
+        between : (2 e,) bool, optional
+            Half-edges of those empty faces that may be between any two parts that meet in a vertex.
         """
         half = np.flatnonzero(outside)
         drawn = _Wedges.of(whole, half, whole.successor[half])
@@ -65,7 +67,7 @@ class OpenCorners:
         leaving = whole.successor[arriving]
         crossed = [_Wedges.of(whole, *pair.T) for pair in (arriving, leaving)]
         possible = np.column_stack([wedges.open for wedges in crossed])
-        others = _between_fans(whole, outside) if wide else np.empty((0, 2), np.int64)
+        others = np.empty((0, 2), np.int64) if between is None else _between_fans(whole, between)
         apart = _Wedges.of(whole, *others.T).chosen()
         wedges = _Wedges.concatenated([_Wedges.concatenated([drawn, *crossed]).chosen(), apart])
         rank = np.empty(len(whole.order), dtype=np.int64)

@@ -72,7 +72,7 @@ class Neighbourhoods:
         self._rivals = [own.tolist() for own in np.split(rivals.indices, rivals.indptr[1:-1])]
         self._local = np.full(max(n, e), -1)
 
-    def with_rivals(self, labels: NDArray[np.bool_], cells: Sequence[int]) -> tuple[int, ...]:
+    def with_rivals(self, labels: Sequence[bool] | NDArray[np.bool_], cells: Sequence[int]) -> tuple[int, ...]:
         """The cells, and those that have to give way to the new ones among them."""
         gone = {other for k in cells if not labels[k] for other in self._rivals[k] if labels[other]}
         return tuple(sorted({*cells} | gone))

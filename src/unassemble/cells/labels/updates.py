@@ -38,6 +38,7 @@ def turned(labels: NDArray[np.bool_], move: Move) -> NDArray[np.bool_]:
 
 _WORK = 3e5  # vertices times moves that are tried at a time, as much as some tens of solves take
 _BATCH = 5e4  # triangles times moves that are computed together
+_SMALL = 200  # vertices up to which all columns of the inverse are asked for at once
 _NEAR = 1e-3  # of the shift to the c at hand: so much nearer than to other maps, that one step tells
 _LEADERS = 60  # moves that are tried together with what they touch
 _AT_FIRST = 8  # moves that are given before those of three labels are told
@@ -91,7 +92,8 @@ class Updates:
         except RecoveryError:
             return
         most = max(int(_WORK / self._sheet.n_vertices), 1)
-        moves = list(dict.fromkeys(self._near.with_rivals(labels, (k,)) for k in self._suspects(reading)[:most]))
+        now = labels.tolist()
+        moves = list(dict.fromkeys(self._near.with_rivals(now, (k,)) for k in self._suspects(reading)[:most]))
         left = self._left(factorised, labels, moves)
         alone, given = self._alone(moves, left), set[Move]()
         for level in range(2, levels + 1):
@@ -116,7 +118,8 @@ class Updates:
         except RecoveryError:
             return
         first = np.flatnonzero(self._free & about).tolist()
-        moves = list(dict.fromkeys(self._near.with_rivals(labels, (k,)) for k in first))
+        now = labels.tolist()
+        moves = list(dict.fromkeys(self._near.with_rivals(now, (k,)) for k in first))
         left = self._left(factorised, labels, moves)
         if not moves:
             return
@@ -154,7 +157,7 @@ class Updates:
         promise: dict[Move, float] = {}
         free, value = self._free.tolist(), alone.tolist()
         for move, left in leaders.items():
-            after = turned(labels, move)
+            after = turned(labels, move).tolist()
             for other in adjacent_to(self._near.touching, np.array(move)).tolist():
                 if other not in move and free[other]:
                     both = tuple(sorted({*move} ^ {*self._near.with_rivals(after, (other,))}))
@@ -164,7 +167,7 @@ class Updates:
 
     def _left(self, factorised: _Factorised, labels: NDArray[np.bool_], moves: list[Move]) -> NDArray[np.float64]:
         """(moves,) mean misfit after each; infinite where there is no map."""
-        batch = max(int(_BATCH / len(self._sheet.triangles)), 1)
+        batch = max(int(_BATCH / np.count_nonzero(labels[self._sheet.cell])), 1)
         parts = [moves[k : k + batch] for k in range(0, len(moves), batch)]
         return np.concatenate([np.empty(0), *(self._left_of_few(factorised, labels, part) for part in parts)])
 
@@ -286,6 +289,8 @@ class _Factorised:
         new = vertices[self._place[vertices] < 0]
         if not len(new):
             return
+        if self._n <= _SMALL:
+            new = np.arange(self._n)
         unit = np.zeros((self._n - 1, len(new)), dtype=np.complex128)
         kept = new < self._n - 1
         unit[new[kept], np.flatnonzero(kept)] = 1
