@@ -90,9 +90,9 @@ class Candidates(CellSet):
     ) -> Candidates:
         """All candidates of one drawing of the graph; the corners about some crosses are right angles.
 
-        `guess` is a c to judge angles by, where it is not known; `errors` are as in the class. On small graphs, and if
-        `wide`, there are corners in quadrilaterals, too, which may be a triangle and a hole, and all half circles that
-        do not fill more than a full turn; if `wide`, also what is possible where many parts meet in a vertex.
+        `guess` is a c to judge angles by, where it is not known; `errors` are as in the class. If `wide`, there are
+        corners in quadrilaterals, too, which may be a triangle and a hole, all half circles that do not fill more than a
+        full turn, faces that turning a part over makes, and what is possible where many parts meet in a vertex.
         """
         blocks = drawing.split()
         relative = weights / (scale or (crosses and crosses.scale) or guess or likeliest_scale(blocks, weights))
@@ -105,13 +105,12 @@ class Candidates(CellSet):
         outside = (blocks.size > _SHORT) | outer | ~blocks.simple
         # How parts hang together at crosses is known, and at other vertices a guess.
         whole = blocks.joined(outside) if crosses is None else drawing
-        many = wide or drawing.n_vertices < FEW
         long = outside[blocks.face]
-        outside |= many & (blocks.size == _SHORT)
+        outside |= wide & (blocks.size == _SHORT)
         corners = OpenCorners.of(whole, outside[blocks.face], long if wide else None)
         about = vertex_excess(blocks, angles)
-        halves = HalfCircles.of(whole, outside[blocks.face], corners, relative, about, wide=many)
-        crossed = CrossedFaces.of(blocks) if many else CrossedFaces.none()
+        halves = HalfCircles.of(whole, outside[blocks.face], corners, relative, about, wide=wide)
+        crossed = CrossedFaces.of(blocks) if wide else CrossedFaces.none()
         crossed_sums = np.bincount(crossed.sides[:, 0], angles[crossed.sides[:, 1]], len(crossed))
         size = np.r_[blocks.size[faces], np.full(len(corners), 3), halves.size, crossed.size]
         others, none = len(corners) + len(halves) + len(crossed), np.zeros(len(size), dtype=bool)

@@ -71,7 +71,8 @@ class HalfCircles:
         excess : (n,) float64
             Of the angles about each vertex over 2 pi, weights being shared equally.
         wide : bool
-            Whether the excess may be twice as much, and inner vertices may be on another boundary or be passed twice.
+            Whether parts of the drawing may be turned over, the excess may be twice as much, and paths along bare edges
+            need not look surrounded: inner vertices may be on another boundary or be passed twice.
         """
         inner = (-np.inf, 2 * _INNER) if wide else (-_INNER, _INNER)
         bare = outside & outside[np.arange(len(outside)) ^ 1]
@@ -87,7 +88,8 @@ class HalfCircles:
                 axis=1
             )
             once = paths.half[:, 0] < paths.half[:, -1]  # all are found from both ends
-            found.append(paths.chosen(once & (surrounded | bare[paths.half].any(axis=1))))
+            possible = surrounded | bare[paths.half].any(axis=1) if wide else surrounded & ~paths.turned
+            found.append(paths.chosen(once & possible))
         degree = np.bincount(whole.tail, minlength=whole.n_vertices)
         count = np.cumsum([0, *(len(some.half) for some in found)])
         return cls(
