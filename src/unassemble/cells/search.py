@@ -103,9 +103,7 @@ def read_cells(
         return triangles
     best, spoilt = _searched(n, edges, weights, scale, errors, effort)
     if best is not None and n < FEW and best.size < _CLOSE and not (best.fits or best.like_noise):
-        # Angles are judged by a guess of c, and that of a reading with few wrong cells is better than the first.
-        again, _ = _searched(n, edges, weights, scale, errors, Effort.for_graph(n), best.scale, wide=True)
-        best = best if again is None else better(best, again)
+        best = _among_all(best, n, edges, weights, scale, errors)
     if best is None or not best.pieces:
         return spoilt
     if spoilt is None or best.fits or best.fits_but_for_few or best.like_noise:
@@ -149,6 +147,22 @@ def _searched(
             break
     best = _at_last(best, begun if together else [])
     return (_redrawn(best, effort) if best is not None and together else best), spoilt
+
+
+def _among_all(
+    best: Reading, n: int, edges: NDArray, weights: NDArray, scale: float | None, errors: NDArray | None
+) -> Reading:
+    """The best of a reading that is nearly right and of what searches among all candidates come to.
+
+    Angles are judged by its c, which is better than a first guess, and then by such a guess again: where either leads
+    to depends on little things.
+    """
+    for guess in (best.scale, None):
+        again, _ = _searched(n, edges, weights, scale, errors, Effort.for_graph(n), guess, wide=True)
+        best = best if again is None else better(best, again)
+        if best.fits or scale is not None:
+            break
+    return best
 
 
 def _of_equal_weights(

@@ -91,8 +91,8 @@ class Candidates(CellSet):
         """All candidates of one drawing of the graph; the corners about some crosses are right angles.
 
         `guess` is a c to judge angles by, where it is not known; `errors` are as in the class. If `wide`, there are
-        corners in quadrilaterals, too, which may be a triangle and a hole, all half circles that do not fill more than a
-        full turn, faces that turning a part over makes, and what is possible where many parts meet in a vertex.
+        corners in quadrilaterals, too, which may be a triangle and a hole, all half circles that do not fill more than
+        a full turn, faces that turning a part over makes, and what is possible where many parts meet in a vertex.
         """
         blocks = drawing.split()
         relative = weights / (scale or (crosses and crosses.scale) or guess or likeliest_scale(blocks, weights))
