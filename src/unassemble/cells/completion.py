@@ -14,11 +14,12 @@ from ..matrix import OperatorMatrix
 from ..planar.piece import PieceMesh
 from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar, settled_numbering
 from ..topology.keys import contains, distinct, pair_keys
+from .beginning import first_reading
 from .by_component import with_pieces
 from .eliminated import incomplete_rows, without_boundary
 from .misfits.doubt import Attempt, Outcome, Solved, misfits_of, unexplained
 from .reading import Reading, add_differing_factors
-from .search import first_reading, read_cells
+from .search import read_cells
 from .undivided import undivided
 
 _BETTER = 0.1  # a reading that does not fit replaces the triangles only if its misfit is below this times theirs

@@ -23,9 +23,9 @@ from ..planar.polish import PolishedMesh, PolishOptions, polish
 from ..planar.robust import ASIDE, RobustFit
 from ..topology import Piece
 from ..words import count_of
+from .beginning import first_reading
 from .misfits.spoilt import without_wrong_entries
 from .reading import FITS, Reading
-from .search import first_reading
 
 _SUM = 1e-10  # sum of a row, relative to its entries, that is rounding
 _FEW = 0.1  # of the entries on the boundary

@@ -20,11 +20,11 @@ from ...topology import Numbering, Piece, Topology
 from ...topology.faces import joined
 from ..agreement import SAME_SCALE
 from ..alike import Answers, Cells, Found
+from ..beginning import fitting_starts
 from ..by_component import with_pieces
 from ..candidates.candidates import Candidates
 from ..labels.descent import beside
 from ..labels.effort import SMALL_GRAPH
-from ..search import fitting_starts
 from .corners import Alternative, OrientedMesh
 from .loose import fits_as_one, is_loose
 from .rereading import cells_of, own_cells

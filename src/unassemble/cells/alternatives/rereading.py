@@ -19,11 +19,12 @@ from ...topology.faces import joined
 from ...topology.keys import contains, pair_keys
 from ..agreement import SAME_SCALE
 from ..alike import ALIKE, Answers, Cells, Found
+from ..beginning import fitting_starts
 from ..candidates.candidates import Candidates
 from ..covers.covering import read_by_cover
 from ..labels.descent import beside
 from ..reading import NEARLY, Reading
-from ..search import fitting_starts, read_cells
+from ..search import read_cells
 from ..undivided import undivided
 from .corners import Alternative, OrientedMesh
 
@@ -127,7 +128,7 @@ def _other_reading(
         errors = None if stored.errors is None else stored.errors[part.edge_rows]
         graph = len(part.vertices), part.edges, -stored.entries[part.edge_rows], scale, errors
         found = list(fitting_starts(*graph)) if supposed else []
-        if not found and (reading := read_cells(*graph)) is not None and reading.fits:
+        if not found and (reading := read_cells(*graph, quick=True)) is not None and reading.fits:
             found = [reading]
         near = [beside(one) for one in found if isinstance(one.candidates, Candidates) and (supposed or noisy)]
         for reading in chain(found, *near if number == 0 else ()):

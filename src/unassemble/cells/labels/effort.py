@@ -25,9 +25,9 @@ class Effort:
     known: dict[bytes, PieceMesh | None] = field(default_factory=dict)
 
     @classmethod
-    def for_graph(cls, n: int) -> Effort:
-        """As much as a graph of n vertices is worth."""
-        return cls(int(np.clip(_WORK / n, 12, _SOLVES)))
+    def for_graph(cls, n: int, part: float = 1.0) -> Effort:
+        """As much as a graph of n vertices is worth, or a part of it."""
+        return cls(int(part * np.clip(_WORK / n, 12, _SOLVES)))
 
     def reading(self, candidates: C, labels: NDArray[np.bool_]) -> Reading[C]:
         """A reading, counted."""
