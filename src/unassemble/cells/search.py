@@ -71,13 +71,16 @@ def read_cells(
     if triangles is not None:
         return triangles
     best, spoilt = _searched(n, edges, weights, scale, errors, effort, thorough=not quick)
-    if best is not None and n < FEW and not quick and best.size < CLOSE and not (best.fits or best.like_noise):
-        best = _among_all(best, n, edges, weights, scale, errors)
-    if best is None or not best.pieces:
+    if best is None:
         return spoilt
-    if spoilt is None or best.fits or best.fits_but_for_few or best.like_noise:
-        return best
-    return spoilt
+    if not (_stands(best) or quick) and n < FEW and best.size < CLOSE:
+        best = _among_all(best, n, edges, weights, scale, errors)
+    return best if spoilt is None or _stands(best) else spoilt
+
+
+def _stands(reading: Reading) -> bool:
+    """Whether there is nothing to be bettered by other cells."""
+    return reading.fits or reading.fits_but_for_few or reading.like_noise
 
 
 def _searched(

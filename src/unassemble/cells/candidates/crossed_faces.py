@@ -37,7 +37,7 @@ class CrossedFaces:
     def of(cls, drawing: FaceComplex) -> CrossedFaces:
         """Those of few edges, of a drawing none of whose faces passes a vertex twice."""
         found = {
-            frozenset(halves): (vertices, halves)
+            frozenset(halves): (_along(drawing, vertices, halves), halves)
             for turn in islice(turns(drawing), _MOST_TURNS)
             for vertices, halves in zip(turn.new, turn.halves, strict=True)
             if len(set(vertices)) == len(vertices) <= _LONGEST
@@ -54,3 +54,10 @@ class CrossedFaces:
 
     def __len__(self) -> int:
         return len(self.size)
+
+
+def _along(drawing: FaceComplex, vertices: tuple[int, ...], halves: tuple[int, ...]) -> tuple[int, ...]:
+    """The vertices in the direction of most of their half-edges."""
+    steps = set(zip(vertices, vertices[1:] + vertices[:1], strict=True))
+    ends = zip(drawing.tail[[*halves]].tolist(), drawing.head[[*halves]].tolist(), strict=True)
+    return vertices if 2 * len(steps.intersection(ends)) >= len(vertices) else vertices[::-1]

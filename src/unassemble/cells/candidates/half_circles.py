@@ -84,10 +84,9 @@ class HalfCircles:
             paths = paths.longer(whole, corners)
             room = (excess[paths.vertices[:, 1:-1]] < inner[1]).all(axis=1)
             paths = paths.chosen(room & (own[paths.half].sum(axis=1) < _FULL))
-            surrounded = (shared[paths.half].sum(axis=1) < _FULL) & (excess[paths.vertices[:, 1:-1]] > inner[0]).all(
-                axis=1
-            )
-            once = paths.half[:, 0] < paths.half[:, -1]  # all are found from both ends
+            alike = (excess[paths.vertices[:, 1:-1]] > inner[0]).all(axis=1)
+            surrounded = alike & (shared[paths.half].sum(axis=1) < _FULL)
+            once = paths.run_along(whole)
             possible = surrounded | bare[paths.half].any(axis=1) if wide else surrounded & ~paths.turned
             found.append(paths.chosen(once & possible))
         degree = np.bincount(whole.tail, minlength=whole.n_vertices)
@@ -142,6 +141,11 @@ class _Paths:
     def chosen(self, which: NDArray[np.bool_]) -> _Paths:
         """Some of them."""
         return _Paths(self.half[which], self.vertices[which], self.turned[which])
+
+    def run_along(self, whole: FaceComplex) -> NDArray[np.bool_]:
+        """Which paths, all of which are found from both ends, go the way of their half-edges, or of most of them."""
+        along = 2 * (whole.tail[self.half] == self.vertices[:, :-1]).sum(axis=1) - self.half.shape[1]
+        return np.asarray((along > 0) | ((along == 0) & (self.half[:, 0] < self.half[:, -1])))
 
     def sides(self, degree: NDArray[np.int64], outside: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Pairs (path, half-edge); those beyond two edges as well where nothing else meets, as of corners."""
