@@ -7,10 +7,12 @@ from collections.abc import Callable
 import networkx
 import numpy as np
 import scipy.sparse as sp
+from irregular import largest_piece
 from numpy.typing import NDArray
 
 from dense_mesh import signed_areas
 from domains import bisected, cut_cells, stairs
+from glued import glued
 from meshes import delaunay, random_mesh
 from vanishing import Mesh, refined, squares, triangular_holes, used
 
@@ -134,6 +136,14 @@ def integer(rng: np.random.Generator) -> Mesh:
     return used(points, triangles)
 
 
+def perforated(rng: np.random.Generator) -> Mesh:
+    """The same of few points, up to a fifth of the triangles removed: what is left of a cell has vanished sides."""
+    side = int(rng.integers(5, 13))
+    points = np.unique(rng.integers(0, side, (side * side // 2, 2)), axis=0).astype(np.float64)
+    points, triangles = without(*delaunay(points), rng, rng.uniform(0.05, 0.2))
+    return used(points, largest_piece(triangles))
+
+
 FAMILIES: dict[str, Callable[[np.random.Generator], Mesh]] = {
     family.__name__: family
     for family in (
@@ -149,6 +159,8 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Mesh]] = {
         polygon,
         scattered,
         integer,
+        perforated,
+        glued,
         cut_cells,
         stairs,
         bisected,
