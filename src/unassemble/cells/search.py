@@ -28,6 +28,7 @@ _SOME = 60  # solves for small changes of a reading that is nearly right
 _TURNING = 0.5  # part of the effort for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of it for the likeliest reading
 _QUICKLY = 0.2  # part of it that the same graph is worth once more
+_ONCE_MORE = 0.4  # part of it that the same graph is worth among all candidates
 _EQUAL = 1e-9  # relative difference of weights that are all the same
 _FEW_TURNS = 8  # solves for turning parts over in each drawing of a graph that is not worth more
 
@@ -139,7 +140,7 @@ def _among_all(
     to depends on little things.
     """
     for guess in (best.scale, None):
-        again, _ = _searched(n, edges, weights, scale, errors, Effort.for_graph(n), guess, wide=True)
+        again, _ = _searched(n, edges, weights, scale, errors, Effort.for_graph(n, _ONCE_MORE), guess, wide=True)
         best = best if again is None else better(best, again)
         if best.fits or scale is not None:
             break

@@ -67,6 +67,9 @@ def _as_found(
     for drawing in _drawings(part, z[part.vertices]):
         candidates = Candidates.of(drawing, weights, scale, errors=errors)
         labels = _labels(candidates, cells)
+        if labels is None:
+            candidates = Candidates.of(drawing, weights, scale, errors=errors, wide=True)
+            labels = _labels(candidates, cells)
         reading = None if labels is None else Reading.of(candidates, labels)
         if reading is not None and reading.fits and cells_of(reading, part) == own:
             return reading

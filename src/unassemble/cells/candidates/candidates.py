@@ -62,6 +62,8 @@ class Candidates(CellSet):
         Parts that can be turned over; its corners are numbered after the faces.
     crosses : Crosses or None
         About which corners are right angles.
+    wide : bool
+        Whether there are unlikely ones among them, see :meth:`of`.
     """
 
     drawing: FaceComplex
@@ -76,6 +78,7 @@ class Candidates(CellSet):
     crossed: NDArray[np.bool_]
     turns: Turns
     crosses: Crosses | None
+    wide: bool
 
     @classmethod
     def of(
@@ -161,7 +164,13 @@ class Candidates(CellSet):
             crossed=np.arange(len(size)) >= len(size) - len(crossed),
             turns=corners.turns,
             crosses=crosses,
+            wide=wide,
         )
+
+    def drawn(self, drawing: FaceComplex, guess: float | None = None) -> Candidates:
+        """Those of another drawing, with angles judged by the same c, or by a guess."""
+        guess = self.judged_by if guess is None else guess
+        return Candidates.of(drawing, self.weights, self.scale, guess=guess, errors=self.errors, wide=self.wide)
 
     def widened(self, labels: NDArray[np.bool_], guess: float | None = None) -> tuple[Candidates, NDArray[np.bool_]]:
         """More candidates in the same drawing, for a likelier c, and the labels of what there was before."""

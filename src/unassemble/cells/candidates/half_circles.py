@@ -78,17 +78,19 @@ class HalfCircles:
         bare = outside & outside[np.arange(len(outside)) ^ 1]
         own = np.where(bare, facing_angles(2 * np.repeat(cotangents, 2)), 0.0)
         shared = facing_angles(np.repeat(cotangents, 2))
-        paths = _Paths.of_corners(corners)
+        steps = _Paths.of_corners(corners)
+        paths = steps = steps if wide else steps.chosen(~steps.turned)
         found = []
         for _ in _EDGES:
-            paths = paths.longer(whole, corners)
-            room = (excess[paths.vertices[:, 1:-1]] < inner[1]).all(axis=1)
-            paths = paths.chosen(room & (own[paths.half].sum(axis=1) < _FULL))
-            alike = (excess[paths.vertices[:, 1:-1]] > inner[0]).all(axis=1)
-            surrounded = alike & (shared[paths.half].sum(axis=1) < _FULL)
-            once = paths.run_along(whole)
-            possible = surrounded | bare[paths.half].any(axis=1) if wide else surrounded & ~paths.turned
-            found.append(paths.chosen(once & possible))
+            paths = paths.longer(whole, steps)
+            about = excess[paths.vertices[:, 1:-1]]
+            room = (about < inner[1]).all(axis=1) & (own[paths.half].sum(axis=1) < _FULL)
+            surrounded = (about > inner[0]).all(axis=1) & (shared[paths.half].sum(axis=1) < _FULL)
+            paths = paths.chosen(room if wide else room & surrounded)
+            possible = paths.run_along(whole)
+            if wide:
+                possible &= surrounded[room] | bare[paths.half].any(axis=1)
+            found.append(paths.chosen(possible))
         degree = np.bincount(whole.tail, minlength=whole.n_vertices)
         count = np.cumsum([0, *(len(some.half) for some in found)])
         return cls(
@@ -119,9 +121,8 @@ class _Paths:
             np.tile(corners.turned, 2),
         )
 
-    def longer(self, whole: FaceComplex, corners: OpenCorners) -> _Paths:
-        """With one more edge each, in all ways in which paths are nowhere else joined to themselves."""
-        two = _Paths.of_corners(corners)
+    def longer(self, whole: FaceComplex, two: _Paths) -> _Paths:
+        """With one more edge each, by paths of two, in all ways in which they are nowhere else joined to themselves."""
         key = 2 * two.half[:, 0] + (two.vertices[:, 1] == whole.head[two.half[:, 0]])  # the end at which they turn
         order = np.argsort(key, kind="stable")
         wanted = 2 * self.half[:, -1] + (self.vertices[:, -1] == whole.head[self.half[:, -1]])

@@ -74,7 +74,5 @@ def redrawings(candidates: Candidates, first: NDArray) -> Iterator[Redrawing]:
     """
     number = {name: k for k, name in enumerate(candidates.names)}
     for cycle, drawing in redrawn(candidates.drawing, first):
-        others = Candidates.of(
-            drawing, candidates.weights, candidates.scale, guess=candidates.judged_by, errors=candidates.errors
-        )
+        others = candidates.drawn(drawing)
         yield Redrawing.of(candidates, number, others, cycle)

@@ -12,7 +12,6 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from ...topology.faces import FaceComplex
 from ...topology.turning_over import turned_over, turns
 from .candidates import Candidates
 
@@ -23,14 +22,11 @@ _LESS = 1e-6  # strain, relative, of drawings that are not the same
 
 def with_less_strain(candidates: Candidates) -> Candidates | None:
     """Candidates of the drawing that turning parts over, each for less strain, leads to; None where none does."""
-    first = best = _drawn(candidates, candidates.drawing.split(), candidates.judged_by)
+    first = best = candidates.drawn(candidates.drawing.split())
     least = _strain(best)
     for _ in range(_MOST_ROUNDS):
         drawing = best.drawing
-        others = [
-            _drawn(candidates, turned_over(drawing, turn), candidates.judged_by)
-            for turn in islice(turns(drawing), _MOST_TURNS)
-        ]
+        others = [candidates.drawn(turned_over(drawing, turn)) for turn in islice(turns(drawing), _MOST_TURNS)]
         strains = [_strain(other) for other in others]
         if not others or min(strains) >= (1 - _LESS) * least:
             break
@@ -49,15 +45,10 @@ def with_a_part_turned_over(
     number = {name: k for k, name in enumerate(candidates.names)}
     drawing = candidates.drawing.split()
     for turn in islice(turns(drawing), _MOST_TURNS):
-        other = _drawn(candidates, turned_over(drawing, turn), guess)
+        other = candidates.drawn(turned_over(drawing, turn), guess)
         same = np.array([number.get(name, -1) for name in other.names])
         kept = other.compatible(np.where((same >= 0) & labels[same], 1.0, -np.inf))
         yield other, other.covering(kept, other.belief)
-
-
-def _drawn(candidates: Candidates, drawing: FaceComplex, guess: float) -> Candidates:
-    """Those of another drawing."""
-    return Candidates.of(drawing, candidates.weights, candidates.scale, guess=guess, errors=candidates.errors)
 
 
 def _strain(candidates: Candidates) -> float:

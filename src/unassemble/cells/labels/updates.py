@@ -167,7 +167,8 @@ class Updates:
 
     def _left(self, factorised: _Factorised, labels: NDArray[np.bool_], moves: list[Move]) -> NDArray[np.float64]:
         """(moves,) mean misfit after each; infinite where there is no map."""
-        batch = max(int(_BATCH / np.count_nonzero(labels[self._sheet.cell])), 1)
+        triangles = max(int(np.count_nonzero(labels[self._sheet.cell])), 1)
+        batch = max(int(_BATCH / triangles), 1)
         parts = [moves[k : k + batch] for k in range(0, len(moves), batch)]
         return np.concatenate([np.empty(0), *(self._left_of_few(factorised, labels, part) for part in parts)])
 
