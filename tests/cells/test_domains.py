@@ -19,9 +19,9 @@ from vanishing import forgotten
 
 # Corners of a twentieth of a square; a cell across the mouth of a slit; corners that have to change places; one corner
 # that leaves the misfit of a wrong entry; several that leave little without six entries, or what looks like noise;
-# three labels that have to change together; corners that are cells too many and bring a lesser c; a corner beside a
-# hole in what looks like a quadrilateral; a half circle one of whose vertices is on another boundary as well; a part
-# between two vertices that all drawings have turned over.
+# three labels that have to change together; two corners about one vertex, which look like a wrong entry; corners that
+# are cells too many and bring a lesser c; a corner beside a hole in what looks like a quadrilateral; a half circle one
+# of whose vertices is on another boundary as well; a part between two vertices that all drawings have turned over.
 @pytest.mark.parametrize(
     ("family", "seed"),
     [
@@ -31,6 +31,7 @@ from vanishing import forgotten
         ("stairs", 9),
         ("cut_cells", 17),
         ("stairs", 319),
+        ("stairs", 21),
         ("cut_cells", 412),
         ("cut_cells", 413),
         ("cut_cells", 435),
@@ -62,6 +63,15 @@ def test_two_cells_too_many():
     for k in range(count):
         rows = label == k
         assert largest_error(found.points[rows], known.points[rows]) <= 1e-10
+
+
+def test_a_chain_of_right_angles_in_another_order():
+    """Five right triangles or three: the chain hangs on a vertex, and what hangs on it has another shape."""
+    rng = np.random.default_rng(11)
+    c = float(rng.choice([1.0, -2.5, 1e-3]))
+    found = recover(forgotten(specimen(*FAMILIES["stairs"](rng), c=c, seed=11)).matrix)
+    assert found.backward_error <= 1e-12
+    assert found.alternatives
 
 
 def test_two_corners_beside_holes():

@@ -90,7 +90,8 @@ def begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
     if spoilt is not None:
         nearest = starts[0]
         if nearest.candidates.n_vertices <= SMALL_GRAPH:  # one wrong corner may look like a wrong entry
-            nearest = Descent(nearest).run(Effort(A_FEW, effort.known))
+            nearest = _turned_over(nearest, Effort(A_FEW, effort.known), A_FEW)
+            nearest = nearest if nearest.fits else Descent(nearest).run(Effort(A_FEW, effort.known))
         if nearest.fits or spoilt.fits_but_for_few:
             return Begun([nearest if nearest.fits else spoilt], settled=True)
     if starts and entries_are_to_blame(starts[0]):

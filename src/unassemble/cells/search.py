@@ -134,16 +134,15 @@ def _searched(
 def _among_all(
     best: Reading, n: int, edges: NDArray, weights: NDArray, scale: float | None, errors: NDArray | None
 ) -> Reading:
-    """The best of a reading that is nearly right and of what searches among all candidates come to.
+    """What a search among all candidates comes to, if that stands; else the reading, nearly right, that there was.
 
     Angles are judged by its c, which is better than a first guess, and then by such a guess again: where either leads
     to depends on little things.
     """
-    for guess in (best.scale, None):
+    for guess in (best.scale, None) if scale is None else (None,):
         again, _ = _searched(n, edges, weights, scale, errors, Effort.for_graph(n, _ONCE_MORE), guess, wide=True)
-        best = best if again is None else better(best, again)
-        if best.fits or scale is not None:
-            break
+        if again is not None and _stands(again):
+            return again
     return best
 
 

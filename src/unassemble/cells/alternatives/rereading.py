@@ -11,7 +11,9 @@ from functools import partial
 from itertools import chain
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse import csgraph
 
 from ...matrix import OperatorMatrix
 from ...topology import Numbering, components
@@ -29,6 +31,7 @@ from ..undivided import undivided
 from .corners import Alternative, OrientedMesh
 
 _MOST_VERTICES = 60
+_MOST_HANGING = 200  # where a vertex holds the graph together: chains of right angles that hang there can be regrouped
 _MOST_NOISY = 400  # where errors of the entries may hide a difference; these are read once
 _ORDERS = 5
 _WORK = 3000  # vertices, those of components that are alike once, times orders; each is read once again at least
@@ -45,14 +48,18 @@ def other_readings(
     others = []
     noisy = _may_hide(stored, agree)
     most = _MOST_NOISY if noisy else _MOST_VERTICES
-    small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= most]
+    small = [
+        part
+        for part in components(stored.n, stored.edges)
+        if len(part.vertices) <= most or (len(part.vertices) <= _MOST_HANGING and _hangs_on_a_vertex(part))
+    ]
     n_orders = int(np.clip(_WORK // max(_distinct_vertices(stored, small), 1), 1, _ORDERS))
     half = with_vanished_sides(stored, mesh)
     answers = Answers()
     for part, own in zip(small, own_cells(stored.n, small, mesh), strict=True):
         supposed = bool(half[part.vertices].any())
         weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
-        orders = n_orders if len(part.vertices) <= _MOST_VERTICES else 1
+        orders = 1 if noisy and len(part.vertices) > _MOST_VERTICES else n_orders
         shuffled = (part.then(_shuffled(part, rng)) for _ in range(orders))
         ask = partial(_other_reading, shuffled, stored, own, scale, c, supposed=supposed, noisy=noisy)
         cells, factor, _ = answers.of(part, weights, own, ask)
@@ -60,6 +67,17 @@ def other_readings(
             same = abs(factor / c - 1) < max(SAME_SCALE, agree)
             others.append(Alternative.of(own, cells, same_scale=same))
     return others
+
+
+def _hangs_on_a_vertex(part: Numbering) -> bool:
+    """Whether the graph falls apart without one of its vertices."""
+    n = len(part.vertices)
+    for vertex in range(n):
+        i, j = part.edges[(part.edges != vertex).all(axis=1)].T
+        graph = sp.coo_array((np.ones(len(i)), (i, j)), shape=(n, n))
+        if csgraph.connected_components(graph, directed=False, return_labels=False) > 2:
+            return True
+    return False
 
 
 def _may_hide(stored: OperatorMatrix, agree: float) -> bool:
