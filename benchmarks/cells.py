@@ -22,10 +22,9 @@ import scipy.sparse as sp
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 
 
-from families import FAMILIES, HOPELESS
-from meshes import Specimen, largest_error, specimen
+from families import FAMILIES, HOPELESS, member
+from meshes import Specimen, largest_error
 from unassemble import RecoveryError, recover
-from vanishing import forgotten
 
 
 def main() -> None:
@@ -51,9 +50,7 @@ def print_family(name: str, seeds: range, *, known_scale: bool) -> None:
     outcomes: dict[str, list[int]] = defaultdict(list)
     seconds, rows = [], []
     for seed in seeds:
-        rng = np.random.default_rng(seed)
-        c = float(rng.choice([1.0, -2.5, 1e-3]))
-        known = forgotten(specimen(*FAMILIES[name](rng), c=c, seed=seed))
+        known, c = member(name, seed)
         start = time.perf_counter()
         outcomes[outcome(known, c if known_scale else None)].append(seed)
         seconds.append(time.perf_counter() - start)

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from dense_mesh import signed_areas
 from domains import bisected, cut_cells, stairs
 from glued import glued
-from meshes import delaunay, random_mesh
-from vanishing import Mesh, refined, squares, triangular_holes, used
+from meshes import Specimen, delaunay, random_mesh, specimen
+from vanishing import Mesh, forgotten, refined, squares, triangular_holes, used
 
 
 def pierced(rng: np.random.Generator) -> Mesh:
@@ -166,6 +166,13 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Mesh]] = {
         bisected,
     )
 }
+
+
+def member(family: str, seed: int) -> tuple[Specimen, float]:
+    """The matrix of one of them without its vanished entries, and its c."""
+    rng = np.random.default_rng(seed)
+    c = float(rng.choice([1.0, -2.5, 1e-3]))
+    return forgotten(specimen(*FAMILIES[family](rng), c=c, seed=seed)), c
 
 
 def tree(n: int, seed: int = 0) -> sp.csr_array:

@@ -5,7 +5,7 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from families import FAMILIES
+from families import member
 from meshes import specimen
 from named_meshes import cells_of, explains
 from unassemble import recover
@@ -17,13 +17,6 @@ from unassemble.cells.covers.numbered import Numbered, frequent_numbers
 from unassemble.cells.covers.program import Program
 from unassemble.cells.covers.shapes import Shapes
 from vanishing import forgotten, holes, squares
-
-
-def member(family, seed):
-    """As the benchmark draws it."""
-    rng = np.random.default_rng(seed)
-    c = float(rng.choice([1.0, -2.5, 1e-3]))
-    return forgotten(specimen(*FAMILIES[family](rng), c=c, seed=seed)), c
 
 
 def graph(known):

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from families import FAMILIES
+from families import FAMILIES, member
 from meshes import largest_error, random_mesh, specimen
 from unassemble import recover
 from unassemble.cells.candidates.cell_set import CellSet
@@ -43,9 +43,7 @@ from vanishing import forgotten
     ],
 )
 def test_domain(family, seed):
-    rng = np.random.default_rng(seed)
-    c = float(rng.choice([1.0, -2.5, 1e-3]))  # as benchmarks/cells.py draws them
-    known = forgotten(specimen(*FAMILIES[family](rng), c=c, seed=seed))
+    known, _ = member(family, seed)
     found = recover(known.matrix)
     assert found.certified, found.reason
     assert largest_error(found.points, known.points) <= 1e-10
@@ -53,9 +51,7 @@ def test_domain(family, seed):
 
 def test_two_cells_too_many():
     """The quotients of their maps are a fifth and three fifths of that of the mesh; it has another component, too."""
-    rng = np.random.default_rng(55)
-    c = float(rng.choice([1.0, -2.5, 1e-3]))
-    known = forgotten(specimen(*FAMILIES["cut_cells"](rng), c=c, seed=55))
+    known, _ = member("cut_cells", 55)
     found = recover(known.matrix)
     assert found.certified, found.reason
     count, label = connected_components(known.matrix)
@@ -67,18 +63,14 @@ def test_two_cells_too_many():
 
 def test_a_chain_of_right_angles_in_another_order():
     """Five right triangles or three: the chain hangs on a vertex, and what hangs on it has another shape."""
-    rng = np.random.default_rng(11)
-    c = float(rng.choice([1.0, -2.5, 1e-3]))
-    found = recover(forgotten(specimen(*FAMILIES["stairs"](rng), c=c, seed=11)).matrix)
+    found = recover(member("stairs", 11)[0].matrix)
     assert found.backward_error <= 1e-12
     assert found.alternatives
 
 
 def test_two_corners_beside_holes():
     """The entries of a vertex do not tell which of two places it has, so that this cannot be certified."""
-    rng = np.random.default_rng(452)
-    c = float(rng.choice([1.0, -2.5, 1e-3]))
-    found = recover(forgotten(specimen(*FAMILIES["integer"](rng), c=c, seed=452)).matrix)
+    found = recover(member("integer", 452)[0].matrix)
     assert found.backward_error <= 1e-12
     assert found.alternatives
 

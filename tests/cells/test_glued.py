@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from families import FAMILIES
+from families import FAMILIES, member
 from meshes import largest_error, specimen
 from unassemble import recover
 from unassemble.cells.candidates.candidates import Candidates
@@ -16,9 +16,7 @@ from vanishing import forgotten
 
 @pytest.mark.parametrize(("family", "seed"), [("glued", 29), ("perforated", 18)])
 def test_all_that_may_be_a_cell(family, seed):
-    rng = np.random.default_rng(seed)
-    c = float(rng.choice([1.0, -2.5, 1e-3]))  # as benchmarks/cells.py draws them
-    known = forgotten(specimen(*FAMILIES[family](rng), c=c, seed=seed))
+    known, _ = member(family, seed)
     found = recover(known.matrix)
     assert found.certified, found.reason
     assert largest_error(found.points, known.points) <= 1e-10

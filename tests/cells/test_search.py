@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from families import FAMILIES, HOPELESS
+from families import FAMILIES, HOPELESS, member
 from meshes import largest_error, random_mesh, specimen, triangle_set
 from unassemble import RecoveryError, recover
 from unassemble.cells import search
@@ -24,9 +24,7 @@ def _member(family, seed, c):
 # Labels have to be relaxed; in the second the pieces close rings, two being mirrored at once.
 @pytest.mark.parametrize(("family", "seed"), [("pierced", 11), ("lattice", 24)])
 def test_one_triangle_in_eight_is_missing(family, seed):
-    rng = np.random.default_rng(seed)
-    c = float(rng.choice([1.0, -2.5, 1e-3]))
-    known = forgotten(specimen(*FAMILIES[family](rng), c=c, seed=seed))
+    known, c = member(family, seed)
     found = recover(known.matrix)
     assert found.status == "certified", found.reason
     assert triangle_set(found.triangles) == triangle_set(known.triangles)
@@ -35,9 +33,7 @@ def test_one_triangle_in_eight_is_missing(family, seed):
 
 def test_pieces_that_share_vertices_have_one_factor():
     """Right triangles in a few small pieces: other cells fit as well where each piece may have a c of its own."""
-    rng = np.random.default_rng(29)
-    c = float(rng.choice([1.0, -2.5, 1e-3]))
-    known = forgotten(specimen(*FAMILIES["lattice"](rng), c=c, seed=29))
+    known, c = member("lattice", 29)
     found = recover(known.matrix)
     assert found.certified, found.reason
     assert found.scale == pytest.approx(c, rel=1e-9)

@@ -6,32 +6,18 @@ from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...topology.faces import FaceComplex
 from ...topology.turning_over import turns
+from .outlines import Outlines
 
 _LONGEST = 8  # edges of a face that may be a cell
 _MOST_TURNS = 100
 
 
 @dataclass(frozen=True, eq=False)
-class CrossedFaces:
-    """Faces that one part turned over makes of two, each with half-edges of both.
-
-    Attributes
-    ----------
-    size : (k,) int64
-        Vertices of each.
-    vertices : (sum of size,) int64
-        One after the other.
-    sides : (s, 2) int64
-        Pairs (face, half-edge).
-    """
-
-    size: NDArray[np.int64]
-    vertices: NDArray[np.int64]
-    sides: NDArray[np.int64]
+class CrossedFaces(Outlines):
+    """Faces that one part turned over makes of two, each with half-edges of both."""
 
     @classmethod
     def of(cls, drawing: FaceComplex) -> CrossedFaces:
@@ -51,9 +37,6 @@ class CrossedFaces:
     def none(cls) -> CrossedFaces:
         """No faces."""
         return cls(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 2), np.int64))
-
-    def __len__(self) -> int:
-        return len(self.size)
 
 
 def _along(drawing: FaceComplex, vertices: tuple[int, ...], halves: tuple[int, ...]) -> tuple[int, ...]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...topology.faces import FaceComplex, joined
 from .angles import facing_angles
 from .open_corners import OpenCorners
+from .outlines import Outlines
 
 _EDGES = (3, 4, 5)  # of a path
 _FULL = 0.85 * np.pi  # angle sum below which a path may be one: it should be pi/2, but shares weights with neighbours
@@ -21,24 +22,15 @@ _INNER = 0.35 * np.pi  # excess of angles at its inner vertices, which look like
 
 
 @dataclass(frozen=True, eq=False)
-class HalfCircles:
+class HalfCircles(Outlines):
     """Paths along empty faces, every two edges of which are an open corner.
 
     Attributes
     ----------
-    size : (k,) int64
-        Vertices of each.
-    vertices : (sum of size,) int64
-        One after the other.
-    sides : (s, 2) int64
-        Pairs (path, half-edge) of what each takes up.
     turned : (k,) bool
         Not as drawn: with parts of the drawing turned over.
     """
 
-    size: NDArray[np.int64]
-    vertices: NDArray[np.int64]
-    sides: NDArray[np.int64]
     turned: NDArray[np.bool_]
 
     @classmethod
@@ -99,9 +91,6 @@ class HalfCircles:
             sides=np.concatenate([some.sides(degree, outside) + [k, 0] for some, k in zip(found, count, strict=False)]),
             turned=np.concatenate([some.turned for some in found]),
         )
-
-    def __len__(self) -> int:
-        return len(self.size)
 
 
 @dataclass(frozen=True, eq=False)
