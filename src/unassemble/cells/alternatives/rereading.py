@@ -59,7 +59,7 @@ def other_readings(
     for part, own in zip(small, own_cells(stored.n, small, mesh), strict=True):
         supposed = bool(half[part.vertices].any())
         weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
-        orders = 1 if noisy and len(part.vertices) > _MOST_VERTICES else n_orders
+        orders = n_orders if len(part.vertices) <= _MOST_VERTICES else 1
         shuffled = (part.then(_shuffled(part, rng)) for _ in range(orders))
         ask = partial(_other_reading, shuffled, stored, own, scale, c, supposed=supposed, noisy=noisy)
         cells, factor, _ = answers.of(part, weights, own, ask)
