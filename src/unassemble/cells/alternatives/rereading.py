@@ -70,12 +70,12 @@ def other_readings(
 
 
 def _hangs_on_a_vertex(part: Numbering) -> bool:
-    """Whether the graph falls apart without one of its vertices."""
+    """Whether the graph falls apart into two without one of its vertices; at hubs of many parts rules do."""
     n = len(part.vertices)
     for vertex in range(n):
         i, j = part.edges[(part.edges != vertex).all(axis=1)].T
         graph = sp.coo_array((np.ones(len(i)), (i, j)), shape=(n, n))
-        if csgraph.connected_components(graph, directed=False, return_labels=False) > 2:
+        if csgraph.connected_components(graph, directed=False, return_labels=False) == 3:  # with the vertex itself
             return True
     return False
 
