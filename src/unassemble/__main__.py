@@ -16,4 +16,9 @@ def run() -> None:
 
 
 if __name__ == "__main__":
-    run()
+    try:
+        run()
+    finally:
+        # Of a signal that fell into an exec of text (modules that make classes have some) Python keeps a note until
+        # the next exec of text, and ``python -m`` would end by that signal instead of with the exit status.
+        exec("")
