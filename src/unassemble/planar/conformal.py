@@ -33,7 +33,11 @@ _STEEPEST = 1e12  # weight in units of the scale, beyond that of any triangle in
 
 _log = logging.getLogger(__name__)
 
-_MOST, _AGREE = 0.7, 1e-10  # if the values of c of that share of the triangles agree like this, that is c
+_AGREE = 1e-10  # relative difference of values of c by triangles that are one
+_MOST = 0.7  # if that share of the triangles agree, that is c
+_MANY, _SHARE = 100, 0.2  # or that many, if they are such a share: mirrored neighbours among others
+_SCATTERS = 3.0  # from the estimate of c to the first shift, in units of the scatter of what triangles say
+_NEAREST = 0.03
 
 _FARTHEST = 1e-6
 """Least ratio of a scale to its estimate, or of the estimate to it."""
@@ -50,7 +54,7 @@ class ConformalOptions:
     max_factorisations : int
         Factorisations before giving up.
     first_shift : float
-        Relative to the estimate of c; any value well inside (0, 1) will do.
+        Relative to the estimate of c; any value well inside (0, 1) will do. Nearer to 1 where triangles say so.
     margin : float
         Distance of the last shift below c, relative. Nearer, M would be singular to working accuracy.
     """
@@ -84,13 +88,6 @@ class ConformalMap:
     converged: bool
 
 
-def _likely_scale(unit: float, *, agreed: bool) -> float | None:
-    """A value of c that is probably right to all digits: that of most triangles, as on structured grids, or 1."""
-    if agreed:
-        return unit
-    return 1.0 if abs(1 / unit - 1) < 0.3 else None
-
-
 def estimate_scale(piece: Piece, weights: NDArray) -> float:
     """A guess of c, right to some ten per cent on meshes of decent triangles.
 
@@ -102,21 +99,58 @@ def estimate_scale(piece: Piece, weights: NDArray) -> float:
     GeometryError
         If the weights add up to zero.
     """
-    return _estimate(piece, weights)[0]
+    return _estimate(piece, weights).scale
 
 
-def _estimate(piece: Piece, weights: NDArray) -> tuple[float, bool]:
-    """The guess, and whether most triangles agree in it to nearly all digits."""
+@dataclass(frozen=True)
+class _Estimate:
+    """What triangles say of c.
+
+    Attributes
+    ----------
+    scale : float
+        Their median.
+    scatter : float
+        The range, relative, of the middle four fifths of them.
+    likely : float or None
+        What is probably right to all digits: what many of them say, as on grids, or 1.
+    """
+
+    scale: float
+    scatter: float
+    likely: float | None
+
+
+def _estimate(piece: Piece, weights: NDArray) -> _Estimate:
     sign = np.sign(weights.sum())
     if not sign:
         raise GeometryError("the off-diagonal entries add up to zero, those of a Laplacian cannot")
     largest = float(np.abs(weights).max())  # taken out, so that no square overflows
     sizes = _scales_of_triangles(piece, weights / largest)
     if not len(sizes):
-        return float(sign * np.sqrt(3) * np.abs(weights / largest).mean() * largest), False
-    size = np.median(sizes)
-    agreed = np.quantile(np.abs(sizes / size - 1), _MOST) < _AGREE
-    return float(sign * size * largest), bool(agreed)
+        size, scatter, common = float(np.sqrt(3) * np.abs(weights / largest).mean()), np.inf, None
+    else:
+        size, common = float(np.median(sizes)), _common(sizes)
+        scatter = float(np.ptp(np.quantile(sizes, (0.1, 0.9)))) / size
+    unit = float(sign * size * largest)
+    if common is not None:
+        return _Estimate(unit, scatter, float(sign * common * largest))
+    return _Estimate(unit, scatter, 1.0 if abs(1 / unit - 1) < 0.3 else None)
+
+
+def _common(values: NDArray[np.float64]) -> float | None:
+    """What most of some positive values are to nearly all digits, or very many, and no other value half as many.
+
+    On meshes of a few triangles over and over some values are frequent that are wrong.
+    """
+    values = np.sort(values)
+    alike = np.searchsorted(values, values * (1 + _AGREE), side="right") - np.arange(len(values))
+    first = int(np.argmax(alike))
+    count = int(alike[first])
+    alike[first : first + count] = 0
+    if count < min(_MOST * len(values), max(_SHARE * len(values), _MANY)) or 2 * alike.max() > count:
+        return None
+    return float(np.median(values[first : first + count]))
 
 
 def _scales_of_triangles(piece: Piece, weights: NDArray) -> NDArray[np.float64]:
@@ -144,8 +178,8 @@ def conformal_map(
     weights : (e,) float64
         -A_ij = c w_ij of each edge.
     scale : float, optional
-        c, where it is known. Otherwise an estimate in which most triangles agree is tried first, or c = 1 if the
-        estimate allows it.
+        c, where it is known. Otherwise a value in which most triangles agree, or more of them than in any other, is
+        tried first, or c = 1 if their median allows it.
     sharp : bool
         Go on until z, not only c, has converged. A polish does not need that.
     analyse : callable
@@ -158,7 +192,8 @@ def conformal_map(
         If no map of positive area is found.
     """
     options = options or ConformalOptions()
-    unit, agreed = _estimate(piece, weights)
+    estimate = _estimate(piece, weights)
+    unit = estimate.scale
     with np.errstate(over="ignore"):
         relative = weights / unit if unit else np.full_like(weights, np.inf)
     if not np.abs(relative).max() < _STEEPEST or (
@@ -175,7 +210,7 @@ def conformal_map(
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     search = ShiftedSearch(ConformalPencil(piece, relative), analyse, options.krylov_steps)
     z = _smooth_start(piece)
-    known = scale if scale is not None else _likely_scale(unit, agreed=agreed)
+    known = scale if scale is not None else estimate.likely
     if known is not None:
         z, c, _ = search.at(known / unit * (1 - options.margin), z, steps=2)
         # The quotient is stationary, and accurate to some hundred roundings at any size.
@@ -186,7 +221,10 @@ def conformal_map(
     else:
         spread = None
     if spread is None:
-        z, c, spread = search.at(options.first_shift, _smooth_start(piece))
+        first = max(1 - max(_SCATTERS * estimate.scatter, _NEAREST), options.first_shift)
+        z, c, spread = search.at(first, _smooth_start(piece))
+        if c < first > options.first_shift:  # not all triangles are wrong in the same sense, but many may be
+            z, c, spread = search.at(options.first_shift, _smooth_start(piece))
         if c < _FARTHEST:
             raise GeometryError("some maps of positive area have no energy: the entries belong to no planar mesh")
     converged = near = False

@@ -27,8 +27,8 @@ def _halved(piece: Piece, left: NDArray, right: NDArray) -> NDArray:
         return np.asarray((left + np.where(piece.inner, right, 0)) / 2)
 
 
-def _cotangent(u: NDArray, w: NDArray) -> NDArray[np.float64]:
-    """Not finite at flat triangles."""
+def cotangent(u: NDArray, w: NDArray) -> NDArray[np.float64]:
+    """Of the angle from side u to side w, complex; not finite at flat triangles."""
     product = np.conj(u) * w
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(product.real / product.imag)
@@ -37,7 +37,7 @@ def _cotangent(u: NDArray, w: NDArray) -> NDArray[np.float64]:
 def edge_weights(piece: Piece, z: NDArray) -> NDArray[np.float64]:
     """w_e: half the sum of the cotangents that face each edge (e,), for positions z (n,) complex."""
     left, right = _sides(piece, z)
-    return _halved(piece, _cotangent(*left), _cotangent(*right))
+    return _halved(piece, cotangent(*left), cotangent(*right))
 
 
 def left_by_all(
@@ -67,7 +67,7 @@ def weights_of_all(pieces: Sequence[Piece], positions: Sequence[NDArray]) -> NDA
         return edge_weights(pieces[0], positions[0])
     union = Together(pieces)
     corners = np.concatenate(positions)[union.triangles]
-    cotangents = _cotangent(np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners)
+    cotangents = cotangent(np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners)
     return np.bincount(union.opposite.ravel(), cotangents.ravel(), len(union.edge_rows)) / 2
 
 

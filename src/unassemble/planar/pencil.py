@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..linalg import UpperTriangle, upper_from_edges
+from ..topology.keys import contains, pair_keys
 
 
 class Outline(Protocol):
@@ -36,7 +37,7 @@ class Outline(Protocol):
 
 
 def pencil_pattern(n: int, edges: NDArray) -> UpperTriangle:
-    """The pattern of M(s) on a piece with these edges, (e, 2) in lexicographic order."""
+    """The pattern of M(s) on a piece of these edges, (e, 2) in lexicographic order: those with weight or on its rim."""
     edges = edges[edges[:, 1] < n - 1]  # the pinned vertex is the higher end of all its edges
     return upper_from_edges(n - 1, edges, np.zeros(len(edges), np.complex128), np.zeros(n - 1))
 
@@ -58,11 +59,16 @@ class ConformalPencil:
         self.n = piece.n_vertices
         self._strength = np.ones(len(piece.boundary)) if strength is None else strength
         self.tail, self.head = piece.boundary.T
-        diagonal = np.bincount(piece.edges.ravel(), np.repeat(weights, 2), self.n)
-        kept = piece.edges[:, 1] < self.n - 1  # the pinned vertex is the higher end of all its edges
-        edges = piece.edges[kept]
-        self._low, self._high = (np.ascontiguousarray(end) for end in piece.edges.T)
+        # An edge without weight has no entries, unless it lies on the boundary: diagonals of undivided cells.
+        used = weights != 0
+        if not used.all():
+            used |= contains(np.sort(pair_keys(self.n, *piece.boundary.T)), pair_keys(self.n, *piece.edges.T))
+        edges, weights = piece.edges[used], weights[used]
+        self._low, self._high = (np.ascontiguousarray(end) for end in edges.T)
         self._half_weights = weights / 2
+        diagonal = np.bincount(edges.ravel(), np.repeat(weights, 2), self.n)
+        kept = edges[:, 1] < self.n - 1  # the pinned vertex is the higher end of all its edges
+        edges = edges[kept]
         self._energy = upper_from_edges(self.n - 1, edges, -weights[kept] / 2, diagonal[:-1] / 2)
         self._place, self._sign = self._boundary_entries(edges)
 

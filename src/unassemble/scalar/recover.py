@@ -59,7 +59,8 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
         # or lack the diagonals of their cells.
         planar = options.method == "conformal" and len(stored.edges) < 3 * stored.n
         if planar and triangles_everywhere(stored.n, numbering.edges):
-            analyse = AnalysisAhead(pencil_pattern(stored.n, numbering.edges), options.threads)
+            used = stored.entries[numbering.edge_rows] != 0
+            analyse = AnalysisAhead(pencil_pattern(stored.n, numbering.edges[used]), options.threads)
         topology = surfaces(stored.n, stored.edges, numbering)
     noise = Noise.known(stored, options.noise)
     if noise is not None:

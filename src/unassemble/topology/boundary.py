@@ -7,6 +7,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
+from .keys import first_rows
 from .orientation import Gluing
 
 
@@ -55,7 +56,7 @@ def loops(successor: NDArray) -> tuple[NDArray, NDArray]:
         return np.empty(0, np.int64), np.empty(0, np.int64)
     step = sp.csr_array((np.ones(b, np.int8), successor, np.arange(b + 1)), shape=(b, b))
     n_loops, loop = csgraph.connected_components(step, directed=True, connection="weak")
-    _, start = np.unique(loop, return_index=True)
+    start = first_rows(loop, n_loops)
     # Breadth-first from an extra node that points at the first element of each cycle.
     graph = sp.csr_array(
         (np.ones(b + n_loops, np.int8), np.append(successor, start), np.append(np.arange(b + 1), b + n_loops)),

@@ -56,11 +56,13 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
     if n >= 3 and len(edges) > 3 * n - 6:  # not planar, and may have very many cycles
         return
     cycles = short_faces(n, edges)
+    given: list[FaceComplex] = []
     seen: set[bytes] = set()
     for drawing in _drawings(n, edges, cycles):
-        name = fingerprint(drawing)
-        if name not in seen:
-            seen.add(name)
+        seen.update(map(fingerprint, given))  # mostly there is no second one to compare with
+        given.clear()
+        if not seen or fingerprint(drawing) not in seen:
+            given.append(drawing)
             yield drawing
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from .boundary import loops
-from .keys import contains, distinct, pair_keys
+from .keys import contains, distinct, first_rows, pair_keys
 from .orientation import glue, orient
 
 _ROUNDS = 20
@@ -243,7 +243,7 @@ def _hanging(n: int, edges: NDArray) -> NDArray[np.bool_]:
 
 def _first(label: NDArray) -> NDArray:
     """One place of each label."""
-    return np.unique(label, return_index=True)[1]
+    return first_rows(label, int(label.max()) + 1)
 
 
 def _cyclic_neighbour(key: NDArray, step: int) -> NDArray[np.int64]:

@@ -54,6 +54,13 @@ def with_sides(n: int, edges: NDArray, triangles: NDArray) -> tuple[NDArray[np.i
     return np.column_stack([keys // n, keys % n]), np.searchsorted(keys, known), np.searchsorted(keys, sides)
 
 
+def first_rows(label: NDArray, n_labels: int) -> NDArray[np.int64]:
+    """(labels,) the first row with each label; every label has one."""
+    first = np.empty(n_labels, dtype=np.int64)
+    first[label[::-1]] = np.arange(len(label))[::-1]  # of several the last that is written stays
+    return first
+
+
 class Grouped:
     """Rows sorted by label; negative labels are left out.
 
