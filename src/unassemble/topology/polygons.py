@@ -28,6 +28,11 @@ class Polygons:
         return cls(np.zeros(1, np.int64), np.empty(0, np.int64))
 
     @classmethod
+    def of_triangles(cls, triangles: NDArray[np.int64]) -> Polygons:
+        """Triangles (m, 3)."""
+        return cls(3 * np.arange(len(triangles) + 1), triangles.ravel())
+
+    @classmethod
     def joined(cls, parts: list[Polygons]) -> Polygons:
         """The polygons of all parts."""
         size = np.concatenate([np.empty(0, np.int64), *(part.size for part in parts)])
@@ -43,6 +48,13 @@ class Polygons:
     def size(self) -> NDArray[np.int64]:
         """(count,) number of vertices of each."""
         return np.diff(self.offsets)
+
+    @property
+    def following(self) -> NDArray[np.int64]:
+        """(offsets[-1],) the vertex that follows each."""
+        place = np.arange(1, len(self.vertices) + 1)
+        place[self.offsets[1:] - 1] = self.offsets[:-1]
+        return self.vertices[place]
 
     def chosen(self, which: NDArray[np.bool_], number: NDArray) -> Polygons:
         """Some of the polygons, with vertex v called ``number[v]``."""
