@@ -120,7 +120,7 @@ def _tiling(candidates: Candidates, effort: Effort) -> Reading | None:
     either = [candidates]
     guess = candidates.other_scale() if candidates.scale is None else None
     if guess is not None:
-        either.append(Candidates.of(candidates.drawing, candidates.weights, guess=guess, errors=candidates.errors))
+        either.append(candidates.drawn(candidates.drawing, guess))
     for one in either:
         for labels in one.tilings():
             reading = Reading.of(one, labels, effort.known)
@@ -151,7 +151,7 @@ def fitting_starts(
 ) -> Iterator[Reading]:
     """All readings to begin with that fit as they are, in all drawings.
 
-    Parameters are those of :func:`read_cells`.
+    Parameters are those of :func:`unassemble.cells.search.read_cells`.
     """
     known: dict[bytes, PieceMesh | None] = {}
     for candidates in drawings(n, edges, weights, scale, errors):

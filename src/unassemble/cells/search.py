@@ -19,12 +19,11 @@ from .labels.mending import mended
 from .labels.relaxation import HopelessError
 from .labels.repairs import repaired
 from .reading import Reading
-from .small_changes import CLOSE, best_of, tried_out, with_parts_turned_over
+from .small_changes import CLOSE, SOME, best_of, tried_out, with_parts_turned_over
 from .triangles.drawings import read_in_drawings
 from .triangles.triangles_only import read_triangles
 
 _DRAWINGS = 3  # that a graph may have, about
-_SOME = 60  # solves for small changes of a reading that is nearly right
 _TURNING = 0.5  # part of the effort for turning parts over, in all drawings that are begun with
 _FIRST = 0.7  # part of it for the likeliest reading
 _QUICKLY = 0.2  # part of it that the same graph is worth once more
@@ -154,10 +153,10 @@ def _redrawn(best: Reading, effort: Effort) -> Reading:
     candidates = None if best.fits else with_less_strain(best.candidates)
     if candidates is None:
         return best
-    first = begun(candidates, Effort(_SOME, effort.known), _FEW_TURNS)
+    first = begun(candidates, Effort(SOME, effort.known), _FEW_TURNS)
     if first.settled:
         return _settled(best, first.starts[0])
-    return best_of(best, first.descents, _SOME)
+    return best_of(best, first.descents, SOME)
 
 
 def _of_equal_weights(
@@ -201,7 +200,7 @@ def _carried_on(
     if best is not None and best.like_noise:  # or wrong in cells that leave little
         return cover() or best, True
     if best is not None and best is not before and best.size < CLOSE:  # covers take longer than a few small changes
-        best = Descent(best).run(Effort(_SOME, effort.known))
+        best = Descent(best).run(Effort(SOME, effort.known))
         if best.fits:
             return best, True
     covered = cover()

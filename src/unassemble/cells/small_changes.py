@@ -16,7 +16,9 @@ CLOSE = 0.15
 QUICK = 36
 """Solves for small changes of a start, those of three readings."""
 
-_SOME = 60  # the same of a reading that is nearly right, or the nearest when all else has failed
+SOME = 60
+"""The same of a reading that is nearly right, or the nearest when all else has failed."""
+
 _MOST_ROUNDS = 4  # parts that are turned over in a reading, one after the other
 _LIKELIEST = 3  # readings with one of them turned over that are gone on with
 
@@ -35,10 +37,10 @@ def tried_out(best: Reading, searches: list[Descent]) -> Reading:
     nearest = sorted(searches, key=lambda search: search.least)[:1]
     if all(search.best is not best for search in nearest):
         nearest.append(Descent(best))
-    best = best if best.fits else best_of(best, nearest, _SOME)
+    best = best if best.fits else best_of(best, nearest, SOME)
     if best.size > CLOSE or best.fits or not isinstance(best.candidates, Candidates):
         return best
-    return best_of(best, [Descent(widened(best))], _SOME)
+    return best_of(best, [Descent(widened(best))], SOME)
 
 
 def with_parts_turned_over(best: Reading[Candidates], effort: Effort) -> Reading[Candidates]:

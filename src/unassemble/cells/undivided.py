@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..topology import Piece, Polygons
+from ..topology.keys import distinct
 from ..topology.together import Together
 
 
@@ -60,6 +61,6 @@ def _cycles(group: NDArray, tail: NDArray, head: NDArray, name: NDArray) -> Poly
         running = step < size
         place[start[running] + step] = at[running]
         at = following[at]
-    if (key[following] != wanted).any() or len(np.unique(place)) < len(place):
+    if (key[following] != wanted).any() or len(distinct(place)) < len(place):
         return None
     return Polygons(np.append(0, np.cumsum(size)), name[tail[place]])

@@ -15,6 +15,7 @@ from ...topology.keys import Grouped
 from .closings import closed_by_right_angles
 from .corners import Alternative, Corners, OrientedMesh
 from .flips import turned_over
+from .hanging import other_hanging_parts
 from .hinged import as_one_piece
 from .hubs import Hub, closed_at, hubs, rearranged
 from .loose import is_loose, other_reading
@@ -80,6 +81,9 @@ def alternatives(
     if not found and scale is None:
         found, left_open = other_scales(stored, topology, mesh, factors, closed, agree)
     found = _each_once(found) or other_readings(stored, mesh, factors, scale, agree)
+    if not found:
+        found, unknown = other_hanging_parts(stored, mesh, factors, agree)
+        left_open = left_open or unknown
     return found or nearby_readings(stored, mesh, factors, scale, agree), left_open
 
 

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...topology import Polygons
+from ...topology.faces import joined
+from ...topology.keys import contains
 from ..alike import Cells
 
 
@@ -122,14 +124,12 @@ class Corners:
         """
         tail, head = mesh.boundary.T
         loop = np.repeat(np.arange(len(mesh.boundary_offsets) - 1), np.diff(mesh.boundary_offsets))
-        stored = np.isin(mesh.boundary.min(axis=1) * n + mesh.boundary.max(axis=1), edges[:, 0] * n + edges[:, 1])
-        third = _third_vertices(n, mesh)
-        gone = ~stored & (third >= 0)
-        apex = third[gone]
+        gone, apex = vanished_sides(n, edges, mesh)
         hub = np.zeros(n, dtype=bool)
         hub[apex] = True
         # Where the boundary runs along a vanished side the last stored edge is that to its apex.
-        after, before = np.where(gone, third, head), np.where(gone, third, tail)
+        after, before = head.copy(), tail.copy()
+        after[gone] = before[gone] = apex
         leaving, arriving = hub[tail], hub[head]
         return cls(
             apex,
@@ -154,19 +154,18 @@ class Corners:
         )
 
 
-def _third_vertices(n: int, mesh: OrientedMesh) -> NDArray[np.int64]:
-    """(b,) the vertex that faces each boundary edge; -1 in polygons."""
-    sides = (mesh.triangles * n + np.roll(mesh.triangles, -1, axis=1)).ravel()
+def vanished_sides(n: int, edges: NDArray, mesh: OrientedMesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Boundary edges of triangles that have no entry, by their rows (k,), and the vertices that face them (k,)."""
+    gone = np.flatnonzero(~joined(n, edges, *mesh.boundary.T))
+    near = np.zeros(n, dtype=bool)
+    near[mesh.boundary[gone]] = True
+    triangles = mesh.triangles[near[mesh.triangles].sum(axis=1) >= 2]
+    sides = (triangles * n + np.roll(triangles, -1, axis=1)).ravel()
     order = np.argsort(sides)
-    wanted = mesh.boundary @ [n, 1]
-    third = np.full(len(wanted), -1)
-    spot = np.searchsorted(sides, wanted, sorter=order)
-    inside = np.flatnonzero(spot < len(sides))
-    side = order[spot[inside]]
-    known = sides[side] == wanted[inside]
-    triangle, position = np.divmod(side[known], 3)
-    third[inside[known]] = mesh.triangles[triangle, (position + 2) % 3]
-    return third
+    wanted = mesh.boundary[gone] @ [n, 1]
+    of_triangle = contains(sides[order], wanted)
+    triangle, position = np.divmod(order[np.searchsorted(sides[order], wanted[of_triangle])], 3)
+    return gone[of_triangle], triangles[triangle, (position + 2) % 3]
 
 
 def _table(vertex: NDArray, loop: NDArray, value: NDArray) -> dict[tuple[int, int], int]:

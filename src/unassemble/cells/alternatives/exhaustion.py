@@ -98,7 +98,7 @@ def all_readings(
         vertices = Polygons(np.append(0, np.cumsum([len(cell) for cell in cells])), np.array(list(chain(*cells))))
         some = CellSet(n, part.edges, weights, None, vertices, np.zeros(len(cells), dtype=bool))
         reading = Reading.of(some, np.ones(len(cells), dtype=bool), known)
-        if reading.nearly_fits(agree) and _lies_flat(reading):
+        if reading.nearly_fits(agree) and lies_flat(reading):
             yield cells_of(reading, part), next(mesh.scale for mesh in reading.meshes if mesh)
 
 
@@ -118,7 +118,7 @@ def _factor_alone(weights: NDArray, closed: bool) -> float | None:
     return float(np.exp(brentq(excess, low, high, xtol=1e-13))) if excess(low) < 0 < excess(high) else np.nan
 
 
-def _lies_flat(reading: Reading) -> bool:
+def lies_flat(reading: Reading) -> bool:
     """Whether triangles are all the same side up, and around no vertex add up to more than a full turn."""
     turns = np.zeros(reading.candidates.n_vertices)
     for piece, mesh in zip(reading.pieces, reading.meshes, strict=True):

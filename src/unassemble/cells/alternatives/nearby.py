@@ -21,6 +21,7 @@ from ..candidates.candidates import Candidates
 from ..labels.descent import as_good
 from ..reading import NEARLY, Reading
 from .corners import Alternative, OrientedMesh
+from .cracks import cracked
 from .rereading import cells_of, own_cells, with_vanished_sides
 
 _MOST_VERTICES = 1000  # the cost grows like the square
@@ -36,6 +37,8 @@ def nearby_readings(
     if stored.errors is not None and agree > NEARLY:
         return []
     half = with_vanished_sides(stored, mesh)
+    if not half.any():
+        return []
     parts = [
         part
         for part in components(stored.n, stored.edges)
@@ -43,12 +46,13 @@ def nearby_readings(
     ]
     others = []
     for part, own in zip(parts, own_cells(stored.n, parts, mesh), strict=True):
-        reading = _as_found(stored, part, own, mesh.z, scale)
-        if reading is None:
+        as_found = _as_found(stored, part, own, mesh.z, scale)
+        if as_found is None:
             continue
+        reading, usual = as_found
         c = float(factors[part.vertices[0]])
-        for other in as_good(reading, reading.candidates.corner | reading.candidates.half):
-            if (cells := cells_of(other, part)) != own:
+        for other in as_good(reading, reading.candidates.corner | reading.candidates.half, usual):
+            if (cells := cells_of(other, part)) != own and not cracked(other):
                 factor = next(solved.scale for solved in other.meshes if solved)
                 same = abs(factor / c - 1) < max(SAME_SCALE, agree)
                 others.append(Alternative.of(own, cells, same_scale=same))
@@ -58,21 +62,24 @@ def nearby_readings(
 
 def _as_found(
     stored: OperatorMatrix, part: Numbering, own: Cells, z: NDArray[np.complex128], scale: float | None
-) -> Reading[Candidates] | None:
-    """The reading that was found, among the candidates of a drawing; None where no drawing has its cells."""
+) -> tuple[Reading[Candidates], NDArray[np.bool_]] | None:
+    """The reading that was found, among the candidates of a drawing; None where no drawing has its cells.
+
+    With what is a candidate in nearly any search, (cells,) bool; all that may be a cell would make very many pairs.
+    """
     rows = {int(row): k for k, row in enumerate(part.vertices)}
     cells = {tuple(sorted(rows[row] for row in cell)) for cell in own}
     weights = -stored.entries[part.edge_rows]
     errors = None if stored.errors is None else stored.errors[part.edge_rows]
     for drawing in _drawings(part, z[part.vertices]):
-        candidates = Candidates.of(drawing, weights, scale, errors=errors)
+        candidates = first = Candidates.of(drawing, weights, scale, errors=errors)
         labels = _labels(candidates, cells)
         if labels is None:
             candidates = Candidates.of(drawing, weights, scale, errors=errors, wide=True)
             labels = _labels(candidates, cells)
         reading = None if labels is None else Reading.of(candidates, labels)
         if reading is not None and reading.fits and cells_of(reading, part) == own:
-            return reading
+            return reading, reading.labels | (first.numbers_of(candidates) >= 0)
     return None
 
 

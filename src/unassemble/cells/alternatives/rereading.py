@@ -11,13 +11,10 @@ from functools import partial
 from itertools import chain
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from ...matrix import OperatorMatrix
 from ...topology import Numbering, components
-from ...topology.faces import joined
 from ...topology.keys import contains, pair_keys
 from ..agreement import SAME_SCALE
 from ..alike import ALIKE, Answers, Cells, Found
@@ -28,38 +25,49 @@ from ..labels.descent import beside
 from ..reading import NEARLY, Reading
 from ..search import read_cells
 from ..undivided import undivided
-from .corners import Alternative, OrientedMesh
+from .corners import Alternative, OrientedMesh, vanished_sides
+from .cracks import cracked
+from .enumeration import enumerated
 
-_MOST_VERTICES = 60
-_MOST_HANGING = 200  # where a vertex holds the graph together: chains of right angles that hang there can be regrouped
+MOST_VERTICES = 60
+"""Rows of a component that is read again."""
+
 _MOST_NOISY = 400  # where errors of the entries may hide a difference; these are read once
+_FEW = 25  # rows of a component all of whose readings are asked for
 _ORDERS = 5
-_WORK = 3000  # vertices, those of components that are alike once, times orders; each is read once again at least
+
+WORK = 3000
+"""Rows times orders in which they are read again."""
 
 
 def other_readings(
-    stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, scale: float | None, agree: float
+    stored: OperatorMatrix,
+    mesh: OrientedMesh,
+    factors: NDArray,
+    scale: float | None,
+    agree: float,
+    *,
+    most: int = MOST_VERTICES,
+    work: int = WORK,
 ) -> list[Alternative]:
-    """Readings of small components that fit, but have other cells; at most one for each.
+    """Readings of components of up to `most` rows that fit, but have other cells; at most one for each.
 
-    Parameters are those of :func:`unassemble.cells.alternatives.ambiguity.alternatives`.
+    They are read in up to five orders, as long as their rows times orders are at most `work`, and in one at least;
+    those that are alike count once. Other parameters are those of
+    :func:`unassemble.cells.alternatives.ambiguity.alternatives`.
     """
     rng = np.random.default_rng(0)
     others = []
     noisy = _may_hide(stored, agree)
-    most = _MOST_NOISY if noisy else _MOST_VERTICES
-    small = [
-        part
-        for part in components(stored.n, stored.edges)
-        if len(part.vertices) <= most or (len(part.vertices) <= _MOST_HANGING and _hangs_on_a_vertex(part))
-    ]
-    n_orders = int(np.clip(_WORK // max(_distinct_vertices(stored, small), 1), 1, _ORDERS))
+    most = _MOST_NOISY if noisy else most
+    small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= most]
+    n_orders = int(np.clip(work // max(distinct_vertices(stored, small), 1), 1, _ORDERS))
     half = with_vanished_sides(stored, mesh)
     answers = Answers()
     for part, own in zip(small, own_cells(stored.n, small, mesh), strict=True):
         supposed = bool(half[part.vertices].any())
         weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
-        orders = n_orders if len(part.vertices) <= _MOST_VERTICES else 1
+        orders = n_orders if len(part.vertices) <= MOST_VERTICES else 1
         shuffled = (part.then(_shuffled(part, rng)) for _ in range(orders))
         ask = partial(_other_reading, shuffled, stored, own, scale, c, supposed=supposed, noisy=noisy)
         cells, factor, _ = answers.of(part, weights, own, ask)
@@ -67,17 +75,6 @@ def other_readings(
             same = abs(factor / c - 1) < max(SAME_SCALE, agree)
             others.append(Alternative.of(own, cells, same_scale=same))
     return others
-
-
-def _hangs_on_a_vertex(part: Numbering) -> bool:
-    """Whether the graph falls apart into two without one of its vertices; at hubs of many parts rules do."""
-    n = len(part.vertices)
-    for vertex in range(n):
-        i, j = part.edges[(part.edges != vertex).all(axis=1)].T
-        graph = sp.coo_array((np.ones(len(i)), (i, j)), shape=(n, n))
-        if csgraph.connected_components(graph, directed=False, return_labels=False) == 3:  # with the vertex itself
-            return True
-    return False
 
 
 def _may_hide(stored: OperatorMatrix, agree: float) -> bool:
@@ -104,7 +101,7 @@ def hidden(stored: OperatorMatrix, mesh: OrientedMesh, agree: float) -> bool:
     )
 
 
-def _distinct_vertices(stored: OperatorMatrix, parts: list[Numbering]) -> int:
+def distinct_vertices(stored: OperatorMatrix, parts: list[Numbering]) -> int:
     """How many vertices components have that are not alike, told by the numbers of their vertices and by their sums.
 
     What is found out about one holds for all that are alike: with fewer orders for each they would all share its luck.
@@ -118,11 +115,10 @@ def _distinct_vertices(stored: OperatorMatrix, parts: list[Numbering]) -> int:
 
 
 def with_vanished_sides(stored: OperatorMatrix, mesh: OrientedMesh) -> NDArray[np.bool_]:
-    """(n,) rows of triangles with a side that has no entry."""
+    """(n,) rows of triangles with a side that has no entry; inside it would make a polygon of two."""
     rows = np.zeros(stored.n, dtype=bool)
-    for k in range(3):
-        one, two = mesh.triangles[:, k], mesh.triangles[:, (k + 1) % 3]
-        rows[mesh.triangles[~joined(stored.n, stored.edges, one, two)]] = True
+    side, facing = vanished_sides(stored.n, stored.edges, mesh)
+    rows[mesh.boundary[side]] = rows[facing] = True
     return rows
 
 
@@ -140,7 +136,7 @@ def _other_reading(
 
     Among all starts if vanished sides have been `supposed` in these cells, as they are not where something fits without
     them; else, or where no start fits, by the search. Once also what differs little from what is found, where that may
-    make little difference.
+    make little difference; and in very small components all sets of candidates.
     """
     for number, part in enumerate(orders):
         errors = None if stored.errors is None else stored.errors[part.edge_rows]
@@ -149,8 +145,10 @@ def _other_reading(
         if not found and (reading := read_cells(*graph, quick=True)) is not None and reading.fits:
             found = [reading]
         near = [beside(one) for one in found if isinstance(one.candidates, Candidates) and (supposed or noisy)]
-        for reading in chain(found, *near if number == 0 else ()):
-            if (cells := cells_of(reading, part)) != own:
+        few = supposed and not noisy and len(part.vertices) <= _FEW
+        every = enumerated(*graph[:3], c) if few else iter(())
+        for reading in chain(found, *near if number == 0 else (), every):
+            if (cells := cells_of(reading, part)) != own and not cracked(reading):
                 return cells, next(solved.scale for solved in reading.meshes if solved), False
     return None, c, False
 

@@ -67,34 +67,48 @@ def _moved(h: int, here: _Place, taken: set[Pair], z: NDArray, c: float, agree: 
     free = [pair for pair in here.openings if pair not in taken]
     weights = [w / c for w in here.weights]
     pulled = sum(w * complex(z[v]) for w, v in zip(weights, here.ends, strict=True))
+    opened = sum(complex(z[after]) - complex(z[before]) for before, after in here.openings)
+    given = _entries(here.cells, h, complex(z[h]), z)
     for cell in here.cells:
         if not _is_right_angled(cell, z, agree):
             continue
+        left, right = complex(z[cell[-1]]), complex(z[cell[1]])
+        kept = [old for old in here.cells if old != cell]
         for p, q in free:
             if (q, p) == (cell[1], cell[-1]):  # the same cell from behind
                 continue
             # (L z)_h = -i / 2 times what the boundary leaves open about h.
-            openings = [pair for pair in here.openings if pair != (p, q)] + [(cell[1], cell[-1])]
-            opened = sum(complex(z[after]) - complex(z[before]) for before, after in openings)
-            place = (pulled - 0.5j * opened) / sum(weights)
-            one, other = complex(z[p]) - place, complex(z[q]) - place
+            before, after = complex(z[p]), complex(z[q])
+            place = (pulled - 0.5j * (opened - (after - before) + left - right)) / sum(weights)
+            one, other = before - place, after - place
             if abs((one.conjugate() * other).real) > max(_NEARLY_RIGHT, agree) * abs(one) * abs(other):
                 continue
-            if (cell[-1], cell[1]) in taken and _is_between(place, complex(z[cell[1]]), complex(z[cell[-1]])):
+            if (cell[-1], cell[1]) in taken and _is_between(place, right, left):
                 continue  # on a side of the cell beyond: no mesh
             new = [(h, p, q), *([cell[1:]] if len(cell) > 3 else [])]
-            if _alike(here.cells, [*(old for old in here.cells if old != cell), *new], h, place, z, agree):
+            if _keeps(kept, new, given, h, place, z, agree):
                 yield Alternative((), (), (), (tuple(sorted(cell)),), tuple(sorted(tuple(sorted(n)) for n in new)))
 
 
-def _alike(cells: list[Cell], others: list[Cell], h: int, place: complex, z: NDArray, agree: float) -> bool:
-    """Whether cells, and others with h in another place, give the same to all edges."""
-    before, after = _entries(cells, h, complex(z[h]), z), _entries(others, h, place, z)
-    if not (before and after):
+def _keeps(
+    kept: list[Cell], new: list[Cell], given: dict[Pair, float], h: int, place: complex, z: NDArray, agree: float
+) -> bool:
+    """Whether all edges have what was `given` to them, with h in another place and new cells there.
+
+    What faces h no other cell at h has a share in: mostly the first of these sides says that it is none.
+    """
+    size = max(map(abs, given.values()), default=0.0)
+    for cell in kept:
+        for one, other in pairwise(cell[1:]):
+            u, w = complex(z[one]) - place, complex(z[other]) - place
+            twice = (u.conjugate() * w).imag
+            facing = (u.conjugate() * w).real / (2 * twice) if twice else np.inf
+            if not abs(given.get((min(one, other), max(one, other)), 0.0) - facing) <= agree * size:
+                return False
+    after = _entries([*kept, *new], h, place, z)
+    if not (given and after):
         return False
-    size = max(map(abs, before.values()))
-    sides = before.keys() | after.keys()
-    return all(abs(before.get(side, 0.0) - after.get(side, 0.0)) <= agree * size for side in sides)
+    return all(abs(given.get(side, 0.0) - after.get(side, 0.0)) <= agree * size for side in given.keys() | after.keys())
 
 
 def _is_between(place: complex, one: complex, other: complex) -> bool:
@@ -139,10 +153,8 @@ def _places(stored: OperatorMatrix, mesh: OrientedMesh, agree: float) -> dict[in
 def _borders_a_cell(mesh: OrientedMesh, ways: NDArray) -> NDArray[np.bool_]:
     """Whether there is a cell on the left of each way (k, 2) from a vertex to another."""
     n, polygons = len(mesh.z), mesh.polygons
-    following = np.arange(1, len(polygons.vertices) + 1)
-    following[polygons.offsets[1:] - 1] = polygons.offsets[:-1]
     tail = np.concatenate([mesh.triangles.ravel(), polygons.vertices])
-    head = np.concatenate([np.roll(mesh.triangles, -1, axis=1).ravel(), polygons.vertices[following]])
+    head = np.concatenate([np.roll(mesh.triangles, -1, axis=1).ravel(), polygons.following])
     begun = np.zeros(n, dtype=bool)
     begun[ways[:, 0]] = True
     sides = begun[tail]

@@ -14,6 +14,10 @@ from numpy.typing import NDArray
 
 from ...topology.faces import FaceComplex
 
+FULL = 1.3 * np.pi
+"""Angle sum below which a face may be a cell."""
+
+_LARGEST, _GAP, _MANY = 3 * np.pi, 0.2 * np.pi, 50  # or below a gap so wide, if so many lie below that
 _SAMPLE = 2000
 _SHORT = 4
 
@@ -26,6 +30,17 @@ def facing_angles(cotangents: NDArray) -> NDArray[np.float64]:
 def face_sums(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]:
     """(faces,) sum of the angles of half-edges around each face, about pi for a cell."""
     return np.asarray(np.bincount(complex_.face, angles), dtype=np.float64)
+
+
+def largest_sum(sums: NDArray[np.float64]) -> float:
+    """Where angle sums of cells end and those of holes begin, if there is a clear gap above those of many cells."""
+    sums = np.sort(sums[sums < _LARGEST])
+    gap = np.diff(sums, append=_LARGEST)
+    gap[: _MANY - 1] = 0
+    widest = int(np.argmax(gap)) if len(gap) >= _MANY else -1
+    if widest < 0 or gap[widest] < _GAP or sums[widest] < FULL:
+        return FULL
+    return float(sums[widest] + gap[widest] / 2)
 
 
 def vertex_excess(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...topology import Polygons
 from ...topology.faces import FaceComplex, joined
-from .angles import face_sums, facing_angles, likeliest_scale, overall_scale, vertex_excess
+from .angles import FULL, face_sums, facing_angles, largest_sum, likeliest_scale, overall_scale, vertex_excess
 from .cell_set import CellSet
 from .crossed_faces import CrossedFaces
 from .crosses import Crosses
@@ -23,7 +23,6 @@ from .turning import Turns
 FEW = 100
 """Vertices below which all is tried before the entries are blamed."""
 _SHORT = 4  # faces of so many edges are cells unless the numbers say otherwise
-_FULL = 1.3 * np.pi  # angle sum below which a face may be a cell
 _TURNED = 0.01  # belief that a corner loses by not being as drawn
 _LEFT_OUT = 0.05  # squared excess of an angle sum, in units of pi, above which a short face may be left out
 _APART = 0.2  # difference of logarithms of two likely c that is worth trying both
@@ -112,7 +111,7 @@ class Candidates(CellSet):
         outside |= wide & (blocks.size == _SHORT)
         corners = OpenCorners.of(whole, outside[blocks.face], long if wide else None)
         about = vertex_excess(blocks, angles)
-        halves = HalfCircles.of(whole, outside[blocks.face], corners, relative, about, wide=wide)
+        halves = HalfCircles.of(whole, outside[blocks.face], corners, relative, angles, about, wide=wide)
         crossed = CrossedFaces.of(blocks) if wide else CrossedFaces.none()
         crossed_sums = np.bincount(crossed.sides[:, 0], angles[crossed.sides[:, 1]], len(crossed))
         size = np.r_[blocks.size[faces], np.full(len(corners), 3), halves.size, crossed.size]
@@ -175,9 +174,16 @@ class Candidates(CellSet):
     def widened(self, labels: NDArray[np.bool_], guess: float | None = None) -> tuple[Candidates, NDArray[np.bool_]]:
         """More candidates in the same drawing, for a likelier c, and the labels of what there was before."""
         wide = Candidates.of(self.drawing, self.weights, self.scale, self.crosses, guess, self.errors, wide=True)
-        number = {name: k for k, name in enumerate(self.names)}
-        same = np.array([number.get(name, -1) for name in wide.names])
+        same = self.numbers_of(wide)
         return wide, (same >= 0) & labels[same]
+
+    def numbers_of(self, others: Candidates) -> NDArray[np.int64]:
+        """(cells,) number here of each of the others; -1 of those that are none here."""
+        return np.array([self._number.get(name, -1) for name in others.names], dtype=np.int64)
+
+    @cached_property
+    def _number(self) -> dict[tuple[tuple[int, ...], int], int]:
+        return {name: k for k, name in enumerate(self.names)}
 
     @cached_property
     def names(self) -> list[tuple[tuple[int, ...], int]]:
@@ -226,9 +232,11 @@ class Candidates(CellSet):
 
     def starts(self) -> Iterator[NDArray[np.bool_]]:
         """Readings to begin with, the likeliest first."""
-        by_angles = ~self.corner & ~self.half & ~self.crossed & (self.belief > 2 - _FULL / np.pi) & (self.size > 3)
+        long = ~self.corner & ~self.half & ~self.crossed & ~self.outer & (self.size > 3)
+        sums = (2 - self.belief) * np.pi  # those of holes are larger than pi
+        by_angles = long & (sums < largest_sum(sums[long]))
         corners = [self.corner & (self.belief > 0.5 + excess / np.pi) for excess in _INNER]
-        faces = (self.first, (self.first & (self.size == 3)) | (by_angles & ~self.outer))
+        faces = (self.first, (self.first & (self.size == 3)) | by_angles)
         none = np.zeros_like(self.corner)
         corners += [chosen & ~self.strip for chosen in (*corners, self.corner & (self.belief == 1.0))]
         corners += [chosen | self.half for chosen in (*corners, none)] if self.half.any() else []
@@ -255,7 +263,7 @@ class Candidates(CellSet):
             if least and not used.reshape(-1, 2).any(axis=1).all():
                 break
             angle = facing_angles(self.relative[half >> 1] * np.where(used[half ^ 1], 1, 2))
-            chosen = longer & ((self.size == 3) | (np.bincount(cell, angle, self.count) < _FULL))
+            chosen = longer & ((self.size == 3) | (np.bincount(cell, angle, self.count) < FULL))
             yield self.covering(self.compatible(np.where(chosen, 1.0, -np.inf)), self.belief)
 
     def strain(self, labels: NDArray[np.bool_]) -> float:

@@ -40,6 +40,7 @@ class HalfCircles(Outlines):
         outside: NDArray[np.bool_],
         corners: OpenCorners,
         cotangents: NDArray,
+        angles: NDArray,
         excess: NDArray,
         *,
         wide: bool = False,
@@ -60,16 +61,17 @@ class HalfCircles(Outlines):
             Those of the drawing.
         cotangents : (e,) float64
             Weights in units of c.
+        angles : (2 e,) float64
+            Facing each half-edge, weights being shared equally.
         excess : (n,) float64
-            Of the angles about each vertex over 2 pi, weights being shared equally.
+            Of these angles about each vertex over 2 pi.
         wide : bool
             Whether parts of the drawing may be turned over, the excess may be twice as much, and paths along bare edges
             need not look surrounded: inner vertices may be on another boundary or be passed twice.
         """
         inner = (-np.inf, 2 * _INNER) if wide else (-_INNER, _INNER)
         bare = outside & outside[np.arange(len(outside)) ^ 1]
-        own = np.where(bare, facing_angles(2 * np.repeat(cotangents, 2)), 0.0)
-        shared = facing_angles(np.repeat(cotangents, 2))
+        own = np.where(bare, np.repeat(facing_angles(2 * cotangents), 2), 0.0)
         steps = _Paths.of_corners(corners)
         paths = steps = steps if wide else steps.chosen(~steps.turned)
         found = []
@@ -77,7 +79,7 @@ class HalfCircles(Outlines):
             paths = paths.longer(whole, steps)
             about = excess[paths.vertices[:, 1:-1]]
             room = (about < inner[1]).all(axis=1) & (own[paths.half].sum(axis=1) < _FULL)
-            surrounded = (about > inner[0]).all(axis=1) & (shared[paths.half].sum(axis=1) < _FULL)
+            surrounded = (about > inner[0]).all(axis=1) & (angles[paths.half].sum(axis=1) < _FULL)
             paths = paths.chosen(room if wide else room & surrounded)
             possible = paths.run_along(whole)
             if wide:

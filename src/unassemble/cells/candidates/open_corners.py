@@ -68,8 +68,8 @@ class OpenCorners:
         crossed = [_Wedges.of(whole, *pair.T) for pair in (arriving, leaving)]
         possible = np.column_stack([wedges.open for wedges in crossed])
         others = np.empty((0, 2), np.int64) if between is None else _between_fans(whole, between)
-        apart = _Wedges.of(whole, *others.T).chosen()
-        wedges = _Wedges.concatenated([_Wedges.concatenated([drawn, *crossed]).chosen(), apart])
+        apart = _Wedges.of(whole, *others.T)
+        wedges = _Wedges.concatenated([drawn, *crossed, apart]).chosen()
         rank = np.empty(len(whole.order), dtype=np.int64)
         rank[whole.order] = np.arange(len(rank))
         turned = np.arange(len(wedges.apex)) >= len(half)
@@ -79,7 +79,7 @@ class OpenCorners:
             vertices=np.column_stack([wedges.far[:, 0], wedges.apex, wedges.far[:, 1]]),
             ends=wedges.ends,
             sides=_sides(whole, wedges, outside, turned),
-            in_strip=np.r_[_in_strips(whole, half), np.zeros(int(possible.sum()) + len(apart.apex), dtype=bool)],
+            in_strip=np.r_[_in_strips(whole, half), np.zeros(int(turned.sum()), dtype=bool)],
             turned=turned,
             turns=Turns(
                 drawn=number[arriving],

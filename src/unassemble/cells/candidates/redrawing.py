@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from ...topology.redrawing import redrawn
 from .candidates import Candidates
 
-_Name = tuple[tuple[int, ...], int]
-
 
 @dataclass(frozen=True, eq=False)
 class Redrawing:
@@ -40,10 +38,9 @@ class Redrawing:
     parts: list[tuple[int, list[int]]]
 
     @classmethod
-    def of(cls, old: Candidates, number: dict[_Name, int], new: Candidates, cycle: NDArray) -> Redrawing:
-        """Candidates in a new drawing, and the `number` of each name in the old one."""
-        names = new.names
-        same = np.array([number.get(name, -1) for name in names])
+    def of(cls, old: Candidates, new: Candidates, cycle: NDArray) -> Redrawing:
+        """Candidates in a new drawing, and the number that each had in the old one."""
+        names, same = new.names, old.numbers_of(new)
         place = {name: k for k, name in enumerate(names)}
         parts = []
         for quad in np.flatnonzero(old.chorded).tolist():
@@ -72,7 +69,5 @@ def redrawings(candidates: Candidates, first: NDArray) -> Iterator[Redrawing]:
     first : (n,) float64
         Cycles at vertices of high value are taken first.
     """
-    number = {name: k for k, name in enumerate(candidates.names)}
     for cycle, drawing in redrawn(candidates.drawing, first):
-        others = candidates.drawn(drawing)
-        yield Redrawing.of(candidates, number, others, cycle)
+        yield Redrawing.of(candidates, candidates.drawn(drawing), cycle)

@@ -42,11 +42,10 @@ def with_a_part_turned_over(
 
     Cells that there are no more leave edges bare, which others take up. `guess` is a c to judge angles by.
     """
-    number = {name: k for k, name in enumerate(candidates.names)}
     drawing = candidates.drawing.split()
     for turn in islice(turns(drawing), _MOST_TURNS):
         other = candidates.drawn(turned_over(drawing, turn), guess)
-        same = np.array([number.get(name, -1) for name in other.names])
+        same = candidates.numbers_of(other)
         kept = other.compatible(np.where((same >= 0) & labels[same], 1.0, -np.inf))
         yield other, other.covering(kept, other.belief)
 

@@ -21,8 +21,9 @@ from .effort import Effort
 from .evidence import label_changes
 from .exchange import whole
 from .leaps import clear_changes
+from .moves import turned
 from .sheet import Sheet
-from .updates import Updates, turned
+from .updates import Updates
 
 _log = logging.getLogger(__name__)
 
@@ -144,12 +145,12 @@ def beside(reading: Reading) -> Iterator[Reading]:
                 yield other
 
 
-def as_good(reading: Reading[Candidates], about: NDArray[np.bool_]) -> Iterator[Reading]:
+def as_good(reading: Reading[Candidates], about: NDArray[np.bool_], usual: NDArray[np.bool_]) -> Iterator[Reading]:
     """Readings that fit as well as one that does, with the same c, and differ by one label or two that touch.
 
-    One of them is among those, (cells,) bool, that this is `about`.
+    One of them is among those, (cells,) bool, that this is `about`, the other among the `usual` ones.
     """
-    for move in Updates(Sheet(reading.candidates, reading.scale)).as_good(reading, about):
+    for move in Updates(Sheet(reading.candidates, reading.scale)).as_good(reading, about, usual):
         other = Reading.of(reading.candidates, turned(reading.labels, move))
         if other.fits:
             yield other

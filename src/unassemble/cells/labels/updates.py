@@ -22,19 +22,9 @@ from ...errors import RecoveryError
 from ...linalg import factorisation
 from ...matrix.operator import row_sizes
 from ..reading import Reading
+from .moves import Move, turned
 from .neighbourhood import Neighbourhoods, adjacent_to
 from .sheet import STEEPEST, Sheet
-
-Move = tuple[int, ...]
-"""Candidates whose labels are turned over together."""
-
-
-def turned(labels: NDArray[np.bool_], move: Move) -> NDArray[np.bool_]:
-    """The labels (cells,) after a move."""
-    after = labels.copy()
-    after[list(move)] ^= True
-    return after
-
 
 _WORK = 3e5  # vertices times moves that are tried at a time, as much as some tens of solves take
 _BATCH = 5e4  # triangles times moves that are computed together
@@ -44,6 +34,7 @@ _LEADERS = 60  # moves that are tried together with what they touch
 _AT_FIRST = 8  # moves that are given before those of three labels are told
 _NEAREST = 1e-6  # the same where the c is that of the mesh: maps that fit are told to about so much over their gap
 _FAINT = 1e-4  # mean misfit that they may leave then; some that do not fit leave 1e-5, and are to be solved for
+_FEW_EDGES = 24
 _STEEP = 5.0  # weights over row sizes beyond which they are those of flat triangles
 _GROSS = 0.5  # misfit above which an entry has no say in c
 
@@ -107,10 +98,11 @@ class Updates:
                     given.add(move)
                     yield move
 
-    def as_good(self, reading: Reading, about: NDArray[np.bool_]) -> Iterator[Move]:
+    def as_good(self, reading: Reading, about: NDArray[np.bool_], usual: NDArray[np.bool_]) -> Iterator[Move]:
         """Moves after which a reading that fits seems to fit with the same c, those to the same surface left out.
 
-        Single labels and pairs that touch; one of each is among those, (cells,) bool, that this is `about`.
+        Single labels and pairs that touch; one of each is among those, (cells,) bool, that this is `about`, the other
+        of pairs among the `usual` ones.
         """
         labels = reading.labels
         try:
@@ -124,8 +116,8 @@ class Updates:
         if not moves:
             return
         alone = self._alone(moves, left)
-        more = self._joined(labels, dict(zip(moves, left.tolist(), strict=True)), alone, set(moves))
-        moves, left = moves + more, np.append(left, self._left(factorised, labels, more))
+        more = self._joined(labels, dict(zip(moves, left.tolist(), strict=True)), alone, set(moves), usual)
+        moves, left = moves + more, np.append(left, self._left(factorised, labels, more, _FAINT))
         seen = {self.outline(labels)}
         for k in np.argsort(left, kind="stable").tolist():
             if not left[k] <= _FAINT:
@@ -151,11 +143,19 @@ class Updates:
         return alone
 
     def _joined(
-        self, labels: NDArray[np.bool_], leaders: dict[Move, float], alone: NDArray, told: set[Move]
+        self,
+        labels: NDArray[np.bool_],
+        leaders: dict[Move, float],
+        alone: NDArray,
+        told: set[Move],
+        others: NDArray[np.bool_] | None = None,
     ) -> list[Move]:
-        """Leaders with another candidate that touches them, by what both leave alone: the most promising first."""
+        """Leaders with another candidate that touches them, by what both leave alone: the most promising first.
+
+        Only with these `others`, (cells,) bool, if they are given.
+        """
         promise: dict[Move, float] = {}
-        free, value = self._free.tolist(), alone.tolist()
+        free, value = (self._free if others is None else self._free & others).tolist(), alone.tolist()
         for move, left in leaders.items():
             after = turned(labels, move).tolist()
             for other in adjacent_to(self._near.touching, np.array(move)).tolist():
@@ -165,24 +165,46 @@ class Updates:
         new = promise.keys() - told - {()}
         return sorted(new, key=lambda both: (promise[both], both))
 
-    def _left(self, factorised: _Factorised, labels: NDArray[np.bool_], moves: list[Move]) -> NDArray[np.float64]:
-        """(moves,) mean misfit after each; infinite where there is no map."""
+    def _left(
+        self, factorised: _Factorised, labels: NDArray[np.bool_], moves: list[Move], most: float = np.inf
+    ) -> NDArray[np.float64]:
+        """(moves,) mean misfit after each; infinite where there is no map, or where it is seen to be above `most`."""
         triangles = max(int(np.count_nonzero(labels[self._sheet.cell])), 1)
         batch = max(int(_BATCH / triangles), 1)
         parts = [moves[k : k + batch] for k in range(0, len(moves), batch)]
-        return np.concatenate([np.empty(0), *(self._left_of_few(factorised, labels, part) for part in parts)])
+        return np.concatenate([np.empty(0), *(self._left_of_few(factorised, labels, part, most) for part in parts)])
 
-    def _left_of_few(self, factorised: _Factorised, labels: NDArray[np.bool_], moves: list[Move]) -> NDArray:
+    def _left_of_few(
+        self, factorised: _Factorised, labels: NDArray[np.bool_], moves: list[Move], most: float
+    ) -> NDArray[np.float64]:
         sheet, count = self._sheet, len(moves)
         z = factorised.maps(labels, moves)
-        turned = np.tile(labels[:, None], count)
-        turned[np.concatenate(moves), np.repeat(np.arange(count), [len(move) for move in moves])] ^= True
-        cells = np.flatnonzero(np.any(turned, axis=1)[sheet.cell])
-        cotangent = _cotangents(z, sheet.triangles[cells]) * turned[sheet.cell[cells]]
-        w = self._of_edge[:, (cells + len(sheet.cell) * np.arange(3)[:, None]).ravel()] @ cotangent.reshape(-1, count)
-        misfit = np.abs(self._scales(w) * w - self._weights[:, None])
-        left = np.where(misfit < 1, misfit, 1.0).mean(axis=0)
-        return np.asarray(np.where(np.isfinite(z).all(axis=0), left, np.inf))
+        after = np.tile(labels[:, None], count)
+        after[np.concatenate(moves), np.repeat(np.arange(count), [len(move) for move in moves])] ^= True
+        left = np.full(count, np.inf)
+        hopeful = np.all(np.isfinite(z), axis=0)
+        if most < np.inf:  # few edges tell of nearly all that they leave more
+            edges = np.arange(0, len(self._weights), -(-len(self._weights) // _FEW_EDGES))
+            few = np.any(np.isin(sheet.row, edges), axis=1)
+            w = self._fitted(z[:, hopeful], after[:, hopeful], few)[edges]
+            hopeful[hopeful] = _misfits(w, self._weights[edges]).sum(axis=0) <= most * len(self._weights)
+        w = self._fitted(z[:, hopeful], after[:, hopeful])
+        left[hopeful] = _misfits(self._scales(w) * w, self._weights).mean(axis=0)
+        return left
+
+    def _fitted(
+        self, z: NDArray[np.complex128], labels: NDArray[np.bool_], among: NDArray[np.bool_] | None = None
+    ) -> NDArray[np.float64]:
+        """(e, k) half the cotangents over row sizes, for positions (n, k) and labels (cells, k).
+
+        Only from triangles `among` these, (m,) bool, if they are given.
+        """
+        sheet = self._sheet
+        used = np.any(labels, axis=1)[sheet.cell]
+        triangles = np.flatnonzero(used if among is None else used & among)
+        cotangent = _cotangents(z, sheet.triangles[triangles]) * labels[sheet.cell[triangles]]
+        columns = (triangles + len(sheet.cell) * np.arange(3)[:, None]).ravel()
+        return np.asarray(self._of_edge[:, columns] @ cotangent.reshape(len(columns), z.shape[1]))
 
     def _scales(self, w: NDArray) -> NDArray[np.float64]:
         """(k,) c for each column of weights over their row sizes, from those that it brings near the given ones."""
@@ -193,6 +215,12 @@ class Updates:
             c = (self._weights @ used) / np.maximum((used * used).sum(axis=0), np.finfo(float).tiny)
             used = np.where(np.abs(c * w - self._weights[:, None]) < _GROSS, w, 0.0)
         return np.asarray(c)
+
+
+def _misfits(w: NDArray, weights: NDArray) -> NDArray[np.float64]:
+    """(e, k) by which each column differs from the weights, at most 1."""
+    misfit = np.abs(w - weights[:, None])
+    return np.asarray(np.where(misfit < 1, misfit, 1.0))
 
 
 def _cotangents(z: NDArray, triangles: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -1,0 +1,76 @@
+"""Small parts that hang on a mesh by a vertex and can be read in another way, whatever the size of the rest."""
+
+import time
+
+import numpy as np
+import pytest
+
+from families import FAMILIES
+from meshes import random_mesh, specimen
+from unassemble import recover
+from unassemble.cells.alternatives.hanging import small_parts
+from unassemble.topology import Numbering, components
+from vanishing import Mesh, forgotten
+
+
+def stairs() -> Mesh:
+    """Of 120 vertices, 16 of which are those of a chain that hangs on one of the others."""
+    rng = np.random.default_rng(11)
+    rng.choice(3)  # as for the member with this number
+    return FAMILIES["stairs"](rng)
+
+
+@pytest.mark.parametrize("c", [1.0, -2.5])
+@pytest.mark.parametrize("order", range(4))
+def test_a_chain_of_right_angles_in_another_order(order, c):
+    """Five right triangles or three: what hangs on the chain has another shape, whichever is found first."""
+    found = recover(forgotten(specimen(*stairs(), c=c, seed=order)).matrix)
+    assert found.backward_error <= 1e-12
+    assert found.alternatives
+    assert all(other.tested for other in found.alternatives)
+
+
+@pytest.mark.parametrize("c", [1.0, -3.0])
+def test_a_chain_on_a_large_mesh(c):
+    """The same, beside 800 vertices more, which hang on the far side of the mesh."""
+    points, triangles = stairs()
+    more, others = random_mesh(800, 1, holes=False)
+    left, right = int(points[:, 0].argmin()), int(more[:, 0].argmax())
+    number = np.arange(len(more)) + len(points)
+    number[right] = left
+    number[right + 1 :] -= 1
+    joined = np.concatenate([points, np.delete(more - more[right] + points[left], right, axis=0)])
+    known = forgotten(specimen(joined, np.concatenate([triangles, number[others]]), c=c, seed=5))
+    found = recover(known.matrix)
+    assert found.backward_error <= 1e-12
+    assert found.alternatives
+    assert all(other.tested for other in found.alternatives)
+
+
+def test_long_chains_are_cut_in_two_ways():
+    """Each edge of a path, and of a comb, lies in a part of at most 60 vertices."""
+    n = 500
+    path = np.column_stack([np.arange(n - 1), np.arange(1, n)])
+    comb = np.concatenate([path, np.column_stack([np.arange(n), n + np.arange(n)])])
+    comb = comb[np.lexsort(comb.T[::-1])]
+    for size, edges in ((n, path), (2 * n, comb)):
+        labels = small_parts(Numbering(np.arange(size), np.arange(len(edges)), edges))
+        assert (labels >= 0).any(axis=0).all()
+        for label in labels:
+            for part in set(label[label >= 0].tolist()):
+                rows = np.unique(edges[label == part])
+                assert len(rows) <= 60
+                assert len(components(size, edges[label == part])) == 1
+
+
+def test_long_paths_are_cut_in_linear_time():
+    """A path of 100,000 vertices: twice as long takes about twice the time, which four times would not be."""
+
+    def seconds(n: int) -> float:
+        path = np.column_stack([np.arange(n - 1), np.arange(1, n)])
+        start = time.process_time()
+        labels = small_parts(Numbering(np.arange(n), np.arange(n - 1), path))
+        assert (labels >= 0).any(axis=0).all()
+        return time.process_time() - start
+
+    assert seconds(100_000) < 16 * max(seconds(12_500), 0.01)
