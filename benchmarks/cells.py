@@ -1,10 +1,12 @@
 """How often cells are told from holes on random meshes, and how long matrices of no mesh keep the search busy.
 
-    python benchmarks/cells.py [--families pierced,crossed,...] [--seeds 60] [--first 0] [--hopeless] [--known-scale]
+    python benchmarks/cells.py [--families pierced,crossed,...] [--seeds 60] [--first 0] [--orders 1] [--rows 10000]
+                               [--hopeless] [--known-scale]
 
-The meshes are those of tests/families.py, assembled by scikit-fem, vanishing entries dropped, rows in random order. An
-answer counts as right if every edge-connected piece of the mesh comes back to 1e-9 of its diameter; certified answers
-that are not right are listed as WRONG. Ambiguous ones name cells that others can take the place of.
+The meshes are those of tests/families.py, assembled by scikit-fem, vanishing entries dropped, rows in random order, or
+in several. An answer counts as right if every edge-connected piece of the mesh comes back to 1e-9 of its diameter, and
+with the same cells; certified answers that are not right are listed as WRONG. Ambiguous ones name cells that others can
+take the place of.
 """
 
 from __future__ import annotations
@@ -13,7 +15,9 @@ import argparse
 import sys
 import time
 from collections import defaultdict
+from collections.abc import Iterable
 from contextlib import suppress
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +37,8 @@ def main() -> None:
     parser.add_argument("--families", default=",".join(FAMILIES))
     parser.add_argument("--seeds", type=int, default=60)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--orders", type=int, default=1, help="of the rows of each mesh, with other factors c")
+    parser.add_argument("--rows", type=int, default=10_000, help="leave out larger meshes")
     parser.add_argument("--hopeless", action="store_true", help="only matrices of no mesh")
     parser.add_argument("--known-scale", action="store_true", help="tell the scale")
     arguments = parser.parse_args()
@@ -42,27 +48,27 @@ def main() -> None:
             print_hopeless(name, seeds)
         return
     for name in arguments.families.split(","):
-        print_family(name, seeds, known_scale=arguments.known_scale)
+        print_family(name, seeds, range(arguments.orders), arguments.rows, known_scale=arguments.known_scale)
 
 
-def print_family(name: str, seeds: range, *, known_scale: bool) -> None:
-    """Outcomes and times on one family."""
-    outcomes: dict[str, list[int]] = defaultdict(list)
-    seconds, rows = [], []
-    for seed in seeds:
-        known, c = member(name, seed)
+def print_family(name: str, seeds: range, orders: range, most: int, *, known_scale: bool) -> None:
+    """Outcomes and times on one family; seed 7 in its third order is called 7/2."""
+    outcomes: dict[str, list[str]] = defaultdict(list)
+    slowest, seconds = "none", [0.0]
+    for seed, order in product(seeds, orders):
+        known, c = member(name, seed, order)
+        if known.matrix.shape[0] > most:
+            continue
         start = time.perf_counter()
-        outcomes[outcome(known, c if known_scale else None)].append(seed)
+        case = f"{seed}/{order}" if order else f"{seed}"
+        outcomes[outcome(known, c if known_scale else None)].append(case)
         seconds.append(time.perf_counter() - start)
-        rows.append(known.matrix.shape[0])
+        if seconds[-1] == max(seconds):
+            slowest = f"{seconds[-1]:.1f} s (seed {case}, {known.matrix.shape[0]} rows)"
     counts = ", ".join(f"{key} {len(value)}" for key, value in sorted(outcomes.items()))
-    slow = int(np.argmax(seconds))
-    print(
-        f"{name}: {counts}; median {np.median(seconds):.2f} s, slowest {seconds[slow]:.1f} s "
-        f"(seed {seeds[slow]}, {rows[slow]} rows)"
-    )
+    print(f"{name}: {counts}; median {np.median(seconds[1:] or seconds):.2f} s, slowest {slowest}")
     for key in sorted(outcomes.keys() - {"certified"}):
-        print(f"    {key}: {' '.join(map(str, outcomes[key]))}")
+        print(f"    {key}: {' '.join(outcomes[key])}")
     sys.stdout.flush()
 
 
@@ -75,7 +81,26 @@ def outcome(known: Specimen, scale: float | None) -> str:
     if found.status == "uncertified":
         return "ambiguous" if found.alternatives else "uncertified"
     wrong = [rows for rows in pieces(known.triangles) if error(found.points[rows], known.points[rows]) > 1e-9]
-    return "WRONG" if wrong else "certified"
+    polygons = np.split(found.polygons_data, found.polygons_offsets[1:-1]) if found.n_polygons else []
+    if wrong or cells(found.triangles, polygons, known.matrix) != cells(known.triangles, [], known.matrix):
+        return "WRONG"
+    return "certified"
+
+
+def cells(triangles: np.ndarray, polygons: Iterable[np.ndarray], matrix: sp.csr_array) -> set[frozenset[int]]:
+    """Vertices of what is left where entries have vanished: cells that share such an edge are one."""
+    parts = [list(map(int, cell)) for cell in (*triangles, *polygons)]
+    across: dict[frozenset[int], list[int]] = defaultdict(list)
+    for k, cell in enumerate(parts):
+        for i, j in zip(cell, cell[1:] + cell[:1], strict=True):
+            if not matrix[i, j]:
+                across[frozenset((i, j))].append(k)
+    pairs = np.array([both for both in across.values() if len(both) == 2], dtype=int).reshape(-1, 2)
+    graph = sp.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(parts), len(parts)))
+    whole: dict[int, set[int]] = defaultdict(set)
+    for cell, label in zip(parts, sp.csgraph.connected_components(graph, directed=False)[1], strict=True):
+        whole[int(label)].update(cell)
+    return {frozenset(vertices) for vertices in whole.values()}
 
 
 def error(points: np.ndarray, true: np.ndarray) -> float:

@@ -168,11 +168,15 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Mesh]] = {
 }
 
 
-def member(family: str, seed: int) -> tuple[Specimen, float]:
-    """The matrix of one of them without its vanished entries, and its c."""
+def member(family: str, seed: int, order: int = 0) -> tuple[Specimen, float]:
+    """The matrix of one of them without its vanished entries, and its c; rows and c depend on `order` as well."""
     rng = np.random.default_rng(seed)
     c = float(rng.choice([1.0, -2.5, 1e-3]))
-    return forgotten(specimen(*FAMILIES[family](rng), c=c, seed=seed)), c
+    mesh = FAMILIES[family](rng)
+    if order:
+        other = np.random.default_rng([seed, order])
+        return forgotten(specimen(*mesh, c=(c := float(np.exp(other.normal()))), seed=int(other.integers(2**32)))), c
+    return forgotten(specimen(*mesh, c=c, seed=seed)), c
 
 
 def tree(n: int, seed: int = 0) -> sp.csr_array:
