@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,17 @@ ALIKE = 10.0**-_DIGITS
 """Relative difference of what is the same in components that are alike."""
 
 Cells = set[tuple[int, ...]]
+"""Cells as :func:`as_cell` writes them."""
+
 Found = tuple[Cells | None, float, bool]
 """Cells of a component, by rows; their c; and whether the search was left open."""
+
+
+def as_cell(corners: Sequence[int]) -> tuple[int, ...]:
+    """A cell by its corners in running order: the smallest first, then the smaller of its neighbours."""
+    place = min(range(len(corners)), key=corners.__getitem__)
+    cell = (*corners[place:], *corners[:place])
+    return cell if cell[1] < cell[-1] else (cell[0], *cell[:0:-1])
 
 
 class Answers:
@@ -56,4 +65,4 @@ class Answers:
 
 
 def _renamed(cells: Cells, number: dict[int, int]) -> Cells:
-    return {tuple(sorted(number[row] for row in cell)) for cell in cells}
+    return {as_cell([number[row] for row in cell]) for cell in cells}

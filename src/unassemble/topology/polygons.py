@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,12 @@ class Polygons:
     def of_triangles(cls, triangles: NDArray[np.int64]) -> Polygons:
         """Triangles (m, 3)."""
         return cls(3 * np.arange(len(triangles) + 1), triangles.ravel())
+
+    @classmethod
+    def of(cls, cycles: Sequence[Sequence[int]]) -> Polygons:
+        """Cycles one by one."""
+        offsets = np.append(0, np.cumsum([len(cycle) for cycle in cycles], dtype=np.int64))
+        return cls(offsets, np.array([v for cycle in cycles for v in cycle], dtype=np.int64))
 
     @classmethod
     def joined(cls, parts: list[Polygons]) -> Polygons:

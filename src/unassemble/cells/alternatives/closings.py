@@ -19,7 +19,7 @@ from ...matrix import OperatorMatrix
 from ...topology import Numbering, Piece, Topology
 from ...topology.faces import joined
 from ..agreement import SAME_SCALE
-from ..alike import Answers, Cells, Found
+from ..alike import Answers, Cells, Found, as_cell
 from ..beginning import fitting_starts
 from ..by_component import with_pieces
 from ..candidates.candidates import Candidates
@@ -107,7 +107,7 @@ def _closed(stored: OperatorMatrix, piece: Piece, reflex: NDArray[np.bool_], own
             continue
         fans = [(cell[0], *pair) for cell in some for pair in pairwise(cell[1:])]
         if fits_as_one(stored, np.concatenate([triangles, np.array(fans)]), tuple(apexes)):
-            return own | {tuple(sorted(cell)) for cell in some}, np.inf, False  # whatever c, it is another one
+            return own | set(map(as_cell, some)), np.inf, False  # whatever c, it is another one
     return None, 0.0, False
 
 

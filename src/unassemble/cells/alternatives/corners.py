@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...topology import Polygons
 from ...topology.faces import joined
 from ...topology.keys import contains
-from ..alike import Cells
+from ..alike import Cells, as_cell
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Alternative:
     found, other : tuple of int
         Rows about them, in the order of the mesh that was found and in that of the other.
     cells, other_cells : tuple of tuple of int
-        Cells that only the one or the other has.
+        Cells that only the one or the other has, corners in running order.
     same_scale : bool
         Whether both have the same factor c; otherwise a known c decides.
     tested : bool
@@ -56,8 +56,8 @@ class Alternative:
             around=named(self.around),
             found=named(self.found),
             other=named(self.other),
-            cells=tuple(named(cell) for cell in self.cells),
-            other_cells=tuple(named(cell) for cell in self.other_cells),
+            cells=tuple(as_cell(named(cell)) for cell in self.cells),
+            other_cells=tuple(as_cell(named(cell)) for cell in self.other_cells),
         )
 
 

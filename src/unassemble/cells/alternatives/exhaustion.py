@@ -7,7 +7,7 @@ is, is that nothing else does, and in small graphs everything can be tried.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain, islice, pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,8 +95,7 @@ def all_readings(
         if solved > _MOST_READINGS:
             raise TooManyError
         cells = [choices.cells[k] for k in chosen]
-        vertices = Polygons(np.append(0, np.cumsum([len(cell) for cell in cells])), np.array(list(chain(*cells))))
-        some = CellSet(n, part.edges, weights, None, vertices, np.zeros(len(cells), dtype=bool))
+        some = CellSet(n, part.edges, weights, None, Polygons.of(cells), np.zeros(len(cells), dtype=bool))
         reading = Reading.of(some, np.ones(len(cells), dtype=bool), known)
         if reading.nearly_fits(agree) and lies_flat(reading):
             yield cells_of(reading, part), next(mesh.scale for mesh in reading.meshes if mesh)

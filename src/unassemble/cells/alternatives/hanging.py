@@ -9,7 +9,7 @@ another one, of more triangles or fewer.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
@@ -23,6 +23,7 @@ from ...topology import Numbering, Polygons, components
 from ...topology.adjacency import adjacency
 from ...topology.blocks import blocks
 from ...topology.keys import contains, distinct, pair_keys, with_sides
+from ..alike import as_cell
 from ..candidates.cell_set import CellSet
 from ..reading import Reading
 from .corners import Alternative, OrientedMesh
@@ -203,23 +204,19 @@ def _all_cells(mesh: OrientedMesh) -> Polygons:
 def _with_the_rest(
     stored: OperatorMatrix, mesh: OrientedMesh, factors: NDArray, other: Alternative, part: Numbering
 ) -> Alternative | None:
-    """Another reading somewhere in this component if it fits with the rest; untried if it has undivided cells."""
+    """Another reading somewhere in this component if it fits with the rest."""
     number = np.full(stored.n, -1)
     number[part.vertices] = np.arange(len(part.vertices))
     if number[other.cells[0][0]] < 0:
         return None
-    if any(len(new) > 3 for new in other.other_cells):
-        return replace(other, tested=False)
     cells = _all_cells(mesh.chosen(number >= 0, number))
-    gone = {tuple(sorted(number[list(old)].tolist())) for old in other.cells}
-    touched = np.isin(cells.vertices, [v for old in gone for v in old])
+    inside = other.renumbered(number)
     owner = np.repeat(np.arange(cells.count), cells.size)
-    whole = np.flatnonzero(np.bincount(owner[touched], minlength=cells.count) == cells.size)
+    touched = np.isin(cells.vertices, [v for old in inside.cells for v in old])
     kept = np.ones(cells.count, dtype=bool)
-    for k in whole.tolist():
-        kept[k] = tuple(sorted(cells.vertices[cells.offsets[k] : cells.offsets[k + 1]].tolist())) not in gone
-    new = number[np.array(other.other_cells, dtype=np.int64).reshape(-1, 3)]
-    every = Polygons.joined([cells.chosen(kept, np.arange(len(part.vertices))), Polygons.of_triangles(new)])
+    for k in np.flatnonzero(np.bincount(owner[touched], minlength=cells.count) == cells.size).tolist():
+        kept[k] = as_cell(cells.vertices[cells.offsets[k] : cells.offsets[k + 1]].tolist()) not in inside.cells
+    every = Polygons.joined([cells.chosen(kept, np.arange(len(part.vertices))), Polygons.of(inside.other_cells)])
     weights, errors = -stored.entries[part.edge_rows], None if stored.errors is None else stored.errors[part.edge_rows]
     none = np.zeros(every.count, dtype=bool)
     c = float(factors[part.vertices[0]])

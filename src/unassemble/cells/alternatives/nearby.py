@@ -68,7 +68,7 @@ def _as_found(
     With what is a candidate in nearly any search, (cells,) bool; all that may be a cell would make very many pairs.
     """
     rows = {int(row): k for k, row in enumerate(part.vertices)}
-    cells = {tuple(sorted(rows[row] for row in cell)) for cell in own}
+    cells = {tuple(sorted(rows[row] for row in cell)) for cell in own}  # as candidates are named
     weights = -stored.entries[part.edge_rows]
     errors = None if stored.errors is None else stored.errors[part.edge_rows]
     for drawing in _drawings(part, z[part.vertices]):

@@ -20,6 +20,7 @@ from ...matrix import OperatorMatrix
 from ...planar.piece import PieceMesh
 from ...topology import Numbering, Polygons, components
 from ...topology.pieces import edge_connected
+from ..alike import as_cell
 from ..candidates.cell_set import CellSet
 from ..reading import FITS, Reading
 from .corners import Alternative, Corners, OrientedMesh, cell
@@ -153,22 +154,21 @@ def _of_pair(one: RightAngle, two: RightAngle, agree: float) -> Iterator[Alterna
 
 def _cells(mesh: OrientedMesh, number: NDArray[np.int64], other: Alternative) -> tuple[Polygons, NDArray[np.bool_]]:
     """All cells of a mesh with the difference made, and which of them are its new corners."""
-    gone = {tuple(sorted(number[list(old)].tolist())) for old in other.cells}
+    gone = {as_cell(number[list(old)].tolist()) for old in other.cells}
     outlines = np.split(mesh.polygons.vertices, mesh.polygons.offsets[1:-1]) if mesh.polygons.count else []
     own = mesh.triangles.tolist() + [outline.tolist() for outline in outlines]
-    cells = [old for old in own if tuple(sorted(old)) not in gone]
+    cells = [old for old in own if as_cell(old) not in gone]
     for row in other.around:
         h = int(number[row])
         for old in own:
-            if tuple(sorted(old)) in gone and len(old) > 3:
+            if len(old) > 3 and as_cell(old) in gone:
                 k = old.index(h)
                 cells.append(old[k + 1 :] + old[:k])
         # The vertex of the right angle stands in the middle.
         ends = [[int(number[v]) for v in new if v != row] for new in other.other_cells if row in new]
         cells += [[a, h, b] for a, b in ends]
     new_corners = sum(row in new for row in other.around for new in other.other_cells)
-    whole = Polygons(np.append(0, np.cumsum([len(c) for c in cells])), np.array([v for c in cells for v in c]))
-    return whole, np.arange(len(cells)) >= len(cells) - new_corners
+    return Polygons.of(cells), np.arange(len(cells)) >= len(cells) - new_corners
 
 
 def _excluded(n: int, mesh: OrientedMesh, others: list[Alternative], error: float) -> list[bool]:
@@ -182,12 +182,12 @@ def _excluded(n: int, mesh: OrientedMesh, others: list[Alternative], error: floa
     near = np.zeros(n, dtype=bool)
     near[list(at)] = True
     touched = np.flatnonzero(near[mesh.triangles].any(axis=1))
-    kept = np.delete(mesh.triangles, [k for k in touched if tuple(sorted(mesh.triangles[k].tolist())) in gone], axis=0)
+    kept = np.delete(mesh.triangles, [k for k in touched if as_cell(mesh.triangles[k].tolist()) in gone], axis=0)
     fans, _ = mesh.polygons.fans()
     owner = np.repeat(np.arange(mesh.polygons.count), mesh.polygons.size - 2)
     touched = np.unique(np.repeat(np.arange(mesh.polygons.count), mesh.polygons.size)[near[mesh.polygons.vertices]])
     outlines = [mesh.polygons.vertices[mesh.polygons.offsets[k] : mesh.polygons.offsets[k + 1]] for k in touched]
-    cut = [k for k, outline in zip(touched, outlines, strict=True) if tuple(sorted(outline.tolist())) in gone]
+    cut = [k for k, outline in zip(touched, outlines, strict=True) if as_cell(outline.tolist()) in gone]
     rest = np.concatenate([kept, fans[~np.isin(owner, cut)]])
     for k in np.flatnonzero(near[rest].any(axis=1)).tolist():
         for row in rest[k].tolist():

@@ -17,7 +17,7 @@ from ...matrix import OperatorMatrix
 from ...topology import Numbering, components
 from ...topology.keys import contains, pair_keys
 from ..agreement import SAME_SCALE
-from ..alike import ALIKE, Answers, Cells, Found
+from ..alike import ALIKE, Answers, Cells, Found, as_cell
 from ..beginning import fitting_starts
 from ..candidates.candidates import Candidates
 from ..covers.covering import read_by_cover
@@ -162,7 +162,7 @@ def own_cells(n: int, parts: list[Numbering], mesh: OrientedMesh) -> list[set[tu
     first = mesh.polygons.vertices[mesh.polygons.offsets[:-1]]
     polygons = mesh.polygons.chosen(label[first] >= 0, np.arange(n))
     own: list[set[tuple[int, ...]]] = [set() for _ in parts]
-    for cell in (*map(_cell, triangles.tolist()), *_polygons(polygons.offsets, polygons.vertices)):
+    for cell in (*map(as_cell, triangles.tolist()), *_polygons(polygons.offsets, polygons.vertices)):
         own[label[cell[0]]].add(cell)
     return own
 
@@ -201,12 +201,8 @@ def cells_of(reading: Reading, numbering: Numbering) -> set[tuple[int, ...]]:
     vanished = ~contains(pair_keys(n, *reading.candidates.edges.T), pair_keys(n, *reading.edges.T))
     triangles, polygons = undivided(reading.pieces, vanished)
     cells = _polygons(polygons.offsets, numbering.vertices[polygons.vertices])
-    return cells | set(map(_cell, numbering.vertices[triangles].tolist()))
+    return cells | set(map(as_cell, numbering.vertices[triangles].tolist()))
 
 
 def _polygons(offsets: NDArray, vertices: NDArray) -> set[tuple[int, ...]]:
-    return {_cell(cell.tolist()) for cell in np.split(vertices, offsets[1:-1]) if len(cell)}
-
-
-def _cell(vertices: list[int]) -> tuple[int, ...]:
-    return tuple(sorted(vertices))
+    return {as_cell(cell.tolist()) for cell in np.split(vertices, offsets[1:-1]) if len(cell)}

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...topology.faces import joined
 from ...topology.keys import contains
+from ..alike import as_cell
 from .corners import Corners, OrientedMesh, cell
 
 _RIGHT = 1e-6  # cosine of an angle that may be a right one, without noise
@@ -32,7 +33,6 @@ class RightAngle:
     gets : float
         Logarithm of the cotangent that the first side gets; the second gets the inverse.
     cell : tuple of int
-        Sorted.
     rest : tuple of tuple of int
         What is left of a cell of more than three corners, in running order.
     """
@@ -74,8 +74,8 @@ def right_angles(n: int, edges: NDArray, mesh: OrientedMesh, corners: Corners, a
         if polygon[k] >= 0:
             start, end = mesh.polygons.offsets[polygon[k] : polygon[k] + 2].tolist()
             outline = mesh.polygons.vertices[start:end].tolist()
-            own, place = tuple(sorted(outline)), outline.index(top)
-            rest = ((*outline[place + 1 :], *outline[:place]),)
+            own, place = as_cell(outline), outline.index(top)
+            rest = (as_cell((*outline[place + 1 :], *outline[:place])),)
         found.setdefault(top, []).append(RightAngle(top, one, two, float(gets[k]), own, rest))
     return list(found.values())
 

@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from ...matrix import OperatorMatrix
 from ...topology import Polygons
+from ..alike import Cells, as_cell
 from .corners import Alternative, OrientedMesh
-
-Cells = set[tuple[int, ...]]
 
 
 def twins(stored: OperatorMatrix, mesh: OrientedMesh, agree: float) -> list[Alternative]:
@@ -34,7 +33,7 @@ def twins(stored: OperatorMatrix, mesh: OrientedMesh, agree: float) -> list[Alte
     found = []
     for x, y, one, other in pairs:
         cells = cells_at[x] | cells_at[y]
-        renamed = {tuple(sorted({x: y, y: x}.get(v, v) for v in cell)) for cell in cells}
+        renamed = {as_cell([{x: y, y: x}.get(v, v) for v in cell]) for cell in cells}
         if renamed != cells:
             around = tuple(sorted({int(neighbour[one]), int(neighbour[other])}))
             found.append(
@@ -44,13 +43,13 @@ def twins(stored: OperatorMatrix, mesh: OrientedMesh, agree: float) -> list[Alte
 
 
 def _cells_at(rows: NDArray, mesh: OrientedMesh) -> dict[int, Cells]:
-    """The cells of each row, as sorted tuples."""
+    """The cells of each row."""
     cells_at: dict[int, Cells] = {row: set() for row in rows.tolist()}
     near = mesh.triangles[np.isin(mesh.triangles, rows).any(axis=1)].tolist() + _polygons_at(rows, mesh.polygons)
     for cell in near:
         for row in cell:
             if row in cells_at:
-                cells_at[row].add(tuple(sorted(cell)))
+                cells_at[row].add(as_cell(cell))
     return cells_at
 
 

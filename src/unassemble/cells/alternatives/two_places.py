@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ...matrix import OperatorMatrix
 from ...topology.faces import joined
+from ..alike import as_cell
 from .corners import Alternative, OrientedMesh
 
 _NEARLY_RIGHT = 1e-3  # cosine of an angle that is worth a closer look
@@ -87,7 +88,7 @@ def _moved(h: int, here: _Place, taken: set[Pair], z: NDArray, c: float, agree: 
                 continue  # on a side of the cell beyond: no mesh
             new = [(h, p, q), *([cell[1:]] if len(cell) > 3 else [])]
             if _keeps(kept, new, given, h, place, z, agree):
-                yield Alternative((), (), (), (tuple(sorted(cell)),), tuple(sorted(tuple(sorted(n)) for n in new)))
+                yield Alternative((), (), (), (as_cell(cell),), tuple(sorted(map(as_cell, new))))
 
 
 def _keeps(
