@@ -20,7 +20,7 @@ from ..planar.cotangent import edge_weights
 from ..planar.inside import fit_inside
 from ..planar.piece import PieceMesh
 from ..planar.polish import PolishedMesh, PolishOptions, polish
-from ..planar.robust import ASIDE, RobustFit
+from ..planar.robust import ASIDE, RobustFit, robust_fit
 from ..topology import Piece
 from ..words import count_of
 from .beginning import first_reading
@@ -28,7 +28,7 @@ from .misfits.spoilt import without_wrong_entries
 from .reading import FITS, Reading
 
 _SUM = 1e-10  # sum of a row, relative to its entries, that is rounding
-_FEW = 0.1  # of the entries on the boundary
+_FEW = 0.1  # wrong entries, for each on the boundary
 _SHORT = PolishOptions(max_steps=20, max_factorisations=3)
 _NOTE = (
     "entries between rows that do not add up to zero, as next to unknowns that were eliminated, still contain cells "
@@ -139,17 +139,24 @@ def _without(piece: Piece, weights: NDArray, aside: NDArray[np.int64], scale: fl
         if np.delete(_fit(piece, weights, found), aside).all():
             return PieceMesh(found.z, found.scale, (_NOTE,), aside=aside)
     inner = fit_inside(piece, weights, aside, scale=scale)
-    if inner is None or piece.redundancy <= len(inner.aside) or _may_be_whole(piece, weights, aside, inner):
+    if inner is None:
         return None
-    return PieceMesh(inner.z, inner.scale, (_NOTE, *_more(len(inner.aside) - len(aside))), aside=inner.aside)
+    # Of entries set aside by choice there are fewer than of those that the mesh is held against.
+    more = len(inner.aside) - len(aside)
+    if piece.redundancy - len(inner.aside) <= more or _may_be_whole(piece, weights, aside, inner, scale):
+        return None
+    return PieceMesh(inner.z, inner.scale, (_NOTE, *_more(more)), aside=inner.aside)
 
 
-def _may_be_whole(piece: Piece, weights: NDArray, unknown: NDArray[np.int64], found: RobustFit) -> bool:
-    """Whether entries on the boundary fit as well, as they cannot where cells beyond them are gone."""
-    return bool(np.count_nonzero(_fit(piece, weights, found)[unknown]) > _FEW * len(unknown))
+def _may_be_whole(
+    piece: Piece, weights: NDArray, unknown: NDArray[np.int64], near: RobustFit, scale: float | None
+) -> bool:
+    """Whether all entries but a few fit, those on the boundary too, as they cannot where cells beyond them are gone."""
+    found = robust_fit(piece, weights, near.z, lambda misfit: bool(misfit.max(initial=0.0) <= FITS), scale=scale)
+    return found is not None and len(found.aside) <= _FEW * len(unknown)
 
 
-def _fit(piece: Piece, weights: NDArray, found: PolishedMesh | RobustFit) -> NDArray[np.bool_]:
+def _fit(piece: Piece, weights: NDArray, found: PolishedMesh) -> NDArray[np.bool_]:
     """(e,) entries that a mesh has."""
     given = weights / found.scale
     return np.asarray(np.abs(edge_weights(piece, found.z) - given) <= FITS * np.abs(given).max())
