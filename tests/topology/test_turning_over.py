@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from families import FAMILIES
-from meshes import specimen
+from meshes import edge_list, specimen
 from unassemble.matrix import check_matrix
 from unassemble.topology.embedding import face_complexes
-from unassemble.topology.faces import FaceComplex
+from unassemble.topology.faces import FaceComplex, from_cycles
 from unassemble.topology.turning_over import turned_over, turns
 from vanishing import forgotten
 
@@ -27,6 +27,18 @@ def test_a_part_beside_paths_of_two_edges_and_of_three():
     drawing = next(iter(face_complexes(8, edges))).split()
     (sizes,) = {tuple(sorted(turned_over(drawing, turn).size.tolist())) for turn in turns(drawing)}
     assert {sizes, tuple(sorted(drawing.size.tolist()))} == {(3, 4, 4, 5, 6), (3, 4, 5, 5, 5)}
+
+
+def test_blocks_that_meet_in_two_vertices_have_no_part_between_them():
+    """Two quadrilaterals, four triangles each, with two opposite corners in common."""
+    half = np.array([[0, 2, 3], [0, 3, 4], [1, 2, 3], [1, 3, 4]])
+    triangles = np.concatenate([half, np.where(half > 1, half + 3, half)])
+    drawing = from_cycles(8, edge_list(triangles), [triangles])
+    assert drawing is not None
+    for turn in turns(drawing):
+        other = turned_over(drawing, turn)
+        assert np.array_equal(np.sort(other.successor), np.arange(len(other.successor)))
+        assert other.is_sphere()
 
 
 @pytest.mark.parametrize("seed", [49, 9, 12])

@@ -12,7 +12,17 @@ from numpy.typing import NDArray
 from ..errors import GeometryError, RecoveryError
 from ..matrix import OperatorMatrix
 from ..planar.piece import PieceMesh
-from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar, settled_numbering
+from ..topology import (
+    Numbering,
+    Piece,
+    Polygons,
+    Topology,
+    components,
+    located,
+    require_planar,
+    settled_numbering,
+    settled_weights,
+)
 from ..topology.keys import contains, distinct, pair_keys
 from .beginning import first_reading
 from .by_component import with_pieces
@@ -125,7 +135,7 @@ def _read_again(
     incomplete: NDArray[np.bool_],
 ) -> _Part:
     """One component: the reading that fits, or the triangles that there were, or the best reading."""
-    weights = -matrix.entries[numbering.edge_rows]
+    weights = settled_weights(-matrix.entries[numbering.edge_rows])  # a search in which every bit may matter
     inside = without_boundary(len(numbering.vertices), numbering.edges, weights, incomplete, scale)
     if inside is not None:
         return _part(matrix, numbering, inside)

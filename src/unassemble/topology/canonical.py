@@ -15,6 +15,8 @@ from .numbering import Numbering, local_numbering
 LARGEST = 1000
 """Vertices above which the breadth-first numbering must do."""
 _MOST_TRIED = 60
+_EQUAL = 1e-9  # of the largest weight: steps between weights that are equal but for rounding
+_BITS = 40  # of 53
 _SEED, _STEP = np.uint64(0x9E3779B97F4A7C15), (np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB))
 
 
@@ -27,29 +29,46 @@ def settled_numbering(n: int, edges: NDArray, weights: NDArray) -> Numbering:
     edges : (e, 2) int64
         Pairs i < j in lexicographic order.
     weights : (e,) float64
-        Equal ones count as equal, all others as different.
+        What is equal but for rounding counts as equal. Neither size nor sign of all together matters.
     """
     if n > LARGEST:
         return local_numbering(n, edges)
-    colours = _Colours(n, edges, weights)
+    kinds = _kinds(weights)
+    colours = _Colours(n, edges, kinds)
     first = colours.refined(colours.of_twins())
     several = np.flatnonzero(np.bincount(first) > 1)
     if not len(several):
         return _numbering(edges, first)
     chosen = np.flatnonzero(first == several[0])[:_MOST_TRIED]
     numberings = [_numbering(edges, colours.discrete(_apart(first, vertex))) for vertex in chosen.tolist()]
-    return min(numberings, key=lambda found: (found.edges.tolist(), weights[found.edge_rows].tolist()))
+    return min(numberings, key=lambda found: (found.edges.tolist(), kinds[found.edge_rows].tolist()))
+
+
+def _kinds(weights: NDArray) -> NDArray[np.int64]:
+    """0, 1, ... for each weight by its rank, the same for equal ones."""
+    weights = weights if weights.sum() >= 0 else -weights
+    order = np.argsort(weights)
+    new = np.diff(weights[order], prepend=-np.inf) > _EQUAL * np.abs(weights).max(initial=0.0)
+    kinds = np.empty(len(weights), dtype=np.int64)
+    kinds[order] = np.cumsum(new) - 1
+    return kinds
+
+
+def settled_weights(weights: NDArray) -> NDArray[np.float64]:
+    """Weights (e,) without their last digits, which sums in another order of the rows may change."""
+    fraction, exponent = np.frexp(weights)
+    return np.ldexp(np.round(fraction * 2.0**_BITS) / 2.0**_BITS, exponent)
 
 
 class _Colours:
     """Colours 0, 1, ... of the vertices of one graph."""
 
-    def __init__(self, n: int, edges: NDArray, weights: NDArray):
+    def __init__(self, n: int, edges: NDArray, kinds: NDArray[np.int64]):
         tail, head = np.concatenate([edges, edges[:, ::-1]]).T
         order = np.argsort(tail, kind="stable")
         self._n = n
         self._tail, self._head = tail[order], head[order]
-        self._weight = np.tile(np.unique(weights, return_inverse=True)[1].ravel(), 2)[order]
+        self._kind = np.tile(kinds, 2)[order]
 
     def of_twins(self) -> NDArray[np.int64]:
         """Rank of each vertex among those with the same neighbours and weights, which any order suits."""
@@ -86,7 +105,7 @@ class _Colours:
         """A number for the weights and colours about each vertex."""
         total = np.zeros(self._n, dtype=np.uint64)
         np.add.at(
-            total, self._tail, _mixed(_mixed(self._weight.astype(np.uint64)) + colour[self._head].astype(np.uint64))
+            total, self._tail, _mixed(_mixed(self._kind.astype(np.uint64)) + colour[self._head].astype(np.uint64))
         )
         return total
 

@@ -42,12 +42,18 @@ class Turn:
 
 
 def turns(drawing: FaceComplex) -> Iterator[Turn]:
-    """All that change a face, of a drawing none of whose faces passes a vertex twice (see FaceComplex.split)."""
+    """All that change a face, of a drawing none of whose faces passes a vertex twice (see FaceComplex.split).
+
+    Blocks may have several vertices in common; faces of two of them have no part between them.
+    """
     arriving: dict[int, dict[int, int]] = defaultdict(dict)  # half-edges by the vertex at their heads and their face
-    for half, (vertex, face) in enumerate(zip(drawing.head.tolist(), drawing.face.tolist(), strict=True)):
+    at: dict[tuple[int, int], list[int]] = defaultdict(list)  # faces by block and vertex
+    places = zip(drawing.head.tolist(), drawing.face.tolist(), drawing.block.tolist(), strict=True)
+    for half, (vertex, face, block) in enumerate(places):
         arriving[vertex][face] = half
+        at[block, vertex].append(face)
     common: dict[tuple[int, int], list[int]] = defaultdict(list)
-    for vertex, faces in arriving.items():
+    for (_, vertex), faces in at.items():
         if len(faces) < 3:
             continue  # inside a path, which may as well be longer
         for pair in combinations(sorted(faces), 2):

@@ -35,6 +35,7 @@ MOST_VERTICES = 60
 _MOST_NOISY = 400  # where errors of the entries may hide a difference; these are read once
 _FEW = 25  # rows of a component all of whose readings are asked for
 _ORDERS = 5
+_MANY_ORDERS = 25  # of these, where sides have been supposed and c is not known
 
 WORK = 3000
 """Rows times orders in which they are read again."""
@@ -52,8 +53,8 @@ def other_readings(
 ) -> list[Alternative]:
     """Readings of components of up to `most` rows that fit, but have other cells; at most one for each.
 
-    They are read in up to five orders, as long as their rows times orders are at most `work`, and in one at least;
-    those that are alike count once. Other parameters are those of
+    They are read in up to five orders, very small ones in more, as long as their rows times orders are at most `work`,
+    and in one at least; those that are alike count once. Other parameters are those of
     :func:`unassemble.cells.alternatives.ambiguity.alternatives`.
     """
     rng = np.random.default_rng(0)
@@ -61,13 +62,14 @@ def other_readings(
     noisy = _may_hide(stored, agree)
     most = _MOST_NOISY if noisy else most
     small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= most]
-    n_orders = int(np.clip(work // max(distinct_vertices(stored, small), 1), 1, _ORDERS))
+    n_orders = int(np.clip(work // max(distinct_vertices(stored, small), 1), 1, _MANY_ORDERS))
     half = with_vanished_sides(stored, mesh)
     answers = Answers()
     for part, own in zip(small, own_cells(stored.n, small, mesh), strict=True):
         supposed = bool(half[part.vertices].any())
         weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
-        orders = n_orders if len(part.vertices) <= MOST_VERTICES else 1
+        many = supposed and scale is None and len(part.vertices) <= _FEW
+        orders = 1 if len(part.vertices) > MOST_VERTICES else min(n_orders, _MANY_ORDERS if many else _ORDERS)
         shuffled = (part.then(_shuffled(part, rng)) for _ in range(orders))
         ask = partial(_other_reading, shuffled, stored, own, scale, c, supposed=supposed, noisy=noisy)
         cells, factor, _ = answers.of(part, weights, own, ask)
