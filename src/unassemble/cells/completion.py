@@ -21,7 +21,6 @@ from ..topology import (
     located,
     require_planar,
     settled_numbering,
-    settled_weights,
 )
 from ..topology.keys import contains, distinct, pair_keys
 from .beginning import first_reading
@@ -135,7 +134,7 @@ def _read_again(
     incomplete: NDArray[np.bool_],
 ) -> _Part:
     """One component: the reading that fits, or the triangles that there were, or the best reading."""
-    weights = settled_weights(-matrix.entries[numbering.edge_rows])  # a search in which every bit may matter
+    weights = -matrix.entries[numbering.edge_rows]
     inside = without_boundary(len(numbering.vertices), numbering.edges, weights, incomplete, scale)
     if inside is not None:
         return _part(matrix, numbering, inside)

@@ -1,6 +1,6 @@
 """From the sparsity graph to faces, orientation, boundary loops and pieces; no coordinates here."""
 
-from .canonical import settled_numbering, settled_weights
+from .canonical import settled_numbering
 from .cycles import triangles_everywhere
 from .numbering import Numbering, components, local_numbering
 from .polygons import Polygons
@@ -18,7 +18,6 @@ __all__ = [
     "recognise",
     "require_planar",
     "settled_numbering",
-    "settled_weights",
     "surfaces",
     "triangles_everywhere",
 ]

@@ -16,7 +16,6 @@ LARGEST = 1000
 """Vertices above which the breadth-first numbering must do."""
 _MOST_TRIED = 60
 _EQUAL = 1e-9  # of the largest weight: steps between weights that are equal but for rounding
-_BITS = 40  # of 53
 _SEED, _STEP = np.uint64(0x9E3779B97F4A7C15), (np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB))
 
 
@@ -52,12 +51,6 @@ def _kinds(weights: NDArray) -> NDArray[np.int64]:
     kinds = np.empty(len(weights), dtype=np.int64)
     kinds[order] = np.cumsum(new) - 1
     return kinds
-
-
-def settled_weights(weights: NDArray) -> NDArray[np.float64]:
-    """Weights (e,) without their last digits, which sums in another order of the rows may change."""
-    fraction, exponent = np.frexp(weights)
-    return np.ldexp(np.round(fraction * 2.0**_BITS) / 2.0**_BITS, exponent)
 
 
 class _Colours:

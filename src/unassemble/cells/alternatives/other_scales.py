@@ -26,11 +26,13 @@ from ..candidates.angles import scales_of_faces
 from ..candidates.crosses import Crosses
 from ..covers.covering import MOST_VERTICES
 from ..covers.shapes import Shapes
+from ..reading import NEARLY
 from .corners import Alternative, OrientedMesh
 from .exhaustion import Budget, TooManyError, all_readings
 from .loose import is_loose
 from .rereading import cells_of, own_cells, with_another_scale
 
+_FEW_PIECES = 6  # whose common c is no proof where they hang together as a tree
 _MOST_SHAPES = 3000
 _MOST_SCALES = 6
 _SHORT = 4  # cells of up to so many sides are right angles, triangles or parts of crosses
@@ -74,23 +76,30 @@ def other_scales(
     gone[topology.edges[topology.vanished]] = True
     loose = []
     for part, pieces in with_pieces(stored.n, stored.edges, topology.pieces):
-        if not (pieces and all(is_loose(piece, closed) for piece in pieces)):
-            continue
-        if gone[part.vertices].any() or (len(pieces) > 1 and _alike(pieces, weights_of, max(ALIKE, agree))):
-            loose.append(part)
+        if pieces and all(is_loose(piece, closed) for piece in pieces):
+            if gone[part.vertices].any():
+                loose.append((part, len(pieces) <= _FEW_PIECES and _in_a_tree(pieces)))
+            elif len(pieces) > 1 and _alike(pieces, weights_of, max(ALIKE, agree)):
+                loose.append((part, True))
     found, left_open, budget = [], False, Budget()
-    own_of = own_cells(stored.n, loose, mesh)
+    own_of = own_cells(stored.n, [part for part, _ in loose], mesh)
     answers = Answers()
-    for part, own in zip(reversed(loose), reversed(own_of), strict=True):  # the smallest first
+    for (part, unproved), own in zip(reversed(loose), reversed(own_of), strict=True):  # the smallest first
         weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
         errors = None if stored.errors is None else stored.errors[part.edge_rows]
-        ask = partial(_other, part, weights, errors, c, own, agree, budget)
+        ask = partial(_other, part, weights, errors, c, own, agree, budget, unproved=unproved)
         cells, factor, unknown = answers.of(part, weights, own, ask)
         left_open |= unknown
         if cells is not None:
             same = abs(factor / c - 1) < SAME_SCALE
             found.append(Alternative.of(own, cells, same_scale=same))
     return found[::-1], left_open
+
+
+def _in_a_tree(pieces: list[Piece]) -> bool:
+    """Whether pieces of one component make no ring."""
+    count = np.unique(np.concatenate([piece.vertices for piece in pieces]), return_counts=True)[1]
+    return int((count - 1).sum()) == len(pieces) - 1
 
 
 def _alike(pieces: list[Piece], weights: NDArray, agree: float) -> bool:
@@ -109,26 +118,34 @@ def _other(
     own: Cells,
     agree: float,
     budget: Budget,
+    *,
+    unproved: bool,
 ) -> Found:
-    """Other cells of one component, all readings tried; where there are too many, by a few factors only."""
+    """Other cells of one component, all readings tried; where there are too many, a few factors.
+
+    With a few it is `unproved` that there are none, unless many pieces, or some in a ring, have one c that need not be
+    the same.
+    """
     try:
         readings = all_readings(part, weights, agree, budget)
         cells, factor = next((reading for reading in readings if reading[0] != own), (None, c))
         return cells, factor, False
     except TooManyError:
         pass
-    return *(_with_common_scale(part, weights, errors, c) or (None, c)), True  # an example, if there is one
+    # No search would settle these: what a cover finds names an example.
+    left_open = unproved or len(part.vertices) > MOST_VERTICES or agree > NEARLY
+    return *(_with_common_scale(part, weights, errors, c, searched=not left_open) or (None, c)), left_open
 
 
 def _with_common_scale(
-    part: Numbering, weights: NDArray, errors: NDArray | None, c: float
+    part: Numbering, weights: NDArray, errors: NDArray | None, c: float, *, searched: bool
 ) -> tuple[Cells, float] | None:
-    """A mesh with another c in which several cells agree that border no other; by a cover."""
+    """A mesh with another c in which several cells agree that border no other; by a cover, or `searched` for."""
     n = len(part.vertices)
     shapes = Shapes.of(n, part.edges, _MOST_SHAPES) if n <= MOST_VERTICES else None
     if shapes is None or not len(shapes):
         return None
-    reading = with_another_scale(part, weights, errors, c, _of_lone_cells(shapes, weights), searched=False)
+    reading = with_another_scale(part, weights, errors, c, _of_lone_cells(shapes, weights), searched=searched)
     if reading is None:
         return None
     return cells_of(reading, part), next(mesh.scale for mesh in reading.meshes if mesh)

@@ -35,6 +35,7 @@ _TRIED = 0.25  # a reading with a batch tried is put off behind those with so mu
 _BETTER = 0.9  # misfit, relative to the least before, that is an improvement worth its price
 _SOLVES = 10  # that telling what changes would leave is worth
 _AT_LEAST, _AT_MOST = 1, 15  # readings whose changes are told before progress is asked for, and that may be worth it
+_NEARLY, _PATIENCE = 0.01, 8  # misfit of a start that is nearly right, and how many are told of such a one
 _BESIDE = 24  # small changes of a reading that fits, those that leave least, that are solved for
 
 _Waiting = tuple[float, int, Reading, Iterator[NDArray[np.bool_]] | None]
@@ -71,6 +72,7 @@ class Descent:
         self._seen = set() if seen is None else seen
         self._first = self.least = start.mean_misfit
         self._told = self._in_vain = 0
+        self._patience = _PATIENCE if start.size < _NEARLY else _AT_LEAST
         # Misfit, more where batches have been tried, a number that settles ties, the reading and its changes.
         self._waiting: list[_Waiting] = [(self.least, -1, start, None)] if start.pieces else []
 
@@ -105,7 +107,7 @@ class Descent:
     @property
     def _hopeless(self) -> bool:
         """Whether the misfit, about proportional to the number of wrong labels, will not be gone falling as it has."""
-        return self._told >= _AT_LEAST and self._told * self.least > _AT_MOST * (self._first - self.least)
+        return self._told >= self._patience and self._told * self.least > _AT_MOST * (self._first - self.least)
 
     def _tried(self, labels: NDArray[np.bool_], before: Reading, effort: Effort) -> float:
         """The mean misfit of labels that have not been tried before."""
