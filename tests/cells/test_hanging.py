@@ -10,7 +10,7 @@ from meshes import random_mesh, specimen
 from unassemble import recover
 from unassemble.cells.alternatives.hanging import small_parts
 from unassemble.topology import Numbering, components
-from vanishing import Mesh, forgotten
+from vanishing import Mesh, forgotten, squares
 
 
 def stairs() -> Mesh:
@@ -33,18 +33,38 @@ def test_a_chain_of_right_angles_in_another_order(order, c):
 @pytest.mark.parametrize("c", [1.0, -3.0])
 def test_a_chain_on_a_large_mesh(c):
     """The same, beside 800 vertices more, which hang on the far side of the mesh."""
-    points, triangles = stairs()
-    more, others = random_mesh(800, 1, holes=False)
-    left, right = int(points[:, 0].argmin()), int(more[:, 0].argmax())
-    number = np.arange(len(more)) + len(points)
-    number[right] = left
-    number[right + 1 :] -= 1
-    joined = np.concatenate([points, np.delete(more - more[right] + points[left], right, axis=0)])
-    known = forgotten(specimen(joined, np.concatenate([triangles, number[others]]), c=c, seed=5))
+    known = forgotten(specimen(*joined(stairs(), random_mesh(800, 1, holes=False)), c=c, seed=5))
     found = recover(known.matrix)
     assert found.backward_error <= 1e-12
     assert found.alternatives
     assert all(other.tested for other in found.alternatives)
+
+
+def test_a_chain_on_a_mesh_with_a_slit():
+    """Closed, with the same places on both sides: it is no crack between cells that do not match."""
+    rng = np.random.default_rng(2)
+    points, triangles = squares(np.ones((6, 2), dtype=bool))
+    points = points + rng.uniform(-0.2, 0.2, points.shape)
+    middle = int(np.flatnonzero((points.round() == [3, 1]).all(axis=1))[0])
+    above = points[triangles].mean(axis=1)[:, 1] > points[middle, 1]
+    both = np.where((triangles == middle) & above[:, None], len(points), triangles)
+    slit = np.concatenate([points, points[[middle]]]), both
+    alone = recover(specimen(*slit, seed=1).matrix)
+    assert alone.certified, alone.reason
+    found = recover(forgotten(specimen(*joined(stairs(), slit), seed=5)).matrix)
+    assert found.backward_error <= 1e-12
+    assert found.alternatives
+
+
+def joined(one: Mesh, other: Mesh) -> Mesh:
+    """Two meshes with one vertex in common, the other one on the left."""
+    (points, triangles), (more, others) = one, other
+    left, right = int(points[:, 0].argmin()), int(more[:, 0].argmax())
+    number = np.arange(len(more)) + len(points)
+    number[right] = left
+    number[right + 1 :] -= 1
+    whole = np.concatenate([points, np.delete(more - more[right] + points[left], right, axis=0)])
+    return whole, np.concatenate([triangles, number[others]])
 
 
 def test_long_chains_are_cut_in_two_ways():

@@ -3,7 +3,7 @@
 Where entries vanish the graph alone does not tell: see the page on theory in the documentation.
 """
 
-from .alternatives.ambiguity import AGREE, alternatives, touching
+from .alternatives.ambiguity import AGREE, Untried, alternatives, touching
 from .alternatives.corners import Alternative, OrientedMesh
 from .alternatives.filled import filled_holes
 from .alternatives.rereading import hidden
@@ -20,6 +20,7 @@ __all__ = [
     "Attempt",
     "OrientedMesh",
     "Outcome",
+    "Untried",
     "alternatives",
     "coincident",
     "completed",

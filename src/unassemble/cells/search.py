@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .beginning import A_FEW, Begun, begun, drawings
+from .block_by_block import read_block_by_block
 from .candidates.candidates import FEW, Candidates
 from .candidates.cell_set import CellSet
 from .candidates.turned_over import with_less_strain
@@ -29,6 +30,7 @@ _FIRST = 0.7  # part of it for the likeliest reading
 _QUICKLY = 0.2  # part of it that the same graph is worth once more
 _ONCE_MORE = 0.4  # part of it that the same graph is worth among all candidates
 _EQUAL = 1e-9  # relative difference of weights that are all the same
+_SMALL_PART = 0.5  # of the edges: blocks that are read by themselves before all else
 _FEW_TURNS = 8  # solves for turning parts over in each drawing of a graph that is not worth more
 
 
@@ -73,6 +75,8 @@ def read_cells(
     best, spoilt = _searched(n, edges, weights, scale, errors, effort, thorough=not quick)
     if best is None:
         return spoilt
+    if not _stands(best):
+        best = read_block_by_block(best, partial(read_cells, quick=quick)) or best
     if not (_stands(best) or quick) and n < FEW and best.size < CLOSE:
         best = _among_all(best, n, edges, weights, scale, errors)
     return best if spoilt is None or _stands(best) else spoilt
@@ -115,6 +119,10 @@ def _searched(
             if beginnings[-1].settled:
                 return _settled(best, beginnings[-1].starts[0]), spoilt
             spoilt = spoilt or beginnings[-1].spoilt
+            for start in beginnings[-1].starts:
+                found = read_block_by_block(start, partial(read_cells, quick=not thorough), _SMALL_PART)
+                if found is not None:
+                    return found, spoilt
         for one in beginnings:
             best, done = _carried_on(best, one, effort, cover)
             if done:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import certify as certificates
-from ..cells import AGREE, Alternative, OrientedMesh, alternatives, coincident, filled_holes, hidden, touching
+from ..cells import AGREE, Alternative, OrientedMesh, Untried, alternatives, coincident, filled_holes, hidden, touching
 from ..clock import Clock
 from ..linalg import AnalysisAhead, blas_threads, factorisation
 from ..matrix import OperatorMatrix
@@ -27,10 +27,12 @@ from .noise import Noise, NoiseTest
 from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
 from .placement import Placement
 from .solving import solve
-from .verdict import all_alike, ambiguous, decides, far_away, hidden_by_errors, passes, unproved, verdict
+from .verdict import all_alike, ambiguous, decides, far_away, hidden_by_errors, passes, unproved, untried_parts, verdict
 
 _SMALL = 1e-3
 _SIGMAS = 10.0  # noise by which numbers that a reading takes for equal may differ
+
+_DOUBTS = {Untried.SCALES: unproved, Untried.PARTS: untried_parts}
 
 
 @dataclass(frozen=True)
@@ -187,19 +189,19 @@ def _alternatives(
     )
     factors = stretch * mesh.scale[mesh.component]
     others = filled_holes(stored, topology, factors, agree) if known is None else []
-    left_open = False
+    untried: Untried | None = None
     if topology.method != "the numbers":
         if not others:
-            others, left_open = touching(stored, topology, oriented, factors, scale=known, agree=agree)
-        return others, unproved if left_open else None
+            others, untried = touching(stored, topology, oriented, factors, scale=known, agree=agree)
+        return others, untried and _DOUBTS[untried]
     if not others:
         with blas_threads(1):  # many small readings
-            others, left_open = alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
+            others, untried = alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
     if known is None and coincident(stored, topology, agree).any():
         return others, all_alike
     if hidden(stored, oriented, agree):
         return others, hidden_by_errors
-    return others, unproved if left_open else None
+    return others, untried and _DOUBTS[untried]
 
 
 def _held_against(

@@ -15,7 +15,8 @@ from .numbering import Numbering, local_numbering
 LARGEST = 1000
 """Vertices above which the breadth-first numbering must do."""
 _MOST_TRIED = 60
-_EQUAL = 1e-9  # of the largest weight: steps between weights that are equal but for rounding
+_EQUAL = 1e-9  # relative difference of weights that are equal but for rounding
+_ZERO = 1e-14  # and one, relative to the largest, that is none
 _SEED, _STEP = np.uint64(0x9E3779B97F4A7C15), (np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB))
 
 
@@ -47,7 +48,8 @@ def _kinds(weights: NDArray) -> NDArray[np.int64]:
     """0, 1, ... for each weight by its rank, the same for equal ones."""
     weights = weights if weights.sum() >= 0 else -weights
     order = np.argsort(weights)
-    new = np.diff(weights[order], prepend=-np.inf) > _EQUAL * np.abs(weights).max(initial=0.0)
+    size = np.abs(weights)
+    new = np.diff(weights[order], prepend=-np.inf) > np.maximum(_EQUAL * size[order], _ZERO * size.max(initial=0.0))
     kinds = np.empty(len(weights), dtype=np.int64)
     kinds[order] = np.cumsum(new) - 1
     return kinds

@@ -6,6 +6,8 @@ far sides have vanished from the boundary.
 
 from __future__ import annotations
 
+from enum import Enum, auto
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,6 +32,15 @@ AGREE = 1e-9
 """Relative difference of numbers that count as equal."""
 
 
+class Untried(Enum):
+    """Where other meshes may be that could not be looked for."""
+
+    SCALES = auto()
+    """With another factor c, in small pieces."""
+    PARTS = auto()
+    """In parts that hang on a mesh by single vertices."""
+
+
 def alternatives(
     stored: OperatorMatrix,
     topology: Topology,
@@ -38,7 +49,7 @@ def alternatives(
     *,
     scale: float | None,
     agree: float = AGREE,
-) -> tuple[list[Alternative], bool]:
+) -> tuple[list[Alternative], Untried | None]:
     """Other meshes that fit as well as the one found: the places where they differ, each by itself.
 
     Where the rules find none, loose pieces are read with other factors, and small graphs again in other orders.
@@ -59,14 +70,14 @@ def alternatives(
     Returns
     -------
     alternatives : list of Alternative
-    open : bool
+    untried : Untried or None
         Whether there may be others that could not be looked for.
     """
     found: list[Alternative] = []
     corners = Corners.of(stored.n, stored.edges, mesh)
     around = list(hubs(corners, mesh.z, agree))
     closed = closed_at(stored.n, around)
-    left_open = False
+    untried: Untried | None = None
     if len(topology.vanished) > (topology.polygons.size - 3).sum():  # not on diagonals only
         found = twins(stored, mesh, agree)
         orders = [other for hub in around if (other := rearranged(hub, agree)) is not None]
@@ -80,11 +91,12 @@ def alternatives(
     found = found or regrouped(stored, mesh, corners, factors, agree)
     if not found and scale is None:
         found, left_open = other_scales(stored, topology, mesh, factors, closed, agree)
+        untried = Untried.SCALES if left_open else None
     found = _each_once(found) or other_readings(stored, mesh, factors, scale, agree)
     if not found:
-        found, unknown = other_hanging_parts(stored, mesh, factors, agree)
-        left_open = left_open or unknown
-    return found or nearby_readings(stored, mesh, factors, scale, agree), left_open
+        found, left_open = other_hanging_parts(stored, mesh, factors, agree)
+        untried = untried or (Untried.PARTS if left_open else None)
+    return found or nearby_readings(stored, mesh, factors, scale, agree), untried
 
 
 def touching(
@@ -95,7 +107,7 @@ def touching(
     *,
     scale: float | None,
     agree: float,
-) -> tuple[list[Alternative], bool]:
+) -> tuple[list[Alternative], Untried | None]:
     """Other meshes where no vanished entries need be supposed, of pieces that touch in a vertex, and of loose ones.
 
     Single vertices may have two places. Right angles of their cells may be regrouped; and if all have the same entries,
@@ -106,15 +118,16 @@ def touching(
     """
     moved = two_places(stored, mesh, factors, min(agree, AGREE))  # errors do not make entries vanish
     if moved:
-        return moved, False
+        return moved, None
     closed, left_open = closed_by_right_angles(stored, topology, mesh, factors) if scale is None else ([], False)
+    untried = Untried.SCALES if left_open else None
     if closed or (np.bincount(mesh.boundary[:, 0], minlength=stored.n) < 2).all():
-        return closed, left_open
+        return closed, untried
     found = regrouped(stored, mesh, Corners.of(stored.n, stored.edges, mesh), factors, agree)
     if found or scale is not None:
-        return found, left_open
-    found, unknown = other_scales(stored, topology, mesh, factors, np.zeros(stored.n, dtype=np.int64), agree)
-    return found, left_open or unknown
+        return found, untried
+    found, left_open = other_scales(stored, topology, mesh, factors, np.zeros(stored.n, dtype=np.int64), agree)
+    return found, Untried.SCALES if left_open else untried
 
 
 def _loose_pieces(

@@ -1,4 +1,4 @@
-"""All readings of a small graph with a known c: every set of candidates that can be cells is held against its numbers.
+"""Readings of a small graph with a known c: every set of candidates of a drawing is held against its numbers.
 
 Nearly all are found to be none without positions, from edge to edge.
 """

@@ -34,6 +34,7 @@ from .rereading import MOST_VERTICES, WORK, distinct_vertices, other_readings, w
 _STRETCH = 12  # edges
 _MOST_WITH_LEGS = 2 * MOST_VERTICES  # legs of right angles in the rest count as rows
 _WORK = WORK // 30
+_MOST_TRIED = 60  # other readings of parts, in each component, with which the rest is solved
 _VANISHED = 1e-9  # of what the cells of a part leave to sides that they share with others, relative to the row
 
 
@@ -53,6 +54,7 @@ def other_hanging_parts(
         if len(part.vertices) > MOST_VERTICES and half[part.vertices].any()
     ]
     found: list[Alternative] = []
+    left_open = False
     for labels in zip(*(_also_wider(part.edges, small_parts(part)) for part in large), strict=True):
         label, so_far = np.full(len(stored.edges), -1), 0
         for part, own in zip(large, labels, strict=True):
@@ -63,15 +65,21 @@ def other_hanging_parts(
             continue
         apart = _Apart.of(stored, mesh, factors, label)
         if distinct_vertices(apart.matrix, components(apart.matrix.n, apart.matrix.edges)) > WORK:
-            return [], True
+            left_open = True
+            break
         c = np.ones(apart.matrix.n)
         others = other_readings(apart.matrix, apart.mesh, c, 1.0, agree, most=_MOST_WITH_LEGS, work=_WORK)
         found += [other.renumbered(apart.rows) for other in others]
-    fitting = (
-        next((fits for other in found if (fits := _with_the_rest(stored, mesh, factors, other, part))), None)
-        for part in large
-    )
-    return [other for other in fitting if other], False
+    fitting: list[Alternative] = []
+    for part in large:
+        inside = np.zeros(stored.n, dtype=bool)
+        inside[part.vertices] = True
+        own = [other for other in found if inside[(*other.cells, *other.other_cells)[0][0]]]
+        tried = (_with_the_rest(stored, mesh, factors, other, part) for other in own[:_MOST_TRIED])
+        fits = next((other for other in tried if other), None)
+        left_open |= fits is None and len(own) > _MOST_TRIED
+        fitting += [] if fits is None else [fits]
+    return fitting, left_open
 
 
 def small_parts(part: Numbering) -> NDArray[np.int64]:
@@ -207,8 +215,6 @@ def _with_the_rest(
     """Another reading somewhere in this component if it fits with the rest."""
     number = np.full(stored.n, -1)
     number[part.vertices] = np.arange(len(part.vertices))
-    if number[other.cells[0][0]] < 0:
-        return None
     cells = _all_cells(mesh.chosen(number >= 0, number))
     inside = other.renumbered(number)
     owner = np.repeat(np.arange(cells.count), cells.size)

@@ -149,7 +149,7 @@ def _other_reading(
         near = [beside(one) for one in found if isinstance(one.candidates, Candidates) and (supposed or noisy)]
         few = supposed and not noisy and len(part.vertices) <= _FEW
         every = enumerated(*graph[:3], c) if few else iter(())
-        for reading in chain(found, *near if number == 0 else (), every):
+        for reading in chain(found, *(*near, every) if number == 0 else ()):
             if (cells := cells_of(reading, part)) != own and not cracked(reading):
                 return cells, next(solved.scale for solved in reading.meshes if solved), False
     return None, c, False
