@@ -54,6 +54,25 @@ def test_easy_families(family, seed):
         assert largest_error(found.points[rows], known.points[rows]) <= 1e-9
 
 
+@pytest.mark.parametrize("side", [1, 2])
+def test_many_holes_of_a_grid_are_told_at_once(side, monkeypatch):
+    """Angle sums of squares beside holes are 1.2 pi at most, of holes of one square 1.4 pi, all alike."""
+    count = 0
+    original = Reading.of.__func__
+
+    def counted(cls, *arguments):
+        nonlocal count
+        count += 1
+        return original(cls, *arguments)
+
+    monkeypatch.setattr(Reading, "of", classmethod(counted))
+    rectangles = [(i, j, side, side) for i in range(2, 38, 5) for j in range(2, 38, 5)]
+    found = recover(forgotten(specimen(*squares(holes(40, 40, *rectangles)), c=-3.7)).matrix)
+    assert found.certified, found.reason
+    assert found.n_polygons == 1600 - len(rectangles) * side**2
+    assert count <= 2
+
+
 @pytest.mark.parametrize(("name", "n"), [("tree", 200), ("dodecahedron", 20), ("random_grid", 60)])
 def test_hopeless_matrices_are_given_up_soon(name, n, monkeypatch):
     """Counted in readings, since times depend on the machine."""

@@ -33,12 +33,18 @@ def face_sums(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]:
 
 
 def largest_sum(sums: NDArray[np.float64]) -> float:
-    """Where angle sums of cells end and those of holes begin, if there is a clear gap above those of many cells."""
+    """Where angle sums of cells end and those of holes begin: where they mostly do, or in a clear gap above many cells.
+
+    What lies in such a gap already stays; above many holes that are alike there is another, and may be wider.
+    """
     sums = np.sort(sums[sums < _LARGEST])
     gap = np.diff(sums, append=_LARGEST)
     gap[: _MANY - 1] = 0
-    widest = int(np.argmax(gap)) if len(gap) >= _MANY else -1
-    if widest < 0 or gap[widest] < _GAP or sums[widest] < FULL:
+    clear = np.flatnonzero(gap >= _GAP)
+    if not len(clear) or ((sums[clear] < FULL) & (sums[clear] + gap[clear] > FULL)).any():
+        return FULL
+    widest = clear[np.argmax(gap[clear])]
+    if sums[widest] < FULL:
         return FULL
     return float(sums[widest] + gap[widest] / 2)
 
