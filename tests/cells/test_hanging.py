@@ -84,7 +84,7 @@ def test_long_chains_are_cut_in_two_ways():
 
 
 def test_long_paths_are_cut_in_linear_time():
-    """A path of 100,000 vertices: twice as long takes about twice the time, which four times would not be."""
+    """Eight times as long takes about eight times the time, and less than half of 64 times on any machine."""
 
     def seconds(n: int) -> float:
         path = np.column_stack([np.arange(n - 1), np.arange(1, n)])
@@ -93,4 +93,4 @@ def test_long_paths_are_cut_in_linear_time():
         assert (labels >= 0).any(axis=0).all()
         return time.process_time() - start
 
-    assert seconds(100_000) < 16 * max(seconds(12_500), 0.01)
+    assert min(seconds(100_000) for _ in range(3)) < 32 * max(min(seconds(12_500) for _ in range(3)), 0.01)
