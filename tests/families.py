@@ -175,7 +175,7 @@ def member(family: str, seed: int, order: int = 0) -> tuple[Specimen, float]:
     mesh = FAMILIES[family](rng)
     if order:
         other = np.random.default_rng([seed, order])
-        return forgotten(specimen(*mesh, c=(c := float(np.exp(other.normal()))), seed=int(other.integers(2**32)))), c
+        c, seed = float(np.exp(other.normal())), int(other.integers(2**32))
     return forgotten(specimen(*mesh, c=c, seed=seed)), c
 
 

@@ -46,18 +46,17 @@ def read_block_by_block(reading: Reading, read: Read, most: float = 1.0) -> Read
     scale = whole.scale or max(sound)[1]
     add_differing_factors(solved, misfit, scale)
     stored = contains(pair_keys(n, *edges.T), pair_keys(n, *reading.edges.T))
-    label = np.unique(blocks(n, edges), return_inverse=True)[1]
-    bad = np.zeros(label.max() + 1, dtype=bool)
-    bad[label[misfit[stored] > FITS]] = True
-    apart = bad[label]
+    label = blocks(n, edges)
+    apart = np.isin(label, label[misfit[stored] > FITS])
     if apart.all() or not 0 < apart.mean() <= most:
         return None
+    rows_apart = np.flatnonzero(apart)
     sides = pair_keys(n, whole.cells.vertices, whole.cells.following)
     touched = np.logical_or.reduceat(contains(pair_keys(n, *edges[apart].T), sides), whole.cells.offsets[:-1])
     kept = reading.labels & ~touched
     parts = [(whole.cells.chosen(kept, np.arange(n)), whole.corner[kept])]
-    for part in components(n, edges[apart]):
-        rows = np.flatnonzero(apart)[part.edge_rows]
+    for part in components(n, edges[rows_apart]):
+        rows = rows_apart[part.edge_rows]
         errors = None if whole.errors is None else whole.errors[rows]
         own = read(len(part.vertices), part.edges, whole.weights[rows], scale, errors)
         if own is None or not own.fits:

@@ -12,16 +12,7 @@ from numpy.typing import NDArray
 from ..errors import GeometryError, RecoveryError
 from ..matrix import OperatorMatrix
 from ..planar.piece import PieceMesh
-from ..topology import (
-    Numbering,
-    Piece,
-    Polygons,
-    Topology,
-    components,
-    located,
-    require_planar,
-    settled_numbering,
-)
+from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar, settled_numbering
 from ..topology.keys import contains, distinct, pair_keys
 from .beginning import first_reading
 from .by_component import with_pieces
