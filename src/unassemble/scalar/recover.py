@@ -26,8 +26,9 @@ from .joined import JoinedMesh
 from .noise import Noise, NoiseTest
 from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
 from .placement import Placement
+from .reservations import all_alike, ambiguous, far_away, hidden_by_errors, unproved, untried_parts
 from .solving import solve
-from .verdict import all_alike, ambiguous, decides, far_away, hidden_by_errors, passes, unproved, untried_parts, verdict
+from .verdict import decides, passes, verdict
 
 _SMALL = 1e-3
 _SIGMAS = 10.0  # noise by which numbers that a reading takes for equal may differ
