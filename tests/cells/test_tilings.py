@@ -5,8 +5,7 @@ import pytest
 
 from meshes import largest_error, specimen
 from unassemble import recover
-from unassemble.cells import completion
-from unassemble.cells.candidates.candidates import Candidates
+from unassemble.cells import beginning, completion
 from vanishing import forgotten, octagons
 
 
@@ -25,7 +24,7 @@ def test_right_triangles_cut_from_octagons_are_not_certified(monkeypatch):
 
     def blind(*graph):
         with monkeypatch.context() as context:
-            context.setattr(Candidates, "tilings", lambda _: iter(()))
+            context.setattr(beginning, "tilings", lambda _: iter(()))
             return read_cells(*graph)
 
     read_cells = completion.read_cells

@@ -12,6 +12,7 @@ from ..planar.piece import PieceMesh
 from ..topology.embedding import drawing_with_corners, face_complexes
 from .candidates.candidates import FEW, Candidates
 from .candidates.crosses import Crosses
+from .candidates.starts import likely_readings, tilings
 from .labels.descent import Descent
 from .labels.effort import SMALL_GRAPH, Effort
 from .labels.evidence import entries_are_to_blame
@@ -79,7 +80,7 @@ def drawings(
 def begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
     """Starts in one drawing, at no more than so many solves for turning its parts over."""
     starts = []
-    for labels in candidates.starts():
+    for labels in likely_readings(candidates):
         starts.append(effort.reading(candidates, labels))
         if starts[-1].fits:
             return Begun(starts[-1:], settled=True)
@@ -122,7 +123,7 @@ def _tiling(candidates: Candidates, effort: Effort) -> Reading | None:
     if guess is not None:
         either.append(candidates.drawn(candidates.drawing, guess))
     for one in either:
-        for labels in one.tilings():
+        for labels in tilings(one):
             reading = Reading.of(one, labels, effort.known)
             if reading.fits:
                 return reading
@@ -155,7 +156,7 @@ def fitting_starts(
     """
     known: dict[bytes, PieceMesh | None] = {}
     for candidates in drawings(n, edges, weights, scale, errors):
-        for labels in candidates.starts():
+        for labels in likely_readings(candidates):
             reading = Reading.of(candidates, labels, known)
             if reading.fits:
                 yield reading
@@ -165,7 +166,7 @@ def first_reading(n: int, edges: NDArray, weights: NDArray) -> Reading | None:
     """What the angles suggest, without positions: the first choice of cells that makes planar surfaces."""
     for drawing in face_complexes(n, edges):
         candidates = Candidates.of(drawing, weights)
-        for labels in candidates.starts():
+        for labels in likely_readings(candidates):
             reading = Reading.unsolved(candidates, labels)
             if reading.pieces:
                 return reading

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...topology import Polygons
 from ...topology.faces import FaceComplex, joined
-from .angles import FULL, face_sums, facing_angles, largest_sum, likeliest_scale, overall_scale, vertex_excess
+from .angles import face_sums, facing_angles, likeliest_scale, overall_scale, vertex_excess
 from .cell_set import CellSet
 from .crossed_faces import CrossedFaces
 from .crosses import Crosses
@@ -24,9 +24,7 @@ FEW = 100
 """Vertices below which all is tried before the entries are blamed."""
 _SHORT = 4  # faces of so many edges are cells unless the numbers say otherwise
 _TURNED = 0.01  # belief that a corner loses by not being as drawn
-_LEFT_OUT = 0.05  # squared excess of an angle sum, in units of pi, above which a short face may be left out
 _APART = 0.2  # difference of logarithms of two likely c that is worth trying both
-_INNER = (-0.35 * np.pi, -0.55 * np.pi)  # angle excess above which a vertex may be an inner one
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,104 +227,3 @@ class Candidates(CellSet):
             turned = labels.copy()
             turned[self.corner] = corners
             yield turned
-
-    def starts(self) -> Iterator[NDArray[np.bool_]]:
-        """Readings to begin with, the likeliest first."""
-        long = ~self.corner & ~self.half & ~self.crossed & ~self.outer & (self.size > 3)
-        sums = (2 - self.belief) * np.pi  # those of holes are larger than pi
-        by_angles = long & (sums < largest_sum(sums[long]))
-        corners = [self.corner & (self.belief > 0.5 + excess / np.pi) for excess in _INNER]
-        faces = (self.first, (self.first & (self.size == 3)) | by_angles)
-        none = np.zeros_like(self.corner)
-        corners += [chosen & ~self.strip for chosen in (*corners, self.corner & (self.belief == 1.0))]
-        corners += [chosen | self.half for chosen in (*corners, none)] if self.half.any() else []
-        tried = {(chosen | extra).tobytes(): chosen | extra for chosen in faces for extra in (*corners, none)}
-        seen = set()
-        for chosen in sorted(tried.values(), key=self.strain):
-            labels = self.covering(self.compatible(np.where(chosen, 1 + self.belief, -np.inf)), self.belief)
-            if labels.any() and labels.tobytes() not in seen:
-                seen.add(labels.tobytes())
-                yield labels
-
-    def tilings(self) -> Iterator[NDArray[np.bool_]]:
-        """Faces by their angles where no others are cells, so that sides between both have all of their weight.
-
-        All faces but the outer ones, then the longer ones only where these border every edge: in tilings all that lie
-        between them may be holes.
-        """
-        inner = ~self.corner & ~self.half & ~self.crossed & ~self.outer
-        for least in (0, *np.unique(self.size[inner])[1:].tolist()):
-            longer = inner & (self.size >= least)
-            cell, half = self.sides[longer[self.sides[:, 0]]].T
-            used = np.zeros(2 * len(self.edges), dtype=bool)
-            used[half] = True
-            if least and not used.reshape(-1, 2).any(axis=1).all():
-                break
-            angle = facing_angles(self.relative[half >> 1] * np.where(used[half ^ 1], 1, 2))
-            chosen = longer & ((self.size == 3) | (np.bincount(cell, angle, self.count) < FULL))
-            yield self.covering(self.compatible(np.where(chosen, 1.0, -np.inf)), self.belief)
-
-    def strain(self, labels: NDArray[np.bool_]) -> float:
-        """How far the angles of some cells are from adding up to pi, edges between two of them shared equally.
-
-        Short faces left out add a little, or no cells would be best.
-        """
-        cell, half = self.sides[labels[self.sides[:, 0]]].T
-        used = np.zeros(2 * len(self.edges), dtype=bool)
-        used[half] = True
-        angles = np.bincount(cell, facing_angles(self.relative[half >> 1] * np.where(used[half ^ 1], 1, 2)), self.count)
-        # A corner has a right angle, and two others, the mean of what its sides show; half circles see one as well.
-        sides = np.maximum(np.bincount(cell, minlength=self.count), 1)
-        sums = (np.where(self.corner, 2 * angles / sides, angles) + np.pi / 2 * (self.corner | self.half))[labels]
-        return float(((sums / np.pi - 1) ** 2).sum()) + _LEFT_OUT * float((self.first & ~labels).sum())
-
-    def compatible(self, value: NDArray) -> NDArray[np.bool_]:
-        """(cells,) candidates of finite value, none of which loses to a better one that wants the same half-edge.
-
-        Rounds of local maxima: a candidate is taken if it beats all rivals that are still in play.
-        """
-        if not self.count:
-            return np.zeros(0, dtype=bool)
-        cell, start = self.conflicts[0][:, 0], self.conflicts[1]
-        rank = np.empty(self.count, dtype=np.int64)
-        # Ties in random order: in the order of numbers they would be settled one by one along a boundary.
-        ties = np.random.default_rng(0).permutation(self.count)
-        rank[np.lexsort((ties, value))] = np.arange(self.count)
-        rank[~np.isfinite(value)] = -1
-        taken = np.zeros(self.count, dtype=bool)
-        run = np.repeat(np.arange(len(start) - 1), np.diff(start))
-        while (rank >= 0).any():
-            best = np.maximum.reduceat(rank[cell], start[:-1])
-            beaten = np.zeros(self.count, dtype=bool)
-            beaten[cell[rank[cell] < best[run]]] = True
-            winners = (rank >= 0) & ~beaten
-            taken |= winners
-            lost = np.zeros(len(start) - 1, dtype=bool)
-            lost[run[winners[cell]]] = True
-            rank[cell[lost[run]]] = -1
-        return taken
-
-    def covering(self, labels: NDArray[np.bool_], value: NDArray) -> NDArray[np.bool_]:
-        """The same labels with further candidates, the most valued ones, for edges that border no cell.
-
-        A nonzero weight is the cotangent of some angle: every edge borders a cell.
-        """
-        labels = labels.copy()
-        cell, half = self.sides.T
-        while True:
-            used = np.zeros(2 * len(self.edges), dtype=bool)
-            used[half[labels[cell]]] = True
-            bare = (self.weights != 0) & ~used.reshape(-1, 2).any(axis=1)
-            blocked = np.zeros(self.count, dtype=bool)
-            blocked[cell[used[half]]] = True
-            wanted = np.zeros(self.count, dtype=bool)
-            wanted[cell[bare[half >> 1]]] = True
-            wanted &= ~blocked & ~labels
-            if not wanted.any():
-                return labels
-            order = np.lexsort((-value[cell], half >> 1))
-            order = order[wanted[cell[order]] & bare[half[order] >> 1]]
-            best = order[np.flatnonzero(np.diff(half[order] >> 1, prepend=-1))]
-            chosen = np.zeros(self.count, dtype=bool)
-            chosen[cell[best]] = True
-            labels |= self.compatible(np.where(chosen, value, -np.inf))

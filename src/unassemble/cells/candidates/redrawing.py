@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ...topology.redrawing import redrawn
 from .candidates import Candidates
+from .choosing import compatible
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +58,7 @@ class Redrawing:
         for quad, halves in self.parts:
             if labels[quad]:
                 carried[halves] = True
-        return self.candidates.compatible(np.where(carried, 1.0 + self.new, -np.inf))
+        return compatible(self.candidates, np.where(carried, 1.0 + self.new, -np.inf))
 
 
 def redrawings(candidates: Candidates, first: NDArray) -> Iterator[Redrawing]:

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from ...topology.turning_over import turned_over, turns
 from .candidates import Candidates
+from .choosing import chosen
+from .starts import likely_readings, strain
 
 _MOST_TURNS = 40  # that are looked at in one drawing
 _MOST_ROUNDS = 8  # parts that are turned over at most
@@ -46,11 +48,10 @@ def with_a_part_turned_over(
     for turn in islice(turns(drawing), _MOST_TURNS):
         other = candidates.drawn(turned_over(drawing, turn), guess)
         same = candidates.numbers_of(other)
-        kept = other.compatible(np.where((same >= 0) & labels[same], 1.0, -np.inf))
-        yield other, other.covering(kept, other.belief)
+        yield other, chosen(other, np.where((same >= 0) & labels[same], 1.0, -np.inf))
 
 
 def _strain(candidates: Candidates) -> float:
     """Of the first choice of cells."""
-    labels = next(candidates.starts(), None)
-    return np.inf if labels is None else candidates.strain(labels)
+    labels = next(likely_readings(candidates), None)
+    return np.inf if labels is None else strain(candidates, labels)

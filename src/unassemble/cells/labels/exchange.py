@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ...errors import RecoveryError
 from ...planar.piece import PieceMesh
 from ..candidates.candidates import Candidates
+from ..candidates.choosing import chosen
 from ..reading import Reading
 from .fitting import Fitted, cost, fitted
 from .neighbourhood import Neighbourhoods, Trial, adjacent_to
@@ -40,8 +41,7 @@ _QUICK = 0.9  # cost, relative to the former one, after a round that is followed
 
 def whole(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """A reading of the graph: no two cells on one half-edge, and cells on all edges."""
-    taken = candidates.compatible(np.where(labels, 1.0, -np.inf))
-    return candidates.covering(taken, candidates.belief)
+    return chosen(candidates, np.where(labels, 1.0, -np.inf))
 
 
 class Exchange:

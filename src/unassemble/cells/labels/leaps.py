@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..candidates.choosing import chosen
 from ..reading import Reading
 
 _CLEAR = 0.35  # a label that is to change by so much is turned over
@@ -32,8 +33,7 @@ def _turned(reading: Reading, changes: NDArray, turned: NDArray[np.bool_]) -> ND
     candidates, labels = reading.candidates, reading.labels
     value = np.where(labels, 1.0, -np.inf)
     value[turned] = np.where(labels[turned], -np.inf, 2.0 + changes[turned])
-    chosen = candidates.compatible(value)
     fallback = np.where(changes != 0, labels + changes, candidates.belief) - 10.0 * (turned & labels)
     # A cell is rather kept than replaced by a corner that can be none.
     fallback[candidates.corner & (candidates.belief < _HOPELESS)] -= 20.0
-    return candidates.covering(chosen, fallback)
+    return chosen(candidates, value, fallback)
