@@ -7,8 +7,9 @@ from families import FAMILIES
 from meshes import random_mesh, specimen
 from unassemble.cells.candidates.candidates import Candidates
 from unassemble.cells.labels import updates as module
+from unassemble.cells.labels.low_rank import ChangedMaps
 from unassemble.cells.labels.sheet import Sheet
-from unassemble.cells.labels.updates import Updates, _Factorised
+from unassemble.cells.labels.updates import Updates
 from unassemble.cells.maps import best_map
 from unassemble.cells.reading import Reading
 from unassemble.cells.search import read_cells
@@ -84,18 +85,18 @@ def test_corners_that_hardly_matter_are_named():
 def test_a_singular_pencil_spoils_no_other_change():
     right = fitting(forgotten(specimen(*MESHES["triangles"], c=C, seed=1)))
     sheet = Sheet(right.candidates, C)
-    factorised = _Factorised(sheet, right.labels)
+    changed = ChangedMaps(sheet, right.labels, 1e-3)
     inside = np.flatnonzero(right.labels & (right.candidates.size == 3))
     vertices = right.candidates.cells.vertices[right.candidates.cells.offsets[inside][:, None] + np.arange(3)]
     far = next(k for k in range(len(inside)) if not np.isin(vertices[k], vertices[0]).any())
     moves = [(int(inside[0]),), (int(inside[far]),)]
-    before = factorised.maps(right.labels, moves)
+    before = changed.after(right.labels, moves)
     assert np.isfinite(before).all()
     # 1 - s T_f G_f is made singular for the first: its entries are powers of two, and so exact.
-    factorised._shift = 4.0
-    factorised._columns[factorised._place[vertices[0]]] = 0
-    factorised._columns[factorised._place[vertices[0, 0]], vertices[0, 1]] = -1j
-    after = factorised.maps(right.labels, moves)
+    changed._shift = 4.0
+    changed._columns[changed._place[vertices[0]]] = 0
+    changed._columns[changed._place[vertices[0, 0]], vertices[0, 1]] = -1j
+    after = changed.after(right.labels, moves)
     assert np.isnan(after[:, 0]).any()
     assert np.isfinite(after[:, 1]).all()
 
