@@ -165,6 +165,21 @@ def test_meshes_without_narrow_places_have_one_reading(mesh):
     assert recover(forgotten(specimen(*mesh)).matrix).certified
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_twins_that_are_no_mirror_images(seed):
+    """The vertices (1, 0) and (1, 1) have the same neighbours and entries, and one of them two cells of its own."""
+    points = [[0, 0], [1, 0], [2, 0], [1, 1], [-1, 1], [3, 1], [0.2, -1.3], [1.8, -1.1], [-1.5, -0.4], [3.2, -0.3]]
+    triangles = [[0, 1, 3], [1, 2, 3], [0, 3, 4], [3, 2, 5], [0, 4, 8], [0, 8, 6], [2, 9, 5], [2, 7, 9], [6, 10, 7]]
+    known = forgotten(specimen(np.array([*points, [1, -2.5]]), np.array(triangles), c=1.7, seed=seed))
+    found = recover(known.matrix)
+    assert found.status == "uncertified"
+    assert found.backward_error < 1e-12
+    (other,) = found.alternatives
+    assert len(other.cells) == len(other.other_cells) == 2
+    assert other.other == other.found[::-1]
+    assert np.allclose(np.abs(np.subtract(*known.points[list(other.found)])), [0, 1])
+
+
 def test_noise_leaves_twins_in_doubt():
     known = forgotten(specimen(*SAME["one row of crossed squares"], seed=1))
     upper = sp.triu(known.matrix, 1).tocoo()

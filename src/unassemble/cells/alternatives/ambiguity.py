@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...matrix import OperatorMatrix
 from ...topology import Topology
+from ...topology.canonical import LARGEST
 from ...topology.keys import Grouped
 from .closings import closed_by_right_angles
 from .corners import Alternative, Corners, OrientedMesh
@@ -25,7 +26,7 @@ from .nearby import nearby_readings
 from .other_scales import other_scales
 from .regrouped import fitting, regrouped
 from .rereading import other_readings
-from .twins import twins
+from .symmetric import symmetric
 from .two_places import two_places
 
 AGREE = 1e-9
@@ -78,8 +79,10 @@ def alternatives(
     around = list(hubs(corners, mesh.z, agree))
     closed = closed_at(stored.n, around)
     untried: Untried | None = None
-    if len(topology.vanished) > (topology.polygons.size - 3).sum():  # not on diagonals only
-        found = twins(stored, mesh, agree)
+    at_boundary = len(topology.vanished) > (topology.polygons.size - 3).sum()  # not on diagonals only
+    if at_boundary or stored.n <= LARGEST:
+        found = symmetric(stored, mesh, agree)
+    if at_boundary:
         orders = [other for hub in around if (other := rearranged(hub, agree)) is not None]
         # Parts that hang together at a hub only may yet be joined by other pieces.
         found += fitting(stored, mesh, factors, orders, agree) if len(topology.hinges) else orders
@@ -110,13 +113,14 @@ def touching(
 ) -> tuple[list[Alternative], Untried | None]:
     """Other meshes where no vanished entries need be supposed, of pieces that touch in a vertex, and of loose ones.
 
-    Single vertices may have two places. Right angles of their cells may be regrouped; and if all have the same entries,
-    they may be parts of larger ones.
+    Rows may be renamed; single vertices may have two places. Right angles of their cells may be regrouped; and if all
+    have the same entries, they may be parts of larger ones.
     Vertices on the boundary of loose pieces may lie inside of a mesh with another c.
 
     Parameters and results are those of :func:`alternatives`.
     """
-    moved = two_places(stored, mesh, factors, min(agree, AGREE))  # errors do not make entries vanish
+    moved = symmetric(stored, mesh, agree) if stored.n <= LARGEST else []
+    moved += two_places(stored, mesh, factors, min(agree, AGREE))  # errors do not make entries vanish
     if moved:
         return moved, None
     closed, left_open = closed_by_right_angles(stored, topology, mesh, factors) if scale is None else ([], False)
