@@ -20,6 +20,7 @@ from .labels.mending import mended
 from .labels.relaxation import HopelessError
 from .labels.repairs import repaired
 from .reading import Reading
+from .reordered import read_in_other_orders
 from .small_changes import CLOSE, SOME, best_of, tried_out, with_parts_turned_over
 from .triangles.drawings import read_in_drawings
 from .triangles.triangles_only import read_triangles
@@ -78,7 +79,8 @@ def read_cells(
     if not _stands(best):
         best = read_block_by_block(best, partial(read_cells, quick=quick)) or best
     if not (_stands(best) or quick) and n < FEW and best.size < CLOSE:
-        best = _among_all(best, n, edges, weights, scale, errors)
+        again = read_in_other_orders(partial(read_cells, quick=True), n, edges, weights, scale, errors)
+        best = again or _among_all(best, n, edges, weights, scale, errors)
     return best if spoilt is None or _stands(best) else spoilt
 
 

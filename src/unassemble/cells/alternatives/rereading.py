@@ -70,7 +70,7 @@ def other_readings(
         weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
         many = supposed and scale is None and len(part.vertices) <= _FEW
         orders = 1 if len(part.vertices) > MOST_VERTICES else min(n_orders, _MANY_ORDERS if many else _ORDERS)
-        shuffled = (part.then(_shuffled(part, rng)) for _ in range(orders))
+        shuffled = (part.shuffled(rng) for _ in range(orders))
         ask = partial(_other_reading, shuffled, stored, own, scale, c, supposed=supposed, noisy=noisy)
         cells, factor, _ = answers.of(part, weights, own, ask)
         if cells is not None:
@@ -186,15 +186,6 @@ def with_another_scale(
             if reading is not None and reading.fits:
                 return reading
     return None
-
-
-def _shuffled(part: Numbering, rng: np.random.Generator) -> Numbering:
-    """The same graph with its vertices in random order."""
-    order = rng.permutation(len(part.vertices))
-    number = np.argsort(order)
-    edges = np.sort(number[part.edges], axis=1)
-    rows = np.lexsort(edges.T[::-1])
-    return Numbering(order, rows, edges[rows])
 
 
 def cells_of(reading: Reading, numbering: Numbering) -> set[tuple[int, ...]]:
