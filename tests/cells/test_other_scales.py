@@ -120,3 +120,45 @@ def test_stored_zeros_are_no_doubles_of_others():
     edges = np.array([[0, 1], [0, 5], [1, 2], [2, 3], [3, 4], [4, 5]])
     with np.errstate(all="raise"):
         other_scales._of_tiles(6, edges, np.array([1.0, 2.0, 0.0, 1.0, 2.0, 1.0]))
+
+
+LOOK_LIKE_TWO = {
+    "root of three": ([[2, 0], [3, 0], [0, 0], [1, 1], [0, 1]], [[0, 3, 2], [2, 3, 4], [3, 0, 1]]),
+    "root of five": ([[2, 0], [2, 2], [0, 1], [1, 2], [1, 1]], [[0, 4, 2], [3, 4, 1], [4, 3, 2], [4, 0, 1]]),
+    "root of 8/3": ([[2, 3], [3, 0], [0, 0], [1, 1], [0, 2]], [[0, 3, 1], [3, 2, 1], [3, 0, 4]]),
+}
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", LOOK_LIKE_TWO)
+def test_one_piece_that_looks_like_two_triangles_with_one_factor(name, seed):
+    """Their sides have vanished from the boundary, and what is left are two triangles that share a vertex."""
+    points, triangles = LOOK_LIKE_TWO[name]
+    known = forgotten(specimen(np.array(points, dtype=float), np.array(triangles), c=1.7, seed=seed))
+    found = recover(known.matrix)
+    assert found.backward_error < 1e-12
+    assert found.status == "uncertified"
+    assert any(not other.same_scale and other.tested for other in found.alternatives)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("count", [1, 4])
+def test_loose_pieces_that_share_a_vertex_are_one_piece_as_well(count, seed):
+    """A triangle, or a strip of some, on each side of a vertex: with c known they are what they seem to be."""
+    rng = np.random.default_rng(seed)
+    strip = np.column_stack([np.arange(count + 2) / 2 + 1, np.arange(count + 2) % 2])
+    strip = (strip - strip[0]) @ [[1, 0], [0.2, 1]] + rng.uniform(-0.1, 0.1, strip.shape) * (np.arange(count + 2) > 0)[
+        :, None
+    ]
+    own = np.arange(count)[:, None] + np.arange(3)
+    points = np.vstack([strip, -strip[1:] * [1.3, 0.7]])
+    other = np.where(own == 0, 0, own + count + 1)
+    known = specimen(points, np.vstack([own, other]), c=-2.5, seed=seed)
+    found = recover(known.matrix)
+    assert len(found.hinges) == 1
+    assert found.status == "uncertified"
+    assert all(other.other_cells and not other.cells for other in found.alternatives)
+    assert found.alternatives[0].tested
+    given = recover(known.matrix, scale=-2.5)
+    assert given.certified, given.reason
+    assert triangle_set(given.triangles) == triangle_set(known.triangles)

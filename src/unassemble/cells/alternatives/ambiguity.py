@@ -80,8 +80,7 @@ def alternatives(
     closed = closed_at(stored.n, around)
     untried: Untried | None = None
     at_boundary = len(topology.vanished) > (topology.polygons.size - 3).sum()  # not on diagonals only
-    if at_boundary or stored.n <= LARGEST:
-        found = symmetric(stored, mesh, agree)
+    renamed = symmetric(stored, mesh, agree) if at_boundary or stored.n <= LARGEST else []
     if at_boundary:
         orders = [other for hub in around if (other := rearranged(hub, agree)) is not None]
         # Parts that hang together at a hub only may yet be joined by other pieces.
@@ -89,13 +88,13 @@ def alternatives(
         found += turned_over(corners, mesh.z, agree)
         if scale is None:
             found += _loose_pieces(stored, topology, corners, around, closed)
-            found += as_one_piece(stored, topology, corners, closed)
     found += two_places(stored, mesh, factors, agree)
     found = found or regrouped(stored, mesh, corners, factors, agree)
     if not found and scale is None:
         found, left_open = other_scales(stored, topology, mesh, factors, closed, agree)
         untried = Untried.SCALES if left_open else None
-    found = _each_once(found) or other_readings(stored, mesh, factors, scale, agree)
+        found = found or as_one_piece(stored, topology, closed, corners.apex)
+    found = _each_once(found + renamed) or other_readings(stored, mesh, factors, scale, agree)
     if not found:
         found, left_open = other_hanging_parts(stored, mesh, factors, agree)
         untried = untried or (Untried.PARTS if left_open else None)
@@ -130,7 +129,9 @@ def touching(
     found = regrouped(stored, mesh, Corners.of(stored.n, stored.edges, mesh), factors, agree)
     if found or scale is not None:
         return found, untried
-    found, left_open = other_scales(stored, topology, mesh, factors, np.zeros(stored.n, dtype=np.int64), agree)
+    none = np.zeros(stored.n, dtype=np.int64)
+    found, left_open = other_scales(stored, topology, mesh, factors, none, agree)
+    found = found or as_one_piece(stored, topology, none, np.empty(0, np.int64))
     return found, Untried.SCALES if left_open else untried
 
 

@@ -2,8 +2,8 @@
 
 Let p pieces be joined in the manner of a tree, each with as many entries as unknowns. With a right angle at every hinge
 they are one piece, again with as many entries as unknowns, so that its map fits with a factor c of its own wherever
-its triangles come out positive. That all pieces have one c is p - 1 numbers that coincide; but where right
-angles have been supposed in one of them anyway, that is no reason to leave them out at the hinges.
+its triangles come out positive. That all pieces have one c is p - 1 numbers that coincide, and speaks for them, but
+the one piece gives back the same entries.
 """
 
 from __future__ import annotations
@@ -19,12 +19,15 @@ from ...matrix import OperatorMatrix
 from ...planar.hinges import groups
 from ...topology import Piece, Topology
 from ...topology.faces import joined
-from .corners import Alternative, Corners, cell
+from .corners import Alternative, cell
 from .loose import MOST_TRIALS, SURE, fits_as_one, is_loose
+
+FEW_PIECES = 6
+"""Loose pieces in a tree whose common c is no proof; that of more is a coincidence too many."""
 
 
 def as_one_piece(
-    stored: OperatorMatrix, topology: Topology, corners: Corners, closed: NDArray[np.int64]
+    stored: OperatorMatrix, topology: Topology, closed: NDArray[np.int64], supposed: NDArray[np.int64]
 ) -> list[Alternative]:
     """One alternative for each group of pieces that also fits as one piece.
 
@@ -35,22 +38,25 @@ def as_one_piece(
     stored : OperatorMatrix
         Without the vanished entries.
     topology : Topology
-    corners : Corners
-        All right angles of the mesh that was found.
+        Of the mesh that was found.
     closed : (n,) int64
         1 for rows that four right angles surround.
+    supposed : (k,) int64
+        Rows with right angles whose far sides have vanished. Where there are any in one piece, those of more than a few
+        pieces are as likely.
     """
     if not len(topology.hinges):
         return []
     label = groups(topology)
     order = np.argsort(label, kind="stable")
     members = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
-    apex = np.zeros(stored.n, dtype=bool)
-    apex[corners.apex] = True
+    right = np.zeros(stored.n, dtype=bool)
+    right[supposed] = True
     found = []
     for numbers in members:
         pieces = [topology.pieces[k] for k in numbers.tolist()]
-        if len(pieces) > 1 and any(apex[piece.vertices].any() for piece in pieces) and _is_loose_tree(pieces, closed):
+        few = len(pieces) <= FEW_PIECES or any(right[piece.vertices].any() for piece in pieces)
+        if len(pieces) > 1 and few and _is_loose_tree(pieces, closed):
             found += _first_that_fits(stored, pieces)
     return found
 

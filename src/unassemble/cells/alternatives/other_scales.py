@@ -29,10 +29,10 @@ from ..covers.shapes import Shapes
 from ..reading import NEARLY
 from .corners import Alternative, OrientedMesh
 from .exhaustion import Budget, TooManyError, all_readings
+from .hinged import FEW_PIECES
 from .loose import is_loose
 from .rereading import cells_of, own_cells, with_another_scale
 
-_FEW_PIECES = 6  # whose common c is no proof where they hang together as a tree
 _MOST_SHAPES = 3000
 _MOST_SCALES = 6
 _SHORT = 4  # cells of up to so many sides are right angles, triangles or parts of crosses
@@ -77,9 +77,10 @@ def other_scales(
     loose = []
     for part, pieces in with_pieces(stored.n, stored.edges, topology.pieces):
         if pieces and all(is_loose(piece, closed) for piece in pieces):
+            few = len(pieces) <= FEW_PIECES and _in_a_tree(pieces)
             if gone[part.vertices].any():
-                loose.append((part, len(pieces) <= _FEW_PIECES and _in_a_tree(pieces)))
-            elif len(pieces) > 1 and _alike(pieces, weights_of, max(ALIKE, agree)):
+                loose.append((part, few))
+            elif len(pieces) > 1 and (few or _alike(pieces, weights_of, max(ALIKE, agree))):
                 loose.append((part, True))
     found, left_open, budget = [], False, Budget()
     own_of = own_cells(stored.n, [part for part, _ in loose], mesh)
