@@ -25,7 +25,7 @@ from .loose import is_loose, other_reading
 from .nearby import nearby_readings
 from .other_scales import other_scales
 from .regrouped import fitting, regrouped
-from .rereading import other_readings
+from .rereading import LARGER, MOST_VERTICES, other_readings
 from .symmetric import symmetric
 from .two_places import two_places
 
@@ -98,7 +98,10 @@ def alternatives(
     if not found:
         found, left_open = other_hanging_parts(stored, mesh, factors, agree)
         untried = untried or (Untried.PARTS if left_open else None)
-    return found or nearby_readings(stored, mesh, factors, scale, agree), untried
+    found = found or nearby_readings(stored, mesh, factors, scale, agree)
+    if not found and at_boundary and stored.errors is None:  # else this has been done
+        found = other_readings(stored, mesh, factors, scale, agree, least=MOST_VERTICES, most=LARGER)
+    return found, untried
 
 
 def touching(

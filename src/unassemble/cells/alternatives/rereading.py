@@ -32,9 +32,13 @@ from .enumeration import enumerated
 MOST_VERTICES = 60
 """Rows of a component that is read again."""
 
+LARGER = 400
+"""Rows of one with vanished sides that is read again if no rule foresees anything."""
+
 _MOST_NOISY = 400  # where errors of the entries may hide a difference; these are read once
 _FEW = 25  # rows of a component all of whose readings are asked for
 _ORDERS = 5
+_ORDERS_OF_LARGER = 4
 _MANY_ORDERS = 25  # of these, where sides have been supposed and c is not known
 
 WORK = 3000
@@ -48,10 +52,11 @@ def other_readings(
     scale: float | None,
     agree: float,
     *,
+    least: int = 0,
     most: int = MOST_VERTICES,
     work: int = WORK,
 ) -> list[Alternative]:
-    """Readings of components of up to `most` rows that fit, but have other cells; at most one for each.
+    """Readings of components of more than `least` rows, up to `most`, that fit, but have other cells; one for each.
 
     They are read in up to five orders, very small ones in more, as long as their rows times orders are at most `work`,
     and in one at least; those that are alike count once. Other parameters are those of
@@ -60,8 +65,9 @@ def other_readings(
     rng = np.random.default_rng(0)
     others = []
     noisy = _may_hide(stored, agree)
-    most = _MOST_NOISY if noisy else most
-    small = [part for part in components(stored.n, stored.edges) if len(part.vertices) <= most]
+    if noisy:
+        least, most = 0, _MOST_NOISY
+    small = [part for part in components(stored.n, stored.edges) if least < len(part.vertices) <= most]
     n_orders = int(np.clip(work // max(distinct_vertices(stored, small), 1), 1, _MANY_ORDERS))
     half = with_vanished_sides(stored, mesh)
     answers = Answers()
@@ -69,7 +75,9 @@ def other_readings(
         supposed = bool(half[part.vertices].any())
         weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
         many = supposed and scale is None and len(part.vertices) <= _FEW
-        orders = 1 if len(part.vertices) > MOST_VERTICES else min(n_orders, _MANY_ORDERS if many else _ORDERS)
+        orders = min(n_orders, _MANY_ORDERS if many else _ORDERS)
+        if len(part.vertices) > MOST_VERTICES:
+            orders = int(noisy) or (min(orders, _ORDERS_OF_LARGER) if supposed else 0)
         shuffled = (part.shuffled(rng) for _ in range(orders))
         ask = partial(_other_reading, shuffled, stored, own, scale, c, supposed=supposed, noisy=noisy)
         cells, factor, _ = answers.of(part, weights, own, ask)
