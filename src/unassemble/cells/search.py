@@ -43,6 +43,7 @@ def read_cells(
     errors: NDArray | None = None,
     *,
     quick: bool = False,
+    covers: bool = True,
 ) -> Reading | None:
     """The reading of a connected planar graph that fits its weights, or else the one that fits best.
 
@@ -59,6 +60,8 @@ def read_cells(
         Standard deviations of the errors of the weights, where they are known.
     quick : bool
         Whether to try a fifth of what is worth trying where nothing else is known of the graph.
+    covers : bool
+        Whether to try exact covers, to which the order of the vertices makes no difference.
 
     Returns
     -------
@@ -73,13 +76,13 @@ def read_cells(
         triangles = read_in_drawings(n, edges, weights, scale, errors)
     if triangles is not None:
         return triangles
-    best, spoilt = _searched(n, edges, weights, scale, errors, effort, thorough=not quick)
+    best, spoilt = _searched(n, edges, weights, scale, errors, effort, thorough=not quick, covers=covers)
     if best is None:
         return spoilt
     if not _stands(best):
         best = read_block_by_block(best, partial(read_cells, quick=quick)) or best
     if not (_stands(best) or quick) and n < FEW and best.size < CLOSE:
-        again = read_in_other_orders(partial(read_cells, quick=True), n, edges, weights, scale, errors)
+        again = read_in_other_orders(partial(read_cells, quick=True, covers=False), n, edges, weights, scale, errors)
         best = again or _among_all(best, n, edges, weights, scale, errors)
     return best if spoilt is None or _stands(best) else spoilt
 
@@ -100,17 +103,19 @@ def _searched(
     *,
     wide: bool = False,
     thorough: bool = True,
+    covers: bool = True,
 ) -> tuple[Reading | None, Reading | None]:
     """The best reading, and the one with entries set aside as wrong that stands where none fits.
 
-    `guess` and `wide` are as for :class:`Candidates`; if not `thorough`, nothing more is tried at last.
+    `guess` and `wide` are as for :class:`Candidates`, `covers` as above; if not `thorough`, nothing more is tried at
+    last.
     """
     best: Reading | None = None
     spoilt: Reading | None = None
     together = n <= SMALL_GRAPH
     turning = _TURNING / (_DRAWINGS if together else 1)
     every = drawings(n, edges, weights, scale, errors, guess, wide=wide)
-    cover = cache(partial(read_by_cover, n, edges, weights, scale, errors))
+    cover = cache(partial(read_by_cover, n, edges, weights, scale, errors)) if covers else _no_cover
     beginnings: list[Begun] = []
     done = False
     # Repairs take most of the effort: small graphs are begun with in all drawings before.
@@ -149,10 +154,15 @@ def _among_all(
     to depends on little things.
     """
     for guess in (best.scale, None) if scale is None else (None,):
-        again, _ = _searched(n, edges, weights, scale, errors, Effort.for_graph(n, _ONCE_MORE), guess, wide=True)
+        effort = Effort.for_graph(n, _ONCE_MORE)
+        again, _ = _searched(n, edges, weights, scale, errors, effort, guess, wide=True, covers=False)
         if again is not None and _stands(again):
             return again
     return best
+
+
+def _no_cover() -> None:
+    """In place of one that has been tried."""
 
 
 def _redrawn(best: Reading, effort: Effort) -> Reading:
