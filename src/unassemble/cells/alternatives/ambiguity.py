@@ -99,7 +99,7 @@ def alternatives(
         found, left_open = other_hanging_parts(stored, mesh, factors, agree)
         untried = untried or (Untried.PARTS if left_open else None)
     found = found or nearby_readings(stored, mesh, factors, scale, agree)
-    if not found and at_boundary and stored.errors is None:  # else this has been done
+    if not found and at_boundary:
         found = other_readings(stored, mesh, factors, scale, agree, least=MOST_VERTICES, most=LARGER)
     return found, untried
 

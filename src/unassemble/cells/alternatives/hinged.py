@@ -25,13 +25,16 @@ from .loose import MOST_TRIALS, SURE, fits_as_one, is_loose
 FEW_PIECES = 6
 """Loose pieces in a tree whose common c is no proof; that of more is a coincidence too many."""
 
+_MOST_GROUPS = 300  # that are tried; most fit at the first trial or two
+
 
 def as_one_piece(
     stored: OperatorMatrix, topology: Topology, closed: NDArray[np.int64], supposed: NDArray[np.int64]
 ) -> list[Alternative]:
     """One alternative for each group of pieces that also fits as one piece.
 
-    Where not all can be tried, or the group is too large to be solved well, the first stands for them, untested.
+    Where not all can be tried, or the group is too large to be solved well, the first stands for them, untested;
+    after 300 groups the next one does for the others.
 
     Parameters
     ----------
@@ -52,12 +55,16 @@ def as_one_piece(
     members = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
     right = np.zeros(stored.n, dtype=bool)
     right[supposed] = True
-    found = []
+    found: list[Alternative] = []
+    tried = 0
     for numbers in members:
         pieces = [topology.pieces[k] for k in numbers.tolist()]
         few = len(pieces) <= FEW_PIECES or any(right[piece.vertices].any() for piece in pieces)
         if len(pieces) > 1 and few and _is_loose_tree(pieces, closed):
-            found += _first_that_fits(stored, pieces)
+            tried += 1
+            found += _first_that_fits(stored, pieces, most=MOST_TRIALS if tried <= _MOST_GROUPS else 0)
+            if found and tried > _MOST_GROUPS:
+                break
     return found
 
 
@@ -69,15 +76,15 @@ def _is_loose_tree(pieces: list[Piece], closed: NDArray[np.int64]) -> bool:
     return all(is_loose(piece, closed) for piece in pieces)
 
 
-def _first_that_fits(stored: OperatorMatrix, pieces: list[Piece]) -> list[Alternative]:
+def _first_that_fits(stored: OperatorMatrix, pieces: list[Piece], most: int) -> list[Alternative]:
     triangles = np.concatenate([piece.vertices[piece.triangles] for piece in pieces])
-    trials = list(islice(_joinings(stored, pieces), MOST_TRIALS + 1))
+    trials = list(islice(_joinings(stored, pieces), most + 1))
     if trials and len(triangles) > SURE:
         return [replace(trials[0], tested=False)]
-    for trial in trials[:MOST_TRIALS]:
+    for trial in trials[:most]:
         if fits_as_one(stored, np.concatenate([triangles, np.array(trial.other_cells)]), trial.around):
             return [trial]
-    return [replace(trials[0], tested=False)] if len(trials) > MOST_TRIALS else []
+    return [replace(trials[0], tested=False)] if len(trials) > most else []
 
 
 def _joinings(stored: OperatorMatrix, pieces: list[Piece]) -> Iterator[Alternative]:

@@ -33,6 +33,7 @@ from .hinged import FEW_PIECES
 from .loose import is_loose
 from .rereading import cells_of, own_cells, with_another_scale
 
+_MOST_FOUND = 1000  # components that fit with other cells, some milliseconds each
 _MOST_SHAPES = 3000
 _MOST_SCALES = 6
 _SHORT = 4  # cells of up to so many sides are right angles, triangles or parts of crosses
@@ -66,7 +67,7 @@ def other_scales(
     Returns
     -------
     alternatives : list of Alternative
-        One for each component that fits with other cells.
+        One for each component that fits with other cells, up to 1,000.
     open : bool
         Whether there are components of which this could not be found out.
     """
@@ -86,6 +87,8 @@ def other_scales(
     own_of = own_cells(stored.n, [part for part, _ in loose], mesh)
     answers = Answers()
     for (part, unproved), own in zip(reversed(loose), reversed(own_of), strict=True):  # the smallest first
+        if len(found) == _MOST_FOUND:
+            break
         weights, c = -stored.entries[part.edge_rows], float(factors[part.vertices[0]])
         errors = None if stored.errors is None else stored.errors[part.edge_rows]
         ask = partial(_other, part, weights, errors, c, own, agree, budget, unproved=unproved)

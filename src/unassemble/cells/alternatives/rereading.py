@@ -66,7 +66,9 @@ def other_readings(
     others = []
     noisy = _may_hide(stored, agree)
     if noisy:
-        least, most = 0, _MOST_NOISY
+        if least:
+            return []  # all have been read at once
+        most = _MOST_NOISY
     small = [part for part in components(stored.n, stored.edges) if least < len(part.vertices) <= most]
     n_orders = int(np.clip(work // max(distinct_vertices(stored, small), 1), 1, _MANY_ORDERS))
     half = with_vanished_sides(stored, mesh)
