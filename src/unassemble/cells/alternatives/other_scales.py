@@ -83,7 +83,8 @@ def other_scales(
                 loose.append((part, few))
             elif len(pieces) > 1 and (few or _alike(pieces, weights_of, max(ALIKE, agree))):
                 loose.append((part, True))
-    found, left_open, budget = [], False, Budget()
+    found: list[Alternative] = []
+    left_open, budget = False, Budget()
     own_of = own_cells(stored.n, [part for part, _ in loose], mesh)
     answers = Answers()
     for (part, unproved), own in zip(reversed(loose), reversed(own_of), strict=True):  # the smallest first
