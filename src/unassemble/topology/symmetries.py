@@ -17,7 +17,7 @@ from scipy.sparse import csgraph
 
 from .canonical import LARGEST
 from .colours import Colours, apart, kinds_of
-from .keys import pair_keys
+from .keys import Grouped, pair_keys
 
 _ROUNDS = 12  # of refinement on larger graphs
 _MOST_TRIED = 60  # vertices of a region that take the place of others
@@ -51,12 +51,13 @@ def symmetries(
         if symmetry.holds(rows, rows[::-1]):
             yield rows, rows[::-1]
     colour = colours.refined(ranks, None if n <= LARGEST else _ROUNDS)
-    for rows in _regions(n, edges, colour):
-        inside = np.zeros(n, dtype=bool)
-        inside[rows] = True
-        own = np.flatnonzero(inside[edges].all(axis=1)) if len(rows) < n else np.arange(len(edges))
-        number = np.cumsum(inside) - 1
-        part = Colours(len(rows), number[edges[own]], colours.kinds[own])
+    region, count = _regions(n, edges, colour)
+    vertices = Grouped(region, count)
+    inner = Grouped(np.where(region[edges[:, 0]] == region[edges[:, 1]], region[edges[:, 0]], -1), count)
+    for k in range(count):
+        rows = vertices.order[vertices.start[k] : vertices.start[k + 1]]
+        own = inner.order[inner.start[k] : inner.start[k + 1]]
+        part = Colours(len(rows), vertices.rank[edges[own]], colours.kinds[own])
         for images in _exchanged(part, colour[rows]):
             moved = images != np.arange(len(rows))
             if symmetry.holds(rows[moved], rows[images[moved]]):
@@ -72,20 +73,22 @@ def _twins(colours: Colours, ranks: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.column_stack([order[:-1], order[1:]])[ranks[order[1:]] > 0]
 
 
-def _regions(n: int, edges: NDArray, colour: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
-    """Vertices of ambiguous colour that hang together, with those of other regions of the same colours."""
+def _regions(n: int, edges: NDArray, colour: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
+    """(n,) labels of vertices of ambiguous colour that hang together, and how many there are.
+
+    Those of the same colours have the same label; -1 for all other vertices, and for those of too large regions.
+    """
     several = np.bincount(colour)[colour] > 1
     inner = edges[several[edges].all(axis=1)]
     graph = sp.coo_array((np.ones(len(inner), np.int8), inner.T), shape=(n, n))
     label = csgraph.connected_components(graph, directed=False)[1]
-    # Regions that have a colour in common belong together.
     rows = np.flatnonzero(several)
     shared = sp.coo_array((np.ones(len(rows), np.int8), (label[rows], n + colour[rows])), shape=(2 * n, 2 * n))
     region = csgraph.connected_components(shared, directed=False)[1][label[rows]]
-    order = np.argsort(region, kind="stable")
-    for some in np.split(rows[order], np.flatnonzero(np.diff(region[order])) + 1):
-        if 1 < len(some) <= LARGEST:
-            yield np.sort(some)
+    small = np.bincount(region)[region] <= LARGEST if len(rows) else several[rows]
+    labels = np.full(n, -1)
+    names, labels[rows[small]] = np.unique(region[small], return_inverse=True)
+    return labels, len(names)
 
 
 def _exchanged(part: Colours, colour: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:

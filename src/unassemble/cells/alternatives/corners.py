@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -88,6 +89,14 @@ class OrientedMesh:
         first = self.polygons.vertices[self.polygons.offsets[:-1]]
         triangles = number[self.triangles[rows[self.triangles[:, 0]]]]
         return replace(self, triangles=triangles, polygons=self.polygons.chosen(rows[first], number))
+
+    def cells_at(self, wanted: NDArray[np.bool_]) -> Iterator[tuple[int, ...]]:
+        """The cells that have one of the wanted vertices, (n,)."""
+        yield from map(tuple, self.triangles[wanted[self.triangles].any(axis=1)].tolist())
+        polygons = self.polygons
+        owner = np.repeat(np.arange(polygons.count), polygons.size)
+        for k in np.unique(owner[wanted[polygons.vertices]]).tolist():
+            yield tuple(polygons.vertices[polygons.offsets[k] : polygons.offsets[k + 1]].tolist())
 
 
 @dataclass(frozen=True, eq=False)

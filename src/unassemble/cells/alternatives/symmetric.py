@@ -7,11 +7,11 @@ symmetry: twins, rows with the same neighbours and the same entries, can have no
 
 from __future__ import annotations
 
+from collections import defaultdict
+
 import numpy as np
-from numpy.typing import NDArray
 
 from ...matrix import OperatorMatrix
-from ...topology import Polygons
 from ...topology.symmetries import symmetries
 from ..alike import Cells, as_cell
 from .corners import Alternative, OrientedMesh
@@ -19,35 +19,29 @@ from .corners import Alternative, OrientedMesh
 
 def symmetric(stored: OperatorMatrix, mesh: OrientedMesh, agree: float) -> list[Alternative]:
     """Meshes with rows renamed that have the same matrix, and other cells."""
+    every = list(symmetries(stored.n, stored.edges, stored.entries, agree))
+    moved = np.zeros(stored.n, dtype=bool)
+    for rows, _ in every:
+        moved[rows] = True
+    cells_at, joined_to = defaultdict[int, Cells](set), defaultdict[int, set[int]](set)
+    for corners in mesh.cells_at(moved):
+        for row in corners:
+            cells_at[row].add(as_cell(corners))
+    for i, j in stored.edges[moved[stored.edges].any(axis=1)].tolist():
+        joined_to[i].add(j)
+        joined_to[j].add(i)
     found = []
-    for rows, images in symmetries(stored.n, stored.edges, stored.entries, agree):
-        cells = _cells_at(rows, mesh)
+    for rows, images in every:
         name = dict(zip(rows.tolist(), images.tolist(), strict=True))
+        cells = set().union(*(cells_at[row] for row in name))
         renamed = {as_cell([name.get(row, row) for row in cell]) for cell in cells}
         if renamed == cells:
             continue
-        if len(rows) == 2:
+        if len(name) == 2:
+            pair = tuple(name)
+            around = tuple(sorted((joined_to[pair[0]] | joined_to[pair[1]]) - name.keys()))
             gone, new = tuple(sorted(cells - renamed)), tuple(sorted(renamed - cells))
-            pair = (int(rows[0]), int(rows[1]))
-            found.append(Alternative(_around(stored, rows), pair, pair[::-1], gone, new))
+            found.append(Alternative(around, pair, pair[::-1], gone, new))
         else:
             found.append(Alternative.of(cells, renamed, same_scale=True))
     return found
-
-
-def _around(stored: OperatorMatrix, rows: NDArray[np.int64]) -> tuple[int, ...]:
-    """The rows that some are joined to, without themselves."""
-    near = stored.edges[np.isin(stored.edges, rows).any(axis=1)]
-    return tuple(np.setdiff1d(near, rows).tolist())
-
-
-def _cells_at(rows: NDArray[np.int64], mesh: OrientedMesh) -> Cells:
-    """The cells that have any of some rows as a corner."""
-    triangles = mesh.triangles[np.isin(mesh.triangles, rows).any(axis=1)].tolist()
-    return {as_cell(cell) for cell in triangles + _polygons_at(rows, mesh.polygons)}
-
-
-def _polygons_at(rows: NDArray[np.int64], polygons: Polygons) -> list[list[int]]:
-    owner = np.repeat(np.arange(polygons.count), polygons.size)
-    near = np.unique(owner[np.isin(polygons.vertices, rows)])
-    return [polygons.vertices[polygons.offsets[k] : polygons.offsets[k + 1]].tolist() for k in near]

@@ -140,7 +140,7 @@ def _places(stored: OperatorMatrix, mesh: OrientedMesh, agree: float) -> dict[in
     places = {h: _Place([], [], [], []) for h in at.tolist()}
     for k in np.flatnonzero(wanted[tail]).tolist():
         places[int(tail[k])].openings.append((int(previous[k]), int(head[k])))
-    for cell in _cells_at(mesh, wanted):
+    for cell in mesh.cells_at(wanted):
         for turn, vertex in enumerate(cell):
             if wanted[vertex]:
                 places[vertex].cells.append((*cell[turn:], *cell[:turn]))
@@ -160,15 +160,6 @@ def _borders_a_cell(mesh: OrientedMesh, ways: NDArray) -> NDArray[np.bool_]:
     begun[ways[:, 0]] = True
     sides = begun[tail]
     return np.isin(ways @ [n, 1], tail[sides] * n + head[sides])
-
-
-def _cells_at(mesh: OrientedMesh, wanted: NDArray[np.bool_]) -> Iterator[Cell]:
-    """The cells that have one of the wanted vertices."""
-    yield from map(tuple, mesh.triangles[wanted[mesh.triangles].any(axis=1)].tolist())
-    polygons = mesh.polygons
-    owner = np.repeat(np.arange(polygons.count), polygons.size)
-    for k in np.unique(owner[wanted[polygons.vertices]]).tolist():
-        yield tuple(polygons.vertices[polygons.offsets[k] : polygons.offsets[k + 1]].tolist())
 
 
 def _entries(cells: list[Cell], h: int, place: complex, z: NDArray) -> dict[Pair, float]:
