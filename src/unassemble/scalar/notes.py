@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..cells import incomplete_rows
 from ..matrix import OperatorMatrix
 from ..topology import Topology
-from ..words import count_of
+from ..words import count_of, words_of
 
 _EQUAL = 1e-12  # relative difference of entries that is rounding
 
@@ -108,4 +108,4 @@ def origin_notes(matrix: OperatorMatrix, suspects: NDArray) -> list[str]:
 
 
 def _some(rows: NDArray, count: int = 8) -> str:
-    return ", ".join(map(str, rows[:count])) + (", ..." if len(rows) > count else "")
+    return words_of(rows[:count]) + (", ..." if len(rows) > count else "")

@@ -68,12 +68,15 @@ def as_one_piece(
     return found
 
 
+def in_a_tree(pieces: list[Piece]) -> bool:
+    """Whether pieces that hang together make no ring."""
+    count = sum(piece.n_vertices for piece in pieces)
+    return len(np.unique(np.concatenate([piece.vertices for piece in pieces]))) == count - len(pieces) + 1
+
+
 def _is_loose_tree(pieces: list[Piece], closed: NDArray[np.int64]) -> bool:
     """Whether each piece has as many entries as unknowns, and no ring of pieces is closed."""
-    count = sum(piece.n_vertices for piece in pieces)
-    if len(np.unique(np.concatenate([piece.vertices for piece in pieces]))) != count - len(pieces) + 1:
-        return False
-    return all(is_loose(piece, closed) for piece in pieces)
+    return in_a_tree(pieces) and all(is_loose(piece, closed) for piece in pieces)
 
 
 def _first_that_fits(stored: OperatorMatrix, pieces: list[Piece], most: int) -> list[Alternative]:

@@ -29,7 +29,7 @@ from ..covers.shapes import Shapes
 from ..reading import NEARLY
 from .corners import Alternative, OrientedMesh
 from .exhaustion import Budget, TooManyError, all_readings
-from .hinged import FEW_PIECES
+from .hinged import FEW_PIECES, in_a_tree
 from .loose import is_loose
 from .rereading import cells_of, own_cells, with_another_scale
 
@@ -78,7 +78,7 @@ def other_scales(
     loose = []
     for part, pieces in with_pieces(stored.n, stored.edges, topology.pieces):
         if pieces and all(is_loose(piece, closed) for piece in pieces):
-            few = len(pieces) <= FEW_PIECES and _in_a_tree(pieces)
+            few = len(pieces) <= FEW_PIECES and in_a_tree(pieces)
             if gone[part.vertices].any():
                 loose.append((part, few))
             elif len(pieces) > 1 and (few or _alike(pieces, weights_of, max(ALIKE, agree))):
@@ -99,12 +99,6 @@ def other_scales(
             same = abs(factor / c - 1) < SAME_SCALE
             found.append(Alternative.of(own, cells, same_scale=same))
     return found[::-1], left_open
-
-
-def _in_a_tree(pieces: list[Piece]) -> bool:
-    """Whether pieces of one component make no ring."""
-    count = np.unique(np.concatenate([piece.vertices for piece in pieces]), return_counts=True)[1]
-    return int((count - 1).sum()) == len(pieces) - 1
 
 
 def _alike(pieces: list[Piece], weights: NDArray, agree: float) -> bool:
