@@ -52,13 +52,22 @@ def cut_cells(rng: np.random.Generator) -> Mesh:
 def stairs(rng: np.random.Generator) -> Mesh:
     """A random domain of rectangles, with half a rectangle wherever three corners of one belong to it."""
     k, m = (int(count) for count in rng.integers(8, 22, 2))
-    field = gaussian_filter(rng.standard_normal((k + 1, m + 1)), rng.uniform(0.8, 2.5)).ravel()
-    inside = field > np.quantile(field, rng.uniform(0.1, 0.5))
-    squares = _squares(k, m)
-    whole, half = (squares[inside[squares].sum(axis=1) == count] for count in (4, 3))
-    triangles = np.concatenate([whole[:, :3], whole[:, [0, 2, 3]], half[inside[half]].reshape(-1, 3)])
-    points = _lattice(k, m) * [rng.choice([1.0, rng.uniform(0.6, 1.6)]), 1]
+    field = gaussian_filter(rng.standard_normal((k + 1, m + 1)), rng.uniform(0.8, 2.5))
+    points, triangles = cut_to_diagonals(field > np.quantile(field, rng.uniform(0.1, 0.5)))
+    points *= [rng.choice([1.0, rng.uniform(0.6, 1.6)]), 1]
     return used(points, largest_piece(triangles))
+
+
+def cut_to_diagonals(inside: NDArray[np.bool_]) -> Mesh:
+    """Squares of the lattice points that are inside, and half a square wherever three of its corners are.
+
+    Unlike a mesh with all points in use, it has them all.
+    """
+    k, m = inside.shape
+    squares = _squares(k - 1, m - 1)
+    whole, half = (squares[inside.ravel()[squares].sum(axis=1) == count] for count in (4, 3))
+    triangles = np.concatenate([whole[:, :3], whole[:, [0, 2, 3]], half[inside.ravel()[half]].reshape(-1, 3)])
+    return _lattice(k - 1, m - 1), triangles
 
 
 def bisected(rng: np.random.Generator) -> Mesh:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from .angles import FULL, facing_angles, largest_sum
 from .candidates import Candidates
 from .choosing import chosen
+from .strain import eased, strain
 
-_LEFT_OUT = 0.05  # squared excess of an angle sum, in units of pi, above which a short face may be left out
 _INNER = (-0.35 * np.pi, -0.55 * np.pi)  # angle excess above which a vertex may be an inner one
 
 
@@ -26,12 +26,17 @@ def likely_readings(candidates: Candidates) -> Iterator[NDArray[np.bool_]]:
     corners = [*inner, *(some & ~candidates.strip for some in (*inner, candidates.corner & (candidates.belief == 1.0)))]
     corners += [some | candidates.half for some in (*corners, none)] if candidates.half.any() else []
     tried = {(some | more).tobytes(): some | more for some in faces for more in (*corners, none)}
-    seen = set()
+    seen: set[bytes] = set()
     for likely in sorted(tried.values(), key=lambda labels: strain(candidates, labels)):
         labels = chosen(candidates, np.where(likely, 1 + candidates.belief, -np.inf))
         if labels.any() and labels.tobytes() not in seen:
+            first = not seen
             seen.add(labels.tobytes())
             yield labels
+            mended = eased(candidates, labels) if first else None
+            if mended is not None and mended.tobytes() not in seen:
+                seen.add(mended.tobytes())
+                yield mended
 
 
 def tilings(candidates: Candidates) -> Iterator[NDArray[np.bool_]]:
@@ -51,20 +56,3 @@ def tilings(candidates: Candidates) -> Iterator[NDArray[np.bool_]]:
         angle = facing_angles(candidates.relative[half >> 1] * np.where(used[half ^ 1], 1, 2))
         likely = longer & ((candidates.size == 3) | (np.bincount(cell, angle, candidates.count) < FULL))
         yield chosen(candidates, np.where(likely, 1.0, -np.inf))
-
-
-def strain(candidates: Candidates, labels: NDArray[np.bool_]) -> float:
-    """How far the angles of some cells are from adding up to pi, edges between two of them shared equally.
-
-    Short faces left out add a little, or no cells would be best.
-    """
-    cell, half = candidates.sides[labels[candidates.sides[:, 0]]].T
-    used = np.zeros(2 * len(candidates.edges), dtype=bool)
-    used[half] = True
-    facing = facing_angles(candidates.relative[half >> 1] * np.where(used[half ^ 1], 1, 2))
-    angles = np.bincount(cell, facing, candidates.count)
-    # A corner has a right angle, and two others, the mean of what its sides show; half circles see one as well.
-    sides = np.maximum(np.bincount(cell, minlength=candidates.count), 1)
-    unseen = np.pi / 2 * (candidates.corner | candidates.half)
-    sums = np.where(candidates.corner, 2 * angles / sides, angles) + unseen
-    return float(((sums[labels] / np.pi - 1) ** 2).sum()) + _LEFT_OUT * float((candidates.first & ~labels).sum())

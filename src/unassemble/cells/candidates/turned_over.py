@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from ...topology.turning_over import turned_over, turns
 from .candidates import Candidates
 from .choosing import chosen
-from .starts import likely_readings, strain
+from .starts import likely_readings
+from .strain import strain
 
 _MOST_TURNS = 40  # that are looked at in one drawing
 _MOST_ROUNDS = 8  # parts that are turned over at most
