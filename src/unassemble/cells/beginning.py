@@ -17,7 +17,7 @@ from .labels.descent import Descent
 from .labels.effort import SMALL_GRAPH, Effort
 from .labels.evidence import entries_are_to_blame
 from .labels.mending import MOST_VERTICES
-from .labels.repairs import repaired
+from .labels.repairs import leapt, repaired
 from .misfits.spoilt import without_wrong_entries
 from .reading import Reading
 from .small_changes import CLOSE, QUICK, best_of, widened
@@ -86,10 +86,15 @@ def begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
             return Begun(starts[-1:], settled=True)
     if starts and candidates.n_vertices <= MOST_VERTICES and (tiling := _tiling(candidates, effort)) is not None:
         return Begun([tiling], settled=True)
+    nearest = min(starts, key=lambda reading: reading.size, default=None)
+    if nearest is not None and nearest.size < CLOSE and nearest.candidates.n_vertices > SMALL_GRAPH:
+        nearest = leapt(nearest, Effort(A_FEW, effort.known))
+        if nearest.fits:
+            return Begun([nearest], settled=True)
+        starts.append(nearest)
     # Of a reading of triangles alone, all there are, this has been asked before.
-    spoilt = without_wrong_entries(starts[0]) if starts and not _all_triangles(starts[0]) else None
-    if spoilt is not None:
-        nearest = starts[0]
+    spoilt = None if nearest is None or _all_triangles(nearest) else without_wrong_entries(nearest)
+    if nearest is not None and spoilt is not None:
         if nearest.candidates.n_vertices <= SMALL_GRAPH:  # one wrong corner may look like a wrong entry
             nearest = _turned_over(nearest, Effort(A_FEW, effort.known), A_FEW)
             nearest = nearest if nearest.fits else Descent(nearest).run(Effort(A_FEW, effort.known))
@@ -107,6 +112,8 @@ def begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
             if nearest.fits:
                 return Begun([nearest], settled=True)
         soon = repaired(start, Effort(int(_SOON * effort.solves), effort.known))
+        if not soon.fits and candidates.n_vertices > SMALL_GRAPH:
+            soon = Descent(soon).run(Effort(A_FEW, effort.known))
         if soon.fits:
             return Begun([soon], settled=True)
     for k, start in enumerate(starts):

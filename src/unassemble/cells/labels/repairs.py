@@ -14,6 +14,7 @@ from .leaps import clear_changes
 
 _log = logging.getLogger(__name__)
 
+_HALF = 0.5
 _PATIENCE = 6  # leaps without an improvement; fewer where they are long
 
 
@@ -21,6 +22,17 @@ def repaired(reading: Reading, effort: Effort) -> Reading:
     """Turn labels over as the misfit asks for it."""
     best = _leaps(reading, effort)
     return best if best.fits else Descent(best).run(effort)
+
+
+def leapt(reading: Reading, effort: Effort) -> Reading:
+    """Turn over all labels that the misfit is clear about, and once more as long as that takes half of it away."""
+    best = reading
+    while best.pieces and not best.fits and not effort.spent:
+        trial = effort.reading(best.candidates, clear_changes(best, np.nan_to_num(label_changes(best))))
+        if not trial.size < _HALF * best.size:
+            break
+        best = trial
+    return best
 
 
 def _leaps(reading: Reading, effort: Effort) -> Reading:

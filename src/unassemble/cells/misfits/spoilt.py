@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...matrix import OperatorMatrix
+from ...planar.cautious import count_flipped
 from ...planar.cotangent import edge_weights
 from ...planar.piece import PieceMesh
 from ...planar.robust import RobustFit, robust_fit
@@ -119,6 +120,8 @@ def _without_few(piece: Piece, weights: NDArray, z: NDArray | None, scale: float
 
     fit = robust_fit(piece, weights, z, settled, scale=scale)
     if fit is None or not _provable(piece, len(fit.aside), scale, _left(piece, weights, fit)):
+        return None
+    if count_flipped(piece, fit.z):  # in a mesh whose other entries are right none is
         return None
     return PieceMesh(fit.z, fit.scale, aside=fit.aside if len(fit.aside) else None)
 
