@@ -61,7 +61,7 @@ def stairs(rng: np.random.Generator) -> Mesh:
 def cut_to_diagonals(inside: NDArray[np.bool_]) -> Mesh:
     """Squares of the lattice points that are inside, and half a square wherever three of its corners are.
 
-    Unlike a mesh with all points in use, it has them all.
+    The points are all of the lattice, whether used or not.
     """
     k, m = inside.shape
     squares = _squares(k - 1, m - 1)

@@ -13,6 +13,8 @@ from scipy.spatial import Delaunay
 from skfem import Basis, BilinearForm, ElementTriP1, MeshTri
 from skfem.helpers import dot, grad
 
+from unassemble import Recovery
+
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 needs_shared = pytest.mark.skipif(not SHARED.is_dir(), reason="third-party meshes are not here")
 
@@ -106,6 +108,12 @@ def largest_error(points: NDArray, true: NDArray) -> float:
     source, target = source - source.mean(), target - target.mean()
     fits = [s * (np.vdot(s, target) / np.vdot(s, s)) for s in (source, np.conj(source))]
     return float(min(np.abs(fit - target).max() for fit in fits) / diameter(true))
+
+
+def largest_error_of_pieces(found: Recovery, true: NDArray) -> float:
+    """The same of each piece by itself, the largest of all."""
+    pieces = (found.component == label for label in range(found.n_components))
+    return max(largest_error(found.points[rows], true[rows]) for rows in pieces)
 
 
 def diameter(points: NDArray) -> float:

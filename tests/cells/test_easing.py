@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from domains import cut_to_diagonals
-from meshes import largest_error, specimen
+from meshes import largest_error_of_pieces, specimen
 from unassemble import recover
 from unassemble.cells.candidates.candidates import Candidates
 from unassemble.cells.candidates.starts import likely_readings
@@ -80,6 +80,4 @@ def test_such_meshes_are_certified(mesh):
     known = forgotten(specimen(*mesh, c=3.1, seed=8))
     found = recover(known.matrix)
     assert found.certified, found.reason
-    for label in range(found.n_components):
-        rows = found.component == label
-        assert largest_error(found.points[rows], known.points[rows]) <= 1e-9
+    assert largest_error_of_pieces(found, known.points) <= 1e-9

@@ -88,10 +88,12 @@ def begun(candidates: Candidates, effort: Effort, turns: int) -> Begun:
         return Begun([tiling], settled=True)
     nearest = min(starts, key=lambda reading: reading.size, default=None)
     if nearest is not None and nearest.size < CLOSE and nearest.candidates.n_vertices > SMALL_GRAPH:
-        nearest = leapt(nearest, Effort(A_FEW, effort.known))
-        if nearest.fits:
-            return Begun([nearest], settled=True)
-        starts.append(nearest)
+        leap = leapt(nearest, Effort(A_FEW, effort.known))
+        if leap.fits:
+            return Begun([leap], settled=True)
+        if leap is not nearest:  # or it would be repaired twice
+            starts.append(leap)
+        nearest = leap
     # Of a reading of triangles alone, all there are, this has been asked before.
     spoilt = None if nearest is None or _all_triangles(nearest) else without_wrong_entries(nearest)
     if nearest is not None and spoilt is not None:

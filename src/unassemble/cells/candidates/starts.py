@@ -33,10 +33,10 @@ def likely_readings(candidates: Candidates) -> Iterator[NDArray[np.bool_]]:
             first = not seen
             seen.add(labels.tobytes())
             yield labels
-            mended = eased(candidates, labels) if first else None
-            if mended is not None and mended.tobytes() not in seen:
-                seen.add(mended.tobytes())
-                yield mended
+            relieved = eased(candidates, labels) if first else None
+            if relieved is not None:
+                seen.add(relieved.tobytes())
+                yield relieved
 
 
 def tilings(candidates: Candidates) -> Iterator[NDArray[np.bool_]]:

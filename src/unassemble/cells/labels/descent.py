@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from ..candidates.candidates import Candidates
 from ..reading import Reading
 from .effort import Effort
-from .evidence import label_changes
 from .exchange import whole
 from .leaps import clear_changes
 from .moves import turned
@@ -35,7 +34,7 @@ _TRIED = 0.25  # a reading with a batch tried is put off behind those with so mu
 _BETTER = 0.9  # misfit, relative to the least before, that is an improvement worth its price
 _SOLVES = 10  # that telling what changes would leave is worth
 _AT_LEAST, _AT_MOST = 1, 15  # readings whose changes are told before progress is asked for, and that may be worth it
-_CLOSE = 0.05  # misfit of a reading whose first changes are all tried, unless one of them is worth its price
+_WORTH_A_BATCH = 0.05  # misfit of a reading whose first changes are all tried, unless one of them is worth its price
 _NEARLY, _PATIENCE = 0.01, 8  # misfit of a start that is nearly right, and how many are told of such a one
 _BESIDE = 24  # small changes of a reading that fits, those that leave least, that are solved for
 
@@ -94,7 +93,7 @@ class Descent:
                 effort.solves -= _SOLVES
                 changed = self._changed(reading)
             asked = 0
-            enough = _BETTER * value if reading.size < _CLOSE else value
+            enough = _BETTER * value if reading.size < _WORTH_A_BATCH else value
             for labels in islice(changed, _BATCH):
                 asked += 1
                 if effort.spent or self._tried(labels, reading, effort) < enough:
@@ -131,7 +130,7 @@ class Descent:
         """Changes of the labels of a reading; where the first few are in vain, also all clear ones at once."""
         for k, move in enumerate(self._updates.ranked(reading)):
             if k == _BATCH:
-                yield clear_changes(reading, np.nan_to_num(label_changes(reading)))
+                yield clear_changes(reading)
             yield whole(reading.candidates, turned(reading.labels, move))
 
 

@@ -7,20 +7,15 @@ from numpy.typing import NDArray
 
 from ..candidates.choosing import chosen
 from ..reading import Reading
+from .evidence import label_changes
 
 _CLEAR = 0.35  # a label that is to change by so much is turned over
 _HOPELESS = -0.3  # belief in a corner at a vertex that does not look like an inner one
 
 
-def clear_changes(reading: Reading, changes: NDArray) -> NDArray[np.bool_]:
-    """Labels with all clear changes made; as they are where there are none.
-
-    Parameters
-    ----------
-    reading : Reading
-    changes : (cells,) float64
-        Of the labels, from the linear explanation; 0 where nothing is known.
-    """
+def clear_changes(reading: Reading) -> NDArray[np.bool_]:
+    """(cells,) labels with all clear changes made; as they are where there are none."""
+    changes = np.nan_to_num(label_changes(reading))
     gain = np.where(reading.labels, -changes, changes)
     top = float(gain.max(initial=0.0))
     if top <= 0:

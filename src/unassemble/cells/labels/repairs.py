@@ -9,7 +9,6 @@ import numpy as np
 from ..reading import Reading
 from .descent import Descent, better
 from .effort import Effort
-from .evidence import label_changes
 from .leaps import clear_changes
 
 _log = logging.getLogger(__name__)
@@ -28,7 +27,7 @@ def leapt(reading: Reading, effort: Effort) -> Reading:
     """Turn over all labels that the misfit is clear about, and once more as long as that takes half of it away."""
     best = reading
     while best.pieces and not best.fits and not effort.spent:
-        trial = effort.reading(best.candidates, clear_changes(best, np.nan_to_num(label_changes(best))))
+        trial = effort.reading(best.candidates, clear_changes(best))
         if not trial.size < _HALF * best.size:
             break
         best = trial
@@ -41,7 +40,7 @@ def _leaps(reading: Reading, effort: Effort) -> Reading:
     patience = np.clip(3e4 / reading.candidates.n_vertices, 2, _PATIENCE)
     seen = {reading.labels.tobytes()}
     while reading.pieces and not reading.fits and since_best < patience and progress.suffices(best.size):
-        labels = clear_changes(reading, np.nan_to_num(label_changes(reading)))
+        labels = clear_changes(reading)
         if labels.tobytes() in seen:
             break
         seen.add(labels.tobytes())
