@@ -103,6 +103,28 @@ def riddled(rng: np.random.Generator) -> Mesh:
     return with_many_holes(points, triangles, rng, rng.choice([1 / 3, 1 / 2]))
 
 
+def gnawed(rng: np.random.Generator) -> Mesh:
+    """A third of all triangles removed, whether they share edges or not, the others being one piece."""
+    points, triangles = random_mesh(int(rng.integers(300, 1200)), int(rng.integers(10**6)), holes=False)
+    return used(points, without_leaves(triangles, rng, len(triangles) // 3))
+
+
+def without_leaves(triangles: NDArray, rng: np.random.Generator, count: int) -> NDArray:
+    """Some triangles fewer: each is a leaf of what is left of a random tree in which neighbours are joined."""
+    sides = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2)
+    of_side: dict[tuple[int, int], list[int]] = {}
+    for k, side in enumerate(sides.tolist()):
+        of_side.setdefault(tuple(side), []).append(k // 3)
+    pairs = (pair for pair in of_side.values() if len(pair) == 2)
+    dual = networkx.Graph([(a, b, {"weight": rng.random()}) for a, b in pairs])
+    tree = networkx.minimum_spanning_tree(dual)
+    while count > 0:
+        leaves = rng.permutation([k for k, degree in tree.degree if degree == 1])[: max(count // 2, 1)]
+        tree.remove_nodes_from(leaves.tolist())
+        count -= len(leaves)
+    return triangles[sorted(tree.nodes)]
+
+
 def polygon(rng: np.random.Generator) -> Mesh:
     """A polygon divided at random."""
     n = int(rng.integers(3, 30))
@@ -156,6 +178,7 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Mesh]] = {
         adaptive,
         separate_holes,
         riddled,
+        gnawed,
         polygon,
         scattered,
         integer,

@@ -23,6 +23,7 @@ from .reading import Reading
 from .reordered import read_in_other_orders
 from .small_changes import CLOSE, SOME, best_of, tried_out, with_parts_turned_over
 from .triangles.drawings import read_in_drawings
+from .triangles.many_holes import read_with_holes
 from .triangles.triangles_only import read_triangles
 
 _DRAWINGS = 3  # that a graph may have, about
@@ -72,8 +73,12 @@ def read_cells(
         return _of_equal_weights(n, edges, weights, scale, errors)
     effort = Effort.for_graph(n, _QUICKLY if quick else 1.0)
     triangles = read_triangles(n, edges, weights, scale, effort)
+    if triangles is None and n >= FEW:  # many drawings take longer than a few paths
+        triangles = read_with_holes(n, edges, weights, scale)
     if triangles is None:
         triangles = read_in_drawings(n, edges, weights, scale, errors)
+    if triangles is None and n < FEW:
+        triangles = read_with_holes(n, edges, weights, scale)
     if triangles is not None:
         return triangles
     best, spoilt = _searched(n, edges, weights, scale, errors, effort, thorough=not quick, covers=covers)

@@ -44,6 +44,8 @@ class Path:
         q at the first barrier.
     mapped_above : float
         Barriers above which positions are those of the conformal map; from there on they move with the labels.
+    outlier : float
+        Misfit beyond which an edge counts by its misfit, not by the square.
     """
 
     first: float = 0.3
@@ -51,14 +53,28 @@ class Path:
     factor: float = 0.75
     slack: float = 0.03
     mapped_above: float = 0.01
+    outlier: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
 class Aim:
-    """What labels are drawn to: (k,) whole labels of the chosen candidates, and the price of a change of each."""
+    """What labels are drawn to: (k,) whole labels of the chosen candidates, and the price of a change of each.
+
+    It is infinite for labels that are known.
+    """
 
     labels: NDArray[np.float64]
     price: NDArray[np.float64]
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """(k,) which labels may change."""
+        return np.isfinite(self.price)
+
+    @property
+    def drawn_to(self) -> NDArray[np.float64]:
+        """Price of a growing strength, where it may change."""
+        return np.where(self.labels > 0.5, -self.price, self.price)[self.free]
 
 
 def central_path(
@@ -71,7 +87,7 @@ def central_path(
     sheet : Sheet
     aim : Aim
     strength : (cells,) float64
-        Start, within (0, 1) on the chosen candidates.
+        Start, within (0, 1) on the chosen candidates that may change.
     placed : Placed, optional
         Positions at the start.
     path : Path
@@ -84,7 +100,7 @@ def central_path(
         If no map on the way leaves less of the weights than no cells at all.
     """
     strength = strength.copy()
-    drawn_to = aim.price * np.where(aim.labels > 0.5, -1.0, 1.0)
+    changing = np.flatnonzero(sheet.chosen)[aim.free]
     t = path.first
     nothing = float(cost(sheet.weights / sheet.spread(1.0)).sum())  # is what no cells explain
     least = 0.0 if t <= path.mapped_above else np.inf
@@ -94,32 +110,34 @@ def central_path(
             least = min(least, float(cost(sheet.misfit(placed, strength)).sum()))
         elif least > nothing:
             raise HopelessError
-        slack = path.slack * t / path.first
-        new, d, log_scale = _step(sheet, placed, strength, drawn_to, t, slack)
+        new, d, log_scale = _step(sheet, placed, strength, aim, t, path)
         if t <= path.mapped_above:
             length = float((np.abs(d) / sheet.extent(placed.z)).max())
             placed = sheet.moved(placed, d, log_scale, 1 / max(length, 1.0))
-        strength[sheet.chosen] = new
+        strength[changing] = new
         t *= path.factor
     assert placed is not None
     return strength, placed
 
 
 def _step(
-    sheet: Sheet, placed: Placed, strength: NDArray, drawn_to: NDArray, t: float, slack: float
+    sheet: Sheet, placed: Placed, strength: NDArray, aim: Aim, t: float, path: Path
 ) -> tuple[NDArray, NDArray, float]:
-    """New strengths of the chosen candidates, displacements and the change of log c."""
-    s = strength[sheet.chosen]
+    """New strengths of the candidates that may change, displacements and the change of log c."""
+    s = strength[sheet.chosen][aim.free]
     by_position, by_label, by_scale = sheet.linearised(placed, strength)
     free = unpinned(placed.z)
     moving, k = int(free.sum()), len(s)
-    columns = sp.hstack([by_position[:, free], by_label, sp.csr_array(by_scale[:, None])]).tocsr()
+    columns = sp.hstack([by_position[:, free], by_label[:, np.flatnonzero(aim.free)], sp.csr_array(by_scale[:, None])])
+    misfit, slack = sheet.misfit(placed, strength), path.slack * t / path.first
+    with np.errstate(divide="ignore"):
+        weighted = columns.T @ sp.diags_array(np.minimum(path.outlier / np.abs(misfit), 1.0) / slack)
     held = np.full(moving + k + 1, _HELD / slack)
     held[-1] += 0.0 if sheet.free_scale else 1.0
     held[moving : moving + k] = t / s**2 + t / (1 - s) ** 2
-    rhs = columns.T @ sheet.misfit(placed, strength) / slack
-    rhs[moving : moving + k] -= drawn_to - t / s + t / (1 - s)
-    step = solved((columns.T @ columns / slack + sp.diags_array(held)).tocsr(), rhs)
+    rhs = weighted @ misfit
+    rhs[moving : moving + k] -= aim.drawn_to - t / s + t / (1 - s)
+    step = solved((weighted @ columns + sp.diags_array(held)).tocsr(), rhs)
     new = np.clip(s + step[moving : moving + k], _NEAREST * s, 1 - _NEAREST * (1 - s))
     d = np.zeros(2 * len(placed.z))
     d[free] = step[:moving]

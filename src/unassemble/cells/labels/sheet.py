@@ -64,6 +64,8 @@ class Sheet:
     candidates : Candidates
     unit : float
         A guess of c.
+    chosen : (cells,) bool, optional
+        Candidates that may be cells; all that can be unless given.
 
     Attributes
     ----------
@@ -82,11 +84,11 @@ class Sheet:
         Median size of the weights.
     """
 
-    def __init__(self, candidates: Candidates, unit: float):
+    def __init__(self, candidates: Candidates, unit: float, chosen: NDArray[np.bool_] | None = None):
         self.candidates = candidates
         self.unit = unit
         self.n_vertices = n = candidates.n_vertices
-        self.chosen = (candidates.size <= LONGEST) & ~candidates.outer
+        self.chosen = (candidates.size <= LONGEST) & ~candidates.outer if chosen is None else chosen
         self.triangles, self.cell = fans_of(candidates, self.chosen)
         self.edges, given, self.row = with_sides(n, candidates.edges, self.triangles)
         tails, heads = self.triangles[:, [1, 2, 0]], self.triangles[:, [2, 0, 1]]

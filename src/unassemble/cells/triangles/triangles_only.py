@@ -30,7 +30,7 @@ def read_triangles(n: int, edges: NDArray, weights: NDArray, scale: float | None
         return None
     _, opposite = three_cycles(n, edges)
     scales = scales_of_lone_triangles(opposite, weights) if scale is None else [scale]
-    possible = _covered(opposite, weights) and scales
+    possible = covered(opposite, weights) and scales
     drawing = next(face_complexes(n, edges), None) if possible else None
     if drawing is None:
         return None
@@ -38,7 +38,7 @@ def read_triangles(n: int, edges: NDArray, weights: NDArray, scale: float | None
     labels = candidates.first & (candidates.size == 3)
     cell, half = candidates.sides.T
     sides = half[labels[cell]].reshape(-1, 3) >> 1
-    if not _covered(sides, weights):
+    if not covered(sides, weights):
         return None
     for c in scales:
         try:
@@ -65,6 +65,6 @@ def _alone(n: int, edges: NDArray, weights: NDArray, c: float, triangles: NDArra
     return CellSet(n, edges, weights, c, cells, none), ~none
 
 
-def _covered(sides: NDArray[np.int64], weights: NDArray[np.float64]) -> bool:
+def covered(sides: NDArray[np.int64], weights: NDArray[np.float64]) -> bool:
     """Whether each nonzero weight is that of a side of some triangle."""
     return not weights[np.bincount(sides.ravel(), minlength=len(weights)) == 0].any()
