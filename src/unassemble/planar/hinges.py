@@ -15,7 +15,8 @@ from ..topology import Topology
 from .images import growing_images
 
 CLOSED = 1e-6  # distance at shared vertices, relative to the largest piece, below which rings count as closed
-_MOST_IMAGES = 100  # pieces; above, those images are taken in which all have the orientation that they were drawn in
+_MOST_GROWN = 200  # pieces; above, those images are taken in which all have the orientation that they were drawn in
+_MOST_IMAGES = 100  # pieces; above, none is turned over by itself
 _FEW, _SOME = 9, 24  # pieces of which several, or two, are turned over at once
 _MOST_TOGETHER = 4
 _TRIED = 4  # choices of images
@@ -149,7 +150,7 @@ def _as_drawn(topology: Topology, positions: list[NDArray], _: float) -> Iterato
 
 def _grown(topology: Topology, positions: list[NDArray], closed: float) -> Iterator[NDArray[np.bool_]]:
     """Images that close all rings, piece by piece."""
-    if len(positions) > _MOST_IMAGES:
+    if len(positions) > _MOST_GROWN:
         return
     shared = [np.flatnonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces]
     vertices = [piece.vertices[s] for piece, s in zip(topology.pieces, shared, strict=True)]
