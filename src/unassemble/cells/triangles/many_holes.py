@@ -80,7 +80,7 @@ def _read(candidates: Candidates, c: float | None, *, peel: bool = False) -> Rea
         free = np.zeros_like(cells)
         free[number] = state == 0
         sheet = Sheet(candidates, c or candidates.judged_by, cells.copy())
-        end = min(_relaxed(sheet, free), key=lambda fit: fit.cost, default=None)
+        end = _relaxed(sheet, free)
         reading = Reading.of(candidates, cells if end is None else end.labels)
         reading = Descent(reading, free=free).run(Effort(_SOLVES))
         best = better(best, reading)
@@ -111,14 +111,16 @@ def _scale_of_sound_pieces(reading: Reading) -> float | None:
     return max(((piece.n_vertices, mesh.scale) for piece, mesh in _sound_pieces(reading)), default=(0, None))[1]
 
 
-def _relaxed(sheet: Sheet, free: NDArray[np.bool_]) -> Iterator[Fitted]:
-    """Whole labels at the ends of paths that begin with cells everywhere; until one leads near enough."""
+def _relaxed(sheet: Sheet, free: NDArray[np.bool_]) -> Fitted | None:
+    """The best whole labels at the ends of paths that begin with cells everywhere; until one leads near enough."""
     aim = Aim(np.ones(int(sheet.chosen.sum())), np.where(free[sheet.chosen], 1.0, np.inf))
+    found: list[Fitted] = []
     for path in _PATHS:
         strength = np.where(free, _FIRST, sheet.chosen.astype(np.float64))
-        with suppress(RecoveryError, HopelessError):
+        # A given scale may be out of all proportion.
+        with suppress(RecoveryError, HopelessError), np.errstate(all="ignore"):
             strength, placed = central_path(sheet, aim, strength, None, path)
-            fit = fitted(sheet, strength > 0.5, placed)
-            yield fit
-            if fit.cost <= _DONE * len(sheet.edges):
-                return
+            found.append(fitted(sheet, strength > 0.5, placed))
+            if found[-1].cost <= _DONE * len(sheet.edges):
+                break
+    return min(found, key=lambda fit: fit.cost, default=None)
