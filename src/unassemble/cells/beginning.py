@@ -142,7 +142,7 @@ def _tiling(candidates: Candidates, effort: Effort) -> Reading | None:
 def _all_triangles(reading: Reading) -> bool:
     """Whether the 3-cycles, all of them, are the cells."""
     candidates = reading.candidates
-    return bool((reading.labels == (candidates.first & (candidates.size == 3))).all())
+    return bool((reading.labels == candidates.triangles).all())
 
 
 def _turned_over(reading: Reading, effort: Effort, solves: int) -> Reading:

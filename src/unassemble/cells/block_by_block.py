@@ -15,7 +15,7 @@ from ..topology import Polygons, components
 from ..topology.blocks import blocks
 from ..topology.keys import contains, pair_keys
 from .candidates.cell_set import CellSet
-from .reading import FITS, Reading, add_differing_factors, misfits
+from .reading import FITS, Reading, add_differing_factors, misfits, sound_pieces
 
 Read = Callable[[int, NDArray, NDArray, float, NDArray | None], Reading | None]
 
@@ -36,11 +36,7 @@ def read_block_by_block(reading: Reading, read: Read, most: float = 1.0) -> Read
     n, edges = whole.n_vertices, whole.edges
     solved = [(piece, mesh) for piece, mesh in zip(reading.pieces, reading.meshes, strict=True) if mesh]
     misfit = misfits(n, reading.edges, reading.weights, solved)
-    sound = [
-        (piece.n_vertices, mesh.scale)
-        for piece, mesh in solved
-        if piece.redundancy > 0 and misfit[piece.edge_rows].max() <= FITS
-    ]
+    sound = [(piece.n_vertices, mesh.scale) for piece, mesh in sound_pieces(solved, misfit)]
     if not sound:
         return None
     scale = whole.scale or max(sound)[1]

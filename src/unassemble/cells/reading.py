@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Generic, TypeVar
@@ -188,6 +189,15 @@ def misfits(n: int, edges: NDArray, weights: NDArray, solved: list[tuple[Piece, 
         left = np.abs(scale * fitted - weights[rows]) / smaller
     misfit[rows] = np.where(left < 1, left, 1.0)
     return misfit
+
+
+def sound_pieces(solved: Iterable[tuple[Piece, PieceMesh | None]], misfit: NDArray) -> list[tuple[Piece, PieceMesh]]:
+    """Pieces that fit by themselves and have entries to spare, so that it is no chance."""
+    return [
+        (piece, mesh)
+        for piece, mesh in solved
+        if mesh is not None and piece.redundancy > 0 and (misfit[piece.edge_rows] <= FITS).all()
+    ]
 
 
 def _add_discord(

@@ -240,7 +240,7 @@ def _finished(best: Reading | None, begun: Begun, effort: Effort) -> Reading | N
     likeliest = begun.likeliest if starts and not starts[0].like_noise else None
     if likeliest is not None and likeliest.candidates.n_vertices <= SMALL_GRAPH:
         candidates = likeliest.candidates
-        triangles = 2 * (candidates.first & (candidates.size == 3)).sum() > candidates.first.sum()
+        triangles = 2 * candidates.triangles.sum() > candidates.first.sum()
         first = candidates.n_vertices >= FEW and triangles
         starts, likeliest = _with_mended(starts, likeliest, effort, 0 if first else len(starts)), None
     number = 0

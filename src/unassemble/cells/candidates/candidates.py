@@ -205,6 +205,17 @@ class Candidates(CellSet):
         given = np.flatnonzero(self.weights)[0]
         return float(self.weights[given] / self.relative[given])
 
+    @property
+    def triangles(self) -> NDArray[np.bool_]:
+        """(cells,) faces of three edges, but for outer ones."""
+        return self.first & (self.size == 3)
+
+    @property
+    def triangle_sides(self) -> NDArray[np.int64]:
+        """(m, 3) edges of each of these."""
+        cell, half = self.sides.T
+        return half[self.triangles[cell]].reshape(-1, 3) >> 1
+
     @cached_property
     def chorded(self) -> NDArray[np.bool_]:
         """(cells,) faces of four edges with an edge between opposite vertices: parts of two cells, if any of one."""

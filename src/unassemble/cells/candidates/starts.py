@@ -21,7 +21,7 @@ def likely_readings(candidates: Candidates) -> Iterator[NDArray[np.bool_]]:
     sums = (2 - candidates.belief) * np.pi  # those of holes are larger than pi
     by_angles = long & (sums < largest_sum(sums[long]))
     inner = [candidates.corner & (candidates.belief > 0.5 + excess / np.pi) for excess in _INNER]
-    faces = (candidates.first, (candidates.first & (candidates.size == 3)) | by_angles)
+    faces = (candidates.first, candidates.triangles | by_angles)
     none = np.zeros_like(candidates.corner)
     corners = [*inner, *(some & ~candidates.strip for some in (*inner, candidates.corner & (candidates.belief == 1.0)))]
     corners += [some | candidates.half for some in (*corners, none)] if candidates.half.any() else []

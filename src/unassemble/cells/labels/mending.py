@@ -83,7 +83,7 @@ def _relaxations(sheet: Sheet, labels: NDArray[np.bool_]) -> list[Fitted]:
     found: list[Fitted] = []
     for aim, path in ((believed, Path()), (Aim(first, even), Path()), (Aim(first, even), _SHORT)):
         try:
-            fit = _relaxed(sheet, aim, path)
+            fit = relaxed(sheet, aim, path)
             if fit is not None and fit.cost > HOPELESS * len(sheet.edges) and not found:
                 raise HopelessError
         except HopelessError:
@@ -156,10 +156,16 @@ def _carried(sheet: Sheet, labels: NDArray[np.bool_], placed: Placed) -> Fitted:
     return fitted(sheet, labels, placed)
 
 
-def _relaxed(sheet: Sheet, aim: Aim, path: Path) -> Fitted | None:
-    """Whole labels at the end of a path; None where there is no map."""
+def relaxed(sheet: Sheet, aim: Aim, path: Path) -> Fitted | None:
+    """Whole labels at the end of a path from near those that it aims at; None where there is no map.
+
+    Raises
+    ------
+    HopelessError
+        If not even labels between 0 and 1 come near the weights.
+    """
     strength = np.zeros(sheet.candidates.count)
-    strength[sheet.chosen] = np.abs(aim.labels - (1 - _NEAR))
+    strength[sheet.chosen] = np.where(aim.free, np.abs(aim.labels - (1 - _NEAR)), aim.labels)
     try:
         strength, placed = central_path(sheet, aim, strength, None, path)
     except RecoveryError:

@@ -9,25 +9,21 @@ where c is known. The few labels that the path leaves wrong are put right by sma
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import RecoveryError
-from ...planar.piece import PieceMesh
-from ...topology import Piece
 from ...topology.cycles import three_cycles
 from ...topology.embedding import face_complexes
 from ..candidates.candidates import Candidates
 from ..labels.descent import Descent, better
 from ..labels.effort import Effort
-from ..labels.fitting import Fitted, fitted
-from ..labels.mending import MOST_VERTICES
-from ..labels.relaxation import Aim, HopelessError, Path, central_path
+from ..labels.fitting import Fitted
+from ..labels.mending import MOST_VERTICES, relaxed
+from ..labels.relaxation import Aim, HopelessError, Path
 from ..labels.sheet import Sheet
-from ..reading import FITS, Reading
+from ..reading import Reading, sound_pieces
 from .peeling import ContradictionError, peeled, scales_of_lone_triangles
 from .triangles_only import covered
 
@@ -36,7 +32,6 @@ _PATHS = (
     Path(mapped_above=1e-3, outlier=1.0, slack=0.1),
     Path(outlier=1.0),
 )
-_FIRST = 0.95  # strength of triangles that may be holes
 _DONE = 0.002  # mean cost of an edge at the end of a path after which no other one is tried
 _SOLVES = 150  # for small changes
 _ROUNDS = 6  # of relaxing what does not fit by itself
@@ -57,70 +52,74 @@ def read_with_holes(n: int, edges: NDArray, weights: NDArray, scale: float | Non
     if drawing is None:
         return None
     candidates = Candidates.of(drawing, weights, scale)
-    best = _read(candidates, scale)
+    best = _read(candidates, _with_own_sides(candidates))
     c = scale or _scale_of_sound_pieces(best) or next(iter(scales_of_lone_triangles(opposite, weights)), None)
     if not best.fits and c:
-        best = better(best, _read(Candidates.of(drawing, weights, c), c, peel=True))
+        candidates = Candidates.of(drawing, weights, c)
+        try:
+            state = peeled(candidates.triangle_sides, 2 * weights / c).state
+        except ContradictionError:  # in a drawing where some cell is no face
+            state = _with_own_sides(candidates)
+        best = better(best, _read(candidates, state))
     return best if best.fits else None
 
 
-def _read(candidates: Candidates, c: float | None, *, peel: bool = False) -> Reading:
-    """The best reading that paths lead to; what fits by itself is kept, and the rest relaxed again."""
-    cells = candidates.first & (candidates.size == 3)
-    cell, half = candidates.sides.T
-    sides, number = half[cells[cell]].reshape(-1, 3) >> 1, np.flatnonzero(cells)
+def _with_own_sides(candidates: Candidates) -> NDArray[np.int8]:
+    """(m,) 1 for triangles with a side on no other one, which are cells; 0 for the others."""
+    sides = candidates.triangle_sides
     own = np.bincount(sides.ravel(), minlength=len(candidates.edges)) == 1
-    state = own[sides].any(axis=1).astype(np.int8)
-    if peel and c:
-        with suppress(ContradictionError):  # in a drawing where some cell is no face
-            state = peeled(sides, 2 * candidates.weights / c).state
-    best: Reading = Reading.unsolved(candidates, cells)
+    return own[sides].any(axis=1).astype(np.int8)
+
+
+def _read(candidates: Candidates, state: NDArray[np.int8]) -> Reading:
+    """The best reading that paths lead to; what fits by itself is kept, and the rest relaxed again.
+
+    Parameters
+    ----------
+    candidates : Candidates
+    state : (m,) int8
+        1 for known cells among the triangles, -1 for known holes, else 0.
+    """
+    number, sides = np.flatnonzero(candidates.triangles), candidates.triangle_sides
+    unit, best = candidates.scale or candidates.judged_by, None
     for _ in range(_ROUNDS):
-        cells[number] = state >= 0
-        free = np.zeros_like(cells)
-        free[number] = state == 0
-        sheet = Sheet(candidates, c or candidates.judged_by, cells.copy())
-        end = _relaxed(sheet, free)
+        cells, free = np.zeros((2, candidates.count), dtype=bool)
+        cells[number], free[number] = state >= 0, state == 0
+        end = _relaxed(Sheet(candidates, unit, cells), free[cells])
         reading = Reading.of(candidates, cells if end is None else end.labels)
         reading = Descent(reading, free=free).run(Effort(_SOLVES))
         best = better(best, reading)
         settled = (state == 0) & _sound(reading)[sides].any(axis=1)
         if best.fits or not settled.any():
             break
-        state[settled] = np.where(reading.labels[number[settled]], 1, -1)
+        state = np.where(settled, np.where(reading.labels[number], 1, -1), state)
+    assert best is not None
     return best
 
 
-def _sound_pieces(reading: Reading) -> Iterator[tuple[Piece, PieceMesh]]:
-    """Pieces that fit by themselves, which is no chance."""
-    for piece, mesh in zip(reading.pieces, reading.meshes, strict=True):
-        if mesh is not None and piece.redundancy > 0 and (reading.misfit[piece.edge_rows] <= FITS).all():
-            yield piece, mesh
-
-
 def _sound(reading: Reading) -> NDArray[np.bool_]:
-    """(e,) edges of such pieces: triangles at these are what they are taken for."""
+    """(e,) edges of pieces that fit by themselves: triangles at these are what they are taken for."""
     sound = np.zeros(len(reading.edges), dtype=bool)
-    for piece, _ in _sound_pieces(reading):
+    for piece, _ in sound_pieces(zip(reading.pieces, reading.meshes, strict=True), reading.misfit):
         sound[piece.edge_rows] = True
     return sound
 
 
 def _scale_of_sound_pieces(reading: Reading) -> float | None:
     """The c of the largest of these, if there are any."""
-    return max(((piece.n_vertices, mesh.scale) for piece, mesh in _sound_pieces(reading)), default=(0, None))[1]
+    sound = sound_pieces(zip(reading.pieces, reading.meshes, strict=True), reading.misfit)
+    return max(((piece.n_vertices, mesh.scale) for piece, mesh in sound), default=(0, None))[1]
 
 
 def _relaxed(sheet: Sheet, free: NDArray[np.bool_]) -> Fitted | None:
     """The best whole labels at the ends of paths that begin with cells everywhere; until one leads near enough."""
-    aim = Aim(np.ones(int(sheet.chosen.sum())), np.where(free[sheet.chosen], 1.0, np.inf))
+    aim = Aim(np.ones(len(free)), np.where(free, 1.0, np.inf))
     found: list[Fitted] = []
     for path in _PATHS:
-        strength = np.where(free, _FIRST, sheet.chosen.astype(np.float64))
         # A given scale may be out of all proportion.
-        with suppress(RecoveryError, HopelessError), np.errstate(all="ignore"):
-            strength, placed = central_path(sheet, aim, strength, None, path)
-            found.append(fitted(sheet, strength > 0.5, placed))
-            if found[-1].cost <= _DONE * len(sheet.edges):
-                break
+        with suppress(HopelessError), np.errstate(all="ignore"):
+            fit = relaxed(sheet, aim, path)
+            found += [fit] if fit else []
+        if found and found[-1].cost <= _DONE * len(sheet.edges):
+            break
     return min(found, key=lambda fit: fit.cost, default=None)

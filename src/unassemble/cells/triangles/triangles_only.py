@@ -35,9 +35,7 @@ def read_triangles(n: int, edges: NDArray, weights: NDArray, scale: float | None
     if drawing is None:
         return None
     candidates = Candidates.of(drawing, weights, scale)
-    labels = candidates.first & (candidates.size == 3)
-    cell, half = candidates.sides.T
-    sides = half[labels[cell]].reshape(-1, 3) >> 1
+    labels, sides = candidates.triangles, candidates.triangle_sides
     if not covered(sides, weights):
         return None
     for c in scales:
