@@ -12,17 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.special import chdtrc, ndtr
 
-CERTIFIED = 1e-9
-"""Largest backward error of a certified mesh."""
-
-SUSPICIOUS = 1e-12
-"""Backward error above which a mesh is certified only if no few entries carry the misfit."""
-
-CONFIDENCE = 1e-3
-"""Least p-value of a mesh certified in the presence of noise."""
-
-LARGEST_NOISE = 0.05
-"""Largest noise, relative to c, that is tested: an angle is then known to about as many radians."""
+from .tolerances import CERTIFIED
 
 
 @dataclass(frozen=True, eq=False)

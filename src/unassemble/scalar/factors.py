@@ -12,13 +12,13 @@ from scipy.special import fdtrc, gammaincc, ndtr
 
 from ..cells.agreement import SAME_SCALE, SCALE_ERROR
 from ..cells.within_errors import GAP
-from ..certify import CONFIDENCE, LARGEST_NOISE
 from ..planar.cotangent import left_by_all
 from ..planar.deviations import factor_deviations
 from ..planar.hinged import Hinged
 from ..planar.hinges import CLOSED, groups, join, rings
 from ..planar.piece import PieceMesh, refined_together
 from ..planar.polish import PolishOptions
+from ..tolerances import CONFIDENCE, LARGEST_NOISE
 from ..topology import Topology
 from .noise import Noise, with_vanished
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certify import CONFIDENCE, LARGEST_NOISE, chi_square_verdict
+from ..certify import chi_square_verdict
 from ..matrix import OperatorMatrix
 from ..matrix.digits import Digits
 from ..matrix.operator import row_sizes
 from ..planar.piece import EXACT
+from ..tolerances import CONFIDENCE, LARGEST_NOISE
 from ..topology import Topology
 from ..topology.keys import pair_keys
 

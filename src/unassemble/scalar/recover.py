@@ -18,6 +18,7 @@ from ..planar.hinges import free_images, join
 from ..planar.pencil import pencil_pattern
 from ..planar.piece import PieceMesh
 from ..recovery import Recovery
+from ..tolerances import SUSPICIOUS
 from ..topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
 from .deviations import coordinate_deviations
 from .evidence import pooled_noise, weigh
@@ -103,7 +104,7 @@ def _recovered(
         certificate, test = _held_against(stored, mesh, mesh.points, placement, noise, freedom, scales)
         # A misfit at rounding level, or one that noise explains, hides no wrong entry.
         search = not passes(certificate, test)
-        search |= not decides(certificate, test) and certificate.backward_error > certificates.SUSPICIOUS
+        search |= not decides(certificate, test) and certificate.backward_error > SUSPICIOUS
         evidence = weigh(
             topology,
             matrix,

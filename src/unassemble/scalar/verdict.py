@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells.reading import FITS
-from ..certify import CERTIFIED, CONFIDENCE, LARGEST_NOISE, SUSPICIOUS, Certificate
+from ..certify import Certificate
 from ..matrix import OperatorMatrix
+from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE, SUSPICIOUS
 from ..topology import Topology
 from ..words import count_of, words_of
 from .evidence import Evidence

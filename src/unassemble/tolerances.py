@@ -1,0 +1,23 @@
+"""All tolerances of the library: one name, one reason and one value each.
+
+Sections by subject. A number that follows from machine epsilon and sizes is computed where it is used, and a choice
+of the caller is a field of a frozen options type: neither belongs here.
+"""
+
+from __future__ import annotations
+
+# The certificate.
+
+CERTIFIED = 1e-9
+"""Largest backward error of a certified mesh: the polish leaves rounding, and a wrong cell leaves far more."""
+
+SUSPICIOUS = 1e-12
+"""Backward error above which a mesh is certified only if no few entries carry the misfit."""
+
+# Noise.
+
+CONFIDENCE = 1e-3
+"""Least p-value of a mesh certified in the presence of noise: one right mesh in a thousand is refused."""
+
+LARGEST_NOISE = 0.05
+"""Largest noise, relative to c, that is tested: an angle is then known to about as many radians."""
