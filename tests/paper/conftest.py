@@ -8,10 +8,10 @@ from skfem import Basis, BilinearForm, ElementTriP1, MeshTri
 from skfem.helpers import dot, grad
 
 from unassemble.paper.corners import corners_of
-from unassemble.paper.experiments import meshes
-from unassemble.paper.experiments.cases import Case, case
 from unassemble.paper.starts import angles_of
 from unassemble.topology import recognise
+from unassemble_paper import meshes
+from unassemble_paper.cases import Case, case
 
 
 @BilinearForm

@@ -8,13 +8,13 @@ from unassemble.paper.alignment import distance
 from unassemble.paper.boundary import FixedPointOptions, boundary_fixed_point, ring
 from unassemble.paper.corners import corners_of
 from unassemble.paper.equations import AngleSystem
-from unassemble.paper.experiments.claims import perturbed_boundary
-from unassemble.paper.experiments.examples import wheel
-from unassemble.paper.experiments.ranks import Ranks
 from unassemble.paper.harmonic import HarmonicReduction, tube_triangles
 from unassemble.paper.parts import part
 from unassemble.paper.starts import angles_of
 from unassemble.paper.substitution import cotangents_of, substitution
+from unassemble_paper.claims import perturbed_boundary
+from unassemble_paper.examples import wheel
+from unassemble_paper.ranks import Ranks
 
 
 def test_interior_from_boundary(paper_case):

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from unassemble.paper.experiments import claims_table, comparison_table, regenerate
-from unassemble.paper.experiments.cases import Case
 from unassemble.planar.conformal import conformal_map
+from unassemble_paper import claims_table, comparison_table, regenerate
+from unassemble_paper.cases import Case
 
 pytestmark = pytest.mark.slow  # a dozen seconds
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from unassemble.paper.corners import corners_of
-from unassemble.paper.experiments import meshes
+from unassemble_paper import meshes
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "paper-meshes"
 

@@ -5,13 +5,13 @@ import pytest
 import scipy.sparse as sp
 from click.testing import CliRunner
 
+import unassemble_paper as experiments
 from unassemble import recover
 from unassemble.cli import main
 from unassemble.errors import InputError
-from unassemble.paper import experiments
 from unassemble.paper.alignment import distance
-from unassemble.paper.experiments.claims import Claim
 from unassemble.planar.conformal import conformal_map
+from unassemble_paper.claims import Claim
 
 
 def matrix_of(case, scale):

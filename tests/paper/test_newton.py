@@ -7,11 +7,11 @@ from unassemble.errors import InputError
 from unassemble.paper.bicg import bicg
 from unassemble.paper.cgls import cgls
 from unassemble.paper.equations import AngleSystem
-from unassemble.paper.experiments.meshes import square
 from unassemble.paper.forcing import eisenstat_walker, forcing
 from unassemble.paper.lsqr import lsqr
 from unassemble.paper.newton import NewtonOptions, solve
 from unassemble.paper.square import Picked, square_rows
+from unassemble_paper.meshes import square
 
 
 class Dense:

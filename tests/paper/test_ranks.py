@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from unassemble.paper.equations import AngleSystem
-from unassemble.paper.experiments import meshes
-from unassemble.paper.experiments.examples import perforated, wheel
-from unassemble.paper.experiments.meshes import square
-from unassemble.paper.experiments.ranks import Ranks
 from unassemble.paper.nullspace import deficiency, null_vector, spiral_matrix
 from unassemble.paper.square import square_rows
+from unassemble_paper import meshes
+from unassemble_paper.examples import perforated, wheel
+from unassemble_paper.meshes import square
+from unassemble_paper.ranks import Ranks
 
 
 def system_of(case, **options):

@@ -7,9 +7,9 @@ from meshes import random_mesh
 from unassemble.errors import GeometryError, InputError
 from unassemble.paper import AngleOptions, recover_angles
 from unassemble.paper.alignment import distance
-from unassemble.paper.experiments.examples import perforated
-from unassemble.paper.experiments.meshes import Mesh
 from unassemble.paper.newton import NewtonOptions
+from unassemble_paper.examples import perforated
+from unassemble_paper.meshes import Mesh
 
 
 @pytest.mark.parametrize("scale", [1.0, 3.7, 1e-6, -2.5, 1e8])

@@ -5,10 +5,10 @@ import pytest
 
 from unassemble.errors import GeometryError, InputError
 from unassemble.paper.equations import AngleSystem
-from unassemble.paper.experiments.examples import perforated
 from unassemble.paper.newton import NewtonOptions, solve
 from unassemble.paper.starts import angles_of, barycentric_embedding, start_angles
 from unassemble.paper.validity import inverted
+from unassemble_paper.examples import perforated
 
 
 @pytest.mark.parametrize("kind", ["barycentric", "weighted"])
@@ -47,7 +47,7 @@ def test_vanished_entries_of_figure_4(assemble):
 
     It exists, since the grid hangs together, and is planar; the diagonals just do not pull.
     """
-    from unassemble.paper.experiments.meshes import square
+    from unassemble_paper.meshes import square
 
     grid = assemble(square(10))
     assert (np.abs(grid.weights) < 1e-14).sum() == 81

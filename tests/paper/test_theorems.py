@@ -10,12 +10,12 @@ from unassemble.paper.alignment import distance
 from unassemble.paper.bfs import bfs_embedding
 from unassemble.paper.corners import corners_of
 from unassemble.paper.equations import AngleSystem
-from unassemble.paper.experiments.cases import case_of
-from unassemble.paper.experiments.examples import perforated, spiral_angles, wheel
-from unassemble.paper.experiments.meshes import Mesh
 from unassemble.paper.newton import NewtonOptions
 from unassemble.paper.nullspace import deficiency
 from unassemble.paper.validity import violations
+from unassemble_paper.cases import case_of
+from unassemble_paper.examples import perforated, spiral_angles, wheel
+from unassemble_paper.meshes import Mesh
 
 
 @pytest.mark.parametrize("holes", [0, 1, 2, 3, 4])

@@ -7,9 +7,9 @@ import pytest
 
 from unassemble.paper import AngleOptions, recover_angles
 from unassemble.paper.alignment import distance
-from unassemble.paper.experiments.meshes import Mesh, stiffness
 from unassemble.paper.newton import NewtonOptions
 from unassemble.topology import recognise
+from unassemble_paper.meshes import Mesh, stiffness
 
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "corpus" / "planar"
 FILES = sorted(FOLDER.glob("*.npz")) if FOLDER.is_dir() else []

@@ -15,7 +15,8 @@ def paper(folder: str) -> int:
 
     With them go a table of its claims beside what is measured, and a comparison with the direct method.
     """
-    from ..paper.experiments import claims_table, comparison_table, regenerate
+    from unassemble_paper import claims_table, comparison_table, regenerate
+
     from ..planar.conformal import conformal_map
 
     made = regenerate(folder, conformal_map)

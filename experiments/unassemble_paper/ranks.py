@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..equations import AngleSystem
+from unassemble.paper.equations import AngleSystem
 
 
 class Ranks:

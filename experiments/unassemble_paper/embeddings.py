@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..alignment import aligned, distance
-from ..bfs import bfs_embedding
-from ..layout import least_squares_layout
-from ..smoothing import coordinate_smoothing
-from ..validity import inverted
+from unassemble.paper.alignment import aligned, distance
+from unassemble.paper.bfs import bfs_embedding
+from unassemble.paper.layout import least_squares_layout
+from unassemble.paper.smoothing import coordinate_smoothing
+from unassemble.paper.validity import inverted
+
 from .cases import Case, Run
 
 # The residuals at which the iteration is stopped. The paper gives 1e-4 for the rocket and an angle error of

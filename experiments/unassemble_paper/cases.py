@@ -9,11 +9,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...topology import Piece, recognise
-from ..corners import Corners, corners_of
-from ..equations import AngleSystem, Unknowns
-from ..newton import NewtonOptions, NewtonResult, solve
-from ..starts import angles_of, start_angles
+from unassemble.paper.corners import Corners, corners_of
+from unassemble.paper.equations import AngleSystem, Unknowns
+from unassemble.paper.newton import NewtonOptions, NewtonResult, solve
+from unassemble.paper.starts import angles_of, start_angles
+from unassemble.topology import Piece, recognise
+
 from . import meshes
 
 

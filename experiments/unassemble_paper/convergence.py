@@ -5,8 +5,9 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from ..alignment import distance
-from ..layout import least_squares_layout
+from unassemble.paper.alignment import distance
+from unassemble.paper.layout import least_squares_layout
+
 from .cases import Case, Direct, Run
 
 

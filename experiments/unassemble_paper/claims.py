@@ -9,9 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..boundary import FixedPointOptions, boundary_fixed_point
-from ..nullspace import deficiency
-from ..substitution import substitution
+from unassemble.paper.boundary import FixedPointOptions, boundary_fixed_point
+from unassemble.paper.nullspace import deficiency
+from unassemble.paper.substitution import substitution
+
 from .cases import Case, case
 from .convergence import Histories
 from .embeddings import Embedded

@@ -9,7 +9,8 @@ from dataclasses import asdict, dataclass
 from os import PathLike
 from pathlib import Path
 
-from ...files import made_folder
+from unassemble.files import made_folder
+
 from .cases import Case, Direct, Run, cases
 from .claims import Claim, claims
 from .convergence import Comparison, Histories, compare, histories
