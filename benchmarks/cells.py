@@ -78,7 +78,7 @@ def outcome(known: Specimen, scale: float | None) -> str:
         found = recover(known.matrix, scale=scale)
     except RecoveryError:
         return "refused"
-    if found.status == "uncertified":
+    if not found.certified:
         tested = [other.tested for other in found.alternatives]
         return "ambiguous" if any(tested) else "doubted" if tested else "uncertified"
     wrong = [rows for rows in pieces(known.triangles) if error(found.points[rows], known.points[rows]) > 1e-9]

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from meshes import edge_list, random_mesh
+from unassemble import Body, PlanarMesh, Recovery
 from unassemble.elasticity.elements.kinds import KINDS
 from unassemble.elasticity.elements.reference import reference_nodes
-from unassemble.recovery import Recovery
 from unassemble.topology import recognise
 
 
-def recovery_of(points: np.ndarray, triangles: np.ndarray) -> Recovery:
+def recovery_of(points: np.ndarray, triangles: np.ndarray) -> PlanarMesh:
     """A certified result with this mesh, whose triangles may have any orientation and one piece only."""
     piece = recognise(len(points), edge_list(triangles)).pieces[0]
     a, b, c = (points[piece.vertices[corner]] @ [1, 1j] for corner in piece.triangles.T)
@@ -22,7 +22,7 @@ def recovery_of(points: np.ndarray, triangles: np.ndarray) -> Recovery:
     boundary, offsets = piece.vertices[piece.boundary], piece.loop_offsets
     if mirrored:
         boundary, offsets = boundary[::-1, ::-1], offsets[-1] - offsets[::-1]
-    return Recovery(
+    return PlanarMesh(
         points=np.asarray(points, dtype=np.float64),
         triangles=piece.vertices[piece.triangles[:, [0, 2, 1]] if mirrored else piece.triangles],
         component=np.zeros(len(points), dtype=np.int64),
@@ -32,6 +32,7 @@ def recovery_of(points: np.ndarray, triangles: np.ndarray) -> Recovery:
         boundary_offsets=offsets,
         node_status=np.zeros(len(points), dtype=np.int8),
         status="certified",
+        uniqueness="searched",
         reason="the operator re-assembled on this mesh gives the matrix back to 1.0e-15",
         operator="laplacian",
         backward_error=1e-15,
@@ -40,7 +41,7 @@ def recovery_of(points: np.ndarray, triangles: np.ndarray) -> Recovery:
     )
 
 
-def lake(n: int = 250, **changes: Any) -> Recovery:
+def lake(n: int = 250, **changes: Any) -> PlanarMesh:
     """A mesh with two holes."""
     return replace(recovery_of(*random_mesh(n, seed=3)), **changes)
 
@@ -55,7 +56,7 @@ def with_loose_row(recovery: Recovery) -> Recovery:
     )
 
 
-def two_pieces(apart: float = 0.0) -> Recovery:
+def two_pieces(apart: float = 0.0) -> PlanarMesh:
     """The lake twice, the second shifted along x."""
     one = lake()
     n = one.n_points
@@ -75,7 +76,7 @@ def two_pieces(apart: float = 0.0) -> Recovery:
 _FIELDS = {"triangle": "triangles", "quad": "quads", "tetra": "tetrahedra", "hexahedron": "hexahedra"}
 
 
-def solid(kind: str) -> Recovery:
+def solid(kind: str) -> Body:
     """Two cells, or one, of any kind on the corners of a box or of two squares, as of an elasticity matrix."""
     square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64)
     flat = np.vstack([square, square + [2, 0.5]])
@@ -89,7 +90,7 @@ def solid(kind: str) -> Recovery:
     points = flat if kind in ("triangle", "quad") else box
     d = points.shape[1]
     fields: dict[str, Any] = {"triangles": np.empty((0, 3), np.int64), _FIELDS[kind]: np.array(cells[kind])}
-    return Recovery(
+    return Body(
         **fields,
         points=points,
         component=np.zeros(8, np.int64),
@@ -99,6 +100,7 @@ def solid(kind: str) -> Recovery:
         boundary_offsets=np.zeros(1, np.int64),
         node_status=np.zeros(8, np.int8),
         status="certified",
+        uniqueness="searched",
         reason="the matrix re-assembled on the elements is the given one",
         operator="elasticity",
         backward_error=1e-15,
@@ -109,7 +111,7 @@ def solid(kind: str) -> Recovery:
     )
 
 
-def quadratic(kind: str) -> Recovery:
+def quadratic(kind: str) -> Body:
     """One quadratic cell of any kind, as of an elasticity matrix."""
     shape = KINDS[kind]
     n, d = shape.nodes, shape.dim

@@ -1,19 +1,23 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from handmade import lake, two_pieces, with_loose_row
+from handmade import lake, quadratic, solid, two_pieces, with_loose_row
 from unassemble.errors import NotPlanarError, OutputError
 from unassemble.report import build_report, check_report, failure_report, write_report
 from unassemble.summary import summary
 
 STABLE = {
     "status",
+    "uniqueness",
     "reason",
     "operator",
+    "element",
+    "reaction",
     "n_points",
     "n_cells",
     "n_components",
@@ -43,6 +47,7 @@ def test_every_stable_key_with_its_value():
     report = build_report(recovery)
     assert set(report) >= STABLE
     assert report["status"] == "certified"
+    assert (report["uniqueness"], report["element"], report["reaction"]) == ("searched", "P1", 0.0)
     assert report["n_points"] == recovery.n_points
     assert report["n_cells"] == len(recovery.triangles)
     assert report["n_holes"] == 2
@@ -116,3 +121,19 @@ def test_summary_tells_of_rows_without_position_and_hinges():
     text = summary(with_loose_row(lake(hinges=np.array([4]))))
     assert "of which 1 not determined" in text
     assert "meeting in 1 hinge\n" in text
+
+
+@pytest.mark.parametrize(
+    ("kind", "element"),
+    [("triangle", "P1"), ("tetra10", "P2"), ("quad", "Q1"), ("hexahedron27", "Q2"), ("hexahedron20", "S2")],
+)
+def test_elements_of_bodies(kind, element):
+    body = solid(kind) if kind in ("triangle", "quad") else quadratic(kind)
+    assert build_report(body)["element"] == element
+    assert build_report(body)["n_holes"] is None
+
+
+def test_bodies_of_several_elements_or_none():
+    body = solid("quad")
+    assert replace(body, triangles=np.array([[4, 6, 7]])).element == "mixed"
+    assert replace(body, quads=body.quads[:0]).element is None

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     )
     from .inspection import inspect_matrix
     from .pipeline import recover
-    from .recovery import Recovery
+    from .recovery import Body, PlanarMesh, Recovery, Structure
 
 # Imported on first use: the command line answers --help without loading scipy.
 _HOMES = {
     "inspect_matrix": "inspection",
     "recover": "pipeline",
-    "Recovery": "recovery",
+    **dict.fromkeys(("Body", "PlanarMesh", "Recovery", "Structure"), "outputs"),
     **dict.fromkeys(
         (
             "FormatError",
@@ -47,6 +47,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "Body",
     "FormatError",
     "GeometryError",
     "InputError",
@@ -54,9 +55,11 @@ __all__ = [
     "MatrixFileError",
     "NotPlanarError",
     "OutputError",
+    "PlanarMesh",
     "Recovery",
     "RecoveryError",
     "SolverError",
+    "Structure",
     "TopologyError",
     "UnassembleError",
     "__version__",

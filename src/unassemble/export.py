@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 from .errors import FormatError
 from .files import check_target, whole_file
 from .formats import MeshFormat, format_of
-from .structures.layouts import layout_named
+from .recovery import PlanarMesh, Recovery
 
 if TYPE_CHECKING:
     import meshio
-
-    from .recovery import Recovery
 
 _log = logging.getLogger(__name__)
 
@@ -74,9 +72,10 @@ def arrays(recovery: Recovery) -> dict[str, Any]:
     """What the ``.npz`` holds, by key; what there is nothing of has no key."""
     content: dict[str, Any] = {"points": recovery.points}
     for name in ("triangles", "quads", "tetrahedra", "hexahedra", "mid_nodes", "lines"):
-        if getattr(recovery, name).size:
-            content[name] = getattr(recovery, name)
-    if recovery.n_polygons:
+        cells = getattr(recovery, name, None)  # each kind of result has its own
+        if cells is not None and cells.size:
+            content[name] = cells
+    if isinstance(recovery, PlanarMesh) and recovery.n_polygons:
         content |= {"polygons_offsets": recovery.polygons_offsets, "polygons_data": recovery.polygons_data}
     content |= {"component": recovery.component, "hinges": recovery.hinges, "scale": recovery.scale}
     content["node_status"] = recovery.node_status
@@ -102,7 +101,7 @@ def _mesh(recovery: Recovery, dimension: int, point_data: dict[str, NDArray], *,
 
     points = np.zeros((recovery.n_points, max(dimension, recovery.dim)))
     points[:, : recovery.points.shape[1]] = recovery.points
-    if polygons and recovery.n_polygons:
+    if polygons and isinstance(recovery, PlanarMesh) and recovery.n_polygons:
         blocks = [*recovery.cells.items(), *(("polygon", same) for same in _by_size(recovery))]
     else:
         blocks = list(_cells(recovery).items())
@@ -111,14 +110,14 @@ def _mesh(recovery: Recovery, dimension: int, point_data: dict[str, NDArray], *,
 
 def _cells(recovery: Recovery) -> dict[str, NDArray[np.int64]]:
     """Cells by kind, polygons divided; where the elements of a vector-valued matrix are not known, its nodes."""
-    if recovery.n_polygons:
+    if isinstance(recovery, PlanarMesh) and recovery.n_polygons:
         return {"triangle": recovery.divided()[0]}
     if recovery.n_cells or not recovery.vector_valued:
         return recovery.cells or {"triangle": recovery.triangles}
     return {"vertex": np.flatnonzero(recovery.node_status == 0)[:, None]}
 
 
-def _by_size(recovery: Recovery) -> list[NDArray[np.int64]]:
+def _by_size(recovery: PlanarMesh) -> list[NDArray[np.int64]]:
     """Polygons as (m, k) arrays, one for each number of vertices."""
     size = np.diff(recovery.polygons_offsets)
     return [
@@ -131,7 +130,7 @@ def _point_data(recovery: Recovery) -> dict[str, NDArray]:
     data |= {"component": recovery.component, "boundary": _boundary_flag(recovery)}
     if recovery.node_status.any():
         data["node_status"] = recovery.node_status.astype(np.int64)
-    if recovery.standard_deviations is not None:
+    if isinstance(recovery, PlanarMesh) and recovery.standard_deviations is not None:
         for name, column in zip("xyz", recovery.standard_deviations.T, strict=False):
             data[f"standard_deviation_{name}"] = np.ascontiguousarray(column)
     return data
@@ -139,6 +138,8 @@ def _point_data(recovery: Recovery) -> dict[str, NDArray]:
 
 def _rows(recovery: Recovery) -> dict[str, NDArray]:
     """Matrix rows of each point, by direction where it has several."""
+    from .structures.layouts import layout_named
+
     node, direction = recovery.node_of_row, recovery.direction_of_row
     if node is None or direction is None:
         return {"row": np.arange(recovery.n_points)}
@@ -156,8 +157,8 @@ def _boundary_flag(recovery: Recovery) -> NDArray[np.int64]:
     if recovery.dim == 3:
         from .elasticity.elements.surface import outer_nodes
 
-        flag[recovery.lines] = 1
-        solid = {kind: cells for kind, cells in recovery.cells.items() if kind != "line"}
+        solid = dict(recovery.cells)
+        flag[solid.pop("line", [])] = 1
         flag[outer_nodes(solid) if solid else []] = 1
     return flag
 

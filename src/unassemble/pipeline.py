@@ -12,7 +12,8 @@ from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, read_matrix
 from .operators import VectorReading, about_translations, asked_for, refuse, second_reading, vector_valued
 from .options import check_options, listed_anchors
-from .recovery import Recovery
+from .outputs import Recovery
+from .recovery import PlanarMesh
 from .scalar import ScalarOptions, recover_scalar
 from .scalar.placement import Direction, Placement
 
@@ -144,7 +145,7 @@ def recover(
         "handed": handed, "standard_deviations": standard_deviations,
     }  # fmt: skip
 
-    def scalar(part: OperatorMatrix, known: Sequence[Any] | None) -> Recovery:
+    def scalar(part: OperatorMatrix, known: Sequence[Any] | None) -> PlanarMesh:
         placement = Placement.checked(part.n, known, tensor, direction, handed)
         options = ScalarOptions(
             method or "conformal",

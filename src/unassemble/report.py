@@ -8,56 +8,50 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ._version import __version__
 from .errors import OutputError, UnassembleError
 from .files import check_target, whole_file
-from .summary import block_size, largest_deviation
-
-if TYPE_CHECKING:
-    from .recovery import Recovery
+from .recovery import Body, Mechanical, PlanarMesh, Recovery
 
 
 def build_report(recovery: Recovery) -> dict[str, Any]:
     """Everything but the mesh, made of what JSON knows; numbers that are not finite become None.
 
-    Keys: ``status``, ``reason``, ``operator``, ``n_points``, ``n_cells``, ``n_components``, ``n_holes``, ``scale`` (one
-    for each piece), ``backward_error``, ``timings`` (seconds by stage), ``warnings``; further ``n_polygons``
-    (cells that the matrix leaves undivided), ``n_hinges``,
-    ``n_undetermined``, ``n_boundary_edges``, ``worst_entries`` (``row``, ``column``, ``misfit``, worst first),
-    ``suspects`` (``row``, ``column``), ``alternatives`` (where other cells fit as well: ``cells`` and
-    ``other_cells``, lists of rows; the rows ``around`` which they lie, and others in the order ``found`` and in that
-    of the ``other`` mesh; ``same_scale``, whether both have the same c), ``chi_square``, ``estimated_noise``,
-    ``largest_standard_deviation`` and ``version``. Vector-valued matrices have those of :func:`_vector_facts` too.
+    Keys: ``status``, ``uniqueness``, ``reason``, ``operator``, ``element``, ``reaction``, ``n_points``, ``n_cells``,
+    ``n_components``, ``n_holes`` (null but for planar meshes), ``scale`` (one for each piece), ``backward_error``,
+    ``timings`` (seconds by stage), ``warnings``; further ``n_polygons`` (cells that the matrix leaves undivided),
+    ``n_hinges``, ``n_undetermined``, ``n_boundary_edges``, ``worst_entries`` (``row``, ``column``, ``misfit``, worst
+    first), ``version``, and those of :func:`_planar_facts`, :func:`_vector_facts` and :func:`_mechanical_facts`.
     """
     return _plain(
         {
             "status": recovery.status,
+            "uniqueness": recovery.uniqueness,
             "reason": recovery.reason,
             "operator": recovery.operator,
+            "element": recovery.element,
+            "reaction": recovery.reaction,
             "n_points": recovery.n_points,
             "n_cells": recovery.n_cells,
             "n_polygons": recovery.n_polygons,
             "n_components": recovery.n_components,
-            "n_holes": recovery.n_holes,
+            "n_holes": recovery.n_holes if isinstance(recovery, PlanarMesh) else None,
             "n_hinges": len(recovery.hinges),
             "n_undetermined": np.count_nonzero(recovery.node_status),
             "n_boundary_edges": len(recovery.boundary),
             "scale": recovery.scale,
             "backward_error": recovery.backward_error,
-            "chi_square": recovery.chi_square,
-            "estimated_noise": recovery.estimated_noise,
-            "largest_standard_deviation": largest_deviation(recovery),
             "worst_entries": [
                 {"row": i, "column": j, "misfit": misfit}
                 for (i, j), misfit in zip(recovery.worst_entries, recovery.worst_misfits, strict=True)
             ],
-            "suspects": [{"row": i, "column": j} for i, j in recovery.suspects],
-            "alternatives": [asdict(other) for other in recovery.alternatives],
+            **(_planar_facts(recovery) if isinstance(recovery, PlanarMesh) else {}),
             **(_vector_facts(recovery) if recovery.vector_valued else {}),
+            **(_mechanical_facts(recovery) if isinstance(recovery, Mechanical) else {}),
             "timings": recovery.timings,
             "warnings": recovery.warnings,
             "version": __version__,
@@ -65,27 +59,54 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
     )
 
 
+def _planar_facts(mesh: PlanarMesh) -> dict[str, Any]:
+    """What only planar meshes have.
+
+    ``chi_square``, ``estimated_noise``, ``largest_standard_deviation``, ``suspects`` (``row``, ``column``) and
+    ``alternatives``, where other cells fit as well: ``cells`` and ``other_cells``, lists of rows; the rows ``around``
+    which they lie, and others in the order ``found`` and in that of the ``other`` mesh; ``same_scale``, whether both
+    have the same c.
+    """
+    return {
+        "chi_square": mesh.chi_square,
+        "estimated_noise": mesh.estimated_noise,
+        "largest_standard_deviation": mesh.largest_deviation,
+        "suspects": [{"row": i, "column": j} for i, j in mesh.suspects],
+        "alternatives": [asdict(other) for other in mesh.alternatives],
+    }
+
+
 def _vector_facts(recovery: Recovery) -> dict[str, Any]:
     """What only vector-valued matrices have.
 
-    ``dimension`` of space, ``block_size``, ``numbering``, ``operator_choice`` (why, if nobody said), ``cells`` (number
-    by kind), ``poisson_ratio``, and for each piece in ``evidence`` the dimension of the null space, the singular value
-    of the coordinates and that of the best field that is none of them.
+    ``dimension`` of space, ``block_size``, ``numbering``, ``operator_choice`` (why, if nobody said) and ``cells``
+    (number by kind).
     """
     return {
         "dimension": recovery.dim,
-        "block_size": block_size(recovery),
+        "block_size": recovery.block_size,
         "numbering": recovery.numbering,
         "operator_choice": recovery.choice,
         "cells": {kind: len(cells) for kind, cells in recovery.cells.items()},
-        "poisson_ratio": recovery.poisson_ratio,
+    }
+
+
+def _mechanical_facts(recovery: Mechanical) -> dict[str, Any]:
+    """What only bodies and structures have.
+
+    ``poisson_ratio``, and for each piece in ``evidence`` the dimension of the null space, the singular value of the
+    coordinates and that of the best field that is none of them.
+    """
+    return {
+        "poisson_ratio": recovery.poisson_ratio if isinstance(recovery, Body) else None,
         "evidence": [asdict(one) for one in recovery.evidence],
     }
 
 
 def failure_report(error: UnassembleError) -> dict[str, Any]:
     """The report of a matrix from which nothing could be recovered: the same keys, mostly empty."""
-    empty = dict.fromkeys(("operator", "n_points", "n_cells", "n_components", "n_holes", "scale", "backward_error"))
+    sizes = ("n_points", "n_cells", "n_components", "n_holes")
+    empty = dict.fromkeys(("uniqueness", "operator", "element", "reaction", *sizes, "scale", "backward_error"))
     return {"status": "failed", "reason": str(error), **empty, "timings": {}, "warnings": [], "version": __version__}
 
 

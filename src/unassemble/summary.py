@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .recovery import Body, Mechanical, PlanarMesh, Recovery
+from .tolerances import SUSPICIOUS
 from .words import count_of
-
-if TYPE_CHECKING:
-    from .recovery import Recovery
 
 _SHOWN = 3
 
@@ -31,19 +29,14 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
         *_cell_rows(recovery),
         ("pieces", _pieces(recovery)),
     ]
-    if recovery.n_holes is not None:
-        rows.append(("holes", f"{recovery.n_holes:,}"))
-    if recovery.mechanical:
+    if isinstance(recovery, PlanarMesh):
+        rows += [("holes", f"{recovery.n_holes:,}"), ("scale c", scale_text(recovery))]
+    if isinstance(recovery, Mechanical):
         rows += _elastic_rows(recovery)
-    else:
-        rows.append(("scale c", scale_text(recovery)))
     rows.append(("backward error", f"{recovery.backward_error:.1e}"))
-    if recovery.estimated_noise is not None and recovery.backward_error > 1e-12:
-        rows.append(("noise", f"the misfit is that of a standard deviation of {recovery.estimated_noise:.1e}"))
-    deviation = largest_deviation(recovery)
-    if deviation is not None:
-        rows.append(("std deviation", f"at most {deviation:.1e} in a coordinate"))
-    if recovery.status == "uncertified" and len(recovery.worst_entries):
+    if isinstance(recovery, PlanarMesh):
+        rows += _noise_rows(recovery)
+    if not recovery.certified and len(recovery.worst_entries):
         rows += _worst(recovery)
     if recovery.timings:
         rows.append(("time", _timings(recovery.timings)))
@@ -53,7 +46,7 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
 def _operator(recovery: Recovery) -> str:
     if not recovery.vector_valued:
         return recovery.operator
-    return f"{recovery.operator}, {block_size(recovery)} unknowns per node, {numbering_text(recovery)}"
+    return f"{recovery.operator}, {recovery.block_size} unknowns per node, {numbering_text(recovery)}"
 
 
 def numbering_text(recovery: Recovery) -> str:
@@ -97,9 +90,18 @@ def _cell_rows(recovery: Recovery) -> list[tuple[str, str]]:
     ]
 
 
-def _elastic_rows(recovery: Recovery) -> list[tuple[str, str]]:
+def _noise_rows(mesh: PlanarMesh) -> list[tuple[str, str]]:
     rows = []
-    if recovery.poisson_ratio is not None:
+    if mesh.estimated_noise is not None and mesh.backward_error > SUSPICIOUS:
+        rows.append(("noise", f"the misfit is that of a standard deviation of {mesh.estimated_noise:.1e}"))
+    if mesh.largest_deviation is not None:
+        rows.append(("std deviation", f"at most {mesh.largest_deviation:.1e} in a coordinate"))
+    return rows
+
+
+def _elastic_rows(recovery: Mechanical) -> list[tuple[str, str]]:
+    rows = []
+    if isinstance(recovery, Body) and recovery.poisson_ratio is not None:
         rows.append(("Poisson's ratio", f"{recovery.poisson_ratio:.10g}"))
     if np.isfinite(recovery.scale).any():
         rows.append(("shear modulus", scale_text(recovery)))
@@ -129,7 +131,8 @@ def scale_text(recovery: Recovery, digits: int = 10) -> str:
 
 def _worst(recovery: Recovery) -> list[tuple[str, str]]:
     """Entries that stand out, then those that fit worst, which are often only their neighbours."""
-    apart = {tuple(pair) for pair in recovery.suspects.tolist()}
+    suspects = recovery.suspects.tolist() if isinstance(recovery, PlanarMesh) else []
+    apart = set(map(tuple, suspects))
     misfits = dict(zip(map(tuple, recovery.worst_entries.tolist()), recovery.worst_misfits.tolist(), strict=True))
     rest = sorted((pair for pair in misfits if pair not in apart), key=misfits.__getitem__, reverse=True)
     named = [("stands out", pair) for pair in misfits if pair in apart][:_SHOWN]
@@ -142,17 +145,3 @@ def _worst(recovery: Recovery) -> list[tuple[str, str]]:
 def _timings(timings: Mapping[str, float]) -> str:
     stages = ", ".join(f"{stage} {seconds:.2g}" for stage, seconds in timings.items() if seconds >= 0.005)
     return f"{sum(timings.values()):.2f} s" + (f" ({stages})" if stages else "")
-
-
-def block_size(recovery: Recovery) -> int:
-    """Unknowns per node."""
-    direction = recovery.direction_of_row
-    return 1 if direction is None else int(direction.max()) + 1
-
-
-def largest_deviation(recovery: Recovery) -> float | None:
-    """The largest error bar of a coordinate, where there are any."""
-    deviations = recovery.standard_deviations
-    if deviations is None or not np.isfinite(deviations).any():
-        return None
-    return float(np.nanmax(deviations))

@@ -14,16 +14,16 @@ from .elasticity.anchoring import checked_anchors
 from .elasticity.results import ScalarParts
 from .errors import RecoveryError
 from .matrix import OperatorMatrix, check_matrix
-from .recovery import Recovery
+from .recovery import PlanarMesh
 
 _SAME = 1e-12  # relative difference up to which the matrices of two directions are one
 
-Scalar = Callable[[OperatorMatrix, Sequence[Any]], Recovery]
+Scalar = Callable[[OperatorMatrix, Sequence[Any]], PlanarMesh]
 
 
 def recover_directions(
     parts: ScalarParts, matrix: OperatorMatrix, anchors: Sequence[Any] | None, scalar: Scalar
-) -> Recovery:
+) -> PlanarMesh:
     """Recover each direction as the scalar matrix that it is; the mesh is that of the direction with most nodes.
 
     Parameters
@@ -64,6 +64,7 @@ def recover_directions(
     return replace(
         _among_all_nodes(mesh, nodes, _rows_of(parts, lead), numbering.n_nodes),
         status=worst.status,
+        uniqueness=worst.uniqueness,
         reason=worst.reason,
         backward_error=worst.backward_error,
         operator="vector laplacian",
@@ -74,7 +75,7 @@ def recover_directions(
     )
 
 
-def _among_all_nodes(mesh: Recovery, nodes: NDArray[np.int64], rows: NDArray[np.int64], n: int) -> Recovery:
+def _among_all_nodes(mesh: PlanarMesh, nodes: NDArray[np.int64], rows: NDArray[np.int64], n: int) -> PlanarMesh:
     """The mesh of one direction with the numbers of all n nodes, and entries with those of the rows of the matrix.
 
     Its point k is node ``nodes[k]`` and has the row ``rows[k]``.

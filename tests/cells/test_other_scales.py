@@ -107,7 +107,7 @@ def test_congruent_triangles_that_share_a_vertex_may_have_a_right_angle_between_
     triangles = np.array([[0, 2, 1], [0, 3, 4], [0, 1, 3]][: 3 if filled else 2])
     known = forgotten(specimen(points, triangles, seed=5))
     found = recover(known.matrix)
-    assert found.status == "uncertified"
+    assert found.status == "ambiguous"
     assert len(found.alternatives) == 1
     assert "so does another" in found.reason
     told = recover(known.matrix, scale=1.0)
@@ -137,7 +137,7 @@ def test_one_piece_that_looks_like_two_triangles_with_one_factor(name, seed):
     known = forgotten(specimen(np.array(points, dtype=float), np.array(triangles), c=1.7, seed=seed))
     found = recover(known.matrix)
     assert found.backward_error < 1e-12
-    assert found.status == "uncertified"
+    assert found.status == "ambiguous"
     assert any(not other.same_scale and other.tested for other in found.alternatives)
 
 
@@ -156,7 +156,7 @@ def test_loose_pieces_that_share_a_vertex_are_one_piece_as_well(count, seed):
     known = specimen(points, np.vstack([own, other]), c=-2.5, seed=seed)
     found = recover(known.matrix)
     assert len(found.hinges) == 1
-    assert found.status == "uncertified"
+    assert found.status == "ambiguous"
     assert all(other.other_cells and not other.cells for other in found.alternatives)
     assert found.alternatives[0].tested
     given = recover(known.matrix, scale=-2.5)

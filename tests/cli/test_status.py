@@ -48,7 +48,7 @@ def test_3_is_not_silent_even_if_quiet(work, one_sentence):
     result = work.recover("--quiet", matrix="B.mtx")
     assert result.exit_code == 3
     assert result.stdout == ""
-    assert one_sentence(result).startswith("not certified: ")
+    assert one_sentence(result).startswith("uncertified: ")
 
 
 BROKEN = {

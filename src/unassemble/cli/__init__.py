@@ -23,7 +23,7 @@ Exit status:
   0    recovered and certified
   1    internal error
   2    bad usage, or a file that cannot be read as a matrix
-  3    a mesh was written, but is not certified
+  3    a mesh was written, but is ambiguous or uncertified
   4    no mesh can be recovered, or the format cannot hold it; nothing written
   130  interrupted; nothing written
 """

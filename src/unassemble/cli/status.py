@@ -98,7 +98,7 @@ def outcome(recovery: Recovery, written: Sequence[str], *, quiet: bool) -> int:
         files = ", ".join(map(click.format_filename, written))
         say(as_typed(summary(recovery), commands) + f"\n  {'written':<15} {files}")
     elif not recovery.certified:
-        click.echo(f"unassemble: not certified: {as_typed(recovery.reason, commands)}", err=True)
+        click.echo(f"unassemble: {recovery.status}: {as_typed(recovery.reason, commands)}", err=True)
     return CERTIFIED if recovery.certified else UNCERTIFIED
 
 

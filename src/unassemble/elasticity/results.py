@@ -9,35 +9,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..recovery import Evidence as Evidence
 from .elements.cells import Cells
 from .modes import rigid_body_modes
 from .rows.numbering import Numbering
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """How uniquely the matrix determines a piece.
-
-    Attributes
-    ----------
-    null_dimension : int
-        Independent fields that satisfy all valid identities, nodes that stay loose left out. 4 in space, 3 in the
-        plane: translations and scale. One less where no field but translations is exact.
-    residual : float
-        Singular value of the coordinates: norm of the residual over the norm of the centred field.
-    gap : float
-        Singular value of the best field that is none of these; an upper bound on large bodies.
-    rows : int
-        Nodes with valid identities.
-    settled : bool
-        Whether the residual is that small beside the gap that no other field has a part in the coordinates.
-    """
-
-    null_dimension: int
-    residual: float
-    gap: float
-    rows: int
-    settled: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Solid bodies served as every other matrix: what was asked for in, one Recovery out."""
+"""Solid bodies served as every other matrix: what was asked for in, one Body out."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..clock import Clock
 from ..matrix import OperatorMatrix
-from ..recovery import Recovery
+from ..recovery import Body
 from .anchoring import anchored, checked_anchors, digits_lost, near_enough
 from .elements.cells import Cells
 from .elements.kinds import KINDS
@@ -36,7 +36,7 @@ def serve_body(
     anchors: Sequence[Any] | None,
     cells: bool,
     choice: str,
-) -> Recovery:
+) -> Body:
     """Recover a solid body whose numbering is known.
 
     Parameters
@@ -73,13 +73,14 @@ def serve_body(
     lame, scale = _in_units(found, factor)
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: with a mesh its point reflection fits the matrix as well")
-    return Recovery(
+    return Body(
         **_cell_fields(found.cells),
         points=points,
         component=found.component,
         scale=scale,
         node_status=found.node_status,
         status=status,
+        uniqueness="searched" if status == "certified" else None,
         reason=reason,
         operator="elasticity",
         backward_error=found.backward_error,
@@ -110,7 +111,7 @@ _FIELD = {"triangle": "triangles", "quad": "quads", "tetra": "tetrahedra", "hexa
 
 
 def _cell_fields(found: Cells) -> dict[str, Any]:
-    """Corners of the cells by their name in a Recovery, their further nodes, and in the plane their boundary."""
+    """Corners of the cells by their name in a Body, their further nodes, and in the plane their boundary."""
     fields = {}
     for name, cells in found.blocks.items():
         kind = KINDS[name]

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..recovery import Recovery, Structure
 from . import style
-from .canvas import footer, header, panels
+from .canvas import panels
 from .mesh import line_handle
 from .structure import draw_structure
 
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from ..recovery import Recovery
 
 # Looking down on the body from the front and the right; z points up.
 _ACROSS = np.array([0.80, 0.60, 0.0])
@@ -27,15 +26,8 @@ _MOST_OUTLINED = 40_000
 _MOST_VECTOR = 5_000
 
 
-def plot_body(recovery: Recovery, headline: str, details: str) -> Figure:
-    """Draw the body of an elasticity matrix; pieces side by side.
-
-    Parameters
-    ----------
-    recovery : Recovery
-    headline, details : str
-        Above the picture.
-    """
+def plot_body(recovery: Recovery) -> tuple[Figure, list[Artist]]:
+    """A body or structure, pieces side by side, and handles for the legend."""
     flat, depth = _projected(recovery.points)
     flat = _side_by_side(flat, recovery)
     known = np.isfinite(flat).all(axis=1)
@@ -45,7 +37,7 @@ def plot_body(recovery: Recovery, headline: str, details: str) -> Figure:
     if not recovery.n_cells:
         ax.plot(*shown.T, "o", markersize=float(np.clip(120 / np.sqrt(len(shown)), 1, 4)), color=style.EDGE)
         handles.append(line_handle(style.EDGE, "nodes; no elements were recognised", width=3))
-    elif len(recovery.lines) or (recovery.dim == 3 and not (len(recovery.tetrahedra) or len(recovery.hexahedra))):
+    elif isinstance(recovery, Structure):
         handles += draw_structure(ax, recovery, flat, depth)
     elif recovery.dim == 3:
         _draw_surface(ax, recovery, flat, depth)
@@ -53,9 +45,7 @@ def plot_body(recovery: Recovery, headline: str, details: str) -> Figure:
     else:
         _draw_cells(ax, recovery, flat)
         handles.append(line_handle(style.OUTER, "boundary of the recognised cells"))
-    header(figure, headline, details, style.STATUS.get(recovery.status, style.TEXT))
-    footer(figure, handles)
-    return figure
+    return figure, handles
 
 
 def _projected(points: NDArray) -> tuple[NDArray, NDArray]:

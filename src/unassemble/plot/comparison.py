@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..recovery import PlanarMesh, Recovery
 from ..summary import counted_cells
 from ..words import count_of
 from . import style
@@ -18,8 +19,6 @@ from .mesh import draw_mesh, extent, outer_loops
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..recovery import Recovery
-
 
 def plot_comparison(true_points: ArrayLike, recovery: Recovery, path: str | os.PathLike[str] | None = None) -> Figure:
     """Draw the true mesh beside the recovered one, each piece moved by the best similarity or reflection.
@@ -28,20 +27,22 @@ def plot_comparison(true_points: ArrayLike, recovery: Recovery, path: str | os.P
     ----------
     true_points : (n, 2) array_like
         Row i belongs to matrix row i.
-    recovery : Recovery
+    recovery : PlanarMesh
     path : path, optional
         Write the picture there, whole or not at all: ``.png``, ``.svg`` or ``.pdf``.
 
     Raises
     ------
     InputError
-        If `true_points` has another shape.
+        If `true_points` has another shape, or `recovery` is no planar mesh.
     OutputError
         If the file cannot be written.
     """
     if path is not None:
         check_plot(path)
     truth = np.asarray(true_points, dtype=np.float64)
+    if not isinstance(recovery, PlanarMesh):
+        raise InputError("only planar meshes are drawn beside the true ones")
     if truth.shape != recovery.points.shape:
         raise InputError(f"the true points have the shape {truth.shape}, the recovered {recovery.points.shape}")
     aligned = align(recovery.points, truth, recovery.component)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .pieces import Pieces, apart, together
 
 if TYPE_CHECKING:
-    from ..recovery import Recovery
+    from ..recovery import PlanarMesh
 
 _MOST_COMPARED = 64
 _SAMPLE = 400
@@ -45,7 +45,7 @@ class Drawing:
     pairs: NDArray[np.int64]
 
 
-def drawing_of(recovery: Recovery) -> Drawing:
+def drawing_of(recovery: PlanarMesh) -> Drawing:
     """Lay out the pieces of a mesh.
 
     Pieces of which any two overlap are shifted side by side; pieces that meet in hinges are kept together unless

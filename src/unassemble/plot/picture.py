@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..recovery import Body, Mechanical, PlanarMesh, Recovery
 from ..summary import counted_cells, scale_text
 from ..words import count_of
 from . import style
@@ -16,9 +18,8 @@ from .layout import drawing_of
 from .mesh import draw_hinges, draw_mesh, draw_worst, extent, outer_loops
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
-
-    from ..recovery import Recovery
 
 
 def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None) -> Figure:
@@ -40,25 +41,26 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     """
     if path is not None:
         check_plot(path)
-    if recovery.mechanical:
-        figure = plot_body(recovery, recovery.status, details(recovery))
-        if path is not None:
-            write_figure(figure, path)
-        return figure
-    drawing = drawing_of(recovery)
-    outer = outer_loops(drawing.points, drawing.boundary, drawing.offsets)
-    figure, (ax,) = panels([extent(drawing.points, drawing.triangles)])
-    handles = draw_mesh(
-        ax, drawing.points, drawing.triangles, drawing.outline, drawing.boundary, drawing.offsets, outer
-    )
-    handles += draw_hinges(ax, drawing.points, drawing.hinges, len(recovery.hinges))
-    if not recovery.certified:
-        handles += draw_worst(ax, drawing.points, drawing.pairs)
+    figure, handles = planar_mesh(recovery) if isinstance(recovery, PlanarMesh) else plot_body(recovery)
     header(figure, recovery.status, details(recovery), style.STATUS.get(recovery.status, style.TEXT))
     footer(figure, handles)
     if path is not None:
         write_figure(figure, path)
     return figure
+
+
+def planar_mesh(mesh: PlanarMesh) -> tuple[Figure, Sequence[Artist]]:
+    """A planar mesh, and handles for the legend."""
+    drawing = drawing_of(mesh)
+    outer = outer_loops(drawing.points, drawing.boundary, drawing.offsets)
+    figure, (ax,) = panels([extent(drawing.points, drawing.triangles)])
+    handles = draw_mesh(
+        ax, drawing.points, drawing.triangles, drawing.outline, drawing.boundary, drawing.offsets, outer
+    )
+    handles += draw_hinges(ax, drawing.points, drawing.hinges, len(mesh.hinges))
+    if not mesh.certified:
+        handles += draw_worst(ax, drawing.points, drawing.pairs)
+    return figure, handles
 
 
 def details(recovery: Recovery) -> str:
@@ -69,9 +71,9 @@ def details(recovery: Recovery) -> str:
     missing = int(np.count_nonzero(recovery.node_status))
     if missing:
         parts.append(f"{missing:,} not determined")
-    if not recovery.mechanical:
+    if not isinstance(recovery, Mechanical):
         parts.append(f"c = {scale_text(recovery, 6)}")
-    elif recovery.poisson_ratio is not None:
+    elif isinstance(recovery, Body) and recovery.poisson_ratio is not None:
         parts.append(f"Poisson's ratio {recovery.poisson_ratio:.6g}")
     parts.append(f"backward error {recovery.backward_error:.1e}")
     return "  ·  ".join(parts)

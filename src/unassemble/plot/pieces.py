@@ -13,7 +13,7 @@ from scipy.sparse import csgraph
 from ..topology.pieces import edge_connected
 
 if TYPE_CHECKING:
-    from ..recovery import Recovery
+    from ..recovery import PlanarMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Pieces:
         return self.piece[self.triangles[:, 0]]
 
 
-def together(recovery: Recovery, triangles: NDArray) -> Pieces:
+def together(recovery: PlanarMesh, triangles: NDArray) -> Pieces:
     """The pieces of a mesh without hinges: nothing is renumbered."""
     return Pieces(
         np.arange(recovery.n_points),
@@ -64,7 +64,7 @@ def together(recovery: Recovery, triangles: NDArray) -> Pieces:
     )
 
 
-def apart(recovery: Recovery, triangles: NDArray) -> Pieces:
+def apart(recovery: PlanarMesh, triangles: NDArray) -> Pieces:
     """The pieces of a mesh with hinges, each of which becomes one vertex for each of its pieces."""
     n = recovery.n_points
     tail, head = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()

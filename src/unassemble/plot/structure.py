@@ -14,18 +14,18 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-    from ..recovery import Recovery
+    from ..recovery import Structure
 
 _MOST_VECTOR = 5_000
 
 
-def draw_structure(ax: Axes, recovery: Recovery, flat: NDArray, depth: NDArray) -> list[Artist]:
+def draw_structure(ax: Axes, recovery: Structure, flat: NDArray, depth: NDArray) -> list[Artist]:
     """Draw shell cells, the farthest first, and the members over them.
 
     Parameters
     ----------
     ax : Axes
-    recovery : Recovery
+    recovery : Structure
     flat : (n, 2) float64
         Where nodes are in the picture.
     depth : (n,) float64

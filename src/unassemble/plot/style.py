@@ -7,7 +7,7 @@ HOLE = "#e4572e"
 HINGE = "#f2b134"
 WORST = "#b5179e"
 TEXT = "#3c4856"
-STATUS = {"certified": "#2a7f4f", "uncertified": "#b3441e"}
+STATUS = {"certified": "#2a7f4f", "ambiguous": "#b3441e", "uncertified": "#b3441e"}
 
 DPI = 160
 LARGEST = (9.0, 7.2)  # inches: the box that a mesh is fitted into

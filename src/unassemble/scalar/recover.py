@@ -17,7 +17,7 @@ from ..matrix import OperatorMatrix
 from ..planar.hinges import free_images, join
 from ..planar.pencil import pencil_pattern
 from ..planar.piece import PieceMesh
-from ..recovery import Recovery
+from ..recovery import PlanarMesh
 from ..tolerances import SUSPICIOUS
 from ..topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
 from .deviations import coordinate_deviations
@@ -50,21 +50,21 @@ class ScalarOptions:
     triangulate: bool = False
 
 
-def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, options: ScalarOptions) -> Recovery:
+def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, options: ScalarOptions) -> PlanarMesh:
     """The mesh of a checked scalar matrix."""
     noise = Noise.known(stored, options.noise)
     found = _recovered(stored, placement, clock, options, noise)
     searched = "faces" in clock.timings  # for cells
-    if searched and found.status == "uncertified" and not found.alternatives and noise and noise.digits:
+    if searched and found.status == "uncertified" and noise and noise.digits:
         # Few digits need not be rounded ones, and errors that entries do not have hide what their cells are.
         exact = _recovered(stored, placement, clock, options, None)
-        return exact if exact.status == "certified" or exact.alternatives else found
+        return exact if exact.status != "uncertified" else found
     return found
 
 
 def _recovered(
     stored: OperatorMatrix, placement: Placement, clock: Clock, options: ScalarOptions, noise: Noise | None
-) -> Recovery:
+) -> PlanarMesh:
     """The mesh of a matrix whose entries have errors of known size, or those of assembly."""
     scale = options.scale
     # With a tensor, c L is what is left of c div(K grad): its factor is c sqrt(det K).
@@ -156,7 +156,7 @@ def _recovered(
     if status == "uncertified" and not (others or noise or distant or certificate.backward_error < _SMALL):
         notes += origin_notes(stored, evidence.suspects)
     polygons = Polygons.none() if options.triangulate else mesh.polygons
-    return Recovery(
+    return PlanarMesh(
         points=points,
         triangles=mesh.triangles if options.triangulate else mesh.triangles[~mesh.in_polygon],
         component=mesh.component,
@@ -167,7 +167,8 @@ def _recovered(
         boundary=mesh.boundary,
         boundary_offsets=mesh.boundary_offsets,
         node_status=(topology.multiplicity == 0).astype(np.int8),
-        status=status,
+        status="ambiguous" if others else status,
+        uniqueness="ambiguous" if others else "searched" if status == "certified" else None,
         reason=reason,
         operator="anisotropic laplacian" if placement.tensor else "laplacian",
         backward_error=certificate.backward_error,

@@ -15,7 +15,7 @@ from ..elasticity.nodal import determined
 from ..elasticity.ordered.rounded import Rounding, with_exact_sums
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
-from ..recovery import Recovery
+from ..recovery import Structure
 from ..words import count_of
 from .certificate import largest_force
 from .members import members_and_cells
@@ -34,7 +34,7 @@ def serve_structure(
     anchors: Sequence[Any] | None,
     choice: str,
     cells: bool,
-) -> Recovery:
+) -> Structure:
     """Recover the coordinates of a structure whose nodes and directions are known, in true units of length.
 
     Parameters
@@ -92,13 +92,14 @@ def serve_structure(
     points, more = _moved(points, component, known)
     lost = digits_lost(points, found.points, component, np.ones(len(evidence))) / _edge_length(nodes, found.points)
     status, reason = near_enough(*_verdict(error, found, layout.dim, rounding), lost)
-    return Recovery(
+    return Structure(
         **fields,
         points=points,
         component=component,
         scale=np.full(len(evidence), np.nan),
         node_status=np.asarray(loose, dtype=np.int8),
         status=status,
+        uniqueness="searched" if status == "certified" else None,
         reason=reason,
         operator=layout.name,
         backward_error=error,

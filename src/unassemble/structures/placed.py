@@ -9,8 +9,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..elasticity.nodal import determined
-from ..elasticity.results import Evidence
 from ..errors import GeometryError, RecoveryError
+from ..recovery import Evidence
 from .equations import Equations, equations
 from .nodes import Nodes
 from .pieces import pieces

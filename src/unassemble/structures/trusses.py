@@ -19,11 +19,10 @@ from ..clock import Clock
 from ..elasticity.anchoring import anchored, checked_anchors, digits_lost, near_enough
 from ..elasticity.nodal import NodalMatrix, determined
 from ..elasticity.nullspace.shape import EXACT, in_gauge, shape
-from ..elasticity.results import Evidence
 from ..elasticity.rows.numbering import Numbering
 from ..errors import GeometryError
 from ..matrix import OperatorMatrix
-from ..recovery import Recovery
+from ..recovery import Evidence, Structure
 from ..words import count_of
 from .bars import Bars
 from .pieces import pieces
@@ -42,7 +41,7 @@ def serve_truss(
     *,
     anchors: Sequence[Any] | None,
     choice: str,
-) -> Recovery:
+) -> Structure:
     """Recover a truss, up to the size of each piece.
 
     Raises
@@ -66,13 +65,14 @@ def serve_truss(
         notes.append("the sign of the scale is free: the point reflection of a truss has the same matrix")
     lost = digits_lost(points, found.points, found.component, factor)
     status, reason = near_enough(*_verdict(error, found), lost)
-    return Recovery(
+    return Structure(
         points=points,
         lines=bars.ends[~loose[bars.ends].any(axis=1)],
         component=found.component,
         scale=np.full(len(found.evidence), np.nan),
         node_status=np.asarray(loose, dtype=np.int8),
         status=status,
+        uniqueness="searched" if status == "certified" else None,
         reason=reason,
         operator="truss",
         backward_error=error,
