@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from .elasticity.ordered.rounded import Rounding
     from .structures import StructuralNumbering
 
-OPERATORS = ("auto", "laplacian", "elasticity")
 _ANNIHILATED = 0.05  # share of rows and directions that annihilate constants; in scalar matrices there are none
 _TURNING = 6  # unknowns of a node that has rotations, in space
 _COMMON = 0.8  # how far the rows of a node couple to the same nodes
@@ -167,19 +166,6 @@ def _truss(whole: sp.csr_array, exact: tuple[sp.csr_array, Rounding] | None, rea
         return None
     bars = f"{found.n_nodes} nodes with {found.block_size} unknowns each, {found.kind}, whose blocks are those of bars"
     return VectorReading(found, f"{reason}, and its rows form {bars}", exact)
-
-
-def refuse(**options: Any) -> None:
-    """Refuse options that only scalar matrices have.
-
-    Raises
-    ------
-    InputError
-    """
-    for name, value in options.items():
-        if value is not None and value is not False:
-            raise InputError(f"`{name}` is for scalar matrices, and this one is read as "
-                             "vector-valued: leave it out, or choose `operator='laplacian'`")  # fmt: skip
 
 
 def _evidence(found: Numbering | StructuralNumbering) -> str:

@@ -1,57 +1,81 @@
-"""Options of :func:`unassemble.recover`, checked before any work: what they mean does not depend on the matrix."""
+"""Options of :func:`unassemble.recover`, one frozen type for each subject.
+
+Each is checked when it is made, before any work: what is refused here has no meaning for any matrix.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from .errors import InputError
-from .operators import OPERATORS
 
+OPERATORS = ("auto", "laplacian", "elasticity")
 METHODS = ("conformal", "angles")
 
-
-def check_options(
-    *,
-    operator: str,
-    method: str | None,
-    scale: float | None,
-    noise: float | None,
-    drop_zeros: float | None,
-    tensor: Any,
-    block_size: int | None,
-    numbering: Any,
-    threads: int | None,
-) -> None:
-    """Refuse values that no matrix can give a meaning to.
-
-    Raises
-    ------
-    InputError
-    """
-    if operator not in OPERATORS:
-        raise InputError(f"`operator={operator}` is not available in this version: use {_words(OPERATORS)}")
-    if method not in (None, *METHODS):
-        raise InputError(f"`method={method}` is not available in this version: use {_words(METHODS)}")
-    for name, value in (("scale", scale), ("noise", noise), ("drop_zeros", drop_zeros)):
-        if value is not None and not _is_number(value):
-            raise InputError(f"`{name}` is a number, not {value!r}")
-    if scale is not None and not (np.isfinite(scale) and scale != 0):
-        raise InputError(f"`scale` is a finite nonzero number, not {scale}")
-    if noise is not None and not (np.isfinite(noise) and noise > 0):
-        raise InputError(f"`noise` is a positive standard deviation, not {noise}")
-    for name, count in (("block_size", block_size), ("threads", threads)):
-        if count is not None and (isinstance(count, bool) or not isinstance(count, (int, np.integer))):
-            raise InputError(f"`{name}` is a whole number, not {count!r}")
-    if tensor is not None and not _are_numbers(tensor, 3):
-        raise InputError(f"`tensor` is three numbers, kxx, kxy and kyy, not {tensor!r}")
-    if operator == "laplacian" and not (block_size is None and numbering is None):
-        raise InputError("`block_size` and `numbering` belong to vector-valued matrices, not to `operator='laplacian'`")
+Direction = tuple[int, int, float]
 
 
-def listed_anchors(anchors: Any) -> list[tuple[Any, ...]]:
+@dataclass(frozen=True, kw_only=True)
+class OperatorOptions:
+    """What is said about the operator, and about how rows form nodes; as in :func:`unassemble.recover`."""
+
+    operator: str = "auto"
+    block_size: int | None = None
+    numbering: Any = None
+    cells: bool = True
+
+    def __post_init__(self) -> None:
+        _known("operator", self.operator, OPERATORS)
+        _whole("block_size", self.block_size)
+        if self.operator == "laplacian" and self.names_nodes:
+            raise InputError("`block_size` and `numbering` are for vector-valued matrices, not `operator='laplacian'`")
+
+    @property
+    def names_nodes(self) -> bool:
+        """Whether the matrix is said to have several rows per node."""
+        return self.operator == "elasticity" or self.block_size is not None or self.numbering is not None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrameOptions:
+    """What is known of the true positions and axes; as in :func:`unassemble.recover`."""
+
+    anchors: tuple[tuple[Any, ...], ...] = ()
+    tensor: tuple[float, float, float] | None = None
+    direction: Direction | None = None
+    handed: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.tensor is not None and not _are_numbers(self.tensor, 3):
+            raise InputError(f"`tensor` is three numbers, kxx, kxy and kyy, not {self.tensor!r}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScalarOptions:
+    """How the mesh of a scalar matrix is found; as in :func:`unassemble.recover`."""
+
+    method: str = "conformal"
+    refine: bool = True
+    scale: float | None = None
+    noise: float | None = None
+    standard_deviations: bool = False
+    triangulate: bool = False
+    threads: int | None = None
+
+    def __post_init__(self) -> None:
+        _known("method", self.method, METHODS)
+        _whole("threads", self.threads)
+        if not (_number("scale", self.scale) or self.scale is None):
+            raise InputError(f"`scale` is a finite nonzero number, not {self.scale}")
+        if self.noise is not None and not (_number("noise", self.noise) and self.noise > 0):
+            raise InputError(f"`noise` is a positive standard deviation, not {self.noise}")
+
+
+def listed_anchors(anchors: Any) -> tuple[tuple[Any, ...], ...]:
     """Anchors as (row, x, y) or (row, x, y, z), rows as int where they are whole; arrays are taken row by row.
 
     Raises
@@ -59,7 +83,7 @@ def listed_anchors(anchors: Any) -> list[tuple[Any, ...]]:
     InputError
     """
     try:
-        return [_anchor(one) for one in (() if anchors is None else anchors)]
+        return tuple(_anchor(one) for one in (() if anchors is None else anchors))
     except (TypeError, ValueError, IndexError) as error:
         raise InputError("`anchors` are (row, x, y), in space (row, x, y, z), with whole rows") from error
 
@@ -71,13 +95,26 @@ def _anchor(one: Any) -> tuple[Any, ...]:
     return int(row), *map(float, place)
 
 
+def _known(name: str, value: str, words: tuple[str, ...]) -> None:
+    if value not in words:
+        raise InputError(f"`{name}={value}` is not available in this version: use {' or '.join(map(repr, words))}")
+
+
+def _whole(name: str, value: Any) -> None:
+    if value is not None and (isinstance(value, bool) or not isinstance(value, (int, np.integer))):
+        raise InputError(f"`{name}` is a whole number, not {value!r}")
+
+
+def _number(name: str, value: Any) -> bool:
+    """Whether an option is finite and not zero; anything but numbers and None is refused."""
+    if value is not None and not _is_number(value):
+        raise InputError(f"`{name}` is a number, not {value!r}")
+    return bool(value and np.isfinite(value))
+
+
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
 
 
 def _are_numbers(values: Any, count: int) -> bool:
     return isinstance(values, Iterable) and len(found := list(values)) == count and all(map(_is_number, found))
-
-
-def _words(known: Iterable[str]) -> str:
-    return " or ".join(map(repr, known))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
@@ -10,12 +11,11 @@ from .clock import Clock
 from .errors import InputError, NotPlanarError, RecoveryError
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, read_matrix
-from .operators import VectorReading, about_translations, asked_for, refuse, second_reading, vector_valued
-from .options import check_options, listed_anchors
-from .outputs import Recovery
-from .recovery import PlanarMesh
-from .scalar import ScalarOptions, recover_scalar
-from .scalar.placement import Direction, Placement
+from .operators import VectorReading, about_translations, asked_for, second_reading, vector_valued
+from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, listed_anchors
+from .outputs import PlanarMesh, Recovery
+from .scalar import recover_scalar
+from .scalar.placement import Placement
 
 
 def recover(
@@ -123,81 +123,106 @@ def recover(
     >>> square.status, len(square.triangles), float(round(square.scale[0], 12))
     ('certified', 2, 1.0)
     """
-    check_options(
-        operator=operator,
-        method=method,
+    about = OperatorOptions(operator=operator, block_size=block_size, numbering=numbering, cells=cells)
+    frame = FrameOptions(anchors=listed_anchors(anchors), tensor=tensor, direction=direction, handed=handed)
+    planar = ScalarOptions(
+        method="conformal" if method is None else method,
+        refine=refine,
         scale=scale,
         noise=noise,
-        drop_zeros=drop_zeros,
-        tensor=tensor,
-        block_size=block_size,
-        numbering=numbering,
+        standard_deviations=standard_deviations,
+        triangulate=triangulate,
         threads=threads,
     )
-    anchors = listed_anchors(anchors)
+    scalar_only = {
+        "method": method, "scale": scale, "noise": noise, "tensor": tensor, "direction": direction,
+        "handed": handed, "standard_deviations": standard_deviations or None,
+    }  # fmt: skip
+    given = tuple(name for name, value in scalar_only.items() if value is not None)
     clock = Clock(progress)
     with clock("read"):
         matrix = A if _is_matrix(A) else read_matrix(A, variable=variable)
     with clock("check"):
         checked = check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
-    scalar_only = {
-        "method": method, "scale": scale, "noise": noise, "tensor": tensor, "direction": direction,
-        "handed": handed, "standard_deviations": standard_deviations,
-    }  # fmt: skip
-
-    def scalar(part: OperatorMatrix, known: Sequence[Any] | None) -> PlanarMesh:
-        placement = Placement.checked(part.n, known, tensor, direction, handed)
-        options = ScalarOptions(
-            method or "conformal",
-            refine=refine,
-            scale=scale,
-            noise=noise,
-            standard_deviations=standard_deviations,
-            threads=threads,
-            triangulate=triangulate,
-        )
-        return recover_scalar(part, placement, clock, options)
-
-    def vector(reading: VectorReading) -> Recovery:
-        from .vector import recover_vector
-
-        refuse(**scalar_only)
-        return recover_vector(checked, reading, clock, anchors=anchors, cells=cells, scalar=scalar)
-
     with thread_limit(threads):
-        if operator == "elasticity" or block_size is not None or numbering is not None:
-            refuse(**scalar_only)
-            with clock("numbering"):
-                reading = asked_for(checked, block_size, numbering)
-            return vector(reading)
-        at_sight = vector_valued(checked) if operator == "auto" else None
-        if at_sight is not None:
-            return vector(at_sight)
-        found: Recovery | None = None
-        failure: RecoveryError | None = None
-        try:
-            found = scalar(checked, anchors)
-        except RecoveryError as error:
-            failure = error
-        # Rows that no mesh explains may be those of nodes: a straight beam's fall apart into planar graphs.
-        doubtful = found is None or (not found.certified and found.node_status.any())
-        second = second_reading(checked) if operator == "auto" and doubtful else None
-        if second is not None:
-            try:
-                other = vector(second)
-            except (RecoveryError, InputError):  # options may be for scalar matrices only
-                pass
-            else:
-                found = other if found is None or other.certified else found
-        if found is None:
-            assert failure is not None
-            if operator == "auto" and isinstance(failure, NotPlanarError):
-                why = about_translations(checked)
-                if why:
-                    raise NotPlanarError(f"the graph of the matrix is not planar; {why}", failure.witness) from failure
-            raise failure
-        return found
+        return _Task(checked, clock, about, frame, planar, given).answer()
 
 
 def _is_matrix(A: Any) -> bool:
     return not isinstance(A, (str, PathLike)) and not hasattr(A, "read")
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """A checked matrix and what is asked of it; `given` are the options given that only scalar matrices have."""
+
+    matrix: OperatorMatrix
+    clock: Clock
+    about: OperatorOptions
+    frame: FrameOptions
+    planar: ScalarOptions
+    given: tuple[str, ...]
+
+    def answer(self) -> Recovery:
+        """As the operator that is named; else as the one that the graph shows, or else the first that fits."""
+        if self.about.names_nodes:
+            self._refuse_scalar_options()
+            with self.clock("numbering"):
+                reading = asked_for(self.matrix, self.about.block_size, self.about.numbering)
+            return self._as_vector(reading)
+        if self.about.operator == "laplacian":
+            return self._as_scalar(self.matrix, self.frame.anchors)
+        at_sight = vector_valued(self.matrix)
+        return self._first_that_fits() if at_sight is None else self._as_vector(at_sight)
+
+    def _first_that_fits(self) -> Recovery:
+        """A planar mesh; or nodes of several unknowns where rows belong to no mesh.
+
+        A straight beam's rows, for one, fall apart into planar graphs.
+        """
+        try:
+            found = self._as_scalar(self.matrix, self.frame.anchors)
+        except RecoveryError as error:
+            other = self._as_second_reading()
+            if other is not None:
+                return other
+            if isinstance(error, NotPlanarError) and (why := about_translations(self.matrix)):
+                raise NotPlanarError(f"the graph of the matrix is not planar; {why}", error.witness) from error
+            raise
+        if found.certified or not found.node_status.any():
+            return found
+        other = self._as_second_reading()
+        return other if other is not None and other.certified else found
+
+    def _as_second_reading(self) -> Recovery | None:
+        """The matrix as a vector-valued one, if anything speaks for that."""
+        reading = second_reading(self.matrix)
+        try:
+            return None if reading is None else self._as_vector(reading)
+        except (RecoveryError, InputError):  # options may be for scalar matrices only
+            return None
+
+    def _as_scalar(self, part: OperatorMatrix, anchors: Sequence[Any]) -> PlanarMesh:
+        frame = self.frame
+        placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
+        return recover_scalar(part, placement, self.clock, self.planar)
+
+    def _as_vector(self, reading: VectorReading) -> Recovery:
+        from .vector import recover_vector
+
+        self._refuse_scalar_options()
+        return recover_vector(
+            self.matrix,
+            reading,
+            self.clock,
+            anchors=self.frame.anchors,
+            cells=self.about.cells,
+            scalar=self._as_scalar,
+        )
+
+    def _refuse_scalar_options(self) -> None:
+        if self.given:
+            raise InputError(
+                f"`{self.given[0]}` is for scalar matrices, and this one is read as vector-valued: leave it out, or "
+                "choose `operator='laplacian'`"
+            )

@@ -70,7 +70,8 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
 
 
 def _check_options(drop_zeros: float | None, noise: float | None) -> None:
-    if drop_zeros is not None and (isinstance(drop_zeros, (bool, str)) or not 0 <= drop_zeros < 1):
+    number = not isinstance(drop_zeros, bool) and isinstance(drop_zeros, (int, float, np.integer, np.floating))
+    if drop_zeros is not None and not (number and 0 <= drop_zeros < 1):
         raise InputError(f"`drop_zeros` is a relative tolerance, at least 0 and below 1 (say 1e-12), not {drop_zeros}")
     if noise is not None and not (noise >= 0 and np.isfinite(noise)):
         raise InputError(f"`noise` is a standard deviation, finite and not negative, not {noise}")

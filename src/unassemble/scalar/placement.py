@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..options import Direction
 from ..planar.frame import Similarity, canonical_frame, collinear, fit_similarity
 from ..planar.hinges import groups
 from ..reductions import ConstantTensor
 from ..topology import Piece, Topology
 
 Anchor = tuple[int, float, float]
-Direction = tuple[int, int, float]
 
 
 def _converted(

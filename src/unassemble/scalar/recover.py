@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from ..cells import AGREE, Alternative, OrientedMesh, Untried, alternatives, coi
 from ..clock import Clock
 from ..linalg import AnalysisAhead, blas_threads, factorisation
 from ..matrix import OperatorMatrix
+from ..options import ScalarOptions
 from ..planar.hinges import free_images, join
 from ..planar.pencil import pencil_pattern
 from ..planar.piece import PieceMesh
@@ -35,19 +36,6 @@ _SMALL = 1e-3
 _SIGMAS = 10.0  # noise by which numbers that a reading takes for equal may differ
 
 _DOUBTS = {Untried.SCALES: unproved, Untried.PARTS: untried_parts}
-
-
-@dataclass(frozen=True)
-class ScalarOptions:
-    """Those options of :func:`unassemble.recover` that a scalar matrix takes, by the same names."""
-
-    method: str = "conformal"
-    refine: bool = True
-    scale: float | None = None
-    noise: float | None = None
-    standard_deviations: bool = False
-    threads: int | None = None
-    triangulate: bool = False
 
 
 def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, options: ScalarOptions) -> PlanarMesh:
