@@ -1,4 +1,4 @@
-"""Bodies of vector-valued matrices as pictures: their outer surface, shaded, or planar cells, or bare nodes."""
+"""Bodies and structures as pictures: outer surfaces, shaded, planar cells, shells and members, or bare nodes."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..recovery import Recovery, Structure
+from ..recovery import Body, Recovery, Structure
 from . import style
 from .canvas import panels
 from .mesh import line_handle
-from .structure import draw_structure
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -22,8 +21,6 @@ if TYPE_CHECKING:
 _ACROSS = np.array([0.80, 0.60, 0.0])
 _TOWARDS = np.array([0.52, -0.69, 0.50]) / np.linalg.norm([0.52, -0.69, 0.50])
 _LIGHT = np.array([0.25, -0.55, 0.80]) / np.linalg.norm([0.25, -0.55, 0.80])
-_MOST_OUTLINED = 40_000
-_MOST_VECTOR = 5_000
 
 
 def plot_body(recovery: Recovery) -> tuple[Figure, list[Artist]]:
@@ -37,14 +34,20 @@ def plot_body(recovery: Recovery) -> tuple[Figure, list[Artist]]:
     if not recovery.n_cells:
         ax.plot(*shown.T, "o", markersize=float(np.clip(120 / np.sqrt(len(shown)), 1, 4)), color=style.EDGE)
         handles.append(line_handle(style.EDGE, "nodes; no elements were recognised", width=3))
-    elif isinstance(recovery, Structure):
-        handles += draw_structure(ax, recovery, flat, depth)
-    elif recovery.dim == 3:
-        _draw_surface(ax, recovery, flat, depth)
-        handles.append(line_handle(style.OUTER, "outer surface of the recognised cells"))
-    else:
-        _draw_cells(ax, recovery, flat)
-        handles.append(line_handle(style.OUTER, "boundary of the recognised cells"))
+    faces = _faces(recovery)
+    if faces:
+        _draw_faces(ax, recovery, faces, flat, depth)
+        what, colour = "outer surface" if recovery.dim == 3 else "boundary", style.OUTER
+        label = f"{what} of the recognised cells"
+        if isinstance(recovery, Structure):
+            label, colour = "cells of shells or plates, read off the graph", style.EDGE
+        handles.append(line_handle(colour, label))
+    if isinstance(recovery, Structure) and len(recovery.lines):
+        order = np.argsort(depth[recovery.lines].mean(axis=1), kind="stable")
+        _draw_lines(ax, flat[recovery.lines[order]], float(np.clip(60 / np.sqrt(len(order)), 0.3, 1.6)))
+        handles.append(line_handle(style.OUTER, "members"))
+    elif len(recovery.boundary):
+        _draw_lines(ax, flat[recovery.boundary], 1.2)
     return figure, handles
 
 
@@ -69,53 +72,56 @@ def _side_by_side(flat: NDArray, recovery: Recovery) -> NDArray:
     return flat
 
 
-def _draw_surface(ax: Axes, recovery: Recovery, flat: NDArray, depth: NDArray) -> None:
-    """Facets that face the eye, the farthest first."""
+def _faces(recovery: Recovery) -> list[NDArray]:
+    """Polygons of nodes (m, k) to be filled; of bodies in space the outer facets that face the eye."""
+    from ..elasticity.elements.surface import outer_facets, planar_outlines
+
+    cells = {kind: cells for kind, cells in recovery.cells.items() if kind != "line"}
+    if not isinstance(recovery, Body):
+        return list(cells.values())
+    if recovery.dim == 2:
+        return [planar_outlines(kind, some) for kind, some in cells.items()]
+    facets = outer_facets(cells) if cells else []
+    return [some[_normals(recovery.points[some]) @ _TOWARDS > 0] for some in facets]
+
+
+def _normals(corners: NDArray) -> NDArray:
+    """(m, 3) unit normals of facets (m, k, 3)."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.asarray(normal / np.where(length > 0, length, 1))
+
+
+def _draw_faces(ax: Axes, recovery: Recovery, faces: list[NDArray], flat: NDArray, depth: NDArray) -> None:
+    """The farthest first."""
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import to_rgb
 
-    from ..elasticity.elements.surface import outer_facets
-
-    polygons: list[NDArray] = []
-    normals, away = [np.empty((0, 3))], [np.empty(0)]
-    for facets in outer_facets(recovery.cells):
-        x = recovery.points[facets]
-        normal = np.cross(x[:, 1] - x[:, 0], x[:, -1] - x[:, 0])
-        length = np.linalg.norm(normal, axis=1, keepdims=True)
-        normal = normal / np.where(length > 0, length, 1)
-        facing = normal @ _TOWARDS > 0
-        polygons += list(flat[facets[facing]])
-        normals.append(normal[facing])
-        away.append(depth[facets[facing]].mean(axis=1))
-    order = np.argsort(np.concatenate(away), kind="stable")
-    shade = 0.3 + 0.7 * np.clip(np.concatenate(normals)[order] @ _LIGHT, 0, 1)[:, None]
-    colours = shade * np.array(to_rgb(style.FILL)) + (1 - shade) * np.array(to_rgb(style.EDGE))
+    order = np.argsort(np.concatenate([depth[some].mean(axis=1) for some in faces]), kind="stable")
+    polygons = [polygon for some in faces for polygon in flat[some]]
+    large = len(order) > style.MOST_VECTOR
+    colours: NDArray | str = style.FILL
+    edge = style.EDGE
+    if isinstance(recovery, Body) and recovery.dim == 3:
+        normals = np.concatenate([_normals(recovery.points[some]) for some in faces])
+        shade = 0.3 + 0.7 * np.clip(normals[order] @ _LIGHT, 0, 1)[:, None]
+        colours = shade * np.array(to_rgb(style.FILL)) + (1 - shade) * np.array(to_rgb(style.EDGE))
+        edge = "face" if large else style.OUTER
     ax.add_collection(
         PolyCollection(
             [polygons[k] for k in order],
             facecolors=colours,
-            edgecolors=style.OUTER if len(polygons) <= _MOST_OUTLINED else "face",
-            linewidths=float(np.clip(30 / np.sqrt(max(len(polygons), 1)), 0.1, 0.6)),
-            rasterized=len(polygons) > _MOST_VECTOR,
+            edgecolors=edge,
+            linewidths=float(np.clip(40 / np.sqrt(max(len(order), 1)), 0.1, 0.6)),
+            rasterized=large,
         ),
         autolim=False,
     )
 
 
-def _draw_cells(ax: Axes, recovery: Recovery, flat: NDArray) -> None:
-    from matplotlib.collections import LineCollection, PolyCollection
+def _draw_lines(ax: Axes, ends: NDArray, width: float) -> None:
+    """Straight lines (m, 2, 2)."""
+    from matplotlib.collections import LineCollection
 
-    from ..elasticity.elements.surface import planar_outlines
-
-    for kind, cells in recovery.cells.items():
-        ax.add_collection(
-            PolyCollection(
-                list(flat[planar_outlines(kind, cells)]),
-                facecolors=style.FILL,
-                edgecolors=style.EDGE,
-                linewidths=float(np.clip(40 / np.sqrt(len(cells)), 0.15, 0.6)),
-                rasterized=len(cells) > _MOST_VECTOR,
-            ),
-            autolim=False,
-        )
-    ax.add_collection(LineCollection(list(flat[recovery.boundary]), colors=style.OUTER, linewidths=1.2), autolim=False)
+    lines = LineCollection(list(ends), colors=style.OUTER, linewidths=width, rasterized=len(ends) > style.MOST_VECTOR)
+    ax.add_collection(lines, autolim=False)

@@ -46,12 +46,11 @@ def plot_comparison(true_points: ArrayLike, recovery: Recovery, path: str | os.P
     if truth.shape != recovery.points.shape:
         raise InputError(f"the true points have the shape {truth.shape}, the recovered {recovery.points.shape}")
     aligned = align(recovery.points, truth, recovery.component)
-    mesh = *recovery.divided(), recovery.boundary, recovery.boundary_offsets
-    figure, axes = panels([extent(truth, mesh[0])] * 2)
-    outer = outer_loops(recovery.points, *mesh[2:])  # in the frame in which cells are counter-clockwise
+    figure, axes = panels([extent(truth, recovery.component >= 0)] * 2)
+    outer = outer_loops(recovery)  # in the frame in which cells are counter-clockwise
     handles = []
     for ax, points, name in zip(axes, (truth, aligned), ("true", "recovered"), strict=True):
-        handles = draw_mesh(ax, points, *mesh, outer)
+        handles = draw_mesh(ax, recovery, points, outer)
         ax.set_title(name, color=style.TEXT, size=9.5, style="italic", pad=3)
     header(figure, *_words(recovery, largest_error(aligned, truth)), style.STATUS.get(recovery.status, style.TEXT))
     footer(figure, handles)

@@ -2,85 +2,45 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
-
-from .pieces import Pieces, apart, together
+from scipy.sparse import csgraph
 
 if TYPE_CHECKING:
     from ..recovery import PlanarMesh
 
-_MOST_COMPARED = 64
-_SAMPLE = 400
 
+def laid_out(mesh: PlanarMesh) -> NDArray[np.float64]:
+    """(n, 2) points of a mesh for the eye: of its parts, if any two overlap, one is put beside the other.
 
-@dataclass(frozen=True, eq=False)
-class Drawing:
-    """A mesh for the eye: its points are numbered anew where pieces that meet in a vertex are drawn apart.
-
-    Attributes
-    ----------
-    points : (k, 2) float64
-    triangles : (m, 3) int64
-        Polygons divided.
-    outline : (m, 3) bool
-        Sides, from each corner to the next, that are none of their diagonals.
-    boundary : (b, 2) int64
-    offsets : (loops + 1,) int64
-    hinges : (h,) int64
-    pairs : (p, 2) int64
-        Ends of the worst entries.
+    A part is what hangs together, by edges or in hinges. Where nothing overlaps, as with known positions, all stay.
     """
+    triangles = mesh.divided()[0]
+    part = _parts(mesh.n_points, triangles)
+    count = int(part.max(initial=-1)) + 1
+    if count < 2:
+        return mesh.points
+    low, high = _boxes(mesh.points, part, count)
+    # More are rarely placed by anchors, and comparing all pairs takes long.
+    if count <= 64 and not _overlap(mesh, triangles, part, low, high):
+        return mesh.points
+    shift = (_shelves(high - low) - low)[part]
+    return mesh.points + np.where(part[:, None] >= 0, shift, 0)
 
-    points: NDArray[np.float64]
-    triangles: NDArray[np.int64]
-    outline: NDArray[np.bool_]
-    boundary: NDArray[np.int64]
-    offsets: NDArray[np.int64]
-    hinges: NDArray[np.int64]
-    pairs: NDArray[np.int64]
 
-
-def drawing_of(recovery: PlanarMesh) -> Drawing:
-    """Lay out the pieces of a mesh.
-
-    Pieces of which any two overlap are shifted side by side; pieces that meet in hinges are kept together unless
-    they overlap each other. Where nothing overlaps, as with known positions, all stay where they are.
-    """
-    triangles, outline = recovery.divided()
-    drawing = Drawing(
-        recovery.points,
-        triangles,
-        outline,
-        recovery.boundary,
-        recovery.boundary_offsets,
-        recovery.hinges,
-        recovery.worst_entries,
-    )
-    if recovery.n_components < 2:
-        return drawing
-    pieces = apart(recovery, triangles) if len(recovery.hinges) else together(recovery, triangles)
-    renumbered = Drawing(
-        recovery.points[pieces.vertices],
-        pieces.triangles,
-        outline,
-        pieces.boundary,
-        recovery.boundary_offsets,
-        pieces.hinges,
-        pieces.pairs,
-    )
-    low, high = _boxes(renumbered.points, pieces.piece, pieces.count)
-    overlap = _overlaps(renumbered, pieces, low, high)
-    if not overlap.any():
-        return drawing
-    unit = _units(pieces.group, overlap)
-    low, high = _boxes(renumbered.points, np.where(pieces.piece >= 0, unit[pieces.piece], -1), int(unit.max()) + 1)
-    shift = (_shelves(high - low) - low)[unit[pieces.piece]]
-    return replace(renumbered, points=renumbered.points + np.where(pieces.piece[:, None] >= 0, shift, 0))
+def _parts(n: int, triangles: NDArray) -> NDArray[np.int64]:
+    """Connected part of each point, -1 for points of no triangle."""
+    sides = (triangles[:, [0, 0]].ravel(), triangles[:, 1:].ravel())
+    graph = sp.coo_array((np.ones(len(sides[0]), np.int8), sides), shape=(n, n))
+    label = csgraph.connected_components(graph, directed=False)[1]
+    used = np.unique(triangles)
+    part = np.full(n, -1)
+    part[used] = np.unique(label[used], return_inverse=True)[1]
+    return part
 
 
 def _boxes(points: NDArray, label: NDArray, count: int) -> tuple[NDArray, NDArray]:
@@ -92,40 +52,27 @@ def _boxes(points: NDArray, label: NDArray, count: int) -> tuple[NDArray, NDArra
     return low, high
 
 
-def _overlaps(drawing: Drawing, pieces: Pieces, low: NDArray, high: NDArray) -> NDArray[np.bool_]:
-    """(count, count) whether some triangle of one piece lies in the other, judged by centroids."""
-    overlap = np.zeros((pieces.count, pieces.count), dtype=bool)
-    if pieces.count > _MOST_COMPARED:  # so many are rarely placed by anchors, and comparing all pairs takes long
-        return ~overlap
+def _overlap(mesh: PlanarMesh, triangles: NDArray, part: NDArray, low: NDArray, high: NDArray) -> bool:
+    """Whether a triangle of one part lies in another, judged by the centroids of some 400 of each."""
+    owner = part[triangles[:, 0]]
     meet: NDArray = np.all((low[:, None] < high[None]) & (high[:, None] > low[None]), axis=2)
     np.fill_diagonal(meet, False)
-    owner = pieces.of_triangle
-    for a in range(pieces.count):
-        mine = np.flatnonzero(owner == a)
-        sample = drawing.points[drawing.triangles[mine[:: max(len(mine) // _SAMPLE, 1)]]].mean(axis=1)
-        for b in np.flatnonzero(meet[a]).tolist():
-            overlap[a, b] = _inside(sample, drawing, pieces.piece, b).any()
-    return overlap | overlap.T
+    for a, b in np.argwhere(meet).tolist():
+        mine = triangles[owner == a]
+        if _inside(mesh.points[mine[:: max(len(mine) // 400, 1)]].mean(axis=1), mesh, part, b).any():
+            return True
+    return False
 
 
-def _inside(sample: NDArray, drawing: Drawing, piece: NDArray, b: int) -> NDArray:
-    """Which points lie in piece b: within an odd number of its loops."""
+def _inside(sample: NDArray, mesh: PlanarMesh, part: NDArray, b: int) -> NDArray[np.bool_]:
+    """Which points lie in part b: within an odd number of its loops."""
     from matplotlib.path import Path
 
     inside = np.zeros(len(sample), dtype=bool)
-    for start, stop in pairwise(drawing.offsets):
-        if piece[drawing.boundary[start, 0]] == b:
-            inside ^= Path(drawing.points[drawing.boundary[start:stop, 0]]).contains_points(sample)
+    for start, stop in pairwise(mesh.boundary_offsets):
+        if part[mesh.boundary[start, 0]] == b:
+            inside ^= Path(mesh.points[mesh.boundary[start:stop, 0]]).contains_points(sample)
     return inside
-
-
-def _units(group: NDArray, overlap: NDArray) -> NDArray[np.int64]:
-    """Label of what moves as one: a group of joined pieces, or each of its pieces if they overlap."""
-    a, b = np.nonzero(overlap)
-    split = np.zeros(int(group.max()) + 1, dtype=bool)
-    split[group[a[group[a] == group[b]]]] = True
-    own = len(split) + np.arange(len(group))
-    return np.unique(np.where(split[group], own, group), return_inverse=True)[1]
 
 
 def _shelves(size: NDArray) -> NDArray:

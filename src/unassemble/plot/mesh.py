@@ -3,60 +3,47 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..words import count_of
 from . import style
-from .ink import ink
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
+    from ..recovery import PlanarMesh
+
 # Above this many edges an image replaces lines: quicker, smaller, and it shows density where lines would be a blot.
 _MOST_LINES = 60_000
-_MOST_VECTOR_LINES = 20_000
 
 
-def draw_mesh(
-    ax: Axes,
-    points: NDArray,
-    triangles: NDArray,
-    outline: NDArray,
-    boundary: NDArray,
-    offsets: NDArray,
-    outer: NDArray,
-) -> list[Line2D]:
+def draw_mesh(ax: Axes, mesh: PlanarMesh, points: NDArray, outer: NDArray) -> list[Line2D]:
     """Draw a mesh; handles for a legend come back.
 
     Parameters
     ----------
     ax : Axes
         With its limits set.
+    mesh : PlanarMesh
     points : (n, 2) float64
-    triangles : (m, 3) int64
-        Neighbours run along a common edge in opposite directions.
-    outline : (m, 3) bool
-        Sides, from each corner to the next, that are drawn.
-    boundary, offsets
-        As in :class:`unassemble.Recovery`.
+        Where its points are drawn.
     outer : (loops,) bool
         Which loops bound a piece from outside, see :func:`outer_loops`.
     """
     from matplotlib.collections import LineCollection
 
-    tail = triangles.ravel()
-    head = triangles[:, [1, 2, 0]].ravel()
-    once = (
-        tail < head
-    ) & outline.ravel()  # neighbours run along their edge in opposite directions; boundary edges come by themselves
+    triangles, outline = mesh.divided()
+    tail, head = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
+    # Neighbours run along their edge in opposite directions; boundary edges come by themselves.
+    once = (tail < head) & outline.ravel()
     start, stop = points[tail[once]], points[head[once]]
     if not len(start):
         return []
-    rings = [points[boundary[a:b, 0]] for a, b in pairwise(offsets)]
+    rings = [points[mesh.boundary[a:b, 0]] for a, b in pairwise(mesh.boundary_offsets)]
     _fill(ax, rings)
     width = _line_width(ax, start, stop)
     if len(start) > _MOST_LINES:
@@ -65,7 +52,7 @@ def draw_mesh(
         lines = LineCollection(
             list(np.stack([start, stop], axis=1)), colors=style.EDGE, linewidths=width, capstyle="round"
         )
-        lines.set_rasterized(len(start) > _MOST_VECTOR_LINES)
+        lines.set_rasterized(len(start) > style.MOST_VECTOR)
         ax.add_collection(lines, autolim=False)
     for is_outer, colour in ((False, style.HOLE), (True, style.OUTER)):
         chosen = [np.vstack([ring, ring[:1]]) for ring, flag in zip(rings, outer, strict=True) if flag == is_outer]
@@ -79,22 +66,22 @@ def draw_mesh(
     )
 
 
-def draw_hinges(ax: Axes, points: NDArray, hinges: NDArray, count: int) -> list[Line2D]:
-    """Mark vertices that join pieces; in a drawing, `count` of them may have become more."""
-    if not len(hinges):
+def draw_hinges(ax: Axes, points: NDArray) -> list[Line2D]:
+    """Mark vertices (k, 2) that join pieces."""
+    if not len(points):
         return []
-    x, y = points[hinges].T
-    marks: dict[str, Any] = {
-        "marker": "D",
-        "color": style.HINGE,
-        "markeredgecolor": style.OUTER,
-        "markeredgewidth": 0.7,
-    }
-    ax.plot(x, y, linestyle="none", markersize=5.5, zorder=5, **marks)
-    from matplotlib.lines import Line2D
-
-    label = count_of(count, "hinge")
-    return [Line2D([], [], linestyle="none", markersize=5, label=label, **marks)]
+    label = count_of(len(points), "hinge")
+    return ax.plot(
+        *points.T,
+        linestyle="none",
+        marker="D",
+        markersize=5.5,
+        zorder=5,
+        color=style.HINGE,
+        markeredgecolor=style.OUTER,
+        markeredgewidth=0.7,
+        label=label,
+    )
 
 
 def draw_worst(ax: Axes, points: NDArray, pairs: NDArray) -> list[Line2D]:
@@ -125,18 +112,18 @@ def line_handle(colour: str, label: str, width: float = 1.6) -> Line2D:
     return Line2D([], [], color=colour, linewidth=width, label=label)
 
 
-def extent(points: NDArray, triangles: NDArray) -> NDArray[np.float64]:
-    """(2, 2) corners of the box around the mesh."""
-    used = points[triangles.ravel()]
-    used = used[np.isfinite(used).all(axis=1)]
+def extent(points: NDArray, used: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(2, 2) corners of the box around the points in use."""
+    used = points[used & np.isfinite(points).all(axis=1)]
     return np.stack([used.min(axis=0), used.max(axis=0)]) if len(used) else np.array([[0.0, 0.0], [1.0, 1.0]])
 
 
-def outer_loops(points: NDArray, boundary: NDArray, offsets: NDArray) -> NDArray[np.bool_]:
-    """(loops,) whether a boundary loop runs counter-clockwise; with cells that do, holes run clockwise."""
+def outer_loops(mesh: PlanarMesh) -> NDArray[np.bool_]:
+    """(loops,) whether a boundary loop runs counter-clockwise, as outer ones do; around holes they run clockwise."""
+    boundary, offsets = mesh.boundary, mesh.boundary_offsets
     loop = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
-    origin = points[boundary[offsets[:-1], 0]][loop]
-    a, b = points[boundary[:, 0]] - origin, points[boundary[:, 1]] - origin
+    origin = mesh.points[boundary[offsets[:-1], 0]][loop]
+    a, b = mesh.points[boundary[:, 0]] - origin, mesh.points[boundary[:, 1]] - origin
     area = np.bincount(loop, a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], len(offsets) - 1)
     return np.asarray(area > 0)
 
@@ -171,10 +158,33 @@ def _draw_ink(ax: Axes, start: NDArray, stop: NDArray, width: float) -> None:
     box = ax.get_window_extent()
     shape = (max(round(box.height * scale), 1), max(round(box.width * scale), 1))
     low, high = np.array([left, bottom]), np.array([right, top])
-    length = ink(start, stop, low, high, shape)
+    length = _ink(start, stop, low, high, shape)
     # Lines as wide as elsewhere, but thinner where most of the picture would be covered: shades then show density.
     covered = length * min(width * style.DPI / 72, 0.6 / float(np.median(length[length > 0])))
     picture = np.empty((*shape, 4), dtype=np.float32)
     picture[..., :3] = to_rgb(style.EDGE)
     picture[..., 3] = 1 - np.exp(-covered)
     ax.imshow(picture, extent=(left, right, bottom, top), origin="lower", zorder=1.5, aspect="equal")
+
+
+def _ink(start: NDArray, stop: NDArray, low: NDArray, high: NDArray, shape: tuple[int, int]) -> NDArray[np.float64]:
+    """Length of line in each pixel, in pixels: points at most half a pixel apart stand for each line.
+
+    Parameters
+    ----------
+    start, stop : (e, 2) float64
+        Ends of the lines.
+    low, high : (2,) float64
+        Corners of the image.
+    shape : (rows, columns)
+        Row 0 is the lowest.
+    """
+    to_pixel = np.array(shape[::-1]) / (high - low)
+    origin, line = (start - low) * to_pixel, (stop - start) * to_pixel
+    length = np.hypot(line[:, 0], line[:, 1])
+    count = np.ceil(2 * length).astype(np.int64).clip(1)
+    which = np.repeat(np.arange(len(count)), count)
+    step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+    x, y = (origin[which] + ((step + 0.5) / count[which])[:, None] * line[which]).T
+    box = ((0, shape[0]), (0, shape[1]))
+    return np.histogram2d(y, x, bins=shape, range=box, weights=(length / count)[which])[0]

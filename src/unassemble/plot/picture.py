@@ -14,7 +14,7 @@ from ..words import count_of
 from . import style
 from .body import plot_body
 from .canvas import check_plot, footer, header, panels, write_figure
-from .layout import drawing_of
+from .layout import laid_out
 from .mesh import draw_hinges, draw_mesh, draw_worst, extent, outer_loops
 
 if TYPE_CHECKING:
@@ -51,15 +51,12 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
 
 def planar_mesh(mesh: PlanarMesh) -> tuple[Figure, Sequence[Artist]]:
     """A planar mesh, and handles for the legend."""
-    drawing = drawing_of(mesh)
-    outer = outer_loops(drawing.points, drawing.boundary, drawing.offsets)
-    figure, (ax,) = panels([extent(drawing.points, drawing.triangles)])
-    handles = draw_mesh(
-        ax, drawing.points, drawing.triangles, drawing.outline, drawing.boundary, drawing.offsets, outer
-    )
-    handles += draw_hinges(ax, drawing.points, drawing.hinges, len(mesh.hinges))
+    points = laid_out(mesh)
+    figure, (ax,) = panels([extent(points, mesh.component >= 0)])
+    handles = draw_mesh(ax, mesh, points, outer_loops(mesh))
+    handles += draw_hinges(ax, points[mesh.hinges])
     if not mesh.certified:
-        handles += draw_worst(ax, drawing.points, drawing.pairs)
+        handles += draw_worst(ax, points, mesh.worst_entries)
     return figure, handles
 
 

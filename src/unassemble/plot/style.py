@@ -9,6 +9,7 @@ WORST = "#b5179e"
 TEXT = "#3c4856"
 STATUS = {"certified": "#2a7f4f", "ambiguous": "#b3441e", "uncertified": "#b3441e"}
 
+MOST_VECTOR = 20_000  # shapes in a vector format; more become an image in it
 DPI = 160
 LARGEST = (9.0, 7.2)  # inches: the box that a mesh is fitted into
 NARROWEST = 6.2  # inches: what a line of text needs
