@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from .errors import InputError
+from .reductions import ConstantTensor
 
 OPERATORS = ("auto", "laplacian", "elasticity")
 METHODS = ("conformal", "angles")
@@ -50,8 +51,53 @@ class FrameOptions:
     handed: str | None = None
 
     def __post_init__(self) -> None:
-        if self.tensor is not None and not _are_numbers(self.tensor, 3):
+        self._check_anchors()
+        self._check_direction()
+        if self.handed not in (None, "left", "right"):
+            raise InputError(f"`handed` is 'left' or 'right', not {self.handed!r}")
+        line = self.direction is not None or len(self.anchors) > 1
+        if self.handed and not line:
+            raise InputError("`handed` needs a line to refer to: give `direction`, or two `anchors`, as well")
+        if self.tensor is None:
+            return
+        if not _are_numbers(self.tensor, 3):
             raise InputError(f"`tensor` is three numbers, kxx, kxy and kyy, not {self.tensor!r}")
+        ConstantTensor(*self.tensor)  # refuses what is not positive definite
+        if not (self._spans_plane() or (line and self.handed)):
+            raise InputError(
+                "`tensor` can be undone only with a known orientation: give three `anchors` that are not in line, or "
+                "`direction` and `handed`"
+            )
+
+    def _check_anchors(self) -> None:
+        rows = [row for row, *_ in self.anchors]
+        places = [tuple(place) for _, *place in self.anchors]
+        if min(rows, default=0) < 0:
+            raise InputError(f"row {min(rows)} of `anchors` is not in the matrix: its rows count from 0")
+        if len(set(rows)) < len(rows):
+            raise InputError(f"row {next(row for row in rows if rows.count(row) > 1)} is anchored twice")
+        if not all(np.isfinite(place).all() for place in places):
+            raise InputError("a coordinate in `anchors` is not a finite number")
+        if len(set(places)) < len(places):
+            raise InputError("two `anchors` have the same position: different rows are different points")
+
+    def _check_direction(self) -> None:
+        if self.direction is None:
+            return
+        try:
+            first, second, degrees = self.direction
+            good = int(first) == first and int(second) == second and first != second and np.isfinite(degrees)
+        except (TypeError, ValueError):
+            good = False
+        if not good:
+            raise InputError("`direction` is (row, row, degrees), with whole rows that differ and a finite angle")
+        if len(self.anchors) > 1:
+            raise InputError("`direction` and two or more `anchors` fix the same freedom: give one of them")
+
+    def _spans_plane(self) -> bool:
+        """Whether the anchors are not all in line."""
+        places = np.array([place[:2] for _, *place in self.anchors])
+        return len(places) > 2 and np.linalg.matrix_rank(places - places[0], tol=1e-9 * np.ptp(places)) == 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +136,7 @@ def listed_anchors(anchors: Any) -> tuple[tuple[Any, ...], ...]:
 
 def _anchor(one: Any) -> tuple[Any, ...]:
     row, *place = one
-    if isinstance(row, (str, bytes)) or int(row) != row:
+    if isinstance(row, (str, bytes)) or int(row) != row or len(place) not in (2, 3):
         raise ValueError(row)
     return int(row), *map(float, place)
 

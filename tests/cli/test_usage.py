@@ -5,19 +5,20 @@ from __future__ import annotations
 import pytest
 from click.testing import CliRunner
 
+from unassemble import InputError, recover
 from unassemble.cli import main
-from unassemble.cli.values import spans_plane, spelled_out
+from unassemble.cli.values import spelled_out
 
 BAD = [
-    (["--scale", "0"], "not a nonzero number"),
-    (["--scale", "nan"], "not a nonzero number"),
-    (["--scale", "two"], "not a nonzero number"),
-    (["--noise", "0"], "above 0"),
-    (["--noise", "-1e-3"], "above 0"),
-    (["--noise", "inf"], "above 0"),
+    (["--scale", "0"], "finite nonzero number"),
+    (["--scale", "nan"], "finite nonzero number"),
+    (["--scale", "two"], "'two' is not a valid float"),
+    (["--noise", "0"], "positive standard deviation"),
+    (["--noise", "-1e-3"], "positive standard deviation"),
+    (["--noise", "inf"], "positive standard deviation"),
     (["--drop-zeros", "-1"], "at least 0 and below 1"),
     (["--drop-zeros", "nan"], "at least 0 and below 1"),
-    (["--drop-zeros=few"], "at least 0 and below 1"),
+    (["--drop-zeros=few"], "'few' is not a valid float"),
     (["--anchor", "3,1"], "not of the form ROW,X,Y"),
     (["--anchor", "3,1,2,3,4"], "not of the form ROW,X,Y"),
     (["--anchor", "3,1,2,3"], "three coordinates"),
@@ -29,17 +30,17 @@ BAD = [
     (["--operator", "elasticity", "--noise", "1e-3"], "--noise is for scalar matrices"),
     (["--operator", "elasticity", "--standard-deviations"], "--standard-deviations is for scalar"),
     (["--anchor", "-3,1,2"], "rows count from 0"),
-    (["--anchor", "3.5,1,2"], "rows count from 0"),
+    (["--anchor", "3.5,1,2"], "not of the form ROW,X,Y"),
     (["--anchor", "3,1,inf"], "not a finite number"),
-    (["--anchor", "3,1,x"], "not a finite number"),
+    (["--anchor", "3,1,x"], "not of the form ROW,X,Y"),
     (["--anchor", "3,1,2", "--anchor", "3,4,5"], "row 3 is anchored twice"),
     (["--anchor", "99999,1,2"], "row 99999"),
     (["--tensor", "1,2,1", "--direction", "0,1,0", "--handed", "left"], "not positive definite"),
     (["--tensor", "-1,0,-1", "--direction", "0,1,0", "--handed", "left"], "not positive definite"),
     (["--tensor", "1,0", "--direction", "0,1,0", "--handed", "left"], "KXX,KXY,KYY"),
-    (["--tensor", "2,0,1"], "three --anchor that are not in line, or --direction ROW,ROW,DEGREES with --handed"),
-    (["--tensor", "2,0,1", "--direction", "0,1,30"], "--handed left|right"),
-    (["--tensor", "2,0,1", "--anchor", "0,0,0", "--anchor", "1,1,1"], "--handed left|right"),
+    (["--tensor", "2,0,1"], "three --anchor that are not in line, or --direction and --handed"),
+    (["--tensor", "2,0,1", "--direction", "0,1,30"], "--handed"),
+    (["--tensor", "2,0,1", "--anchor", "0,0,0", "--anchor", "1,1,1"], "--handed"),
     (
         ["--tensor", "2,0,1", "--anchor", "0,0,0", "--anchor", "1,1,1", "--anchor", "2,3,3"],
         "three --anchor that are not in line",
@@ -47,7 +48,7 @@ BAD = [
     (["--handed", "left"], "needs a line"),
     (["--handed", "up", "--direction", "0,1,30"], "'up'"),
     (["--direction", "0,1"], "ROW,ROW,DEGREES"),
-    (["--direction", "0,0,30"], "two different rows"),
+    (["--direction", "0,0,30"], "rows that differ"),
     (["--direction", "0,1,30", "--anchor", "0,0,0", "--anchor", "1,1,1"], "fix the same freedom"),
     (["--operator", "surface"], "--operator surface is not available in this version"),
     (["--operator", "heat"], "'heat'"),
@@ -122,7 +123,7 @@ def test_refusals_come_before_the_work(work, monkeypatch):
         raise AssertionError("the work has begun")
 
     monkeypatch.setattr("unassemble.recover", recover)
-    for words in (["--plot", "p.jpg"], ["--report", "no/r.json"], ["--tensor", "2,0,1"]):
+    for words in (["--plot", "p.jpg"], ["--report", "no/r.json"]):
         assert work.recover(*words).exit_code == 2
     assert work.recover(out="no/mesh.npz").exit_code == 2
     assert work.recover(out="mesh.node").exit_code == 4
@@ -142,11 +143,12 @@ def test_bare_drop_zeros_gets_its_value():
         assert spelled_out(words.split()) == expected.split()
 
 
-def test_points_that_span_the_plane():
-    assert spans_plane(((0, 0.0, 0.0), (1, 1.0, 0.0), (2, 0.0, 1e-3)))
-    assert not spans_plane(((0, 0.0, 0.0), (1, 1.0, 2.0), (2, -2.0, -4.0)))
-    assert not spans_plane(((0, 1.0, 1.0), (1, 1.0, 1.0), (2, 1.0, 1.0)))
-    assert not spans_plane(((0, 0.0, 0.0), (1, 1.0, 0.0)))
+@pytest.mark.parametrize(
+    "options", [{"tensor": (1, 2, 1)}, {"noise": 0.0}, {"method": ""}, {"handed": "left"}, {"direction": (0, 0, 1.0)}]
+)
+def test_options_are_checked_before_the_file_is_read(options):
+    with pytest.raises(InputError, match=f"`{next(iter(options))}"):
+        recover("no such file.mtx", **options)
 
 
 @pytest.mark.parametrize("words", [["--help"], ["-h"], ["recover", "--help"], ["inspect", "-h"], ["demo", "--help"]])

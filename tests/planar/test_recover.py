@@ -156,7 +156,7 @@ def test_direction_and_handedness_replace_anchors(turn):
 
 def test_what_a_tensor_needs_is_said():
     known = specimen(*random_mesh(100), tensor=(4.0, 0.0, 1.0))
-    with pytest.raises(InputError, match="three anchors"):
+    with pytest.raises(InputError, match="three `anchors`"):
         recover(known.matrix, tensor=(4.0, 0.0, 1.0))
     with pytest.raises(InputError, match="handed"):
         recover(known.matrix, tensor=(4.0, 0.0, 1.0), direction=(0, 1, 30.0))

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from .values import DROP_ZEROS, Number
+from .values import DROP_ZEROS
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
@@ -20,7 +20,7 @@ def matrix_options(command: _Command) -> _Command:
         click.option("--variable", metavar="NAME", help="Name of the variable in a .mat file."),
         click.option(
             DROP_ZEROS,
-            type=Number("a tolerance, at least 0 and below 1", lambda value: 0 <= value < 1),
+            type=float,
             metavar="[TOL]",
             help="Forget stored entries of at most TOL (default 1e-12) times the largest off-diagonal entry of their "
             "row, and of their transpose's.",

@@ -9,7 +9,7 @@ import click
 
 from .options import matrix_options, nodes_options, refuse_shared, spelled_numbering
 from .status import outcome
-from .values import Number, Numbers, OptionalTolerance, check_anchors, check_orientation, check_tensor
+from .values import Numbers, OptionalTolerance
 
 if TYPE_CHECKING:
     from ..progress import StageDisplay
@@ -44,10 +44,10 @@ class _Files:
     "--method", type=click.Choice(["conformal", "angles", *_LATER_METHODS]), help="The default picks the best."
 )
 @click.option("--no-refine", is_flag=True, help="Leave out the polish.")
-@click.option("--scale", type=Number("a nonzero number", bool), metavar="C", help="The factor c is known.")
+@click.option("--scale", type=float, metavar="C", help="The factor c is known.")
 @click.option(
     "--noise",
-    type=Number("a standard deviation above 0", lambda sigma: sigma > 0),
+    type=float,
     metavar="SIGMA",
     help="Standard deviation of the entries; the certificate becomes a chi-square test.",
 )
@@ -56,13 +56,11 @@ class _Files:
     "anchors",
     type=Numbers("ROW,X,Y[,Z]"),
     multiple=True,
-    callback=check_anchors,
     help="A known position, repeatable: two fix a similarity, a third, not in line, the mirror image.",
 )
 @click.option(
     "--tensor",
     type=Numbers("KXX,KXY,KYY"),
-    callback=check_tensor,
     help="Constant anisotropy to undo; needs an orientation: three anchors, or --direction with --handed.",
 )
 @click.option(
@@ -86,7 +84,6 @@ def recover(matrix: str, out: str, report: str | None, plot: str | None, quiet: 
     Rows count from 0.
     """
     _check_available(options.pop("realise"), options["operator"], options["method"])
-    check_orientation(options["tensor"], options["anchors"], options["direction"], options["handed"])
     options["numbering"] = spelled_numbering(options["numbering"])
     files = _Files(matrix, out, report, plot)
     _check_files(files)

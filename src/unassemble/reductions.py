@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from .errors import InputError
 
 _FLAT = 1e-8  # root of the ratio of eigenvalues below which that ratio is rounding
 
