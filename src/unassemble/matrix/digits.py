@@ -11,14 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-_LEFTOVER = 1e-14  # of the largest number: less is what cancelling leaves, in no few digits
 _DIGITS = range(3, 13)  # decimal ones to look for; fewer do not tell what is rounded from what is exact
-_SHORT = 12  # binary digits of numbers that are exact by nature
-_SINGLE = 24, 20  # binary digits of single precision, and what nearly all of its numbers need
-_LEAST = 2  # different numbers that need the last digit: one may be a factor that somebody chose
-_MANY = 0.25  # of the different numbers: those of regular meshes have few digits by nature, up to half of them
-_SAMPLE = 2000
-_EXACT = 8 * float(np.finfo(float).eps)  # relative error of a number scaled by a power of ten
+_SHORT, _NEARLY, _SINGLE = 12, 20, 24  # binary digits: of numbers exact by nature; of nearly all singles; of singles
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,16 +34,16 @@ class Digits:
     def of(cls, values: NDArray[np.float64]) -> Digits | None:
         """The precision of some numbers (k,); None where they have not been rounded, or not so that it shows."""
         size = np.abs(values)
-        size = size[size > _LEFTOVER * size.max(initial=0.0)]
-        sample = size[:: max(1, len(size) // _SAMPLE)]
-        if not (_are_binary(sample, _SINGLE[0]).all() or _have(sample, _DIGITS[-1]).all()):  # as in most matrices
+        size = size[size > 1e-14 * size.max(initial=0.0)]  # less is what cancelling leaves, in no few digits
+        sample = size[:: max(1, len(size) // 2000)]
+        if not (_are_binary(sample, _SINGLE).all() or _have(sample, _DIGITS[-1]).all()):  # as in most matrices
             return None
         size = np.unique(size)
         told = size[~_are_binary(size, _SHORT)]
-        if len(told) < _LEAST:
+        if len(told) < 2:  # one may be a factor that somebody chose
             return None
-        if _are_binary(size, _SINGLE[0]).all() and _need_more(_are_binary(told, _SINGLE[1])):
-            return cls("single precision", _last_bit(np.abs(values), _SINGLE[0]))
+        if _are_binary(size, _SINGLE).all() and _need_more(_are_binary(told, _NEARLY)):
+            return cls("single precision", _last_bit(np.abs(values), _SINGLE))
         digits = next((d for d in _DIGITS if _have(sample, d).all() and _have(size, d).all()), None)
         return None if digits is None else cls._decimal(np.abs(values), size, told, digits)
 
@@ -67,8 +61,11 @@ class Digits:
 
 
 def _need_more(coarse: NDArray[np.bool_]) -> bool:
-    """Whether many of some numbers, and more than one, are not among those with a digit less."""
-    return bool(np.count_nonzero(~coarse) >= max(_LEAST, _MANY * len(coarse)))
+    """Whether many of some numbers, and more than one, are not among those with a digit less.
+
+    Of the numbers of regular meshes up to half have few digits by nature.
+    """
+    return bool(np.count_nonzero(~coarse) >= max(2, len(coarse) / 4))
 
 
 def _exponent(size: NDArray) -> NDArray[np.float64]:
@@ -85,7 +82,7 @@ def _are_multiples(size: NDArray, exponent: NDArray) -> NDArray[np.bool_]:
     # Powers of ten are exact up to 10^22: dividing by one, or multiplying, errs by a last place.
     with np.errstate(over="ignore", under="ignore"):
         count = np.where(exponent < 0, size * 10.0 ** np.abs(exponent), size / 10.0 ** np.abs(exponent))
-        return np.asarray(np.abs(count - np.rint(count)) <= _EXACT * count)
+        return np.asarray(np.abs(count - np.rint(count)) <= 8 * np.finfo(float).eps * count)
 
 
 def _are_binary(size: NDArray, digits: int) -> NDArray[np.bool_]:

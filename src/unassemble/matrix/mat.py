@@ -1,4 +1,4 @@
-"""MATLAB files up to version 7, SuiteSparse's ``Problem.A`` included.
+"""MATLAB files of versions 5 to 7, SuiteSparse's ``Problem.A`` included.
 
 The reader of scipy (1.17) ends the process by a segmentation fault on some damaged files; this one looks at every
 length before it believes it, and unpacks nothing but what may hold a sparse matrix.
@@ -13,9 +13,7 @@ import scipy.sparse as sp
 
 from ..errors import MatrixFileError
 from .canonical import canonical, entry_rows
-from .mat4 import read_mat4
-from .mat5 import is_mat5, read_mat5
-from .variable import Variable
+from .mat5 import Variable, read_mat5
 
 
 def read_mat(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
@@ -44,8 +42,7 @@ def read_mat(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
     ValueError
         If the file is truncated or damaged, in a few words.
     """
-    content = stream.read()
-    variables = read_mat5(content) if is_mat5(content) else read_mat4(content)
+    variables = read_mat5(stream.read())
     found = dict(_sparse_variables(variables))
     held = _listed({key: A.shape for key, A in found.items()} or {v.name: v.shape for v in variables})
     if variable is not None:

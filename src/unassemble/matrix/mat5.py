@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import struct
 import zlib
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-
-from .variable import Variable
 
 _HEADER = 128
 _MATRIX, _COMPRESSED = 14, 15
@@ -24,9 +23,24 @@ _COMPLEX, _LOGICAL = 8, 2  # their flags
 _PEEK = 4096  # unpacked bytes that show what a compressed variable is
 
 
-def is_mat5(content: bytes) -> bool:
-    """Whether the header is that of version 5."""
-    return content[126:128] in (b"IM", b"MI")
+@dataclass(frozen=True, eq=False)
+class Variable:
+    """A variable of a MATLAB file.
+
+    Attributes
+    ----------
+    name : str
+    shape : tuple of int
+    sparse : scipy sparse array or None
+        The value of a sparse variable, its index arrays still to be checked.
+    fields : tuple of Variable
+        Of a structure with one element.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    sparse: Any = None
+    fields: tuple[Variable, ...] = ()
 
 
 def read_mat5(content: bytes) -> list[Variable]:
@@ -35,11 +49,13 @@ def read_mat5(content: bytes) -> list[Variable]:
     Raises
     ------
     ValueError
-        If an element does not fit into the one that holds it.
+        If the header makes no sense, or an element does not fit into the one that holds it.
     zlib.error
         If a compressed one is damaged.
     """
-    order = "<" if content[126:128] == b"IM" else ">"
+    order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
+    if order is None:
+        raise ValueError("the header does not tell the order of bytes")
     elements = _Elements(content, order, _HEADER)
     variables = []
     while not elements.exhausted:

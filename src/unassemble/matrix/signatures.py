@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import struct
-
 HEAD = 1024  # bytes that tell
 
 _MARKET = b"%%matrixmarket"
@@ -14,10 +12,6 @@ _FOREIGN: tuple[tuple[int, bytes, str], ...] = (
     (0, b"\x93NUMPY", "is a dense NumPy array (.npy): save the matrix with scipy.sparse.save_npz"),
     (0, b"\xff\xfe", "is text in the encoding UTF-16: save it as ASCII or UTF-8"),
     (0, b"\xfe\xff", "is text in the encoding UTF-16: save it as ASCII or UTF-8"),
-    (0, b"\x89PNG", "is a PNG image, not a matrix"),
-    (0, b"\xff\xd8\xff", "is a JPEG image, not a matrix"),
-    (0, b"GIF8", "is a GIF image, not a matrix"),
-    (0, b"%PDF", "is a PDF document, not a matrix"),
     (0, b"BZh", "is compressed by bzip2: unpack it first, or use gzip"),
     (0, b"\xfd7zXZ", "is compressed by xz: unpack it first, or use gzip"),
     (0, b"\x28\xb5\x2f\xfd", "is compressed by zstd: unpack it first, or use gzip"),
@@ -38,7 +32,7 @@ def kind_of(head: bytes) -> str | None:
         return "gzip"
     if head.startswith((b"PK\x03\x04", b"PK\x05\x06")):
         return "npz"
-    if not _is_hdf5(head) and (_is_mat5(head) or _is_mat4(head)):
+    if not _is_hdf5(head) and _is_mat5(head):
         return "mat"
     return None
 
@@ -74,18 +68,6 @@ def _is_hdf5(head: bytes) -> bool:
 
 def _is_mat5(head: bytes) -> bool:
     return head.startswith(b"MATLAB 5") or head[124:128] in (b"\x00\x01IM", b"\x01\x00MI")
-
-
-def _is_mat4(head: bytes) -> bool:
-    """The header of MATLAB version 4: type, rows, columns, imaginary part or not, length of the name."""
-    for order in "<>":
-        if len(head) < 21 or not any(head[:20]):
-            return False
-        kind, rows, columns, imaginary, length = struct.unpack(order + "5i", head[:20])
-        known = kind in range(0, 53) if order == "<" else kind in range(1000, 1053)
-        if known and rows >= 0 and columns >= 0 and imaginary in (0, 1) and 1 < length <= 64:
-            return head[20 : 20 + length - 1].replace(b"_", b"a").isalnum()
-    return False
 
 
 def _is_pickle(head: bytes) -> bool:
