@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,15 +11,12 @@ import scipy.sparse as sp
 from .errors import GeometryError, InputError, RecoveryError
 from .matrix import OperatorMatrix
 from .matrix.digits import Digits
+from .tolerances import ROUNDED
 
 if TYPE_CHECKING:
     from .elasticity import Numbering
     from .elasticity.ordered.rounded import Rounding
     from .structures import StructuralNumbering
-
-_ANNIHILATED = 0.05  # share of rows and directions that annihilate constants; in scalar matrices there are none
-_TURNING = 6  # unknowns of a node that has rotations, in space
-_COMMON = 0.8  # how far the rows of a node couple to the same nodes
 
 
 @dataclass(frozen=True)
@@ -61,6 +58,7 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
     from .elasticity.rows.orders import ORDERS
     from .elasticity.unknowns import find_numbering, given_numbering, regular_numbering
     from .structures import find_structure, given_structure, truss_numbering
+    from .structures.layouts import SPACE
 
     whole, exact = _exact(matrix)
     if numbering is None or isinstance(numbering, str):
@@ -69,7 +67,7 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
         structure = find_structure(whole, numbering, block_size)
         if structure is not None:
             return VectorReading(structure, "", exact)
-        if block_size == _TURNING:
+        if block_size == SPACE.block_size:
             raise GeometryError(
                 "with 6 unknowns per node, three displacements and three rotations, no row annihilates translations"
             )
@@ -109,7 +107,7 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
         why = f"the graph has more edges than a planar one can have, and {_evidence(structure)}"
         return VectorReading(structure, why, exact)
     found = numbering_at_sight(whole)
-    if found is None or found.share < _ANNIHILATED or found.common < _COMMON:
+    if not _convinces(found):
         return _truss(whole, exact, "the graph has more edges than a planar one can have") if crowded else None
     graph = "the graph has more edges than a planar one can have" if crowded else "no even row is coupled to an odd one"
     return VectorReading(found, f"{graph}, and {_evidence(found)}", exact)
@@ -131,7 +129,7 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
         found = find_numbering(whole) if promising(whole, (3, 2)) else None
     except RecoveryError:
         found = None
-    if found is None or found.share < _ANNIHILATED or found.common < _COMMON:
+    if not _convinces(found):
         return _truss(whole, exact, "it is no planar mesh")
     return VectorReading(found, f"it is no planar mesh, and {_evidence(found)}", exact)
 
@@ -168,6 +166,11 @@ def _truss(whole: sp.csr_array, exact: tuple[sp.csr_array, Rounding] | None, rea
     return VectorReading(found, f"{reason}, and its rows form {bars}", exact)
 
 
+def _convinces(found: Numbering | None) -> TypeGuard[Numbering]:
+    """Whether rows annihilate constants, as those of scalar matrices never do, and those of a node look alike."""
+    return found is not None and found.share >= 0.05 and found.common >= 0.8
+
+
 def _evidence(found: Numbering | StructuralNumbering) -> str:
     order = {"pattern": "in no regular order"}.get(found.kind, found.kind)
     return (
@@ -185,4 +188,4 @@ def _twins_interleaved(matrix: OperatorMatrix) -> bool:
     pairs = matrix.edges // 2
     if not np.array_equal(pairs[even], pairs[~even]):
         return False
-    return bool(np.abs(matrix.entries[even] - matrix.entries[~even]).max() <= 1e-12 * np.abs(matrix.entries).max())
+    return bool(np.abs(matrix.entries[even] - matrix.entries[~even]).max() <= ROUNDED * np.abs(matrix.entries).max())

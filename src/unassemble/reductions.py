@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 
-_FLAT = 1e-8  # root of the ratio of eigenvalues below which that ratio is rounding
-
 
 @dataclass(frozen=True)
 class ConstantTensor:
@@ -37,7 +35,7 @@ class ConstantTensor:
         positive = np.isfinite(values).all() and self.kxx > 0 and self.kyy > 0
         if not positive or abs(self.kxy) >= np.sqrt(self.kxx) * np.sqrt(self.kyy):
             raise InputError(f"`tensor` {values} is not positive definite: KXX > 0 and KXX KYY > KXY^2 are needed")
-        if self.root_determinant <= _FLAT * max(self.kxx, self.kyy):
+        if self.root_determinant <= 1e-8 * max(self.kxx, self.kyy):  # the root of the ratio of its eigenvalues
             raise InputError(f"`tensor` {values} is degenerate up to rounding and cannot be undone")
 
     @property

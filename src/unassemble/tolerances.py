@@ -6,6 +6,17 @@ of the caller is a field of a frozen options type: neither belongs here.
 
 from __future__ import annotations
 
+# Entries.
+
+ROUNDED = 1e-12
+"""Relative difference up to which entries are the same number, or none: assemblers leave that much in any matrix."""
+
+SUMMED = 1e-10
+"""Relative error of sums of entries, and of entries that were summed in two orders, as both triangles are."""
+
+SIGMAS = 10.0
+"""Standard deviations that no difference of independent noise exceeds, in a matrix of any size."""
+
 # The certificate.
 
 CERTIFIED = 1e-9

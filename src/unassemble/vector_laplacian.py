@@ -15,8 +15,7 @@ from .elasticity.results import ScalarParts
 from .errors import RecoveryError
 from .matrix import OperatorMatrix, check_matrix
 from .recovery import PlanarMesh
-
-_SAME = 1e-12  # relative difference up to which the matrices of two directions are one
+from .tolerances import ROUNDED
 
 Scalar = Callable[[OperatorMatrix, Sequence[Any]], PlanarMesh]
 
@@ -107,4 +106,4 @@ def _rows_of(parts: ScalarParts, direction: int) -> NDArray[np.int64]:
 
 
 def _same(one: sp.csr_array, other: sp.csr_array) -> bool:
-    return one.shape == other.shape and bool(abs(one - other).max() <= _SAME * abs(other).max())
+    return one.shape == other.shape and bool(abs(one - other).max() <= ROUNDED * abs(other).max())

@@ -13,10 +13,8 @@ from ..errors import GeometryError
 from ..matrix import OperatorMatrix
 from ..operators import VectorReading
 from ..planar.conformal import estimate_scale
+from ..tolerances import ROUNDED, SUMMED
 from ..topology import Piece, Topology
-
-VANISHED = 1e-12  # an entry this small, relative to both of its rows, is zero up to rounding
-ZERO_SUM = 1e-10  # likewise the sum of a row, to which every entry adds its own rounding
 
 
 def matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
@@ -33,8 +31,8 @@ def matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
         "asymmetry": float(matrix.asymmetry),
         "n_connected": int(csgraph.connected_components(graph, directed=False)[0]) - n_isolated,
         "n_isolated": n_isolated,
-        "n_vanished": int(np.count_nonzero(np.abs(matrix.entries) <= VANISHED * smaller)),
-        "n_zero_sums": int(np.count_nonzero((np.abs(sums) <= ZERO_SUM * size) & (degree > 0))),
+        "n_vanished": int(np.count_nonzero(np.abs(matrix.entries) <= ROUNDED * smaller)),
+        "n_zero_sums": int(np.count_nonzero((np.abs(sums) <= SUMMED * size) & (degree > 0))),
         "warnings": matrix.warnings,
     }
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..matrix.symmetry import ORDINARY
+from ..tolerances import ROUNDED
 from ..topology.obstruction import obstruction_text
 from ..words import count_of
 
@@ -46,7 +46,7 @@ def _above(number: int) -> str:
 def _symmetry(asymmetry: float) -> str:
     if not asymmetry:
         return "symmetric"
-    return "symmetric up to rounding" if asymmetry <= ORDINARY else f"symmetric up to {asymmetry:.1e}"
+    return "symmetric up to rounding" if asymmetry <= ROUNDED else f"symmetric up to {asymmetry:.1e}"
 
 
 def _vanished(number: int) -> str:

@@ -17,10 +17,6 @@ from scipy.sparse.linalg import splu
 from ..errors import SolverError
 from .columns import with_unit_columns
 
-_WEIGHT = 2.0**-20
-"""Factor of the residual, when columns have length 1. The best is the least singular value, but partial pivoting serves
-for all that are not far above it."""
-
 
 class AugmentedSystem:
     """Solves min |B x - r| by way of [w I, B; B', 0] [s; x] = [r; 0], whose s is the residual over w.
@@ -39,10 +35,15 @@ class AugmentedSystem:
         If the rank is not full to working accuracy, or entries are not finite.
     """
 
+    weight = 2.0**-20
+    """w: the least singular value would be best, but partial pivoting serves for all that are not far above it."""
+
     def __init__(self, matrix: sp.csr_array):
         self._matrix, self._unit = with_unit_columns(matrix)
         rows = matrix.shape[0]
-        system = sp.block_array([[_WEIGHT * sp.eye_array(rows), self._matrix], [self._matrix.T, None]], format="csc")
+        system = sp.block_array(
+            [[self.weight * sp.eye_array(rows), self._matrix], [self._matrix.T, None]], format="csc"
+        )
         try:
             self._factor = splu(system, diag_pivot_thresh=1.0)
         except RuntimeError as error:
@@ -54,7 +55,7 @@ class AugmentedSystem:
         found = np.zeros(sum(b.shape))
         for _ in range(2):
             s, x = found[:rows], found[rows:]
-            found = found + self._factor.solve(np.concatenate([right - _WEIGHT * s - b @ x, -(b.T @ s)]))
+            found = found + self._factor.solve(np.concatenate([right - self.weight * s - b @ x, -(b.T @ s)]))
         return np.asarray(self._unit * found[rows:])
 
     def release(self) -> None:

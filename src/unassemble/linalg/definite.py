@@ -13,8 +13,6 @@ from ..errors import GeometryError, SolverError
 from .factorisation import Factorisation, factorisation
 from .upper import UpperTriangle
 
-_NOTHING = float(np.finfo(float).eps) ** 2  # of the largest entry: unknowns in no equation are stored with less
-
 
 @contextmanager
 def nearly_singular(matrix: UpperTriangle, shifts: Sequence[float]) -> Iterator[Factorisation]:
@@ -36,7 +34,8 @@ def nearly_singular(matrix: UpperTriangle, shifts: Sequence[float]) -> Iterator[
     start = matrix.indptr[:-1]
     own = matrix.data[start].reshape(-1, block, block)
     diagonal = np.diagonal(own, axis1=1, axis2=2)
-    there = diagonal > _NOTHING * diagonal.max(initial=0.0)
+    # Unknowns in no equation are stored with less.
+    there = diagonal > np.finfo(float).eps ** 2 * diagonal.max(initial=0.0)
     typical = float(np.median(diagonal[there])) if there.any() else 1.0
     for shift in shifts:
         data = matrix.data.copy()

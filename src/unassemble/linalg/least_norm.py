@@ -9,10 +9,6 @@ from scipy.sparse.linalg import splu
 
 from ..errors import SolverError
 
-_DAMPING = 1e-6  # of the longest column: smaller singular values need many rounds
-_ROUNDS = 100
-_SLOW = 0.95  # length of a step, relative to the former one, that is the last
-
 
 def least_norm(matrix: sp.csr_array, right: NDArray) -> NDArray[np.complex128]:
     """Solve min |B x - r|, of all such x the shortest one, by proximal iteration.
@@ -35,7 +31,8 @@ def least_norm(matrix: sp.csr_array, right: NDArray) -> NDArray[np.complex128]:
     """
     rows, columns = matrix.shape
     size = np.sqrt(np.asarray(abs(matrix).power(2).sum(axis=0)).ravel())
-    damping = (_DAMPING * float(size.max(initial=0.0))) ** 2 or 1.0
+    # Singular values below this need many rounds.
+    damping = (1e-6 * float(size.max(initial=0.0))) ** 2 or 1.0
     adjoint = matrix.conj().T.tocsr()
     blocks = [[sp.eye_array(rows), matrix], [adjoint, -damping * sp.eye_array(columns)]]
     try:
@@ -44,10 +41,10 @@ def least_norm(matrix: sp.csr_array, right: NDArray) -> NDArray[np.complex128]:
         raise SolverError(f"SuperLU could not go on with a matrix of order {rows + columns}: {error}") from error
     found = np.zeros(columns, dtype=np.complex128)
     none, before = found, np.inf
-    for _ in range(_ROUNDS):
+    for _ in range(100):
         step = factor.solve(np.concatenate([right - matrix @ found, none]))[rows:]
         length = float(np.linalg.norm(step))
-        if not length < _SLOW * before:
+        if not length < 0.95 * before:
             break
         found, before = found + step, length
     return found

@@ -13,6 +13,7 @@ import os
 import re
 import sys
 import threading
+from enum import IntEnum
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
 
@@ -22,15 +23,18 @@ from numpy.typing import NDArray
 from ..errors import SolverError
 from .upper import UpperTriangle
 
-_REAL_DEFINITE, _REAL_INDEFINITE, _COMPLEX_HERMITIAN_INDEFINITE = 2, -2, -4
-_ANALYSE, _FACTORISE, _SOLVE, _RELEASE = 11, 22, 33, -1
-_REPRODUCIBLE = 2  # MKL_CBWR_AUTO: the fastest code for this processor, reproducible between runs
-_OUT_OF_MEMORY = -2
-_ERRORS = {
-    -3: "the reordering failed",
-    -4: "a pivot is zero",
-    -8: "a 32-bit index overflowed",
-}
+
+class _Kind(IntEnum):
+    REAL_DEFINITE = 2
+    REAL_INDEFINITE = -2
+    COMPLEX_HERMITIAN_INDEFINITE = -4
+
+
+class _Phase(IntEnum):
+    ANALYSE = 11
+    FACTORISE = 22
+    SOLVE = 33
+    RELEASE = -1
 
 
 @cache
@@ -39,7 +43,7 @@ def _library() -> ctypes.CDLL:
     library = ctypes.CDLL(_installed() or _searched())
     if "MKL_CBWR" not in os.environ:
         # The same bits on every run: sums of several threads are otherwise added in the order in which they come in.
-        library.MKL_CBWR_Set(_REPRODUCIBLE)
+        library.MKL_CBWR_Set(2)  # MKL_CBWR_AUTO: the fastest code for this processor that is reproducible
     return library
 
 
@@ -70,8 +74,6 @@ def available() -> bool:
 
 
 _ONE_AT_A_TIME = threading.RLock()  # two calls at once, even on matrices of their own, spoil memory
-_LARGEST = 1e30  # with larger entries, and with what is no number, the library has been seen to spoil memory
-_SMALL = 1000  # rows; below, MKL's parallel ordering gains nothing, and has been seen to spoil memory
 
 
 class PardisoFactorisation:
@@ -95,7 +97,8 @@ class PardisoFactorisation:
         self._handle = np.zeros(64, dtype=np.int64)
         self._iparm = np.zeros(64, dtype=np.int32)
         self._iparm[0] = 1  # no defaults: all of iparm is set here
-        large = matrix.n >= _SMALL
+        # Below, MKL's parallel ordering gains nothing, and has been seen to spoil memory.
+        large = matrix.n >= 1000
         self._iparm[1] = 3 if large else 2  # nested dissection, in parallel if that pays
         self._iparm[9] = 30  # never perturb a pivot: shifts next to an eigenvalue have small ones, rightly
         self._iparm[17] = -1  # count the entries of the factor
@@ -106,32 +109,32 @@ class PardisoFactorisation:
             self._iparm[36] = matrix.block  # rows of square blocks
         complex_entries = np.iscomplexobj(matrix.data)
         if complex_entries:
-            self._mtype = _COMPLEX_HERMITIAN_INDEFINITE
+            self._mtype = _Kind.COMPLEX_HERMITIAN_INDEFINITE
         else:
-            self._mtype = _REAL_DEFINITE if definite else _REAL_INDEFINITE
+            self._mtype = _Kind.REAL_DEFINITE if definite else _Kind.REAL_INDEFINITE
         self._dtype = np.dtype(np.complex128 if complex_entries else np.float64)
         self._matrix = matrix
-        self._call(_ANALYSE)
+        self._call(_Phase.ANALYSE)
 
     def factorise(self, matrix: UpperTriangle) -> None:
         """Factorise a matrix with the analysed pattern."""
         size = float(np.abs(matrix.data).max(initial=0.0))
-        if not size <= _LARGEST:
+        if not size <= 1e30:  # such entries have been seen to spoil memory
             raise SolverError(f"a matrix to be factorised has entries that are not finite, or as large as {size:.1e}")
         self._matrix = matrix
-        self._call(_FACTORISE)
+        self._call(_Phase.FACTORISE)
 
     def solve(self, rhs: NDArray) -> NDArray:
         """Solve for one right-hand side (n,) or several (n, k)."""
         rhs = np.asfortranarray(rhs, dtype=self._dtype)
         solution = np.empty_like(rhs, order="F")
-        self._call(_SOLVE, rhs, solution)
+        self._call(_Phase.SOLVE, rhs, solution)
         return solution
 
     def release(self) -> None:
         """Give the memory of the factor back."""
         if self._handle.any():
-            self._call(_RELEASE)
+            self._call(_Phase.RELEASE)
             self._handle[:] = 0
 
     def __del__(self) -> None:
@@ -155,10 +158,11 @@ class PardisoFactorisation:
                 _pointer(unused if rhs is None else rhs), _pointer(unused if solution is None else solution),
                 ctypes.byref(error),
             )  # fmt: skip
+        if error.value == -2:
+            raise MemoryError(f"PARDISO found too little memory to factorise a matrix of order {m.n * m.block}")
         if error.value:
-            if error.value == _OUT_OF_MEMORY:
-                raise MemoryError(f"PARDISO found too little memory to factorise a matrix of order {m.n * m.block}")
-            reason = _ERRORS.get(error.value, f"error {error.value}")
+            reasons = {-3: "the reordering failed", -4: "a pivot is zero", -8: "a 32-bit index overflowed"}
+            reason = reasons.get(error.value, f"error {error.value}")
             raise SolverError(f"PARDISO could not go on with a matrix of order {m.n * m.block}: {reason}")
 
 

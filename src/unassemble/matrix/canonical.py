@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from ..errors import MatrixError
 from ..words import count_of
 
-# Above this many rows for each stored entry, a matrix is a wrong header rather than a mesh.
-_ROWS_PER_ENTRY = 100
-
 
 def canonical(A: Any) -> sp.csr_array:
     """Bring a sparse matrix into compressed rows without losing its structure.
@@ -57,7 +54,7 @@ def refuse_mostly_empty(n: int, n_stored: int) -> None:
     MatrixError
         If n is beyond 100 (n_stored + 10).
     """
-    if n > _ROWS_PER_ENTRY * (n_stored + 10):
+    if n > 100 * (n_stored + 10):  # a wrong header rather than a mesh
         raise MatrixError(
             f"at least {n - n_stored} of the {n} rows have no off-diagonal entry (only "
             f"{count_of(n_stored, 'entry is', 'entries are')} stored), so that this is no matrix of a mesh: check its "

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from ..errors import MatrixError, MatrixFileError
 from ..words import count_of
 
-_BLOCK = 1 << 18  # characters; larger ones are slower
 _FIELDS = ("real", "double", "integer", "unsigned-integer", "complex", "pattern")
 _SYMMETRIES = ("general", "symmetric", "skew-symmetric", "hermitian")
 _DATA = re.compile(r"^[ \t\r]*[^%\s]", re.MULTILINE)  # a line with something in it
@@ -210,7 +209,8 @@ def _blocks(text: io.TextIOWrapper, header: _Header) -> Iterator[NDArray[np.floa
     """The numbers, as tables of `header.width` columns; stops beyond the announced count."""
     line = header.lines
     seen = 0
-    while seen <= header.count and (block := text.read(_BLOCK)):
+    size = 1 << 18  # characters; larger blocks are slower
+    while seen <= header.count and (block := text.read(size)):
         block += text.readline()
         if _DATA.search(block):
             lines = (block.translate(_FORTRAN) if "D" in block or "d" in block else block).split("\n")

@@ -9,18 +9,33 @@ from __future__ import annotations
 import struct
 import zlib
 from dataclasses import dataclass
+from enum import IntEnum, IntFlag
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-_HEADER = 128
-_MATRIX, _COMPRESSED = 14, 15
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-_STRUCT, _SPARSE = 2, 5  # classes of arrays
-_COMPLEX, _LOGICAL = 8, 2  # their flags
-_PEEK = 4096  # unpacked bytes that show what a compressed variable is
+
+
+class _Element(IntEnum):
+    """Types of data elements that are no numbers."""
+
+    MATRIX = 14
+    COMPRESSED = 15
+
+
+class _Array(IntEnum):
+    """Classes of arrays."""
+
+    STRUCT = 2
+    SPARSE = 5
+
+
+class _Flag(IntFlag):
+    LOGICAL = 2
+    COMPLEX = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,13 +71,13 @@ def read_mat5(content: bytes) -> list[Variable]:
     order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
     if order is None:
         raise ValueError("the header does not tell the order of bytes")
-    elements = _Elements(content, order, _HEADER)
+    elements = _Elements(content, order, 128)
     variables = []
     while not elements.exhausted:
         kind, data = elements.take()
-        if kind == _COMPRESSED:
+        if kind == _Element.COMPRESSED:
             kind, data = _unpacked(data, order)
-        if kind == _MATRIX:
+        if kind == _Element.MATRIX:
             variables.append(_variable(_Elements(data, order)))
     return variables
 
@@ -89,7 +104,7 @@ class _Elements:
                 raise ValueError("a small data element is too long")
             return word & 0xFFFF, tag[4 : 4 + (word >> 16)]
         data = self._slice(self._at + 8, size)
-        padding = 0 if word == _COMPRESSED else -size % 8
+        padding = 0 if word == _Element.COMPRESSED else -size % 8
         self._at += 8 + size + padding
         return word, data
 
@@ -112,8 +127,9 @@ class _Elements:
 
 def _unpacked(data: memoryview, order: str) -> tuple[int, memoryview]:
     """The element in a compressed one; only its beginning, where that shows that it is of no use."""
-    beginning = zlib.decompressobj().decompress(data, _PEEK)
-    if len(beginning) < _PEEK or _array_class(beginning, order) in (_STRUCT, _SPARSE):
+    enough = 4096  # bytes
+    beginning = zlib.decompressobj().decompress(data, enough)
+    if len(beginning) < enough or _array_class(beginning, order) in (_Array.STRUCT, _Array.SPARSE):
         return _Elements(zlib.decompress(data), order).take()
     (kind,) = struct.unpack(order + "I", beginning[:4])
     return kind, memoryview(beginning)[8:]
@@ -131,9 +147,9 @@ def _variable(elements: _Elements) -> Variable:
     flags = int(elements.numbers()[0])
     shape = tuple(int(size) for size in elements.numbers())
     name = elements.text()
-    if flags & 0xFF == _SPARSE and len(shape) == 2:
+    if flags & 0xFF == _Array.SPARSE and len(shape) == 2:
         return Variable(name, shape, sparse=_sparse(elements, shape, flags >> 8))
-    if flags & 0xFF == _STRUCT and shape == (1, 1):
+    if flags & 0xFF == _Array.STRUCT and shape == (1, 1):
         return Variable(name, shape, fields=tuple(_fields(elements)))
     return Variable(name, shape)
 
@@ -141,8 +157,8 @@ def _variable(elements: _Elements) -> Variable:
 def _sparse(elements: _Elements, shape: tuple[int, ...], flags: int) -> Any:
     rows, starts = elements.numbers(), elements.numbers()
     # What a logical matrix stores is true; MATLAB announces its bytes as doubles.
-    values = np.ones(len(rows), dtype=bool) if flags & _LOGICAL else elements.numbers()
-    if flags & _COMPLEX:
+    values = np.ones(len(rows), dtype=bool) if flags & _Flag.LOGICAL else elements.numbers()
+    if flags & _Flag.COMPLEX:
         values = values + 1j * elements.numbers()
     if len(starts) != shape[1] + 1 or not 0 <= starts[-1] <= min(len(rows), len(values)):
         raise ValueError("the arrays of a sparse variable do not belong together")
@@ -166,7 +182,7 @@ def _fields(elements: _Elements) -> list[Variable]:
     fields = []
     for start in range(0, len(names), width):
         kind, data = elements.take()
-        if kind != _MATRIX:
+        if kind != _Element.MATRIX:
             raise ValueError("a field of a structure is no array")
         value = _variable(_Elements(data, elements.order))
         name = names[start : start + width].split(b"\0")[0].decode("utf-8", "replace")

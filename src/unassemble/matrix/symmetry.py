@@ -9,16 +9,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import MatrixError
+from ..tolerances import ROUNDED, SIGMAS, SUMMED
 from ..words import count_of
 from .canonical import entry_rows
 from .operator import row_sizes
-
-# Assembly in floating point sums the contributions to A_ij and A_ji in different orders.
-ROUNDING = 1e-10
-# Assemblers leave differences of this size in nearly every matrix: there is nothing to say about them.
-ORDINARY = 1e-12
-# Ten standard deviations: independent noise in both triangles stays below for any size of matrix.
-NOISE = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +78,7 @@ def symmetric_entries(
     size = np.maximum(row[i], row[j])
     with np.errstate(over="ignore", under="ignore"):  # an infinite difference is one too large
         difference = np.abs(upper - lower)
-        tolerance = np.maximum(ROUNDING * size, NOISE * (noise or 0.0))
+        tolerance = np.maximum(SUMMED * size, SIGMAS * (noise or 0.0))
         relative = difference / size
     if (difference > tolerance).any():
         worst = int(np.argmax(np.where(difference > tolerance, difference, -1.0)))
@@ -92,7 +86,7 @@ def symmetric_entries(
     entries = pairs.upper.copy()
     entries[differing] += 0.5 * (lower - upper)
     worst = int(np.argmax(relative))
-    if relative[worst] <= ORDINARY:
+    if relative[worst] <= ROUNDED:
         return entries, float(relative[worst]), warnings
     average = (
         f"{count_of(len(differing), 'entry was', 'entries were')} averaged with the transpose: they differ by up to "
