@@ -172,10 +172,10 @@ def _check_content(recovery: Recovery, suffix: str, mesh_format: MeshFormat) -> 
         raise FormatError(f"the format {suffix} cannot hold {what}: write .npz or .vtu")
     missing = int(np.count_nonzero(recovery.node_status))
     if missing and mesh_format.keeps_rows and not mesh_format.undetermined:
-        rows = "nodes, the first being node" if recovery.vector_valued else "rows, the first being row"
+        first = f"{'node' if recovery.vector_valued else 'row'} {int(np.argmax(recovery.node_status))}"
         raise FormatError(
-            f"the format {suffix} cannot hold points without coordinates, and the matrix determines none for "
-            f"{missing} {rows} {int(np.argmax(recovery.node_status))}: write .npz or .vtu"
+            f"the format {suffix} cannot hold points without coordinates, of which there are {missing:,} ({first} for "
+            "one): write .npz or .vtu"
         )
     if not (recovery.n_cells or mesh_format.keeps_rows):
         raise FormatError(f"the format {suffix} holds triangles only, and there are none")

@@ -143,8 +143,8 @@ def _complex(csr: sp.csr_array) -> MatrixError:
     k = int(np.argmax(imaginary))
     i, j = place(csr, k)
     return MatrixError(
-        f"the matrix is complex: the entry at row {i}, column {j} is {csr.data[k]}, and the operators are real; "
-        "take the real part, A.real, if the imaginary parts mean nothing"
+        f"the matrix is complex: the entry at row {i}, column {j} is {csr.data[k]}; take the real part, A.real, if the "
+        "imaginary parts mean nothing"
     )
 
 

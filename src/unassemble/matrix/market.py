@@ -139,7 +139,7 @@ def _check_indices(block: NDArray, header: _Header, seen: int) -> None:
         k = int(np.argmin(good))
         raise header.error(
             f"puts its entry number {seen + k + 1} at row {i[k]:.15g}, column {j[k]:.15g} of a matrix of {header.rows} "
-            f"rows and {header.columns} columns: Matrix Market counts both from 1"
+            f"rows and {header.columns} columns, where both count from 1"
         )
 
 
@@ -165,8 +165,8 @@ def _check_one_triangle(i: NDArray, j: NDArray, header: _Header) -> None:
     if len(both):
         row, column = divmod(int(both[0]), header.rows)
         raise header.error(
-            f"is announced as {header.symmetry} but holds both the entry at row {row + 1}, column {column + 1} and "
-            f"its transpose (counted from 1): keep one triangle, or write 'general' in its first line"
+            f"is announced as {header.symmetry} but holds the transpose of row {row + 1}, column {column + 1} as well: "
+            "keep one triangle, or write 'general' in its first line"
         )
 
 
