@@ -37,19 +37,6 @@ def matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
     }
 
 
-def no_mesh(obstacle: str, planar: bool, witness: tuple[tuple[int, int], ...]) -> dict[str, Any]:
-    """Where no mesh is recognised."""
-    counts = ("triangles", "faces", "holes", "boundary_edges", "pieces", "hinges", "bare_edges", "undetermined")
-    return {
-        **{f"n_{name}": 0 for name in counts},
-        "planar": planar,
-        "witness": witness,
-        "obstacle": obstacle,
-        "scale": np.empty(0),
-        "mixed_signs": (),
-    }
-
-
 def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]:
     """Of a vector-valued matrix."""
     from ..elasticity.nodal import nodal_matrix, uncoupled
@@ -82,9 +69,6 @@ def mesh_facts(matrix: OperatorMatrix, topology: Topology) -> dict[str, Any]:
     n_triangles = sum(len(piece.triangles) for piece in pieces) - int((polygons.size - 2).sum())
     estimates = [_scale_of(piece, -matrix.entries[piece.edge_rows]) for piece in pieces]
     return {
-        "planar": True,
-        "witness": (),
-        "obstacle": "",
         "n_triangles": n_triangles,
         "n_faces": n_triangles + polygons.count + sum(piece.n_loops for piece in pieces),
         "n_holes": topology.n_holes,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from ..matrix import OperatorMatrix, load
 from ..operators import vector_valued
 from ..topology import Topology, recognise, surfaces
 from ..words import count_of
-from .facts import matrix_facts, mesh_facts, no_mesh, nodes_facts
+from .facts import matrix_facts, mesh_facts, nodes_facts
 from .text import lines_of, mesh_text
 
 _IF = "if the entries agree, which recovery tells"
@@ -82,20 +82,20 @@ class Inspection:
     n_isolated: int
     n_vanished: int
     n_zero_sums: int
-    planar: bool
-    witness: tuple[tuple[int, int], ...]
-    obstacle: str
-    n_triangles: int
-    n_faces: int
-    n_holes: int
-    n_boundary_edges: int
-    n_pieces: int
-    n_hinges: int
-    n_bare_edges: int
-    n_undetermined: int
-    scale: NDArray[np.float64]
-    mixed_signs: tuple[int, ...]
     warnings: tuple[str, ...]
+    planar: bool = True
+    witness: tuple[tuple[int, int], ...] = ()
+    obstacle: str = ""
+    n_triangles: int = 0
+    n_faces: int = 0
+    n_holes: int = 0
+    n_boundary_edges: int = 0
+    n_pieces: int = 0
+    n_hinges: int = 0
+    n_bare_edges: int = 0
+    n_undetermined: int = 0
+    scale: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    mixed_signs: tuple[int, ...] = ()
     block_size: int = 1
     n_nodes: int = 0
     numbering: str = ""
@@ -150,7 +150,7 @@ class Inspection:
 
     def to_dict(self) -> dict[str, Any]:
         """All attributes, ready for JSON."""
-        content: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
+        content: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(self)}
         content["scale"] = [c if np.isfinite(c) else None for c in self.scale.tolist()]
         return content | {"operator": self.operator, "recoverable": self.recoverable}
 
@@ -186,7 +186,7 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
     facts = matrix_facts(matrix)
     vector = vector_valued(matrix)
     if vector is not None:
-        return Inspection(**facts, **no_mesh(vector.why, False, ()), **nodes_facts(matrix, vector))
+        return Inspection(**facts, planar=False, obstacle=vector.why, **nodes_facts(matrix, vector))
     topology = surfaces(matrix.n, matrix.edges)
     read = matrix
     if _left_over(matrix, topology):
@@ -197,7 +197,7 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
         except (NotPlanarError, TopologyError) as error:
             planar = not isinstance(error, NotPlanarError)
             if not (planar and topology.pieces):
-                return Inspection(**facts, **no_mesh(str(error), planar, getattr(error, "witness", ())))
+                return Inspection(**facts, planar=planar, obstacle=str(error), witness=getattr(error, "witness", ()))
         else:
             if not topology.pieces:
                 read, topology = matrix, plain

@@ -12,6 +12,7 @@ from ..errors import MatrixFileError
 from .canonical import refuse_mostly_empty, working_dtype
 
 _INTEGERS, _NUMBERS = "iu", "biufc"
+_STORAGES = {"coo": sp.coo_array, "csr": sp.csr_array, "csc": sp.csc_array, "bsr": sp.bsr_array, "dia": sp.dia_array}
 
 
 def read_npz(stream: BinaryIO, name: str) -> Any:
@@ -36,76 +37,55 @@ def read_npz(stream: BinaryIO, name: str) -> Any:
     MatrixError
         If there are far more rows than entries.
     """
-    with np.load(stream, allow_pickle=False) as archive:
-        return _Arrays(archive, name).matrix()
+    try:
+        with np.load(stream, allow_pickle=False) as archive:
+            return _matrix(archive)
+    except _ArchiveError as error:
+        raise MatrixFileError(f"{name} {error}") from error
 
 
-class _Arrays:
-    """The arrays of one archive, checked as they are taken."""
-
-    def __init__(self, archive: Any, name: str):
-        self._archive = archive
-        self._name = name
-
-    def matrix(self) -> Any:
-        storage = self._storage()
-        shape = self._shape()
-        if storage == "dia":
-            return sp.dia_array((self._data(2), self._take("offsets", _INTEGERS, 1)), shape=shape)
-        data = self._data(3 if storage == "bsr" else 1)
-        refuse_mostly_empty(shape[0], data.size)  # before an index pointer of that length is unpacked
-        if storage == "coo":
-            return sp.coo_array((data, self._coordinates()), shape=shape)
-        arrays = data, self._take("indices", _INTEGERS, 1), self._take("indptr", _INTEGERS, 1)
-        return {"csr": sp.csr_array, "csc": sp.csc_array, "bsr": sp.bsr_array}[storage](arrays, shape=shape)
-
-    def _storage(self) -> str:
-        names = self._archive.files
-        if "format" not in names:
-            raise self._error(f"holds no sparse matrix ({_listed(names)}): save one with scipy.sparse.save_npz")
-        value = self._take("format", "SU", 0).item()
-        storage = value.decode("ascii", "replace") if isinstance(value, bytes) else value
-        if storage not in ("coo", "csr", "csc", "bsr", "dia"):
-            raise self._error(f"stores a matrix in the unknown format {storage[:40]!r}: save it as csr")
-        return str(storage)
-
-    def _shape(self) -> tuple[int, int]:
-        shape = self._take("shape", _INTEGERS, 1)
-        if len(shape) != 2 or shape.min() < 0:
-            raise self._error(f"gives the shape of its matrix as {shape[:5].tolist()} instead of rows and columns")
-        return int(shape[0]), int(shape[1])
-
-    def _data(self, ndim: int) -> NDArray:
-        data = self._take("data", _NUMBERS, ndim)
-        return data.astype(working_dtype(data.dtype), copy=False)  # scipy lacks half precision and foreign byte orders
-
-    def _coordinates(self) -> tuple[NDArray, NDArray]:
-        if "coords" in self._archive.files:
-            coordinates = self._take("coords", _INTEGERS, 2)
-            if len(coordinates) != 2:
-                raise self._error(f"holds a sparse array of {len(coordinates)} dimensions, and a matrix has two")
-            return coordinates[0], coordinates[1]
-        return self._take("row", _INTEGERS, 1), self._take("col", _INTEGERS, 1)
-
-    def _take(self, key: str, kinds: str, ndim: int) -> NDArray:
-        if key not in self._archive.files:
-            raise self._error(f"has no array {key!r}, which a sparse matrix needs: save it with scipy.sparse.save_npz")
-        try:
-            array = self._archive[key]
-        except ValueError as error:
-            if "allow_pickle" in str(error):
-                raise self._error(f"has Python objects in its array {key!r}, which are never loaded") from error
-            raise
-        if not isinstance(array, np.ndarray) or array.dtype.kind not in kinds or array.ndim != ndim:
-            held = f"{array.ndim}-dimensional {array.dtype}" if isinstance(array, np.ndarray) else "no array"
-            raise self._error(f"has in {key!r} {held}, which is no part of a sparse matrix of numbers")
-        return array
-
-    def _error(self, what: str) -> MatrixFileError:
-        return MatrixFileError(f"{self._name} {what}")
+class _ArchiveError(Exception):
+    """What is wrong with an archive, to follow its name."""
 
 
-def _listed(names: list[str]) -> str:
-    if not names:
-        return "it is an empty archive"
-    return "only " + ", ".join(repr(n[:40]) for n in names[:5]) + (", ..." if len(names) > 5 else "")
+def _matrix(archive: Any) -> Any:
+    if "format" not in archive.files:
+        names = ", ".join(repr(key[:40]) for key in archive.files[:5]) + ", ..." * (len(archive.files) > 5)
+        what = f"only {names}" if names else "it is an empty archive"
+        raise _ArchiveError(f"holds no sparse matrix ({what}): save one with scipy.sparse.save_npz")
+    value = _array(archive, "format", "SU", 0).item()
+    storage = value.decode("ascii", "replace") if isinstance(value, bytes) else value
+    if storage not in _STORAGES:
+        raise _ArchiveError(f"stores a matrix in the unknown format {storage[:40]!r}: save it as csr")
+    shape = _array(archive, "shape", _INTEGERS, 1).tolist()
+    if len(shape) != 2 or min(shape) < 0:
+        raise _ArchiveError(f"gives the shape of its matrix as {shape[:5]} instead of rows and columns")
+    data = _array(archive, "data", _NUMBERS, {"bsr": 3, "dia": 2}.get(storage, 1))
+    data = data.astype(working_dtype(data.dtype), copy=False)  # scipy lacks half precision and foreign byte orders
+    if storage == "dia":
+        return sp.dia_array((data, _array(archive, "offsets", _INTEGERS, 1)), shape=shape)
+    refuse_mostly_empty(shape[0], data.size)  # before an index pointer of that length is unpacked
+    if "coords" in archive.files:
+        coordinates = tuple(_array(archive, "coords", _INTEGERS, 2))
+        if len(coordinates) != 2:
+            raise _ArchiveError(f"holds a sparse array of {len(coordinates)} dimensions, and a matrix has two")
+        return sp.coo_array((data, coordinates), shape=shape)
+    keys = ("row", "col") if storage == "coo" else ("indices", "indptr")
+    first, second = (_array(archive, key, _INTEGERS, 1) for key in keys)
+    arrays = (data, (first, second)) if storage == "coo" else (data, first, second)
+    return _STORAGES[storage](arrays, shape=shape)
+
+
+def _array(archive: Any, key: str, kinds: str, ndim: int) -> NDArray:
+    if key not in archive.files:
+        raise _ArchiveError(f"has no array {key!r}, which a sparse matrix needs: save it with scipy.sparse.save_npz")
+    try:
+        array = archive[key]
+    except ValueError as error:
+        if "allow_pickle" in str(error):
+            raise _ArchiveError(f"has Python objects in its array {key!r}, which are never loaded") from error
+        raise
+    if not isinstance(array, np.ndarray) or array.dtype.kind not in kinds or array.ndim != ndim:
+        held = f"{array.ndim}-dimensional {array.dtype}" if isinstance(array, np.ndarray) else "no array"
+        raise _ArchiveError(f"has in {key!r} {held}, which is no part of a sparse matrix of numbers")
+    return array
