@@ -1,14 +1,17 @@
-"""Options that several commands share."""
+"""Options and steps that several commands share."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from .values import DROP_ZEROS
+
+if TYPE_CHECKING:
+    from ..recovery import Recovery
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
@@ -51,24 +54,51 @@ def nodes_options(command: _Command) -> _Command:
     return command
 
 
-def refuse_shared(names: Mapping[str, str | None]) -> None:
-    """Refuse one file in two roles; a matrix named "-" is standard input.
+def check_files(matrix: str, files: Mapping[str, tuple[str | None, Callable[[str], Any]]]) -> None:
+    """Find out, before the long work, what can be known to fail of the files to be written.
+
+    Parameters
+    ----------
+    matrix : str
+        A file that is not to be overwritten; "-" is standard input.
+    files : mapping of role to (name or None, check)
 
     Raises
     ------
+    OutputError, FormatError
+        As the checks do.
     click.UsageError
+        If one file has two roles.
     """
-    seen: dict[Path, str] = {}
-    for role, name in names.items():
-        if name is None or (role == "MATRIX" and name == "-"):
+    seen = {} if matrix == "-" else {_resolved(matrix): "MATRIX"}
+    for role, (name, check) in files.items():
+        if name is None:
             continue
-        try:
-            path = Path(name).resolve()
-        except (OSError, RuntimeError, ValueError):  # whoever opens it will say what is wrong
-            continue
-        if path in seen:
-            raise click.UsageError(f"{seen[path]} and {role} are the same file, {click.format_filename(name)!r}")
-        seen[path] = role
+        check(name)
+        other = seen.setdefault(_resolved(name), role)
+        if other != role:
+            raise click.UsageError(f"{other} and {role} are the same file, {click.format_filename(name)!r}")
+
+
+def _resolved(name: str) -> Path | str:
+    try:
+        return Path(name).resolve()
+    except (OSError, RuntimeError, ValueError):  # whoever opens it will say what is wrong
+        return name
+
+
+def recovered(matrix: str, report: str | None, **options: Any) -> Recovery:
+    """The library's answer; a failure has a report as well, where one is asked for."""
+    import unassemble
+
+    try:
+        return unassemble.recover(matrix, **options)
+    except unassemble.RecoveryError as error:
+        if report is not None:
+            from ..report import failure_report, write_report
+
+            write_report(failure_report(error), report)
+        raise
 
 
 def spelled_numbering(word: str | None) -> str | None:

@@ -2,32 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from .options import matrix_options, nodes_options, refuse_shared, spelled_numbering
+from .options import check_files, matrix_options, nodes_options, recovered, spelled_numbering
 from .status import outcome
 from .values import Numbers, OptionalTolerance
 
-if TYPE_CHECKING:
-    from ..progress import StageDisplay
-    from ..recovery import Recovery
-
 _LATER_OPERATORS = ("surface",)
 _LATER_METHODS = ("metric",)
-
-
-@dataclass(frozen=True)
-class _Files:
-    """What is read and written; standard input is "-"."""
-
-    matrix: str
-    out: str
-    report: str | None = None
-    plot: str | None = None
-    written: list[str] = field(default_factory=list)
 
 
 @click.command(cls=OptionalTolerance)
@@ -85,16 +69,23 @@ def recover(matrix: str, out: str, report: str | None, plot: str | None, quiet: 
     """
     _check_available(options.pop("realise"), options["operator"], options["method"])
     options["numbering"] = spelled_numbering(options["numbering"])
-    files = _Files(matrix, out, report, plot)
-    _check_files(files)
     options["refine"] = not options.pop("no_refine")
-
+    from ..export import check_output
+    from ..plot.canvas import check_plot
     from ..progress import StageDisplay
+    from ..report import check_report, write_report
 
+    check_files(matrix, {"OUT": (out, check_output), "--report": (report, check_report), "--plot": (plot, check_plot)})
     with StageDisplay(enabled=not quiet) as display:
-        recovery = _recovered(files, display, options)
-        _write(recovery, files, display)
-    return outcome(recovery, files.written, quiet=quiet)
+        recovery = recovered(matrix, report, progress=display, **options)
+        display("write")
+        recovery.save(out)
+        if report is not None:
+            write_report(recovery, report)
+        if plot is not None:
+            display("plot")
+            recovery.plot(plot)
+    return outcome(recovery, [out, report, plot], quiet=quiet)
 
 
 def _check_available(realise: bool, operator: str, method: str | None) -> None:
@@ -106,49 +97,3 @@ def _check_available(realise: bool, operator: str, method: str | None) -> None:
     for name, wanted in later:
         if wanted:
             raise click.UsageError(f"{name} is not available in this version")
-
-
-def _check_files(files: _Files) -> None:
-    """Everything that can be known to fail, before the long work."""
-    from ..export import check_output
-
-    check_output(files.out)
-    if files.report is not None:
-        from ..report import check_report
-
-        check_report(files.report)
-    if files.plot is not None:
-        from ..plot.canvas import check_plot
-
-        check_plot(files.plot)
-    refuse_shared(
-        {"MATRIX": files.matrix, "OUT": files.out, "--report": files.report, "--plot": files.plot},
-    )
-
-
-def _recovered(files: _Files, display: StageDisplay, options: dict[str, Any]) -> Recovery:
-    import unassemble
-
-    try:
-        return unassemble.recover(files.matrix, progress=display, **options)
-    except unassemble.RecoveryError as error:
-        if files.report is not None:
-            from ..report import failure_report, write_report
-
-            write_report(failure_report(error), files.report)
-        raise
-
-
-def _write(recovery: Recovery, files: _Files, display: StageDisplay) -> None:
-    display("write")
-    recovery.save(files.out)
-    files.written.append(files.out)
-    if files.report is not None:
-        from ..report import write_report
-
-        write_report(recovery, files.report)
-        files.written.append(files.report)
-    if files.plot is not None:
-        display("plot")
-        recovery.plot(files.plot)
-        files.written.append(files.plot)

@@ -89,13 +89,13 @@ def verdict(error: BaseException) -> tuple[int, str]:
             )
 
 
-def outcome(recovery: Recovery, written: Sequence[str], *, quiet: bool) -> int:
+def outcome(recovery: Recovery, written: Sequence[str | None], *, quiet: bool) -> int:
     """Say what came of a recovery, and return the exit status."""
     commands = [click.get_current_context().command]
     if not quiet:
         from ..summary import summary
 
-        files = ", ".join(map(click.format_filename, written))
+        files = ", ".join(click.format_filename(name) for name in written if name is not None)
         say(as_typed(summary(recovery), commands) + f"\n  {'written':<15} {files}")
     elif not recovery.certified:
         click.echo(f"unassemble: {recovery.status}: {as_typed(recovery.reason, commands)}", err=True)
