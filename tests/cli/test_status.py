@@ -19,6 +19,7 @@ from unassemble.errors import (
     TopologyError,
     UnassembleError,
 )
+from vanishing import forgotten
 
 
 def spoilt(matrix: sp.csr_array) -> sp.coo_array:
@@ -49,6 +50,20 @@ def test_3_is_not_silent_even_if_quiet(work, one_sentence):
     assert result.exit_code == 3
     assert result.stdout == ""
     assert one_sentence(result).startswith("uncertified: ")
+
+
+def test_3_of_several_meshes_that_fit(work):
+    """Right angles at a vertex in another order: the far sides have vanished."""
+    star = np.array([[0.0, 0], [1, 0], [0, 2], [-3, 0], [0, -1.5]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]])
+    work.write("B.mtx", forgotten(specimen(star, triangles)).matrix)
+    result = work.recover("--report", "r.json", "--plot", "p.png", matrix="B.mtx")
+    assert result.exit_code == 3, result.stderr
+    assert result.stdout.startswith("ambiguous: ")
+    report = json.loads((work.folder / "r.json").read_text())
+    assert (report["status"], report["uniqueness"]) == ("ambiguous", "ambiguous")
+    assert report["alternatives"]
+    assert report["backward_error"] < 1e-12
 
 
 BROKEN = {
