@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from os import PathLike
 from typing import Any
 
 from .clock import Clock
 from .errors import InputError, NotPlanarError, RecoveryError
 from .linalg import threads as thread_limit
-from .matrix import OperatorMatrix, check_matrix, read_matrix
+from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
 from .operators import VectorReading, about_translations, asked_for, second_reading, vector_valued
 from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, listed_anchors
 from .outputs import PlanarMesh, Recovery
@@ -141,15 +140,11 @@ def recover(
     given = tuple(name for name, value in scalar_only.items() if value is not None)
     clock = Clock(progress)
     with clock("read"):
-        matrix = A if _is_matrix(A) else read_matrix(A, variable=variable)
+        matrix = read_matrix(A, variable=variable) if is_file(A) else A
     with clock("check"):
         checked = check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
     with thread_limit(threads):
         return _Task(checked, clock, about, frame, planar, given).answer()
-
-
-def _is_matrix(A: Any) -> bool:
-    return not isinstance(A, (str, PathLike)) and not hasattr(A, "read")
 
 
 @dataclass(frozen=True, eq=False)

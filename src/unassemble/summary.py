@@ -12,6 +12,7 @@ from .tolerances import SUSPICIOUS
 from .words import count_of
 
 _SHOWN = 3
+_OTHERS = {"proved": "none fits", "searched": "none found that fits", "ambiguous": "another fits as well"}
 
 
 def summary(recovery: Recovery) -> str:
@@ -34,6 +35,8 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
     if isinstance(recovery, Mechanical):
         rows += _elastic_rows(recovery)
     rows.append(("backward error", f"{recovery.backward_error:.1e}"))
+    if recovery.uniqueness is not None:
+        rows.append(("other meshes", _OTHERS[recovery.uniqueness]))
     if isinstance(recovery, PlanarMesh):
         rows += _noise_rows(recovery)
     if not recovery.certified and len(recovery.worst_entries):

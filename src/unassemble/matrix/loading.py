@@ -30,6 +30,10 @@ def load(
     MatrixError
         If the matrix fails a check.
     """
-    is_file = isinstance(source, (str, bytes, os.PathLike)) or hasattr(source, "read")
-    matrix = read_matrix(source, variable=variable) if is_file else source
+    matrix = read_matrix(source, variable=variable) if is_file(source) else source
     return check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
+
+
+def is_file(source: Any) -> bool:
+    """Whether `source` names a file, or is an open one."""
+    return isinstance(source, (str, bytes, os.PathLike)) or hasattr(source, "read")
