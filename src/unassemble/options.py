@@ -13,6 +13,7 @@ import numpy as np
 
 from .errors import InputError
 from .reductions import ConstantTensor
+from .tolerances import SUMMED
 
 OPERATORS = ("auto", "laplacian", "elasticity")
 METHODS = ("conformal", "angles")
@@ -53,8 +54,8 @@ class FrameOptions:
     def __post_init__(self) -> None:
         self._check_anchors()
         self._check_direction()
-        if self.handed not in (None, "left", "right"):
-            raise InputError(f"`handed` is 'left' or 'right', not {self.handed!r}")
+        if self.handed is not None:
+            _known("handed", self.handed, ("left", "right"))
         line = self.direction is not None or len(self.anchors) > 1
         if self.handed and not line:
             raise InputError("`handed` needs a line to refer to: give `direction`, or two `anchors`, as well")
@@ -87,7 +88,7 @@ class FrameOptions:
         try:
             first, second, degrees = self.direction
             good = int(first) == first and int(second) == second and first != second and np.isfinite(degrees)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             good = False
         if not good:
             raise InputError("`direction` is (row, row, degrees), with whole rows that differ and a finite angle")
@@ -97,7 +98,10 @@ class FrameOptions:
     def _spans_plane(self) -> bool:
         """Whether the anchors are not all in line."""
         places = np.array([place[:2] for _, *place in self.anchors])
-        return len(places) > 2 and np.linalg.matrix_rank(places - places[0], tol=1e-9 * np.ptp(places)) == 2
+        if len(places) < 3:
+            return False
+        places /= np.abs(places).max()  # so that nothing overflows
+        return bool(np.linalg.matrix_rank(places - places[0], tol=SUMMED * np.ptp(places)) == 2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,7 +134,7 @@ def listed_anchors(anchors: Any) -> tuple[tuple[Any, ...], ...]:
     """
     try:
         return tuple(_anchor(one) for one in (() if anchors is None else anchors))
-    except (TypeError, ValueError, IndexError) as error:
+    except (TypeError, ValueError, IndexError, OverflowError) as error:
         raise InputError("`anchors` are (row, x, y), in space (row, x, y, z), with whole rows") from error
 
 
@@ -142,8 +146,8 @@ def _anchor(one: Any) -> tuple[Any, ...]:
 
 
 def _known(name: str, value: str, words: tuple[str, ...]) -> None:
-    if value not in words:
-        raise InputError(f"`{name}={value}` is not available in this version: use {' or '.join(map(repr, words))}")
+    if not isinstance(value, str) or value not in words:
+        raise InputError(f"`{name}={value}` is not available: use {' or '.join(map(repr, words))}")
 
 
 def _whole(name: str, value: Any) -> None:

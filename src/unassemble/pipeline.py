@@ -6,8 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from .clock import Clock
-from .errors import InputError, NotPlanarError, RecoveryError
+from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
 from .operators import VectorReading, about_translations, asked_for, second_reading, vector_valued
@@ -198,7 +200,9 @@ class _Task:
             return None
 
     def _as_scalar(self, part: OperatorMatrix, anchors: Sequence[Any]) -> PlanarMesh:
-        frame = self.frame
+        frame, scale = self.frame, self.planar.scale
+        if scale is not None:
+            _check_proportion(scale, float(np.abs(part.entries).max()))
         placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
         return recover_scalar(part, placement, self.clock, self.planar)
 
@@ -221,3 +225,13 @@ class _Task:
                 f"`{self.given[0]}` is for scalar matrices, and this one is read as vector-valued: leave it out, or "
                 "choose `operator='laplacian'`"
             )
+
+
+def _check_proportion(scale: float, largest: float) -> None:
+    """Refuse a factor next to which entries vanish or overflow: no triangle has such angles."""
+    with np.errstate(over="ignore", under="ignore"):
+        ratio = abs(np.float64(scale)) / largest
+    if not np.finfo(float).eps ** 2 < ratio < np.finfo(float).eps ** -2:
+        raise GeometryError(
+            f"the scale {scale:g} is out of all proportion to the entries of the matrix, whose largest is {largest:.3g}"
+        )

@@ -181,3 +181,9 @@ def test_a_wrong_entry_is_not_taken_for_an_elimination():
     found = recover(spoilt)
     assert found.reason.startswith(f"the entry of rows {i} and {j} stands out")
     assert not [note for note in found.warnings if "eliminated" in note]
+
+
+@pytest.mark.parametrize("scale", [-1e308, 1e200, 1e40, 1e-40, 5e-324])
+def test_a_scale_out_of_all_proportion(scale):
+    with pytest.raises(GeometryError, match="proportion"):
+        recover(specimen(*random_mesh(40)).matrix, scale=scale)
