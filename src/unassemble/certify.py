@@ -10,9 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse import csgraph
 from scipy.special import chdtrc, ndtr
 
 from .tolerances import CERTIFIED
+
+_DENSE = 400  # triangles of a piece whose equations are counted by their rank
+_RANK = 1e-9  # singular values, in units of angles over mean lengths
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +139,80 @@ def _assemble(
     summed = sp.coo_array((np.concatenate(values), (rows, columns)), shape=(n, n)).tocsr()
     summed.sort_indices()
     return np.repeat(np.arange(n), np.diff(summed.indptr)) * n + summed.indices, summed.data
+
+
+def without_spare_equations(
+    edges: NDArray, points: NDArray, triangles: NDArray, *, known_scale: bool
+) -> NDArray[np.int64]:
+    """A row of each edge-connected piece that has no more equations than unknowns: that it fits proves nothing.
+
+    A piece of n vertices has an equation for each side of its triangles, and 2 n - 4 unknown coordinates, and c. Those
+    that touch in vertices have one c: told by any that has equations to spare, it is known to the others. Sides without
+    an entry are zeros that were supposed, and what they say of each other is no evidence: as many equations are left
+    out as vanishing sides depend on each other.
+
+    Parameters
+    ----------
+    edges : (e, 2) int64
+        Pairs i < j of stored entries.
+    points : (n, 2) float64
+    triangles : (m, 3) int64
+    known_scale : bool
+        Whether c is given.
+
+    Returns
+    -------
+    (k,) int64
+    """
+    n = len(points)
+    ends = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2)
+    key, side = np.unique(ends @ [n, 1], return_inverse=True)
+    owner = np.repeat(np.arange(len(triangles)), 3)
+    by_side = sp.coo_array((np.ones(len(owner)), (owner, side.ravel())), shape=(len(triangles), len(key))).tocsr()
+    count, piece = csgraph.connected_components(by_side @ by_side.T, directed=False)
+    vertex = np.unique(np.repeat(piece, 3) * np.int64(n) + triangles.ravel())
+    member, row = vertex // n, vertex % n
+    of_side = np.empty(len(key), dtype=np.int64)
+    of_side[side.ravel()] = np.repeat(piece, 3)
+    spare = np.bincount(of_side, minlength=count) - (2 * np.bincount(member, minlength=count) - 4)
+    stored = np.isin(key, edges @ [n, 1])
+    gone = np.bincount(of_side[~stored], minlength=count)
+    for k in np.flatnonzero((gone > 0) & (spare - 1 <= gone)):
+        own = triangles[piece == k]
+        spare[k] -= _dependent(points, own, key[(of_side == k) & ~stored])
+    if known_scale:
+        return row[np.searchsorted(member, np.flatnonzero(spare <= 0))]
+    touching = sp.coo_array((np.ones(len(vertex)), (member, row)), shape=(count, n)).tocsr()
+    group = csgraph.connected_components(touching @ touching.T, directed=False)[1]
+    told = np.bincount(group, spare >= 2) > 0
+    return row[np.searchsorted(member, np.flatnonzero(~told[group] | (spare <= 0)))]
+
+
+def _dependent(points: NDArray, triangles: NDArray, gone: NDArray) -> int:
+    """How many of the equations cot + cot' = 0 of vanished sides, by their keys, follow from the others.
+
+    Their rank, by a dense decomposition; of large pieces a bound, since equations depend on each other where all sides
+    that face a vertex have vanished, so that the angles about it add up to a full turn by themselves.
+    """
+    n = len(points)
+    ends = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]], axis=2) @ [n, 1]
+    row = np.searchsorted(gone, ends)
+    here = np.isin(ends, gone)
+    if len(triangles) > _DENSE:
+        facing, total = (np.bincount(triangles[some], minlength=n) for some in (here, np.ones_like(here)))
+        return int(((facing == total) & (total > 2)).sum())
+    vertices = np.unique(triangles)
+    z = (points - points[vertices].mean(axis=0)) @ [1, 1j]
+    jacobian = np.zeros((len(gone), 2 * n))
+    for k in range(3):
+        own, one, other = (triangles[here[:, k], (k + step) % 3] for step in range(3))
+        u, w = z[one] - z[own], z[other] - z[own]
+        # d log (w / u) = dw / w - du / u, whose imaginary part is the change of the angle.
+        for at, change in ((other, 1 / w), (one, -1 / u), (own, 1 / u - 1 / w)):
+            np.add.at(jacobian, (row[here[:, k], k], 2 * at), change.imag)
+            np.add.at(jacobian, (row[here[:, k], k], 2 * at + 1), change.real)
+    # Angles at both ends of a vanished side add up to pi: no sines are needed.
+    return len(gone) - int(np.linalg.matrix_rank(jacobian[:, np.r_[2 * vertices, 2 * vertices + 1]], tol=_RANK))
 
 
 def chi_square_verdict(misfit: NDArray, freedom: int, sigma: float, *, repeats: float = 1.0) -> dict[str, float]:

@@ -111,7 +111,8 @@ def recover(
 
     Examples
     --------
-    Two right triangles, the diagonal stored as an explicit zero:
+    Two right triangles, the diagonal stored as an explicit zero. Without the scale there would be as many unknowns as
+    entries, and no certificate:
 
     >>> import scipy.sparse as sp
     >>> from unassemble import recover
@@ -120,7 +121,7 @@ def recover(
     >>> full = sp.coo_array(
     ...     (list(half.data) * 2, (row + column, column + row)), shape=(4, 4)
     ... )
-    >>> square = recover(full)
+    >>> square = recover(full, scale=1.0)
     >>> square.status, len(square.triangles), float(round(square.scale[0], 12))
     ('certified', 2, 1.0)
     """

@@ -63,9 +63,7 @@ def _planar_facts(mesh: PlanarMesh) -> dict[str, Any]:
     """What only planar meshes have.
 
     ``chi_square``, ``estimated_noise``, ``largest_standard_deviation``, ``suspects`` (``row``, ``column``) and
-    ``alternatives``, where other cells fit as well: ``cells`` and ``other_cells``, lists of rows; the rows ``around``
-    which they lie, and others in the order ``found`` and in that of the ``other`` mesh; ``same_scale``, whether both
-    have the same c.
+    ``alternatives``, where other cells fit as well: ``cells`` and ``other_cells``, lists of rows.
     """
     return {
         "chi_square": mesh.chi_square,

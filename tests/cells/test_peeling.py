@@ -6,7 +6,7 @@ import pytest
 from families import FAMILIES
 from meshes import specimen
 from unassemble import recover
-from unassemble.cells.triangles.peeling import ContradictionError, peeled, scales_of_lone_triangles
+from unassemble.cells.propagate.peeling import ContradictionError, lone_scales, peeled
 from unassemble.topology.cycles import three_cycles
 from vanishing import forgotten
 
@@ -33,8 +33,8 @@ def lattice(seed, c=1.0):
 @pytest.mark.parametrize("seed", [1, 9, 13, 15])
 def test_what_is_peeled_is_right(seed, c):
     sides, weights, true = cycles_of(lattice(seed, c))
-    assert scales_of_lone_triangles(sides, weights) == [pytest.approx(c, rel=1e-9)]
-    state = peeled(sides, 2 * weights / c).state
+    assert list(lone_scales(sides, weights)) == [pytest.approx(c, rel=1e-9)]
+    state = peeled(sides, 2 * weights / c)
     assert true[state == 1].all()
     assert not true[state == -1].any()
     assert (state == 1).sum() > 0.6 * true.sum()
@@ -49,13 +49,13 @@ def test_a_wrong_scale_is_contradicted():
 
 def test_random_weights_agree_in_no_scale():
     sides, weights, _ = cycles_of(lattice(13))
-    assert scales_of_lone_triangles(sides, np.random.default_rng(0).uniform(0.2, 2, len(weights))) == []
+    assert list(lone_scales(sides, np.random.default_rng(0).uniform(0.2, 2, len(weights)))) == []
 
 
 def test_a_right_angle_across_an_inner_edge():
     """Taken for a cell because of its other sides, a triangle may have no part in the weight of the third."""
     cotangents = np.array([1.0, 1.0, 2.0, 0.5, 0.0])
-    state = peeled(np.array([[0, 1, 4], [2, 3, 4]]), cotangents).state
+    state = peeled(np.array([[0, 1, 4], [2, 3, 4]]), cotangents)
     assert state.tolist() == [1, 1]
 
 

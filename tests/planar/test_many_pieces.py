@@ -27,7 +27,7 @@ def chain(count, seed=0):
 def test_a_chain_is_joined_from_triangle_to_triangle(scale):
     known = specimen(*chain(2000), c=-2.5)
     found = recover(known.matrix, scale=scale)
-    assert found.certified, found.reason
+    assert found.certified == (scale is not None), found.reason  # a triangle has as many unknowns as entries
     assert (found.n_components, len(found.hinges)) == (2000, 1999)
     assert found.scale == pytest.approx(-2.5, rel=1e-9)
     for rows in known.triangles[::50]:

@@ -269,7 +269,7 @@ def test_graph_without_triangles():
 )
 def test_smallest_meshes(points):
     known = specimen(*delaunay(np.array(points, dtype=float)), c=-3.0)
-    found = recover(known.matrix)
+    found = recover(known.matrix, scale=-3.0)
     assert found.certified
     assert largest_error(found.points, known.points) < 1e-13
 

@@ -1,4 +1,4 @@
-"""Parts of a matrix whose triangles do not explain it, read anew: vanished entries put back, holes left open."""
+"""Components whose triangles do not explain the matrix: cells looked for, vanished entries put back."""
 
 from __future__ import annotations
 
@@ -12,17 +12,15 @@ from numpy.typing import NDArray
 from ..errors import GeometryError, RecoveryError
 from ..matrix import OperatorMatrix
 from ..planar.piece import PieceMesh
-from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar, settled_numbering
+from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar
 from ..topology.keys import contains, distinct, pair_keys
-from .beginning import first_reading
-from .by_component import with_pieces
+from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained, with_pieces
 from .eliminated import incomplete_rows, without_boundary
-from .misfits.doubt import Attempt, Outcome, Solved, misfits_of, unexplained
-from .reading import Reading, add_differing_factors
-from .search import read_cells
+from .judge.labelling import Labelling, add_differing_factors
+from .search.search import first_labelling, label_cells
 from .undivided import undivided
 
-_BETTER = 0.1  # a reading that does not fit replaces the triangles only if its misfit is below this times theirs
+_BETTER = 0.1  # a labelling that does not fit replaces the triangles only if its misfit is below this times theirs
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,11 +80,10 @@ def completed(
     for part, own in components_with_pieces:
         if not doubtful[part.vertices[0]]:
             continue
-        near = _near(matrix, part)
         try:
-            parts.append(_read_again(matrix, near, own, attempt, misfit_of_triangles, scale, incomplete[near.vertices]))
+            parts.append(_labelled(matrix, part, own, attempt, misfit_of_triangles, scale, incomplete[part.vertices]))
         except RecoveryError as error:
-            failures.append(located(error, near, named=len(components_with_pieces) > 1))
+            failures.append(located(error, part, named=len(components_with_pieces) > 1))
     if not any(part.pieces for part in parts):
         raise failures[0]
     return _merged(matrix, topology, parts, tuple(map(str, failures)))
@@ -103,19 +100,13 @@ def guessed(matrix: OperatorMatrix, topology: Topology) -> tuple[OperatorMatrix,
     parts = [_Part(kept, np.empty((0, 2), np.int64), Polygons.none())]
     for part in components(matrix.n, matrix.edges):
         if doubtful[part.vertices[0]]:
-            near = _near(matrix, part)
-            reading = first_reading(len(near.vertices), near.edges, -matrix.entries[near.edge_rows])
-            if reading is not None:
-                parts.append(_part(matrix, near, reading))
+            labelling = first_labelling(len(part.vertices), part.edges, -matrix.entries[part.edge_rows])
+            if labelling is not None:
+                parts.append(_part(matrix, part, labelling))
     return _merged(matrix, topology, parts, ())[:2]
 
 
-def _near(matrix: OperatorMatrix, part: Numbering) -> Numbering:
-    """A component in a numbering that does not depend on the order of the rows, as far as it is small."""
-    return part.then(settled_numbering(len(part.vertices), part.edges, -matrix.entries[part.edge_rows]))
-
-
-def _read_again(
+def _labelled(
     matrix: OperatorMatrix,
     numbering: Numbering,
     own: list[Piece],
@@ -124,24 +115,24 @@ def _read_again(
     scale: float | None,
     incomplete: NDArray[np.bool_],
 ) -> _Part:
-    """One component: the reading that fits, or the triangles that there were, or the best reading."""
+    """One component: the labelling that fits, or the triangles that there were, or the best labelling."""
     weights = -matrix.entries[numbering.edge_rows]
     inside = without_boundary(len(numbering.vertices), numbering.edges, weights, incomplete, scale)
     if inside is not None:
         return _part(matrix, numbering, inside)
     errors = None if matrix.errors is None else matrix.errors[numbering.edge_rows]
-    reading = read_cells(len(numbering.vertices), numbering.edges, weights, scale, errors)
-    if reading is not None and (reading.fits or reading.has_wrong_entries):
-        return _part(matrix, numbering, reading)
+    labelling = label_cells(len(numbering.vertices), numbering.edges, weights, scale, errors)
+    if labelling is not None and (labelling.fits or labelling.has_wrong_entries):
+        return _part(matrix, numbering, labelling)
     before = _misfit_of_own(misfit_of_triangles(), numbering, own, attempt, scale)
-    if reading is not None and reading.size < _BETTER * before and reading.misfit.max() < 1:
-        return _part(matrix, numbering, reading)
+    if labelling is not None and labelling.size < _BETTER * before and labelling.misfit.max() < 1:
+        return _part(matrix, numbering, labelling)
     n, e = len(numbering.vertices), len(numbering.edges)
-    if reading is None or not own:
+    if labelling is None or not own:
         require_planar(n, numbering.edges)
     if own:
         return _Part([(piece, attempt(piece)) for piece in own], np.empty((0, 2), np.int64), Polygons.none())
-    if reading is None:
+    if labelling is None:
         raise GeometryError(
             f"no cells can be put on the graph of the matrix ({n} rows, {e} entries above the diagonal)"
         )
@@ -154,7 +145,7 @@ def _read_again(
 def _misfit_of_own(
     misfit: NDArray, numbering: Numbering, own: list[Piece], attempt: Attempt, scale: float | None
 ) -> float:
-    """Root mean square misfit of a component's triangles; what their factors differ by counts as in a reading."""
+    """Root mean square misfit of a component's triangles; what their factors differ by counts as in a labelling."""
     solved = [(piece, mesh) for piece in own if isinstance(mesh := attempt(piece), PieceMesh)]
     misfit = misfit.copy()
     if solved:
@@ -162,14 +153,14 @@ def _misfit_of_own(
     return float(np.sqrt(np.mean(misfit[numbering.edge_rows] ** 2)))
 
 
-def _part(matrix: OperatorMatrix, numbering: Numbering, reading: Reading) -> _Part:
-    """A reading in the numbering of the matrix."""
+def _part(matrix: OperatorMatrix, numbering: Numbering, labelling: Labelling) -> _Part:
+    """A labelling in the numbering of the matrix."""
     vertices = numbering.vertices
     pieces: Solved = [
         (replace(piece, vertices=vertices[piece.vertices]), mesh or GeometryError("no map fits the entries of a piece"))
-        for piece, mesh in zip(reading.pieces, reading.meshes, strict=True)
+        for piece, mesh in zip(labelling.pieces, labelling.meshes, strict=True)
     ]
-    pairs = np.sort(vertices[reading.edges], axis=1)
+    pairs = np.sort(vertices[labelling.edges], axis=1)
     added = ~contains(pair_keys(matrix.n, *matrix.edges.T), pair_keys(matrix.n, *pairs.T))
     return _Part(pieces, pairs[added], undivided([piece for piece, _ in pieces], added)[1])
 

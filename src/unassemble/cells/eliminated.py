@@ -23,9 +23,8 @@ from ..planar.polish import PolishedMesh, PolishOptions, polish
 from ..planar.robust import ASIDE, RobustFit, robust_fit
 from ..topology import Piece
 from ..words import count_of
-from .beginning import first_reading
-from .misfits.spoilt import without_wrong_entries
-from .reading import FITS, Reading
+from .judge.labelling import FITS, Labelling
+from .search.search import first_labelling
 
 _SUM = 1e-10  # sum of a row, relative to its entries, that is rounding
 _FEW = 0.1  # wrong entries, for each on the boundary
@@ -53,7 +52,7 @@ def incomplete_rows(matrix: OperatorMatrix) -> NDArray[np.bool_]:
 
 def without_boundary(
     n: int, edges: NDArray, weights: NDArray, incomplete: NDArray[np.bool_], scale: float | None = None
-) -> Reading | None:
+) -> Labelling | None:
     """What angles suggest, where incomplete rows are just those of its boundary, and where it does not fit whole.
 
     Parameters
@@ -70,56 +69,56 @@ def without_boundary(
 
     Returns
     -------
-    Reading or None
+    Labelling or None
         With entries set aside if these are all that does not fit. None if the boundary is another, or if the mesh may
         be whole, with a diagonal matrix added on its boundary: it takes a search to tell which.
     """
     if not incomplete.any():
         return None
     between = np.asarray(incomplete[edges].all(axis=1))
-    readings = [first_reading(n, edges, some) for some in (weights, np.where(between, weights / 2, weights))]
-    inside = [one for one in readings if one is not None and np.array_equal(_on_boundary(one), incomplete)]
+    labellings = [first_labelling(n, edges, some) for some in (weights, np.where(between, weights / 2, weights))]
+    inside = [one for one in labellings if one is not None and np.array_equal(_on_boundary(one), incomplete)]
     if not inside:
         return None
-    whole = [Reading.of(replace(one.candidates, weights=weights), one.labels) for one in inside]
+    whole = [Labelling.of(replace(one.candidates, weights=weights), one.labels) for one in inside]
     if any(one.fits for one in whole):  # a diagonal matrix was added on the boundary
         return None
     inner = _left_to_others(whole[-1], incomplete, scale)
     if inner.has_wrong_entries and None not in inner.meshes and (not _has_corners(inner) or _redundancy(inner) > 0):
         return inner
-    may_be_whole = any(_has_corners(one) or without_wrong_entries(one) is not None for one in whole)
+    may_be_whole = any(_has_corners(one) for one in whole)
     return None if may_be_whole else whole[0]
 
 
-def _has_corners(reading: Reading) -> bool:
-    """Whether sides have been supposed to have vanished; then a first reading is easily wrong inside its boundary."""
-    return bool((reading.labels & reading.candidates.corner).any())
+def _has_corners(labelling: Labelling) -> bool:
+    """Whether sides have been supposed to have vanished; then a first labelling is easily wrong inside its boundary."""
+    return bool((labelling.labels & labelling.candidates.corner).any())
 
 
-def _redundancy(reading: Reading) -> int:
+def _redundancy(labelling: Labelling) -> int:
     """Entries that are not set aside, vanished ones counted, less positions and c of each piece."""
-    aside = sum(len(mesh.aside) for mesh in reading.meshes if mesh is not None and mesh.aside is not None)
-    return sum(piece.redundancy for piece in reading.pieces) - aside
+    aside = sum(len(mesh.aside) for mesh in labelling.meshes if mesh is not None and mesh.aside is not None)
+    return sum(piece.redundancy for piece in labelling.pieces) - aside
 
 
-def _left_to_others(reading: Reading, incomplete: NDArray[np.bool_], scale: float | None) -> Reading:
+def _left_to_others(labelling: Labelling, incomplete: NDArray[np.bool_], scale: float | None) -> Labelling:
     """The same cells, placed without the entries on their boundary between incomplete rows."""
-    between = np.asarray(incomplete[reading.edges].all(axis=1))
+    between = np.asarray(incomplete[labelling.edges].all(axis=1))
     meshes = []
-    for piece in reading.pieces:
+    for piece in labelling.pieces:
         aside = np.flatnonzero(~piece.inner & between[piece.edge_rows])
-        meshes.append(_without(piece, reading.weights[piece.edge_rows], aside, scale))
-    return reading.placed(tuple(meshes))
+        meshes.append(_without(piece, labelling.weights[piece.edge_rows], aside, scale))
+    return labelling.placed(tuple(meshes))
 
 
-def _on_boundary(reading: Reading) -> NDArray[np.bool_]:
+def _on_boundary(labelling: Labelling) -> NDArray[np.bool_]:
     """(n,) vertices on the boundary of pieces, or with edges on none."""
-    on_boundary = np.zeros(reading.candidates.n_vertices, dtype=bool)
-    bare = np.ones(len(reading.edges), dtype=bool)
-    for piece in reading.pieces:
+    on_boundary = np.zeros(labelling.candidates.n_vertices, dtype=bool)
+    bare = np.ones(len(labelling.edges), dtype=bool)
+    for piece in labelling.pieces:
         on_boundary[piece.vertices[piece.boundary]] = True
         bare[piece.edge_rows] = False
-    on_boundary[reading.edges[bare]] = True
+    on_boundary[labelling.edges[bare]] = True
     return on_boundary
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -45,6 +45,11 @@ class OperatorMatrix:
     def row_size(self) -> NDArray[np.float64]:
         """(n,) largest absolute off-diagonal entry of each row."""
         return row_sizes(self.n, self.edges, np.abs(self.entries))
+
+    def without(self, gone: NDArray[np.bool_]) -> OperatorMatrix:
+        """The same with some entries, (e,) bool, not stored."""
+        errors = None if self.errors is None else self.errors[~gone]
+        return replace(self, edges=self.edges[~gone], entries=self.entries[~gone], errors=errors)
 
     def csr(self) -> sp.csr_array:
         """Both triangles and the diagonal, all of it stored."""

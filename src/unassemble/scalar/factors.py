@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc, gammaincc, ndtr
 
 from ..cells.agreement import SAME_SCALE, SCALE_ERROR
-from ..cells.within_errors import GAP
+from ..cells.judge.within_errors import GAP
 from ..planar.cotangent import left_by_all
 from ..planar.deviations import factor_deviations
 from ..planar.hinged import Hinged

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import certify as certificates
-from ..cells import AGREE, Alternative, OrientedMesh, Untried, alternatives, coincident, filled_holes, hidden, touching
+from ..cells import Alternative, alternatives
 from ..clock import Clock
 from ..linalg import AnalysisAhead, blas_threads, factorisation
 from ..matrix import OperatorMatrix
@@ -28,14 +27,12 @@ from .joined import JoinedMesh
 from .noise import Noise, NoiseTest
 from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
 from .placement import Placement
-from .reservations import all_alike, ambiguous, far_away, hidden_by_errors, unproved, untried_parts
+from .reservations import ambiguous, far_away, nothing_to_spare
 from .solving import solve
 from .verdict import decides, passes, verdict
 
 _SMALL = 1e-3
 _SIGMAS = 10.0  # noise by which numbers that a reading takes for equal may differ
-
-_DOUBTS = {Untried.SCALES: unproved, Untried.PARTS: untried_parts}
 
 
 def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, options: ScalarOptions) -> PlanarMesh:
@@ -114,16 +111,21 @@ def _recovered(
     status, reason = verdict(
         topology, certificate, test, matrix, evidence, scales, trouble, doubt, apart, polished=options.refine
     )
+    if status == "certified":
+        loose = certificates.without_spare_equations(
+            stored.edges, mesh.points, mesh.triangles, known_scale=scale is not None
+        )
+        if len(loose):
+            status, reason = nothing_to_spare(certificate, loose)
     others: list[Alternative] = []
+    uniqueness: str | None = None
     if status == "certified":
         with clock("ambiguity") if topology.method == "the numbers" else nullcontext():  # else next to nothing
             told = noise and (options.noise or decides(certificate, test))  # else entries that are exact
             sigma = noise.sigma if noise and told else evidence.noise or 0.0
-            agree = max(AGREE, _SIGMAS * sigma / float(np.abs(scales).min()))
+            agree = _SIGMAS * sigma / float(np.abs(scales).min())
             given = stored if told else replace(stored, errors=None)
-            others, doubt_of_cells = _alternatives(topology, given, placement, mesh, stretch, agree, known)
-        if doubt_of_cells and not others:
-            status, reason = doubt_of_cells(certificate)
+            others, uniqueness = _uniqueness(topology, given, placement, mesh, agree, known)
     if others:
         status, reason = ambiguous(others, certificate)
     distant = False
@@ -155,8 +157,8 @@ def _recovered(
         boundary=mesh.boundary,
         boundary_offsets=mesh.boundary_offsets,
         node_status=(topology.multiplicity == 0).astype(np.int8),
-        status="ambiguous" if others else status,
-        uniqueness="ambiguous" if others else "searched" if status == "certified" else None,
+        status=status,
+        uniqueness=uniqueness,
         reason=reason,
         operator="anisotropic laplacian" if placement.tensor else "laplacian",
         backward_error=certificate.backward_error,
@@ -173,39 +175,30 @@ def _recovered(
     )
 
 
-def _alternatives(
+def _uniqueness(
     topology: Topology,
     stored: OperatorMatrix,
     placement: Placement,
     mesh: JoinedMesh,
-    stretch: float,
     agree: float,
     known: float | None,
-) -> tuple[list[Alternative], Callable[[certificates.Certificate], tuple[str, str]] | None]:
-    """Other meshes that fit, in the frame in which the operator is the Laplacian; or what says that there may be."""
-    z = mesh.points @ [1, 1j]
-    oriented = OrientedMesh(
-        mesh.triangles[~mesh.in_polygon],
-        mesh.polygons,
-        mesh.boundary,
-        mesh.boundary_offsets,
-        np.asarray(placement.tensor.to_laplacian(z) if placement.tensor else z, dtype=np.complex128),
-    )
-    factors = stretch * mesh.scale[mesh.component]
-    others = filled_holes(stored, topology, factors, agree) if known is None else []
-    untried: Untried | None = None
-    if topology.method != "the numbers":
-        if not others:
-            others, untried = touching(stored, topology, oriented, factors, scale=known, agree=agree)
-        return others, untried and _DOUBTS[untried]
-    if not others:
-        with blas_threads(1):  # many small readings
-            others, untried = alternatives(stored, topology, oriented, factors, scale=known, agree=agree)
-    if known is None and coincident(stored, topology, agree).any():
-        return others, all_alike
-    if hidden(stored, oriented, agree):
-        return others, hidden_by_errors
-    return others, untried and _DOUBTS[untried]
+) -> tuple[list[Alternative], str]:
+    """Other meshes that fit, and whether there are none: ``"proved"``, ``"searched"`` or ``"ambiguous"``.
+
+    Where every cell is a 3-cycle and every 3-cycle a cell the graph shows the boundary. Entries that are stored as
+    zeros show it no better than those that are not.
+    """
+    shown = topology.method == "3-cycles"
+    zero = stored.entries == 0
+    others: list[Alternative] = []
+    if not shown or zero.any():
+        z = np.asarray(mesh.points @ [1, 1j], dtype=np.complex128)
+        if placement.tensor:
+            z = np.asarray(placement.tensor.to_laplacian(z), dtype=np.complex128)
+        cells = Polygons.joined([Polygons.of_triangles(mesh.triangles[~mesh.in_polygon]), mesh.polygons])
+        with blas_threads(1):  # many small problems
+            others = alternatives(stored.without(zero), cells, z, known, agree)
+    return others, "ambiguous" if others else "proved" if shown else "searched"
 
 
 def _held_against(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cells.reading import FITS
+from ..cells.judge import FITS
 from ..certify import Certificate
 from ..matrix import OperatorMatrix
 from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE, SUSPICIOUS
@@ -76,6 +76,11 @@ def verdict(
         return "uncertified", (
             f"the operator re-assembled on this mesh gives the matrix back to {error:.1e}, but so may others: in "
             f"double precision the entries determine the positions to about {doubt:.0e} of the size only"
+        )
+    if good and len(topology.bare_edges):
+        i, j = topology.edges[topology.bare_edges[0]]
+        return "uncertified", (
+            f"the mesh gives the matrix back to {error:.1e}, but the stored zero of rows {i} and {j} belongs to no cell"
         )
     if good and not evidence.certain:
         return "certified", f"the operator re-assembled on this mesh gives the matrix back to {error:.1e}"

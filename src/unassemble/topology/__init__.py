@@ -1,6 +1,5 @@
 """From the sparsity graph to faces, orientation, boundary loops and pieces; no coordinates here."""
 
-from .canonical import settled_numbering
 from .cycles import triangles_everywhere
 from .numbering import Numbering, components, local_numbering
 from .polygons import Polygons
@@ -17,7 +16,6 @@ __all__ = [
     "located",
     "recognise",
     "require_planar",
-    "settled_numbering",
     "surfaces",
     "triangles_everywhere",
 ]

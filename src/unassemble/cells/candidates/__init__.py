@@ -1,1 +1,1 @@
-"""What can be a cell in a drawing of the graph."""
+"""What can be a cell in an embedding of the graph, and what the angles suggest."""

@@ -91,30 +91,3 @@ def scales_of_faces(complex_: FaceComplex, cotangents: NDArray, faces: NDArray[n
         above = np.add.reduceat(angle, first) > np.pi  # angles grow with c
         low, high = np.where(above, low, middle), np.where(above, middle, high)
     return unit * np.asarray(np.exp((low + high) / 2))
-
-
-def overall_scale(complex_: FaceComplex, weights: NDArray, outer: NDArray[np.bool_]) -> float:
-    """The c for which the angles of all faces but the outer ones add up to pi on average.
-
-    Sides along an outer face have all of their weight on the other side, others are shared equally. Short faces and
-    long ones err in opposite directions where they border each other, as squares and octagons do.
-
-    Parameters
-    ----------
-    complex_ : FaceComplex
-    weights : (e,) float64
-        -A_ij = c w_ij.
-    outer : (faces,) bool
-    """
-    unit = float(np.median(np.abs(weights[weights != 0]))) * np.sign(weights.sum())
-    if not unit:
-        return 1.0
-    faces = complex_.simple & ~outer
-    half = np.flatnonzero(faces[complex_.face])
-    share = (weights / unit)[half >> 1] * np.where(outer[complex_.face[half ^ 1]], 2, 1)
-    low, high = -8.0, 8.0
-    for _ in range(40):
-        middle = (low + high) / 2
-        above = facing_angles(share / np.exp(middle)).sum() > np.pi * faces.sum()
-        low, high = (low, middle) if above else (middle, high)
-    return unit * float(np.exp((low + high) / 2))

@@ -1,4 +1,4 @@
-"""Cells that a graph may have, as far as a reading of it needs them."""
+"""Cells that a weighted graph may have, as far as a labelling of it needs them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sets of candidates that are readings: no half-edge in two cells, no edge in none."""
+"""Sets of candidates that are labellings: no half-edge in two cells, no edge in none."""
 
 from __future__ import annotations
 

@@ -1,1 +1,0 @@
-"""Other meshes that the same matrix fits."""

@@ -1,0 +1,210 @@
+"""Which parts of a matrix their triangles do not explain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse import csgraph
+
+from ..errors import RecoveryError, SolverError
+from ..matrix import OperatorMatrix
+from ..planar.cautious import cautious_polish, count_flipped
+from ..planar.cotangent import left_by_all
+from ..planar.deviations import factor_deviations
+from ..planar.piece import PieceMesh
+from ..planar.polish import PolishOptions, polish
+from ..topology import Numbering, Piece, Topology, components
+from ..topology.keys import Grouped
+from .agreement import SAME_SCALE
+from .judge.labelling import FITS, even, misfits
+
+_WIDE = 200  # rows of a matrix on which the misfit of a wrong cell stays near it
+SURE = 1e-3
+"""Misfit, even if spread evenly, that no wrong cell is known to leave."""
+
+_SIGMAS = 5.0  # errors of c by which pieces may differ: the last word on that is not spoken here
+_CHANCE = np.log(1e-6)  # that factors agree by coincidence
+_NORMAL_MEDIAN = 1.4826  # standard deviation of normal errors, over the median of their moduli
+_SHORT = PolishOptions(max_steps=8, max_factorisations=3)
+
+Outcome = PieceMesh | RecoveryError
+"""Positions of a piece, or why there are none."""
+
+Attempt = Callable[[Piece], Outcome]
+"""Solves a piece, each only once."""
+
+Solved = list[tuple[Piece, Outcome]]
+
+
+def in_doubt(
+    matrix: OperatorMatrix,
+    topology: Topology,
+    attempt: Attempt,
+    scale: float | None = None,
+    noise: float | None = None,
+) -> NDArray[np.bool_]:
+    """(n,) rows of components with nonzero entries on no triangle, entries that do not fit, or several factors c.
+
+    A misfit that is small and spread evenly, at the latest after a short polish, is that of errors in the entries, and
+    raises no doubt. Pieces of components that are in doubt without it are not solved. `scale` is c, where it is known,
+    and `noise` the standard deviation of the entries' errors.
+    """
+    doubtful = unexplained(matrix, topology)
+    solved = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
+    doubtful |= _discordant(matrix, solved, scale, noise or 0.0)
+    solved = [(piece, mesh) for piece, mesh in solved if not doubtful[piece.vertices[0]]]
+    rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
+    misfit = misfits_of(matrix, solved)[rest]
+    wrong = misfit > FITS
+    if not wrong.any() or _like_noise(misfit, matrix.n):
+        return doubtful
+    if _like_noise(
+        misfits_of(matrix, _shortly_polished(matrix, solved, scale, small_steps=bool(noise)))[rest], matrix.n
+    ):
+        return doubtful
+    return doubtful | _components_of(matrix, rest[wrong])
+
+
+def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None, noise: float) -> NDArray[np.bool_]:
+    """(n,) rows of components whose pieces fit, but loose ones with another factor c than is known or others have.
+
+    With a hole filled such a piece still fits, with another c. That of pieces with more entries than unknowns is right,
+    if any is: where these differ from each other, or from the known one, other cells are no help.
+    """
+    having = [(piece, mesh) for piece, mesh in solved if isinstance(mesh, PieceMesh)]
+    none = np.zeros(matrix.n, dtype=bool)
+    if not having:
+        return none
+    pieces, meshes = zip(*having, strict=True)
+    label = components_of(matrix)
+    count = int(label.max()) + 1
+    own = label[[piece.vertices[0] for piece in pieces]]
+    loose = np.array([piece.redundancy <= 0 for piece in pieces])
+    c = np.array([mesh.scale for mesh in meshes])
+    order = np.lexsort((np.array([piece.n_vertices for piece in pieces]), ~loose))
+    telling = np.full(count, -1)  # the piece that tells c: the largest of those with entries to spare, if there is one
+    telling[own[order]] = order
+    right = np.full(len(c), scale) if scale else c[telling[own]]
+    apart = np.abs(c / right - 1) > SAME_SCALE
+    if not apart.any():
+        return none
+    deviation = factor_deviations(pieces, [mesh.z for mesh in meshes], [None] * len(pieces)) / np.abs(c)
+    told = np.zeros(len(c)) if scale else deviation[telling[own]]
+    sigma = np.full(count, noise) if noise else _noise(matrix, pieces, meshes, own, count, c, deviation)
+    apart &= np.abs(c / right - 1) > _SIGMAS * sigma[own] * np.hypot(deviation, told)
+    wrong, hopeless = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    wrong[own[apart]] = True
+    hopeless[own[apart & ~loose]] = True
+    return np.asarray((wrong & ~hopeless)[label])
+
+
+def _noise(
+    matrix: OperatorMatrix,
+    pieces: Sequence[Piece],
+    meshes: Sequence[PieceMesh],
+    own: NDArray,
+    count: int,
+    c: NDArray,
+    deviation: NDArray,
+) -> NDArray[np.float64]:
+    """(count,) standard deviation of the entries' errors in each component, from what their pieces leave unexplained.
+
+    Where no piece has entries to spare it is the one for which half of them have the same c, if they are so many that
+    this is no coincidence, and 0 otherwise.
+    """
+    sizes = [len(piece.edge_rows) for piece in pieces]
+    left = left_by_all(pieces, -matrix.entries, [mesh.z for mesh in meshes], c)
+    with np.errstate(all="ignore"):  # not finite at flat triangles
+        squares = np.bincount(np.repeat(own, sizes), left**2, count)
+    spare = np.bincount(own, [piece.redundancy for piece in pieces], count)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sigma = np.where(spare > 0, np.sqrt(squares / spare), 0.0)
+    for component in np.flatnonzero((spare <= 0) & (np.bincount(own, minlength=count) > 2)):
+        inside = own == component
+        if (c[inside] * c[inside][0] > 0).all():
+            size = np.log(np.abs(c[inside]))
+            away = np.abs(size - np.median(size))
+            if (inside.sum() / 2 - 1) * np.log(max(float(np.median(away)), np.finfo(float).tiny)) < _CHANCE:
+                sigma[component] = _NORMAL_MEDIAN * np.median(away / deviation[inside])
+    return np.asarray(sigma)
+
+
+def _like_noise(misfit: NDArray, n: int) -> bool:
+    """Whether a misfit is that of errors in the entries; small meshes spread that of a wrong cell as evenly."""
+    return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < SURE)
+
+
+def _shortly_polished(matrix: OperatorMatrix, solved: Solved, scale: float | None, *, small_steps: bool) -> Solved:
+    """By a few large steps; where these lead to flat triangles by as many `small_steps` as it takes, if at all."""
+    polished: Solved = []
+    for piece, mesh in solved:
+        if isinstance(mesh, PieceMesh):
+            weights, failure = -matrix.entries[piece.edge_rows], None
+            try:
+                found = polish(piece, weights, mesh.z, scale=scale, options=_SHORT)
+            except SolverError as error:
+                failure = error
+            try:
+                if small_steps and (failure or count_flipped(piece, found.z)):
+                    found, failure = cautious_polish(piece, weights, mesh.z, scale=scale), None
+            except SolverError as error:
+                failure = error
+            polished.append((piece, failure or PieceMesh(found.z, found.scale)))
+        else:
+            polished.append((piece, mesh))
+    return polished
+
+
+def misfits_of(matrix: OperatorMatrix, solved: Solved) -> NDArray[np.float64]:
+    """(e,) as :func:`unassemble.cells.judge.labelling.misfits`."""
+    return misfits(
+        matrix.n,
+        matrix.edges,
+        -matrix.entries,
+        [(piece, mesh) for piece, mesh in solved if isinstance(mesh, PieceMesh)],
+    )
+
+
+def unexplained(matrix: OperatorMatrix, topology: Topology) -> NDArray[np.bool_]:
+    """(n,) rows of components with nonzero entries on no triangle."""
+    bare = topology.bare_edges
+    return _components_of(matrix, bare[matrix.entries[bare] != 0])
+
+
+def _components_of(matrix: OperatorMatrix, rows: NDArray) -> NDArray[np.bool_]:
+    """(n,) rows of the connected components that have one of the given edges."""
+    chosen = np.zeros(matrix.n, dtype=bool)
+    if not len(rows):
+        return chosen
+    label = components_of(matrix)
+    chosen[label[matrix.edges[rows, 0]]] = True
+    return chosen[label]
+
+
+def components_of(matrix: OperatorMatrix) -> NDArray[np.int32]:
+    """(n,) number of the connected component of each row."""
+    graph = sp.coo_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
+    return np.asarray(csgraph.connected_components(graph, directed=False)[1])
+
+
+def with_pieces(n: int, edges: NDArray[np.int64], pieces: Sequence[Piece]) -> list[tuple[Numbering, list[Piece]]]:
+    """Each component, the largest first, and its pieces in their order; in linear time.
+
+    Parameters
+    ----------
+    n : int
+    edges : (e, 2) int64
+        Pairs i < j in lexicographic order.
+    pieces : sequence of Piece
+        None of which belongs to two components.
+    """
+    parts = components(n, edges)
+    label = np.full(n, -1)
+    for k, part in enumerate(parts):
+        label[part.vertices] = k
+    own = Grouped(label[np.array([piece.vertices[0] for piece in pieces], dtype=np.int64)], len(parts))
+    bounds, order = own.start.tolist(), own.order.tolist()
+    return [(part, [pieces[j] for j in order[bounds[k] : bounds[k + 1]]]) for k, part in enumerate(parts)]

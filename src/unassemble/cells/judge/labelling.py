@@ -1,0 +1,305 @@
+"""A labelling of the graph: some candidates taken for cells, solved, and held against the matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...matrix.operator import row_sizes
+from ...planar.cotangent import weights_of_all
+from ...planar.hinges import CLOSED, gap
+from ...planar.piece import PieceMesh
+from ...planar.triangles import lone_triangles
+from ...topology import Piece, Topology
+from ...topology.keys import contains, pair_keys, with_sides
+from ...topology.pieces import planar_pieces
+from ..candidates.cell_set import CellSet
+from .maps import best_map
+from .within_errors import GAP, beyond, factor_tolerances, polished
+
+FITS = 1e-6
+"""Largest misfit, relative to the row, of a conformal solve with the right cells; the polish does the rest."""
+
+NEARLY = 1e-5
+"""Misfit up to which entries of few digits may keep a labelling from fitting."""
+
+_RIGHT_ANGLES = 4
+
+
+C = TypeVar("C", bound=CellSet)
+
+
+@dataclass(frozen=True, eq=False)
+class Labelling(Generic[C]):
+    """Cells, the triangulated pieces that they make, and how the weights of these fit.
+
+    Attributes
+    ----------
+    candidates : CellSet
+    labels : (cells,) bool
+        What is taken for a cell.
+    edges : (e', 2) int64
+        Those of the graph, with the vanished ones of the cells' triangles.
+    weights : (e',) float64
+        Zero for these.
+    pieces : tuple of Piece
+        Empty where the cells do not make planar surfaces.
+    meshes : tuple of PieceMesh or None
+        None where a piece has no positions.
+    misfit : (e',) float64
+        |c w - a| relative to the smaller of both rows' largest entries, at most 1; 1 on edges of no piece. Where errors
+        of the weights are known, and it is not far beyond them, less what they explain.
+    """
+
+    candidates: C
+    labels: NDArray[np.bool_]
+    edges: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    pieces: tuple[Piece, ...]
+    meshes: tuple[PieceMesh | None, ...]
+    misfit: NDArray[np.float64]
+
+    @classmethod
+    def unsolved(cls, candidates: C, labels: NDArray[np.bool_]) -> Labelling[C]:
+        """Triangulate the cells, without positions."""
+        n = candidates.n_vertices
+        triangles = triangulation(candidates, labels)
+        edges, given, opposite = with_sides(n, candidates.edges, triangles)
+        weights = np.zeros(len(edges))
+        weights[given] = candidates.weights
+        pieces = planar_pieces(n, edges, triangles, opposite) or ()
+        return cls(candidates, labels, edges, weights, pieces, (None,) * len(pieces), misfits(n, edges, weights, []))
+
+    @classmethod
+    def of(
+        cls, candidates: C, labels: NDArray[np.bool_], known: dict[bytes, PieceMesh | None] | None = None
+    ) -> Labelling[C]:
+        """Triangulate the cells and solve every piece, but for those `known`, to which new ones are added."""
+        bare = cls.unsolved(candidates, labels)
+        weights = bare.weights
+        known = {} if known is None else known
+        meshes: dict[Piece, PieceMesh | None] = {**lone_triangles(bare.pieces, weights)}
+        for piece in bare.pieces:
+            if piece not in meshes:
+                name = _key_of(piece)
+                if name not in known:
+                    known[name] = best_map(piece, weights[piece.edge_rows])
+                meshes[piece] = known[name]
+        return bare.placed(tuple(meshes[piece] for piece in bare.pieces))
+
+    def placed(self, meshes: tuple[PieceMesh | None, ...]) -> Labelling:
+        """With positions of each piece, or None."""
+        candidates, n, edges = self.candidates, self.candidates.n_vertices, self.edges
+        solved = [(piece, mesh) for piece, mesh in zip(self.pieces, meshes, strict=True) if mesh]
+        misfit = misfits(n, edges, self.weights, solved)
+        errors = self._errors
+        better = None if errors is None else polished(solved, self.weights, errors, misfit)
+        if better is None or errors is None:
+            errors = None
+        else:
+            solved, meshes = better, tuple(mesh for _, mesh in better)
+            misfit = beyond(n, edges, solved, self.weights, errors)
+        _add_discord(n, edges, solved, misfit, candidates.scale, errors)
+        misfit[np.isin(edges, _crowded(candidates, self.labels)).any(axis=1)] = 1.0
+        return replace(self, meshes=meshes, misfit=misfit)
+
+    @cached_property
+    def _errors(self) -> NDArray[np.float64] | None:
+        """(e',) standard deviations, 0 for what has vanished; None where they are not known, or nothing is solved."""
+        given, n = self.candidates.errors, self.candidates.n_vertices
+        if given is None or not self.pieces or not given.any():
+            return None
+        errors = np.zeros(len(self.edges))
+        keys = pair_keys(n, *self.edges.T)
+        errors[np.searchsorted(keys, pair_keys(n, *self.candidates.edges.T))] = given
+        return errors
+
+    @property
+    def fits(self) -> bool:
+        """Whether every entry is reproduced."""
+        return bool(len(self.pieces) and (self.misfit <= FITS).all())
+
+    def nearly_fits(self, agree: float) -> bool:
+        """Whether it might fit, were it not for errors of the entries; those of noise are up to `agree`."""
+        return bool(len(self.pieces) and self.misfit.max() <= max(NEARLY, agree))
+
+    @property
+    def fits_but_for_few(self) -> bool:
+        """Whether every entry is reproduced that has not been set aside as wrong."""
+        rest = np.ones(len(self.edges), dtype=bool)
+        for piece, mesh in zip(self.pieces, self.meshes, strict=True):
+            if mesh is not None and mesh.aside is not None:
+                rest[piece.edge_rows[mesh.aside]] = False
+        return bool(len(self.pieces) and not rest.all() and (self.misfit[rest] <= FITS).all())
+
+    @property
+    def has_wrong_entries(self) -> bool:
+        """Whether entries have been set aside as wrong; those that are left may have small errors."""
+        return any(mesh is not None and mesh.aside is not None for mesh in self.meshes)
+
+    @cached_property
+    def size(self) -> float:
+        """Root mean square of the misfit."""
+        return float(np.sqrt(np.mean(self.misfit**2))) if self.pieces else np.inf
+
+    @property
+    def mean_misfit(self) -> float:
+        """Where little is wrong this is smaller than where all is wrong a little."""
+        return float(self.misfit.mean())
+
+    @property
+    def scale(self) -> float:
+        """The c that is known, or that of the largest piece; 1 where nothing is solved."""
+        solved = [(piece.n_vertices, mesh.scale) for piece, mesh in zip(self.pieces, self.meshes, strict=True) if mesh]
+        return self.candidates.scale or max(solved, default=(0, 1.0))[1]
+
+    @property
+    def like_noise(self) -> bool:
+        """Whether the misfit is that of errors in the entries, see :func:`even`.
+
+        If they are known and do not explain it, they are larger than is said, or it is that of wrong cells.
+        """
+        return bool(len(self.pieces)) and self.size < 1e-3 and even(self.misfit)
+
+
+def _crowded(candidates: CellSet, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Vertices with more than four right angles: the mesh would wind around them more than once."""
+    apex = candidates.cells.vertices[candidates.cells.offsets[:-1] + 1]
+    return np.flatnonzero(
+        np.bincount(apex[labels & candidates.corner], minlength=candidates.n_vertices) > _RIGHT_ANGLES
+    )
+
+
+def misfits(n: int, edges: NDArray, weights: NDArray, solved: list[tuple[Piece, PieceMesh]]) -> NDArray[np.float64]:
+    """(e,) |c w - a| relative to the smaller of both rows' largest entries, at most 1; 1 on edges of no piece."""
+    misfit = np.where(weights != 0, 1.0, 0.0)
+    size = row_sizes(n, edges, np.abs(weights))
+    if not solved:
+        return misfit
+    rows = np.concatenate([piece.edge_rows for piece, _ in solved])
+    scale = np.repeat([mesh.scale for _, mesh in solved], [len(piece.edge_rows) for piece, _ in solved])
+    smaller = size[edges[rows]].min(axis=1)
+    with np.errstate(all="ignore"):  # flat triangles fit nothing
+        fitted = weights_of_all(*zip(*((piece, mesh.z) for piece, mesh in solved), strict=True))
+        left = np.abs(scale * fitted - weights[rows]) / smaller
+    misfit[rows] = np.where(left < 1, left, 1.0)
+    return misfit
+
+
+def sound_pieces(solved: Iterable[tuple[Piece, PieceMesh | None]], misfit: NDArray) -> list[tuple[Piece, PieceMesh]]:
+    """Pieces that fit by themselves and have entries to spare, so that it is no chance."""
+    return [
+        (piece, mesh)
+        for piece, mesh in solved
+        if mesh is not None and piece.redundancy > 0 and (misfit[piece.edge_rows] <= FITS).all()
+    ]
+
+
+def _add_discord(
+    n: int,
+    edges: NDArray,
+    solved: list[tuple[Piece, PieceMesh]],
+    misfit: NDArray,
+    scale: float | None,
+    errors: NDArray | None,
+) -> None:
+    """Raise the misfit where pieces do not go together: another scale, or rings of pieces that do not close.
+
+    Small pieces by themselves fit nearly everything. What `errors` (e,) explain is left out.
+    """
+    if not solved or (len(solved) == 1 and scale is None):
+        return
+    tolerance = 0.0 if errors is None else factor_tolerances(solved, errors, scale)
+    add_differing_factors(solved, misfit, scale, tolerance)
+    if (misfit > FITS).any():  # whether rings close is the last question, and the dearest
+        return
+    topology = Topology(n, edges, tuple(piece for piece, _ in solved), "")
+    closed = 0.0 if errors is None else GAP * float(errors.max()) / min(abs(mesh.scale) for _, mesh in solved)
+    left = gap(topology, [mesh.z / np.abs(mesh.z).max() for _, mesh in solved], max(CLOSED, closed))
+    left = left if left > closed else 0.0
+    at_hinges = np.isin(edges, topology.hinges).any(axis=1)
+    misfit[at_hinges] = np.maximum(misfit[at_hinges], min(left, 1.0))
+
+
+def add_differing_factors(
+    solved: list[tuple[Piece, PieceMesh]], misfit: NDArray, scale: float | None, tolerance: NDArray | float = 0.0
+) -> None:
+    """Raise the misfit of pieces with another factor than is known, or than the largest has, by that difference.
+
+    Differences up to `tolerance`, (pieces,), are none.
+    """
+    scale = scale or max(solved, key=lambda item: item[0].n_vertices)[1].scale
+    apart = np.minimum(np.abs(np.array([mesh.scale for _, mesh in solved]) / scale - 1), 1.0)
+    apart[apart <= tolerance] = 0.0
+    rows = np.concatenate([piece.edge_rows for piece, _ in solved])
+    misfit[rows] = np.maximum(misfit[rows], np.repeat(apart, [len(piece.edge_rows) for piece, _ in solved]))
+
+
+def even(misfit: NDArray) -> bool:
+    """Whether a misfit is small and spread evenly, as that of errors in the entries is, and that of wrong cells is not.
+
+    Of normal errors half are above 0.67 times their root mean square.
+    """
+    if not misfit.max(initial=0.0) < 1:  # squares of more may overflow
+        return False
+    size = float(np.sqrt(np.mean(misfit**2)))
+    return size < 0.03 and float(misfit.max()) < 8 * size and float(np.median(misfit)) > 0.3 * size
+
+
+def triangulation(candidates: CellSet, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(m, 3) triangles of the chosen cells, longer ones in fans.
+
+    The apex of a fan moves on where a diagonal would be an edge already, of the graph or of another cell.
+    """
+    n, shift = candidates.n_vertices, np.zeros(candidates.count, dtype=np.int64)
+    given = candidates.edges[:, 0] * n + candidates.edges[:, 1]
+    for _ in range(int(candidates.size.max())):
+        triangles, cell, diagonal = _fans(candidates, labels, shift)
+        key = _keys(n, triangles)[:, 1]  # each diagonal belongs to the triangle before it
+        key, owner = key[diagonal], cell[diagonal]
+        value, place, count = np.unique(key, return_inverse=True, return_counts=True)
+        clash = contains(given, value) | (count > 1)
+        if not clash.any():
+            break
+        moved = owner[clash[place]]
+        # Of two cells that want the same diagonal one keeps it.
+        keeps = np.unique(key[clash[place]], return_index=True)[1]
+        moved = np.setdiff1d(moved, moved[keeps][count[clash] > 1])
+        shift[moved] += 1
+    return triangles
+
+
+def _fans(candidates: CellSet, labels: NDArray, shift: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Triangles, the cell of each, and whether its last side is a diagonal."""
+    cells = np.flatnonzero(labels)
+    size = candidates.size[cells]
+    cell = np.repeat(cells, size - 2)
+    step = np.arange(len(cell)) - np.repeat(np.cumsum(size - 2) - (size - 2), size - 2) + 1
+    start, length = candidates.cells.offsets[cell], candidates.size[cell]
+    corner = (shift[cell][:, None] + np.column_stack([np.zeros_like(step), step, step + 1])) % length[:, None]
+    return candidates.cells.vertices[start[:, None] + corner], cell, step < length - 2
+
+
+def fans_of(candidates: CellSet, labels: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(m, 3) triangles of cells, each in a fan about its first vertex, and (m,) the cell of each."""
+    triangles, cell, _ = _fans(candidates, labels, np.zeros(candidates.count, dtype=np.int64))
+    return triangles, cell
+
+
+def _keys(n: int, triangles: NDArray) -> NDArray[np.int64]:
+    """(m, 3) keys i n + j, i < j, of the edges facing the corners."""
+    ends = triangles[:, [[1, 2], [2, 0], [0, 1]]]
+    return pair_keys(n, ends[..., 0], ends[..., 1])
+
+
+def _key_of(piece: Piece) -> bytes:
+    """The same for the same triangles in the same orientation, which positions go with."""
+    triangles = piece.vertices[piece.triangles]
+    first = triangles.argmin(axis=1)[:, None]
+    triangles = np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1)
+    return triangles[np.lexsort(triangles.T)].tobytes()

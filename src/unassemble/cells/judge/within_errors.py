@@ -1,0 +1,94 @@
+"""Readings of entries with errors of known size: what of a misfit these do not explain."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from ...errors import SolverError
+from ...matrix.operator import row_sizes
+from ...planar.cotangent import left_by_all
+from ...planar.deviations import factor_deviations
+from ...planar.piece import EXACT, PieceMesh
+from ...planar.polish import PolishOptions, polish
+from ...topology import Piece
+
+SIGMAS = 6.0
+"""Standard deviations that errors of the entries of any mesh stay below."""
+
+GAP = 30.0
+"""What errors may leave open in rings of pieces, in units of their size and of the errors over c."""
+
+_FAR = 1e5  # standard deviations of misfits that conformal maps with the right cells leave, where these are slender
+_DROWNED = 0.1  # misfit, relative to the row, of which nothing is to be learnt
+_CHANCE = 1e-6  # of a misfit with the right cells: of many readings one may be improbable
+_SHORT = PolishOptions(max_steps=8, max_factorisations=3)
+
+Solved = list[tuple[Piece, PieceMesh]]
+
+
+def polished(solved: Solved, weights: NDArray, errors: NDArray, misfit: NDArray) -> Solved | None:
+    """Pieces as the entries ask for in the mean; None where their misfit is more than errors explain.
+
+    Parameters
+    ----------
+    solved : list of (Piece, PieceMesh)
+    weights, errors : (e,) float64
+        Of all edges; errors of those that have vanished are 0.
+    misfit : (e,) float64
+        As in :class:`unassemble.cells.judge.Labelling`.
+    """
+    if not solved:
+        return None
+    allowed = _FAR * errors.max(initial=0.0) / np.median(np.abs(weights[weights != 0]))
+    if not misfit.max() <= min(allowed, _DROWNED):
+        return None
+    spread = np.maximum(errors, EXACT * np.median(errors[errors > 0]))
+    found = []
+    for piece, mesh in solved:
+        rows = piece.edge_rows
+        try:
+            with np.errstate(all="ignore"):
+                better = polish(piece, weights[rows], mesh.z, spread=spread[rows], options=_SHORT)
+        except SolverError:
+            return None
+        if not (np.isfinite(better.z).all() and np.isfinite(better.scale)):
+            return None
+        found.append((piece, PieceMesh(better.z, better.scale)))
+    return found if _likely(found, weights, spread) else None
+
+
+def _likely(solved: Solved, weights: NDArray, errors: NDArray) -> bool:
+    """Whether the sum of squares of the misfit is not improbably large; c is fitted in each piece."""
+    pieces, meshes = zip(*solved, strict=True)
+    left = left_by_all(pieces, weights, [mesh.z for mesh in meshes], np.array([mesh.scale for mesh in meshes]))
+    freedom = max(sum(piece.redundancy for piece in pieces), 1)
+    with np.errstate(all="ignore"):  # flat triangles
+        squares = float(np.sum((left / errors[np.concatenate([piece.edge_rows for piece in pieces])]) ** 2))
+    return bool(chdtrc(freedom, squares) >= _CHANCE)
+
+
+def beyond(n: int, edges: NDArray, solved: Solved, weights: NDArray, errors: NDArray) -> NDArray[np.float64]:
+    """(e,) the misfit less what errors explain, relative to the smaller of both rows' largest entries, at most 1."""
+    misfit = np.where(weights != 0, 1.0, 0.0)
+    pieces, meshes = zip(*solved, strict=True)
+    rows = np.concatenate([piece.edge_rows for piece in pieces])
+    smaller = row_sizes(n, edges, np.abs(weights))[edges[rows]].min(axis=1)
+    left = left_by_all(pieces, weights, [mesh.z for mesh in meshes], np.array([mesh.scale for mesh in meshes]))
+    error = np.maximum(errors, EXACT * np.median(errors[errors > 0]))[rows]
+    with np.errstate(all="ignore"):
+        excess = np.maximum(np.abs(left) - SIGMAS * error, 0.0) / smaller
+    misfit[rows] = np.where(excess < 1, excess, 1.0)
+    return misfit
+
+
+def factor_tolerances(solved: Solved, errors: NDArray, scale: float | None) -> NDArray[np.float64]:
+    """(pieces,) what errors explain of how far factors c are from a known one, or from that of the largest piece."""
+    pieces, meshes = zip(*solved, strict=True)
+    typical = float(np.median(errors[errors > 0]))
+    spreads = [np.maximum(errors[piece.edge_rows] / typical, EXACT) for piece in pieces]
+    deviation = factor_deviations(pieces, [mesh.z for mesh in meshes], spreads)
+    deviation *= typical / np.abs([mesh.scale for mesh in meshes])
+    largest = int(np.argmax([piece.n_vertices for piece in pieces]))
+    return SIGMAS * np.hypot(deviation, 0.0 if scale else deviation[largest])

@@ -1,0 +1,232 @@
+"""Candidates of one embedding as one elastic sheet: weights, and their derivatives, for labels between 0 and 1.
+
+With a strength s_k in [0, 1] for each candidate the weights are w_e = 1/2 sum_k s_k cot_ke, as if the material of
+candidate k had the conductivity s_k, and the area form is that of the candidates, each times its s_k: the conformal
+map is found as ever.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ...linalg import factorisation
+from ...planar.cotangent import corner_gradients
+from ...planar.krylov import ShiftedSearch
+from ...planar.normal import distant_pair
+from ...planar.pencil import ConformalPencil
+from ...topology.keys import with_sides
+from ..candidates.candidates import Candidates
+from ..judge.labelling import fans_of
+from ..judge.maps import best_of, mean_misfit
+
+LONGEST = 40
+"""Edges of a face that may be a cell."""
+
+STEEPEST = 1e5
+"""Cotangents beyond belong to flat triangles."""
+
+_SHIFT = 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class _Graph:
+    """The edges of all candidates, vanished ones among them; what the pencil needs to know."""
+
+    n_vertices: int
+    edges: NDArray[np.int64]
+
+    @property
+    def boundary(self) -> NDArray[np.int64]:
+        """Every edge, from its lower vertex to the higher one."""
+        return self.edges
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Positions of a sheet.
+
+    Attributes
+    ----------
+    z : (n,) complex128
+    c : float
+        Scale in units of the sheet's.
+    """
+
+    z: NDArray[np.complex128]
+    c: float
+
+
+class Sheet:
+    """Candidates of one embedding, triangulated once.
+
+    Parameters
+    ----------
+    candidates : Candidates
+    unit : float
+        A guess of c.
+    chosen : (cells,) bool, optional
+        Candidates that may be cells; all that can be unless given.
+
+    Attributes
+    ----------
+    chosen : (cells,) bool
+        Candidates that can be cells, k of them; these have triangles.
+    triangles : (m, 3) int64
+    cell : (m,) int64
+        Candidate of each triangle.
+    row : (m, 3) int64
+        Edges that face the corners.
+    edges : (e, 2) int64
+        Those of the graph and of the triangles.
+    weights : (e,) float64
+        -A_ij in units of the guess; zero for edges that the graph does not have.
+    typical : float
+        Median size of the weights.
+    """
+
+    def __init__(self, candidates: Candidates, unit: float, chosen: NDArray[np.bool_] | None = None):
+        self.candidates = candidates
+        self.unit = unit
+        self.n_vertices = n = candidates.n_vertices
+        self.chosen = (candidates.size <= LONGEST) & ~candidates.outer if chosen is None else chosen
+        self.triangles, self.cell = fans_of(candidates, self.chosen)
+        self.edges, given, self.row = with_sides(n, candidates.edges, self.triangles)
+        tails, heads = self.triangles[:, [1, 2, 0]], self.triangles[:, [2, 0, 1]]
+        self._sense = np.where(tails < heads, 1.0, -1.0)
+        self._number = np.cumsum(self.chosen) - 1
+        self.free_scale = candidates.scale is None
+        self.weights = np.zeros(len(self.edges))
+        self.weights[given] = candidates.weights / unit
+        self.typical = float(np.median(np.abs(self.weights[given][candidates.weights != 0])))
+
+    def spread(self, c: float) -> NDArray[np.float64]:
+        """(e,) by which misfits are divided."""
+        return np.asarray((np.abs(self.weights) + self.typical) / c)
+
+    def misfit(self, placed: Placed, strength: NDArray) -> NDArray[np.float64]:
+        """(e,) what is left of the weights, divided by their spread."""
+        w = self.fitted_weights(placed.z, strength)
+        return np.asarray((self.weights / placed.c - w) / self.spread(placed.c))
+
+    def fitted_weights(self, z: NDArray, strength: NDArray) -> NDArray[np.float64]:
+        """(e,) half the cotangents at positions, each times the strength of its candidate."""
+        cotangent = strength[self.cell][:, None] * self.cotangents(z[self.triangles])
+        return np.asarray(np.bincount(self.row.ravel(), cotangent.ravel() / 2, len(self.weights)), dtype=np.float64)
+
+    @staticmethod
+    def cotangents(at: NDArray) -> NDArray[np.float64]:
+        """(m, 3) cotangents at the corners of triangles, (m, 3) complex."""
+        u, w = at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at
+        product = np.conj(u) * w
+        with np.errstate(all="ignore"):
+            cotangent = np.nan_to_num(product.real / product.imag, posinf=STEEPEST, neginf=-STEEPEST)
+        return np.clip(cotangent, -STEEPEST, STEEPEST)
+
+    @staticmethod
+    def gradients(at: NDArray) -> NDArray[np.complex128]:
+        """(3, m, 3) derivatives of half the cotangents by the corner itself, the next one and the one after."""
+        u, w = at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at
+        with np.errstate(all="ignore"):
+            at_u, at_w = corner_gradients(u, w)
+        gradient = np.stack([-at_u - at_w, at_u, at_w])
+        gradient[:, ~(np.abs(gradient) < STEEPEST**2).all(axis=0)] = 0
+        return gradient
+
+    def around(self, strength: NDArray) -> NDArray[np.float64]:
+        """(e,) the boundary of all candidates, each times its strength: as whole labels have it, so is their map."""
+        sides = (self._sense * strength[self.cell][:, None]).ravel()
+        return np.asarray(np.bincount(self.row.ravel(), sides, len(self.weights)), dtype=np.float64)
+
+    def pencil(self, strength: NDArray, unit: float = 1.0) -> ConformalPencil:
+        """The conformal pencil for fractional labels, of weights over some c."""
+        return ConformalPencil(_Graph(self.n_vertices, self.edges), self.weights / unit, self.around(strength))
+
+    def mapped(self, strength: NDArray, start: Placed | None = None) -> Placed:
+        """The conformal map for fractional labels.
+
+        Raises
+        ------
+        RecoveryError
+            If there is none.
+        """
+        search = ShiftedSearch(self.pencil(strength), factorisation, 8)
+        noise = np.random.default_rng(0).standard_normal((self.n_vertices, 2)).view(np.complex128).ravel()
+        z, c = (start.z, start.c) if start else (noise, 1.0)
+        shift = _SHIFT * c
+        for _ in range(4):
+            z, c, spread = search.at(shift, z)
+            if spread < 1e-9:
+                break
+            shift = c * (1 - min(max(4 * spread, 1e-6), 0.3))
+        return Placed(z, c if self.free_scale else 1.0)
+
+    def best_mapped(self, strength: NDArray) -> Placed:
+        """The map that fits best of the first few, see :mod:`unassemble.cells.judge.maps`.
+
+        Raises
+        ------
+        RecoveryError
+            If there is none.
+        """
+        first = self.mapped(strength)
+        unit = first.c
+        mean = mean_misfit(self.edges, self.weights / unit)
+
+        def misfit(z: NDArray, c: float) -> float:
+            return mean(c * self.fitted_weights(z, strength))
+
+        z, c = best_of(self.pencil(strength, unit), first.z, misfit)
+        return Placed(z, c * unit)
+
+    def linearised(self, placed: Placed, strength: NDArray) -> tuple[sp.csr_array, sp.csr_array, NDArray]:
+        """Derivatives of the weights over their spread.
+
+        Returns
+        -------
+        by_position : (e, 2 n) csr_array
+        by_label : (e, k) csr_array
+            Labels of the chosen candidates.
+        by_scale : (e,) float64
+            By log c.
+        """
+        t, z = self.triangles, placed.z
+        at, shape = z[t], (len(self.weights), 2 * len(z))
+        gradient = strength[self.cell][:, None] * self.gradients(at)
+        vertex = np.stack([t, t[:, [1, 2, 0]], t[:, [2, 0, 1]]])
+        row = np.broadcast_to(self.row, vertex.shape).ravel()
+        columns = np.concatenate([2 * vertex.ravel(), 2 * vertex.ravel() + 1])
+        by_position = sp.coo_array(
+            (np.concatenate([gradient.real.ravel(), -gradient.imag.ravel()]), (np.tile(row, 2), columns)), shape=shape
+        )
+        by_label = sp.coo_array(
+            (self.cotangents(at).ravel() / 2, (self.row.ravel(), np.repeat(self._number[self.cell], 3))),
+            shape=(shape[0], int(self.chosen.sum())),
+        ).tocsr()
+        spread = self.spread(placed.c)
+        scaled = sp.diags_array(1 / spread)
+        w = by_label @ strength[self.chosen] / spread * (1.0 if self.free_scale else 0.0)
+        return (scaled @ by_position.tocsr()).tocsr(), (scaled @ by_label).tocsr(), w
+
+    def moved(self, placed: Placed, d: NDArray, log_scale: float, factor: float = 1.0) -> Placed:
+        """Displaced, (n,) complex, and rescaled."""
+        c = placed.c * max(1 + factor * log_scale, 0.1) if self.free_scale else placed.c
+        return Placed(placed.z + factor * d, c)
+
+    def extent(self, z: NDArray) -> NDArray[np.float64]:
+        """(n,) mean length of the edges at each vertex."""
+        length = np.repeat(np.abs(z[self.edges[:, 0]] - z[self.edges[:, 1]]), 2)
+        ends = self.edges.ravel()
+        mean = np.bincount(ends, length, len(z)) / np.maximum(np.bincount(ends, minlength=len(z)), 1)
+        return np.maximum(mean, 1e-6 * np.median(mean))
+
+
+def unpinned(z: NDArray) -> NDArray[np.bool_]:
+    """(2 n,) coordinates of all but two vertices."""
+    free = np.ones(2 * len(z), dtype=bool)
+    pins = distant_pair(z)
+    free[np.r_[2 * pins, 2 * pins + 1]] = False
+    return free

@@ -1,0 +1,177 @@
+"""The last wrong labels: small changes, those that should leave least first, from the best of all labellings so far.
+
+The last wrong labels may have to be put right together: a change for the better can raise the misfit a little. So of
+the changes of each labelling a few are tried, then a few of another that is about as good.
+"""
+
+from __future__ import annotations
+
+import heapq
+import logging
+from collections.abc import Iterator
+from functools import cached_property
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...budget import Budget
+from ...planar.piece import PieceMesh
+from ..candidates.candidates import Candidates
+from ..candidates.choosing import chosen
+from ..judge.labelling import Labelling
+from ..relax.sheet import Sheet
+from .leaps import leap
+from .moves import turned
+from .updates import Updates
+
+_log = logging.getLogger(__name__)
+
+_BATCH = 8
+"""Small changes of a labelling that are tried at a time."""
+
+_IN_VAIN = 40
+"""Changes in all without an improvement."""
+
+_TRIED = 0.25
+"""A labelling with a batch tried is put off behind those with so much more misfit."""
+
+_BETTER = 0.9
+"""Misfit, relative to the least before, that is an improvement worth its price."""
+
+_RANKING = 10
+"""Solves that ranking the changes of a labelling costs."""
+
+_PATIENCE = 15
+"""Labellings whose changes are ranked for as much misfit as there is, if it goes on falling as it has."""
+
+_LEAPS = 8
+"""Changes of many labels at once, one after the other."""
+
+_MANY = 20
+"""Pieces that cost as much as another solve."""
+
+_Waiting = tuple[float, int, Labelling, Iterator[NDArray[np.bool_]] | None]
+
+
+class Judge:
+    """Solves labellings, at the expense of a budget; pieces that come again are not solved again."""
+
+    def __init__(self, budget: Budget):
+        self.budget = budget
+        self._known: dict[bytes, PieceMesh | None] = {}
+
+    def __call__(self, candidates: Candidates, labels: NDArray[np.bool_]) -> Labelling[Candidates]:
+        """A labelling, its cost taken."""
+        labelling = Labelling.of(candidates, labels, self._known)
+        self.spend(labelling, 1 + len(labelling.pieces) // _MANY)
+        return labelling
+
+    def spend(self, labelling: Labelling, solves: float) -> None:
+        """Take what some solves of its size cost, or what is left."""
+        self.budget.take(min(solves * labelling.candidates.n_vertices, self.budget.left))
+
+    @property
+    def spent(self) -> bool:
+        """Whether it is time to give up."""
+        return self.budget.left <= 0
+
+
+def better(one: Labelling | None, other: Labelling) -> Labelling:
+    """The one with less misfit."""
+    return other if one is None or other.size < one.size else one
+
+
+def leapt(start: Labelling[Candidates], judge: Judge) -> Labelling[Candidates]:
+    """The best of what all clear changes at once lead to, uphill too: with many wrong cells the misfit is no guide."""
+    best = labelling = start
+    sheet, seen = Sheet(start.candidates, start.scale), {start.labels.tobytes()}
+    for _ in range(_LEAPS):
+        labels = leap(sheet, labelling.labels)
+        if labelling.fits or judge.spent or labels.tobytes() in seen:
+            break
+        seen.add(labels.tobytes())
+        labelling = judge(start.candidates, labels)
+        best = better(best, labelling)
+    return best
+
+
+class BestFirst:
+    """A search from one labelling, that has pieces.
+
+    Parameters
+    ----------
+    start : Labelling
+    free : (cells,) bool, optional
+        Labels that may change; all of them by default.
+    """
+
+    def __init__(self, start: Labelling[Candidates], free: NDArray[np.bool_] | None = None):
+        self.best = start
+        self._candidates, self._scale = start.candidates, start.scale
+        self._n_faces = int(start.candidates.sides[:, 0].max(initial=-1)) + 1
+        self._free = np.ones(start.candidates.count, dtype=bool) if free is None else free
+        self._seen: set[bytes] = set()
+        self._first = self._least = start.mean_misfit
+        self._ranked = self._in_vain = 0
+        # Misfit, more where batches have been tried, a number that settles ties, the labelling and its changes.
+        self._waiting: list[_Waiting] = [(self._least, -1, start, None)] if start.pieces else []
+
+    @cached_property
+    def _updates(self) -> Updates:
+        return Updates(Sheet(self._candidates, self._scale), self._free)
+
+    def run(self, judge: Judge) -> Labelling[Candidates]:
+        """Go on until a labelling fits, or the budget is spent, or the search is in vain; the best so far."""
+        while self._waiting and not (self.best.fits or judge.spent) and self._in_vain < _IN_VAIN:
+            value, number, labelling, changed = heapq.heappop(self._waiting)
+            if changed is None:
+                if self._hopeless:
+                    break
+                self._seen.add(self._updates.outline(labelling.labels))
+                self._ranked += 1
+                changed = self._changed(labelling)
+            asked = 0
+            for labels in islice(changed, _BATCH):
+                asked += 1
+                if judge.spent or self._tried(labels, labelling, judge) < _BETTER * value:
+                    break
+            else:
+                judge.spend(labelling, _RANKING)  # what leads on is not counted
+                value += _TRIED * labelling.mean_misfit
+            if asked:
+                heapq.heappush(self._waiting, (value, number, labelling, changed))
+        _log.debug("best-first: misfit %.1e, %d labellings ranked", self.best.size, self._ranked)
+        return self.best
+
+    @property
+    def _hopeless(self) -> bool:
+        """Whether the misfit, about proportional to the number of wrong labels, will not be gone falling as it has."""
+        return self._ranked >= 8 and self._ranked * self._least > _PATIENCE * (self._first - self._least)
+
+    def _changed(self, labelling: Labelling[Candidates]) -> Iterator[NDArray[np.bool_]]:
+        """Small changes of the labels; where the first few are in vain, also all clear ones at once."""
+        for k, move in enumerate(self._updates.ranked(labelling)):
+            if k == _BATCH and self._n_faces == self._candidates.count:
+                yield leap(self._updates.sheet, labelling.labels)
+            yield self._whole(turned(labelling.labels, move))
+
+    def _whole(self, labels: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """With cells on all edges, unless some cells claim no half-edges."""
+        if labels[self._n_faces :].any():
+            return labels
+        return chosen(self._candidates, np.where(labels, 1.0, -np.inf))
+
+    def _tried(self, labels: NDArray[np.bool_], before: Labelling, judge: Judge) -> float:
+        """The mean misfit of labels that have not been tried before."""
+        outline = self._updates.outline(labels)
+        if outline in self._seen or (labels != before.labels)[~self._free].any():
+            return np.inf
+        self._seen.add(outline)
+        trial = judge(self._candidates, labels)
+        self.best, value = better(self.best, trial), trial.mean_misfit
+        self._in_vain = 0 if value < self._least else self._in_vain + 1
+        self._least = min(value, self._least)
+        if trial.pieces:
+            heapq.heappush(self._waiting, (value, len(self._seen), trial, None))
+        return value

@@ -1,0 +1,53 @@
+"""Many labels turned over at once: those whose change explains the misfit best, to first order.
+
+With label s_k of each candidate the weights are w_e = 1/2 sum_k s_k cot_ke. At a map of some labels the misfit r is
+explained to first order by displacements d of the vertices, a change g of log c and changes ds of the labels:
+
+    minimise  | r - J d - g w - B ds |^2 + ridge^2 | ds |^2,        B_ek = 1/2 cot_ke.
+
+Displacements spread the misfit over the mesh, so that the largest residuals need not surround the wrong cell; the
+labels that take part in the best explanation do.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ...errors import RecoveryError
+from ...linalg import solved
+from ..candidates.choosing import chosen
+from ..relax.sheet import Sheet, unpinned
+
+_RIDGE = 0.1
+_HELD = 1e-12
+_CLEAR = 0.35
+"""A label that is to change by so much is turned over."""
+
+
+def leap(sheet: Sheet, labels: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(cells,) labels with all clear changes made; as they are where there is no map."""
+    strength = labels.astype(np.float64)
+    try:
+        placed = sheet.best_mapped(strength)
+        by_position, by_label, by_scale = sheet.linearised(placed, strength)
+        free = unpinned(placed.z)
+        columns = sp.hstack([by_position[:, free], sp.csr_array(by_scale[:, None]), by_label]).tocsr()
+        held = np.append(np.full(int(free.sum()) + 1, _HELD), np.full(by_label.shape[1], _RIDGE**2))
+        held[int(free.sum())] += 0.0 if sheet.free_scale else 1.0
+        solution = solved(
+            (columns.T @ columns + sp.diags_array(held)).tocsr(), columns.T @ sheet.misfit(placed, strength)
+        )
+    except RecoveryError:
+        return labels
+    changes = np.zeros(len(labels))
+    changes[sheet.chosen] = np.nan_to_num(solution[-by_label.shape[1] :])
+    gain = np.where(labels, -changes, changes)
+    top = float(gain.max(initial=0.0))
+    if top <= 0:
+        return labels
+    turned = gain >= (max(_CLEAR, 0.6 * top) if top > _CLEAR else 0.7 * top)
+    value = np.where(labels, 1.0, -np.inf)
+    value[turned] = np.where(labels[turned], -np.inf, 2.0 + changes[turned])
+    return chosen(sheet.candidates, value, labels + changes - 10.0 * (turned & labels))

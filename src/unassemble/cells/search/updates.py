@@ -1,0 +1,224 @@
+"""What small changes of the labels would leave, by the maps of :mod:`unassemble.cells.search.low_rank`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ...errors import RecoveryError
+from ...matrix.operator import row_sizes
+from ..judge.labelling import Labelling
+from ..relax.sheet import STEEPEST, Sheet
+from .low_rank import ChangedMaps
+from .moves import Move, Neighbours, turned
+
+_WORK = 3e5  # vertices times moves that are tried at a time, as much as some tens of solves take
+_MOST_MOVES = 1500
+_WORK_BESIDE = 2e6  # the same around a labelling that fits
+_BATCH = 5e4  # triangles times moves that are computed together
+_NEAR = 1e-3  # of the shift to the c at hand: so much nearer than to other maps, that one step tells
+_LEADERS = 60  # moves that are tried together with what they touch
+_AT_FIRST = 8  # moves that are given before those of three labels are told
+_NEAREST = 1e-6  # the same where the c is that of the mesh: maps that fit are told to about so much over their gap
+_FAINT = 1e-4  # mean misfit that they may leave then; some that do not fit leave 1e-5, and are to be solved for
+_FEW_EDGES = 24
+_STEEP = 5.0  # weights over row sizes beyond which they are those of flat triangles
+_GROSS = 0.5  # misfit above which an entry has no say in c
+
+
+class Updates:
+    """Changes of the labels in one embedding.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    free : (cells,) bool, optional
+        Labels that may change; all of them by default.
+    """
+
+    def __init__(self, sheet: Sheet, free: NDArray[np.bool_] | None = None):
+        self.sheet = sheet
+        self._free = sheet.chosen if free is None else sheet.chosen & free
+        self._near = Neighbours(sheet)
+        n, m = sheet.n_vertices, len(sheet.triangles)
+        smaller = row_sizes(n, sheet.edges, np.abs(sheet.weights))[sheet.edges].min(axis=1)
+        self._weights = sheet.weights / smaller
+        half = 0.5 / smaller[sheet.row.T.ravel()]
+        self._of_edge = sp.csc_array((half, (sheet.row.T.ravel(), np.arange(3 * m))), shape=(len(sheet.edges), 3 * m))
+
+    def outline(self, labels: NDArray[np.bool_]) -> bytes:
+        """The same for labels that make the same surface, whichever cells they put together or divide."""
+        return bytes(np.rint(self.sheet.around(labels.astype(np.float64))).astype(np.int8).tobytes())
+
+    def ranked(self, labelling: Labelling, *, leaders: int = _LEADERS, levels: int = 3) -> Iterator[Move]:
+        """Moves that leave least, the best first; what is in the way of a new cell goes.
+
+        Single labels and pairs, then also threes: these are told after a few of the others only.
+
+        Parameters
+        ----------
+        labelling : Labelling
+            In this drawing; with pieces.
+        leaders : int
+            Moves, the best, that are tried with what they touch.
+        levels : int
+            Labels in one move, at most.
+        """
+        labels = labelling.labels
+        try:
+            maps = ChangedMaps(self.sheet, labels, _NEAR)
+        except RecoveryError:
+            return
+        most = int(np.clip(_WORK / self.sheet.n_vertices, 1, _MOST_MOVES))
+        now = labels.tolist()
+        moves = list(dict.fromkeys(self._near.with_rivals(now, (k,)) for k in self._suspects(labelling)[:most]))
+        left = self._left(maps, labels, moves)
+        alone, given = self._alone(moves, left), set[Move]()
+        for level in range(2, levels + 1):
+            first = np.argsort(left, kind="stable")[:leaders].tolist()
+            more = self._joined(labels, {moves[k]: float(left[k]) for k in first}, alone, set(moves))[:most]
+            left = np.append(left, self._left(maps, labels, more))
+            moves += more
+            order = [k for k in np.argsort(left, kind="stable").tolist() if np.isfinite(left[k])]
+            for move in (moves[k] for k in order[: len(order) if level == levels else _AT_FIRST]):
+                if move not in given:
+                    given.add(move)
+                    yield move
+
+    def as_good(
+        self, labelling: Labelling, supposed: NDArray[np.bool_], usual: NDArray[np.bool_], more: list[Move]
+    ) -> Iterator[Move]:
+        """Moves after which a labelling that fits seems to fit still, those to the same surface left out; best first.
+
+        Single labels, of those (cells,) bool that are `supposed`; pairs of one of these, or of `more` moves, with one
+        that touches it, of the `usual` ones; and these `more` moves.
+        """
+        labels = labelling.labels
+        maps = ChangedMaps(self.sheet, labels, _NEAREST)
+        now = labels.tolist()
+        first = np.flatnonzero(self._free & supposed).tolist()
+        moves = list(dict.fromkeys([*more, *(self._near.with_rivals(now, (k,)) for k in first)]))
+        if not moves:
+            return
+        most = int(_WORK_BESIDE / self.sheet.n_vertices) + 1
+        left = self._left(maps, labels, moves)
+        leaders = dict(zip(moves, left.tolist(), strict=True))
+        pairs = self._joined(labels, leaders, self._alone(moves, left), set(moves), usual)[:most]
+        moves, left = moves + pairs, np.append(left, self._left(maps, labels, pairs, _FAINT))
+        seen = {self.outline(labels)}
+        for k in np.argsort(left, kind="stable").tolist():
+            if not left[k] <= _FAINT:
+                return
+            if (outline := self.outline(turned(labels, moves[k]))) not in seen:
+                seen.add(outline)
+                yield moves[k]
+
+    def _suspects(self, labelling: Labelling) -> list[int]:
+        """Candidates, those about the largest misfits first."""
+        sheet = self.sheet
+        at_vertex = np.bincount(labelling.edges.ravel(), np.repeat(labelling.misfit**2, 2), sheet.n_vertices)
+        cells = sheet.candidates.cells
+        owner = np.repeat(np.arange(cells.count), cells.size)
+        nearby = np.bincount(owner, at_vertex[cells.vertices], cells.count) / cells.size
+        order = np.argsort(-nearby, kind="stable")
+        return order[self._free[order]].tolist()
+
+    def _alone(self, moves: list[Move], left: NDArray) -> NDArray[np.float64]:
+        """(cells,) what is left after the change of one label, with what gives way; the most of all where not known."""
+        alone = np.full(self.sheet.candidates.count, np.max(left, initial=0.0, where=np.isfinite(left)))
+        np.minimum.at(alone, np.concatenate(moves), np.repeat(left, [len(move) for move in moves]))
+        return alone
+
+    def _joined(
+        self,
+        labels: NDArray[np.bool_],
+        leaders: dict[Move, float],
+        alone: NDArray,
+        told: set[Move],
+        others: NDArray[np.bool_] | None = None,
+    ) -> list[Move]:
+        """Leaders with another candidate that touches them, by what both leave alone: the most promising first.
+
+        Only with these `others`, (cells,) bool, if they are given.
+        """
+        promise: dict[Move, float] = {}
+        free, value = (self._free if others is None else self._free & others).tolist(), alone.tolist()
+        for move, left in leaders.items():
+            after = turned(labels, move).tolist()
+            for other in self._near.touching(move):
+                if other not in move and free[other]:
+                    both = tuple(sorted({*move} ^ {*self._near.with_rivals(after, (other,))}))
+                    promise[both] = min(promise.get(both, np.inf), left + value[other])
+        new = promise.keys() - told - {()}
+        return sorted(new, key=lambda both: (promise[both], both))
+
+    def _left(
+        self, maps: ChangedMaps, labels: NDArray[np.bool_], moves: list[Move], most: float = np.inf
+    ) -> NDArray[np.float64]:
+        """(moves,) mean misfit after each; infinite where there is no map, or where it is seen to be above `most`."""
+        triangles = max(int(np.count_nonzero(labels[self.sheet.cell])), 1)
+        batch = max(int(_BATCH / triangles), 1)
+        parts = [moves[k : k + batch] for k in range(0, len(moves), batch)]
+        return np.concatenate([np.empty(0), *(self._left_of_few(maps, labels, part, most) for part in parts)])
+
+    def _left_of_few(
+        self, maps: ChangedMaps, labels: NDArray[np.bool_], moves: list[Move], most: float
+    ) -> NDArray[np.float64]:
+        sheet, count = self.sheet, len(moves)
+        z = maps.after(labels, moves)
+        after = np.tile(labels[:, None], count)
+        after[np.concatenate(moves), np.repeat(np.arange(count), [len(move) for move in moves])] ^= True
+        left = np.full(count, np.inf)
+        hopeful = np.all(np.isfinite(z), axis=0)
+        if most < np.inf:  # few edges tell of nearly all that they leave more
+            edges = np.arange(0, len(self._weights), -(-len(self._weights) // _FEW_EDGES))
+            few = np.any(np.isin(sheet.row, edges), axis=1)
+            w = self._fitted(z[:, hopeful], after[:, hopeful], few)[edges]
+            hopeful[hopeful] = _misfits(w, self._weights[edges]).sum(axis=0) <= most * len(self._weights)
+        w = self._fitted(z[:, hopeful], after[:, hopeful])
+        left[hopeful] = _misfits(self._scales(w) * w, self._weights).mean(axis=0)
+        return left
+
+    def _fitted(
+        self, z: NDArray[np.complex128], labels: NDArray[np.bool_], among: NDArray[np.bool_] | None = None
+    ) -> NDArray[np.float64]:
+        """(e, k) half the cotangents over row sizes, for positions (n, k) and labels (cells, k).
+
+        Only from triangles `among` these, (m,) bool, if they are given.
+        """
+        sheet = self.sheet
+        used = np.any(labels, axis=1)[sheet.cell]
+        triangles = np.flatnonzero(used if among is None else used & among)
+        cotangent = _cotangents(z, sheet.triangles[triangles]) * labels[sheet.cell[triangles]]
+        columns = (triangles + len(sheet.cell) * np.arange(3)[:, None]).ravel()
+        return np.asarray(self._of_edge[:, columns] @ cotangent.reshape(len(columns), z.shape[1]))
+
+    def _scales(self, w: NDArray) -> NDArray[np.float64]:
+        """(k,) c for each column of weights over their row sizes, from those that it brings near the given ones."""
+        if not self.sheet.free_scale:
+            return np.ones(w.shape[1])
+        used = np.clip(w, -_STEEP, _STEEP)
+        for _ in range(3):
+            c = (self._weights @ used) / np.maximum((used * used).sum(axis=0), np.finfo(float).tiny)
+            used = np.where(np.abs(c * w - self._weights[:, None]) < _GROSS, w, 0.0)
+        return np.asarray(c)
+
+
+def _misfits(w: NDArray, weights: NDArray) -> NDArray[np.float64]:
+    """(e, k) by which each column differs from the weights, at most 1."""
+    misfit = np.abs(w - weights[:, None])
+    return np.asarray(np.where(misfit < 1, misfit, 1.0))
+
+
+def _cotangents(z: NDArray, triangles: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(3, m, k) at the corners of triangles (m, 3), for positions (n, k)."""
+    at = [z[corner] for corner in triangles.T]
+    sides = [at[k - 1] - at[k - 2] for k in range(3)]  # facing the corners
+    x, y = [side.real for side in sides], [side.imag for side in sides]
+    twice = x[0] * y[1] - y[0] * x[1]
+    with np.errstate(all="ignore"):
+        cotangent = np.stack([-(x[k - 1] * x[k - 2] + y[k - 1] * y[k - 2]) / twice for k in range(3)])
+    return np.asarray(np.nan_to_num(cotangent, posinf=STEEPEST, neginf=-STEEPEST))

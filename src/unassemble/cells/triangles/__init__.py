@@ -1,1 +1,0 @@
-"""Graphs of triangles and holes only, where nothing need have vanished."""

@@ -1,0 +1,1 @@
+"""Whether other cells fit as well: the same search with the answer excluded."""

@@ -1,0 +1,155 @@
+"""Other cells with the same entries: the search for labels with the answer excluded.
+
+A component of up to 1,000 rows is searched around its answer, all with low-rank updates of one conformal map:
+
+- one label or two that touch, turned over, one of them of a cell with a side that has vanished from the boundary: only
+  these come and go without leaving an edge bare;
+- a vertex at a right angle given up by a cell of more than three vertices;
+- two right angles at one vertex regrouped. A right angle a-h-b gives the edges h-a and h-b the cotangents |hb| / |ha|
+  and its inverse, whatever else there is; where another one, d-h-f, gives the same pair, a-h-f and b-h-d (or a-h-d and
+  b-h-f) give all four edges what they had.
+
+What then fits when solved by itself is another mesh with the same matrix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import chain, islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import RecoveryError
+from ...matrix import OperatorMatrix
+from ...topology import Numbering, Polygons, components
+from ...topology.embedding import face_complexes
+from ...topology.faces import FaceComplex, from_rotation
+from ...topology.keys import contains, pair_keys
+from ..candidates.candidates import Candidates
+from ..judge.labelling import Labelling
+from ..relax.sheet import Sheet
+from ..search.moves import Move, turned
+from ..search.updates import Updates
+from ..undivided import undivided
+from .around import Around, Cell, cycles
+from .cracks import cracked
+
+MOST_VERTICES = 1000
+"""Rows of a component around whose answer others are looked for: the cost grows like the square."""
+
+_RIGHT = 1e-6
+"""Cosine of a right angle, and relative difference of equal ratios, without noise."""
+
+_MOST_SOLVED = 60
+"""Labellings of a component that are solved for, of either kind."""
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """Another mesh that fits as well as the one found, in the place where they differ.
+
+    Attributes
+    ----------
+    cells, other_cells : tuple of tuple of int
+        Cells that only the one or the other has, rows in running order.
+    """
+
+    cells: tuple[Cell, ...]
+    other_cells: tuple[Cell, ...]
+
+    def renumbered(self, number: NDArray[np.int64]) -> Alternative:
+        """The same with row v called ``number[v]``."""
+        return Alternative(_named(self.cells, number), _named(self.other_cells, number))
+
+
+def alternatives(
+    stored: OperatorMatrix, cells: Polygons, z: NDArray[np.complex128], scale: float | None, agree: float
+) -> list[Alternative]:
+    """One other mesh for each component of up to 1,000 rows that has any.
+
+    Parameters
+    ----------
+    stored : OperatorMatrix
+        Without the vanished entries.
+    cells : Polygons
+        Of the mesh that was found, counter-clockwise.
+    z : (n,) complex128
+        Positions in the frame in which the operator is the Laplacian.
+    scale : float, optional
+        c, where it is known.
+    agree : float
+        Relative difference of numbers that noise may cause.
+    """
+    found = []
+    for part in components(stored.n, stored.edges):
+        if len(part.vertices) <= MOST_VERTICES:
+            other = _other(stored, part, _within(part, cells, stored.n), z[part.vertices], scale, max(agree, _RIGHT))
+            found += [] if other is None else [other]
+    return found
+
+
+def _within(part: Numbering, cells: Polygons, n: int) -> Polygons:
+    """The cells of a component in its numbering."""
+    number = np.full(n, -1)
+    number[part.vertices] = np.arange(len(part.vertices))
+    return cells.chosen(number[cells.vertices[cells.offsets[:-1]]] >= 0, number)
+
+
+def _other(
+    stored: OperatorMatrix, part: Numbering, cells: Polygons, z: NDArray, scale: float | None, agree: float
+) -> Alternative | None:
+    embedding = _embedding(part, z)
+    if embedding is None or not cells.count:
+        return None
+    errors = None if stored.errors is None else stored.errors[part.edge_rows]
+    candidates = Candidates.of(embedding, -stored.entries[part.edge_rows], scale, errors)
+    around = Around.of(candidates, cells, z, agree)
+    answer = Labelling.of(around.candidates, around.labels)
+    if not answer.fits:
+        return None
+    own = _cells_of(answer)
+    every = (around.regrouped, around.turned_over, _relabelled(around, answer))
+    for move in chain.from_iterable(islice(moves, _MOST_SOLVED) for moves in every):
+        other = Labelling.of(around.candidates, turned(answer.labels, move))
+        if other.fits and (others := _cells_of(other)) != own and not cracked(other):
+            return Alternative(*(_named(some, part.vertices) for some in (own - others, others - own)))
+    return None
+
+
+def _relabelled(around: Around, answer: Labelling[Candidates]) -> Iterator[Move]:
+    """Small changes that low-rank updates do not tell from the answer."""
+    with suppress(RecoveryError):
+        updates = Updates(Sheet(around.candidates, answer.scale))
+        yield from updates.as_good(answer, around.supposed, around.usual, around.reduced)
+
+
+def _named(cells: Iterable[Cell], rows: NDArray[np.int64]) -> tuple[Cell, ...]:
+    """By the rows of the matrix."""
+    return tuple(sorted(as_cell(rows[list(cell)].tolist()) for cell in cells))
+
+
+def _embedding(part: Numbering, z: NDArray[np.complex128]) -> FaceComplex | None:
+    """The graph as the mesh lies; where that is no embedding, as parts may lie on others, any."""
+    n, edges = len(part.vertices), part.edges
+    tail, head = np.concatenate([edges, edges[:, ::-1]]).T
+    order = np.lexsort((-np.angle(z[head] - z[tail]), tail))  # clockwise: faces run counter-clockwise, as cells do
+    embedding = from_rotation(n, edges, tail[order], head[order])
+    return embedding if embedding.is_sphere() else next(face_complexes(n, edges), None)
+
+
+def _cells_of(labelling: Labelling) -> set[Cell]:
+    """However they were put together."""
+    n = labelling.candidates.n_vertices
+    vanished = ~contains(pair_keys(n, *labelling.candidates.edges.T), pair_keys(n, *labelling.edges.T))
+    triangles, polygons = undivided(labelling.pieces, vanished)
+    return {as_cell(cell) for cell in (*triangles.tolist(), *cycles(polygons))}
+
+
+def as_cell(corners: list[int] | Cell) -> Cell:
+    """A cell by its corners in running order: the smallest first, then the smaller of its neighbours."""
+    place = min(range(len(corners)), key=corners.__getitem__)
+    cell = (*corners[place:], *corners[:place])
+    return cell if cell[1] < cell[-1] else (cell[0], *cell[:0:-1])
