@@ -15,6 +15,7 @@ from .atlas import NullFields, null_fields
 from .shape import EXACT, Shape, in_gauge, shape
 from .slender import affordable, unbent
 from .solution import Solution
+from .springs import drawn_together, without_springs
 
 # Gaps of thin pieces that as a whole cost no more than in charts, and lose no digits where these meet. The square of a
 # smaller one is too near to the shift with which normal matrices are factorised.
@@ -52,6 +53,7 @@ def placed(
     GeometryError
         If no piece has positions.
     """
+    nodal, valid = without_springs(nodal, valid)
     component, n_pieces = pieces_of(nodal, valid)
     graph = nodal.graph
     points = np.full((nodal.n, nodal.dim), np.nan)
@@ -93,6 +95,7 @@ def placed(
                 evidence[-1] = replace(evidence[-1], residual=residual, settled=settled)
         freedoms.append(one.freedom)
         exact.append(one.exact)
+    points[drawn_together(nodal, valid, points)] = np.nan
     if not exact:
         raise failure or GeometryError("no row annihilates constants: no node has a valid equation")
     component = np.where(determined(points), component, -1)
