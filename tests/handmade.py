@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from meshes import edge_list, random_mesh
-from unassemble.elasticity.elements.kinds import KINDS
-from unassemble.elasticity.elements.reference import reference_nodes
+from unassemble.elements.kinds import KINDS
+from unassemble.elements.reference import reference_nodes
 from unassemble.recovery import Recovery
 from unassemble.topology import recognise
 

@@ -65,17 +65,30 @@ def test_nodes_that_hang_on_one_spring_have_no_position(kind, spring_kind, clamp
     assert_body_alone_is_placed(as_given(case, (on_plane(case, 0) & clamped)[:, None] & np.ones(case.dim, bool)), n)
 
 
+@pytest.mark.parametrize("spring_kind", ["axial", "scalar"])
 @pytest.mark.parametrize("grounded", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_web_of_springs_has_no_position_and_leaves_the_body_its_own(kind, grounded):
-    """The web would be drawn together, or hold two nodes of the body in one place."""
+def test_a_ring_of_springs_has_no_position_and_leaves_the_body_its_own(kind, grounded, spring_kind):
+    """The ring would be drawn together, and hold two nodes of the body in one place."""
     rng = np.random.default_rng(2)
     body = permuted_nodes(stiffness(kind, box(kind, KINDS[kind], perturb=0.2), lam=1.5), seed=2)
     n = len(body.points)
     first, second = rng.choice(n, 2, replace=False).tolist()
-    pairs = [(n, first), (n + 1, second), *((n + a, n + b) for b in range(4) for a in range(b))]
-    case = with_springs(body, pairs, "scalar", rng, grounded=(n + 2,) if grounded else ())
-    assert_body_alone_is_placed(as_given(case, np.zeros(case.points.shape, dtype=bool)), n)
+    pairs = [(n, first), (n + 1, second), *((n + k, n + (k + 1) % 4) for k in range(4))]
+    case = with_springs(body, pairs, spring_kind, rng, grounded=(n + 2,) if grounded else ())
+    case = as_given(case, np.zeros(case.points.shape, dtype=bool))
+    assert_body_alone_is_placed(case, n)
+    assert any("4 nodes hang on springs" in warning for warning in recover_elasticity(case.matrix).warnings)
+
+
+def test_springs_from_node_to_node_of_a_body_leave_it_as_it_is():
+    body = permuted_nodes(stiffness("quad-q1", box("quad-q1", (7, 6), perturb=0.2), lam=1.5), seed=3)
+    left, right = (np.flatnonzero(on_plane(body, 0, x)) for x in (0.0, 1.0))
+    case = with_springs(body, list(zip(left, right, strict=True)), "axial", np.random.default_rng(3))
+    case = as_given(case, np.zeros(case.points.shape, dtype=bool))
+    found = recover_elasticity(case.matrix)
+    assert found.cells.n_cells == len(body.cells)
+    assert judged(found, case).error < 1e-10
 
 
 def test_random_springs_are_never_certified_and_wrong():

@@ -9,20 +9,22 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .elements.cells import Cells
+from .materials.cells import Cells
 from .nodal import NodalMatrix, annihilating, determined, without_trace
 from .nullspace.solution import Solution
 from .rows.grouping import by_first_row
 from .rows.numbering import Numbering
 from .rows.orders import ORDERS
+from .springs import without_springs
 
 
 def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
-    """Mark nodes whose rows may be those of two halves of one: near, with no direction in common.
+    """Take springs out, and mark nodes whose rows may be those of two halves of one: near, no direction in common.
 
     Where all entries are stored the halves of a node couple to the same nodes; and where unknowns stand in order, it
     tells which of them are in doubt. Where order alone joined rows that couple to different nodes, so are theirs.
     """
+    nodal = without_springs(nodal)
     inferred = numbering.common < 1 and numbering.kind != "given"
     mixed = _mixed(nodal) if inferred else np.zeros(nodal.n, dtype=bool)
     nodal = replace(nodal, sure=_sure(nodal, numbering))

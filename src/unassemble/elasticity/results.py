@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .elements.cells import Cells
+from .materials.cells import Cells
 from .modes import rigid_body_modes
 from .rows.numbering import Numbering
 

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..words import count_of
-from .elements.cells import Cells
+from .materials.cells import Cells
 from .nodal import NodalMatrix, without_trace
 from .nullspace.shape import SOFT
 from .nullspace.solution import Solution

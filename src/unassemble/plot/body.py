@@ -84,7 +84,7 @@ def _draw_surface(ax: Axes, recovery: Recovery, flat: NDArray, depth: NDArray) -
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import to_rgb
 
-    from ..elasticity.elements.surface import outer_facets
+    from ..elements.surface import outer_facets
 
     polygons: list[NDArray] = []
     normals, away = [np.empty((0, 3))], [np.empty(0)]
@@ -115,7 +115,7 @@ def _draw_surface(ax: Axes, recovery: Recovery, flat: NDArray, depth: NDArray) -
 def _draw_cells(ax: Axes, recovery: Recovery, flat: NDArray) -> None:
     from matplotlib.collections import LineCollection, PolyCollection
 
-    from ..elasticity.elements.surface import planar_outlines
+    from ..elements.surface import planar_outlines
 
     for kind, cells in recovery.cells.items():
         ax.add_collection(

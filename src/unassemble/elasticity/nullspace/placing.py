@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from ...errors import GeometryError
 from ..nodal import NodalMatrix, determined, linked
 from ..results import Evidence
+from ..springs import drawn_together
 from .atlas import NullFields, null_fields
 from .shape import EXACT, Shape, in_gauge, shape
 from .slender import affordable, unbent
 from .solution import Solution
-from .springs import drawn_together, without_springs
 
 # Gaps of thin pieces that as a whole cost no more than in charts, and lose no digits where these meet. The square of a
 # smaller one is too near to the shift with which normal matrices are factorised.
@@ -53,7 +53,6 @@ def placed(
     GeometryError
         If no piece has positions.
     """
-    nodal, valid = without_springs(nodal, valid)
     component, n_pieces = pieces_of(nodal, valid)
     graph = nodal.graph
     points = np.full((nodal.n, nodal.dim), np.nan)

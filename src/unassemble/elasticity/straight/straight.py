@@ -2,8 +2,8 @@
 
 Where a homogeneous body is held all around, no boundary term is left that would fix the axes: the identities have more
 solutions than translations and scale. With the boundary terms known to vanish, inside, they are scalar equations, the
-same for each coordinate, among whose solutions are the affine functions. These make up an affine picture of the piece
-(:mod:`.pictures`), of which :mod:`.frame` finds the axes.
+same for each coordinate, whose solutions are the affine functions. Any d of these are an affine picture of the piece,
+of which :mod:`.frame` finds the axes.
 """
 
 from __future__ import annotations
@@ -12,18 +12,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
+from ...linalg import svd
 from ..nodal import NodalMatrix, determined
 from ..nullspace.atlas import null_fields
-from ..nullspace.identities import no_terms
+from ..nullspace.identities import identities, no_terms
 from ..nullspace.placing import pieces_of
-from ..nullspace.shape import EXACT, in_gauge
+from ..nullspace.shape import EXACT, in_gauge, set_aside
 from ..nullspace.solution import Solution
 from ..results import Evidence
 from .frame import frame
-from .pictures import picture
-from .rigid import interchangeable, rigid
+
+_NONE = 1e-6  # singular value of functions that are none, beside others of norm one
 
 Rows = tuple[NodalMatrix, NDArray[np.bool_]]  # which of them are valid, (n, d, d) or (n, d, d, d)
 
@@ -103,18 +105,67 @@ def _straight(
         exact = null.values <= EXACT
         if not len(exact) or exact[-1] or exact.sum() <= nodal.dim:
             continue
-        shown = picture(nodal, inside, null.nodes, null.fields[..., exact])
-        one = None if shown is None else frame(nodal, shown.points)
-        if shown is None or one is None:
+        shown = _picture(nodal, inside, null.nodes, null.fields[..., exact])
+        told = None if shown is None else frame(nodal, shown[0])
+        if shown is None or told is None:
             continue
-        body = determined(shown.points)
-        points = np.full_like(shown.points, np.nan)
-        points[body] = in_gauge(shown.points[body] @ one.map.T, graph[body][:, body])
-        models = tuple(replace(model, points=points) for model in one.models)
-        told = not shown.told_by_cells or not interchangeable(nodal, inside, body)
-        if told and (not shown.told_by_cells or rigid(models, one.entries, one.ratio, shown.functions)):
-            residual, gap = map(float, null.values[[nodal.dim, exact.sum()]])
-            yield Straight(points, one.ratio, Evidence(shown.fields, residual, gap, null.rows))
+        (points, fields), (matrix, ratio) = shown, told
+        body = determined(points)
+        points[body] = in_gauge(points[body] @ matrix.T, graph[body][:, body])
+        residual, gap = map(float, null.values[[nodal.dim, exact.sum()]])
+        yield Straight(points, ratio, Evidence(fields, residual, gap, null.rows))
+
+
+def _picture(
+    nodal: NodalMatrix, inside: NDArray[np.bool_], nodes: NDArray[np.int64], null: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], int] | None:
+    """An affine picture among null fields, (n, d), NaN elsewhere, and how many of the fields it has; None if none.
+
+    Parameters
+    ----------
+    nodal : NodalMatrix
+    inside : (n, d, d) bool
+        Rows whose boundary terms vanish in homogeneous material.
+    nodes : (N,) int64
+        Of the piece.
+    null : (N, d, k) float64
+        Orthonormal fields that satisfy its identities.
+    """
+    if not inside[nodes].any():
+        return None
+    null = _without_terms(nodal, inside, nodes, null)
+    d, functions = nodal.dim, _functions(null)
+    held = np.ones(len(nodes), dtype=bool)
+    if functions.shape[1] > d:  # those of nodes that can move by themselves are among them
+        _, loose = set_aside(np.column_stack([np.full(len(nodes), len(nodes) ** -0.5), functions])[:, None], d + 1)
+        held = ~loose
+        functions = _functions(null[held])
+    if functions.shape[1] != d:
+        return None
+    points = np.full((nodal.n, d), np.nan)
+    points[nodes[held]] = functions
+    return points, int((scipy.linalg.svdvals(null[held].reshape(-1, null.shape[2])) > _NONE).sum())
+
+
+def _without_terms(
+    nodal: NodalMatrix, inside: NDArray[np.bool_], nodes: NDArray[np.int64], null: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(N, d, k') those of the fields without boundary terms inside."""
+    n, d, k = null.shape
+    place = np.full(nodal.n, -1)
+    place[nodes] = np.arange(n)
+    scalar = identities(nodal, inside, nodes, no_terms(d))
+    residual = scalar.residual(null[place[scalar.columns]]).reshape(-1, k)
+    _, values, v = svd(np.linalg.qr(residual, mode="r"))
+    kept = np.concatenate([values, np.zeros(k - len(values))]) <= 10 * EXACT
+    return np.asarray(null.reshape(-1, k) @ v[kept].T).reshape(n, d, -1)
+
+
+def _functions(null: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, m) orthonormal basis of all components of the fields, constants aside."""
+    flat = (null - null.mean(axis=0)).reshape(len(null), -1)
+    u, s, _ = svd(flat, full_matrices=False)
+    return np.asarray(u[:, s > _NONE * max(s.max(initial=0), _NONE)])
 
 
 def in_place(found: Solution | None, valid: NDArray[np.bool_], straight: list[Straight]) -> Solution:
