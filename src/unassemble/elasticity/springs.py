@@ -31,7 +31,7 @@ def without_springs(nodal: NodalMatrix) -> NodalMatrix:
     alone = (common.data <= 2) & (i != j) & (nodal.data != 0).any(axis=(1, 2))  # each of the two is its own neighbour
     if not alone.any():
         return nodal
-    whole = valid_pairs(nodal).all(axis=(1, 2))
+    whole = np.asarray(valid_pairs(nodal).all(axis=(1, 2)))
     alone &= whole[i] | whole[j]
     data = nodal.data.copy()
     np.add.at(data, np.flatnonzero(i == j)[i[alone]], data[alone])

@@ -40,20 +40,11 @@ def about_open_rows(numbering: Numbering) -> str:
 def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solution) -> str:
     """Why the fields that are left say nothing of positions; empty where they are few, or nodes are beyond doubt.
 
-    Where it is not known which rows are one node's, those that are left move rows of one direction only, as if there
-    were more nodes; and the points that belong to rows of several nodes are none of the body's.
+    The points that belong to rows of several nodes are none of the body's.
     """
     if not any(solution.freedoms):
         return ""
-    if "hourglass" in solution.freedoms and about_open_rows(numbering):
-        return about_open_rows(numbering)
     odd = int(np.asarray(without_trace(nodal).any(axis=1)).sum()) if numbering.open_row is None else 0
-    inferred = numbering.kind == "pattern" and numbering.incomplete and numbering.open_row is None
-    if not odd and inferred and "hourglass" in solution.freedoms:
-        return (
-            "which rows belong to one node, and to which direction, was inferred, and fields are left that move rows "
-            "of one direction only, as where rows of one node were not joined; give the numbering if it is known"
-        )
     if not odd:
         return ""
     return (
@@ -75,9 +66,6 @@ _MISREAD = ", or to other nodes and directions than was inferred; give the numbe
 _FREEDOMS = {
     "axes": "each axis keeps a scale of its own",
     "affine": "an affine map stays free, since the material around every valid row is homogeneous",
-    "hourglass": "fields that move points in one direction only may be added in each: hourglass modes of reduced "
-    "integration, or smooth ones where a homogeneous body is held on its whole boundary; the points are the smoothest "
-    "that fit",
 }
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .cliques import Graph, largest_cliques, shared_cliques, simplices, straight_simplices
+from .cliques import Graph, shared_cliques, simplices, straight_simplices
 from .kinds import KINDS, Kind
 from .ordering import ordered
 from .overlap import convex, unpierced, without_diagonals
@@ -52,11 +52,6 @@ def candidates(graph: Graph, points: NDArray[np.float64]) -> Iterator[tuple[Bloc
         cells = ordered(sets, points, kind)
         if len(np.unique(cells)) > _COVERED * known:
             yield (Block(kind, cells),)
-            if not kind.simplex:
-                more = ordered(largest_cliques(graph, sets, kind.nodes), points, kind)
-                more = more[convex(more, points, kind)]
-                if len(more):
-                    yield (Block(kind, np.vstack([cells, more])),)
         if kind.name == "quad":
             quads = Block(kind, cells[convex(cells, points, kind)])
             beside = without_diagonals(graph, quads.cells)

@@ -102,7 +102,7 @@ def placed(
 
 
 def _shape(found: NullFields, graph: sp.csr_array, told: NDArray[np.bool_], common: int | None) -> Shape:
-    return shape(found.fields, found.values, graph[found.nodes][:, found.nodes], told[found.nodes], common)
+    return shape(found.fields, found.values, told[found.nodes], common)
 
 
 def _thin(found: NullFields, one: Shape, graph: sp.csr_array) -> bool:
