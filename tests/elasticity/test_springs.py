@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from assembled import Assembled, box, on_plane, permuted_nodes, stiffness
+from assembled import Assembled, box, error, on_plane, permuted_nodes, stiffness
 from supported import Given, judged
 
 from unassemble.elasticity import recover_elasticity
@@ -89,6 +89,22 @@ def test_springs_from_node_to_node_of_a_body_leave_it_as_it_is():
     found = recover_elasticity(case.matrix)
     assert found.cells.n_cells == len(body.cells)
     assert judged(found, case).error < 1e-10
+
+
+def test_two_bodies_joined_by_springs_are_two_pieces():
+    """Whatever lies between them is not in the matrix."""
+    one = stiffness("quad-q1", box("quad-q1", (5, 5), perturb=0.2), lam=1.5)
+    other = stiffness("tri-p1", box("tri-p1", (5, 6), perturb=0.2), lam=2.0)
+    n = len(one.points)
+    top, bottom = np.flatnonzero(on_plane(one, 1, 1.0)), np.flatnonzero(on_plane(other, 1))
+    matrix = sp.block_diag([one.matrix, other.matrix], format="csr")
+    both = Assembled(matrix, np.vstack([one.points, other.points + [0.0, 1.3]]), one.cells)
+    case = with_springs(both, list(zip(top, n + bottom, strict=True)), "axial", np.random.default_rng(0))
+    found = recover_elasticity(case.matrix[: -4 * 2, : -4 * 2])
+    assert found.certified
+    assert len(found.evidence) == 2
+    for piece, truth in enumerate((one.points, other.points)):
+        assert error(found.points[found.component == piece], truth) < 1e-10
 
 
 def test_random_springs_are_never_certified_and_wrong():

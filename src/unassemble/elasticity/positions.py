@@ -62,7 +62,7 @@ def _solve(nodal: NodalMatrix, patch: int | None) -> Solution:
             if completed is not None:
                 found = _with_planes(*completed, found, rows, patch)
         if strict and not (found is not None and found.unique):
-            found = straightened(nodal, found, valid, completed, patch)
+            found = straightened(nodal, found, valid, patch)
             if found is not None and found.straight and found.planes:  # elements told axes only
                 found = replace(found, hanging=determined(found.points))
         if found is None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from ...linalg import svd
 from ..nodal import NodalMatrix, determined
 from ..nullspace.atlas import null_fields
-from ..nullspace.identities import identities, no_terms
+from ..nullspace.identities import no_terms
 from ..nullspace.placing import pieces_of
 from ..nullspace.shape import EXACT, in_gauge, set_aside
 from ..nullspace.solution import Solution
@@ -26,8 +27,6 @@ from ..results import Evidence
 from .frame import frame
 
 _NONE = 1e-6  # singular value of functions that are none, beside others of norm one
-
-Rows = tuple[NodalMatrix, NDArray[np.bool_]]  # which of them are valid, (n, d, d) or (n, d, d, d)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +48,9 @@ class Straight:
 
 
 def straightened(
-    nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.bool_], completed: Rows | None, patch: int | None
+    nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.bool_], patch: int | None
 ) -> Solution | None:
     """The solution with as many of its bent pieces straight as elements explain; unchanged where there are none.
-
-    All identities place more nodes than those of rows inside alone, which have fewer solutions. So these are for
-    pieces of which the first show no picture.
 
     Parameters
     ----------
@@ -63,23 +59,11 @@ def straightened(
         None where the identities determine nothing.
     valid : (n, d, d) bool
         By the strict rule.
-    completed : (NodalMatrix, (n, d, d, d) bool), optional
-        What rows next to rollers say too; see :mod:`.planes`.
     patch : int, optional
         Most nodes per chart.
     """
-    bent = _bent(nodal, found)
-    inside = valid & (valid.all(axis=(1, 2)) & bent)[:, None, None]
-    if not inside.any():
-        return found
-    straight: list[Straight] = []
-    if found is not None:
-        rows, used = completed if completed is not None and found.planes else (nodal, found.valid)
-        used = used & bent.reshape(-1, *(1,) * (used.ndim - 1))
-        straight += _straight(nodal, inside, (rows, used), None, patch)
-        for one in straight:
-            inside = inside & (found.component != one.piece_in(found))[:, None, None]
-    straight += _straight(nodal, inside, (nodal, inside), no_terms(nodal.dim), patch)
+    inside = valid & (valid.all(axis=(1, 2)) & _bent(nodal, found))[:, None, None]
+    straight = list(_straight(nodal, inside, patch)) if inside.any() else []
     return in_place(found, valid, straight) if straight else found
 
 
@@ -90,75 +74,51 @@ def _bent(nodal: NodalMatrix, found: Solution | None) -> NDArray[np.bool_]:
     return np.isin(found.component, [piece for piece, freedom in enumerate(found.freedoms) if freedom])
 
 
-def _straight(
-    nodal: NodalMatrix,
-    inside: NDArray[np.bool_],
-    rows: Rows,
-    terms: NDArray[np.float64] | None,
-    patch: int | None,
-) -> Iterator[Straight]:
-    """Pieces that these rows hold together, and of which elements tell the axes."""
-    component, n_pieces = pieces_of(*rows)
+def _straight(nodal: NodalMatrix, inside: NDArray[np.bool_], patch: int | None) -> Iterator[Straight]:
+    """Pieces that rows inside, (n, d, d) bool, hold together, and of which elements tell the axes."""
+    component, n_pieces = pieces_of(nodal, inside)
     graph = nodal.graph
     for piece in range(n_pieces):
-        null = null_fields(*rows, np.flatnonzero(component == piece), patch=patch, terms=terms)
+        body = np.flatnonzero(component == piece)
+        null = null_fields(nodal, inside, body, patch=patch, terms=no_terms(nodal.dim))
         exact = null.values <= EXACT
         if not len(exact) or exact[-1] or exact.sum() <= nodal.dim:
             continue
-        shown = _picture(nodal, inside, null.nodes, null.fields[..., exact])
-        told = None if shown is None else frame(nodal, shown[0])
-        if shown is None or told is None:
+        shown = _picture(null.fields[..., exact])
+        if shown is None:
             continue
-        (points, fields), (matrix, ratio) = shown, told
-        body = determined(points)
-        points[body] = in_gauge(points[body] @ matrix.T, graph[body][:, body])
+        points = np.full((nodal.n, nodal.dim), np.nan)
+        points[null.nodes[shown.held]] = shown.points
+        told = frame(nodal, points)
+        if told is None:
+            continue
+        matrix, ratio = told
+        here = determined(points)
+        points[here] = in_gauge(points[here] @ matrix.T, graph[here][:, here])
         residual, gap = map(float, null.values[[nodal.dim, exact.sum()]])
-        yield Straight(points, ratio, Evidence(fields, residual, gap, null.rows))
+        yield Straight(points, ratio, Evidence(shown.fields, residual, gap, null.rows))
 
 
-def _picture(
-    nodal: NodalMatrix, inside: NDArray[np.bool_], nodes: NDArray[np.int64], null: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], int] | None:
-    """An affine picture among null fields, (n, d), NaN elsewhere, and how many of the fields it has; None if none.
+class _Picture(NamedTuple):
+    """Which nodes are held, (N,), an affine picture of these, (N', d), and how many of the fields they share."""
 
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    inside : (n, d, d) bool
-        Rows whose boundary terms vanish in homogeneous material.
-    nodes : (N,) int64
-        Of the piece.
-    null : (N, d, k) float64
-        Orthonormal fields that satisfy its identities.
-    """
-    if not inside[nodes].any():
-        return None
-    null = _without_terms(nodal, inside, nodes, null)
-    d, functions = nodal.dim, _functions(null)
-    held = np.ones(len(nodes), dtype=bool)
+    held: NDArray[np.bool_]
+    points: NDArray[np.float64]
+    fields: int
+
+
+def _picture(null: NDArray[np.float64]) -> _Picture | None:
+    """An affine picture among fields (N, d, k) without boundary terms; None where there is more than that."""
+    d, functions = null.shape[1], _functions(null)
+    held = np.ones(len(null), dtype=bool)
     if functions.shape[1] > d:  # those of nodes that can move by themselves are among them
-        _, loose = set_aside(np.column_stack([np.full(len(nodes), len(nodes) ** -0.5), functions])[:, None], d + 1)
-        held = ~loose
+        constant = np.full(len(null), len(null) ** -0.5)
+        held = ~set_aside(np.column_stack([constant, functions])[:, None], d + 1)[1]
         functions = _functions(null[held])
     if functions.shape[1] != d:
         return None
-    points = np.full((nodal.n, d), np.nan)
-    points[nodes[held]] = functions
-    return points, int((scipy.linalg.svdvals(null[held].reshape(-1, null.shape[2])) > _NONE).sum())
-
-
-def _without_terms(
-    nodal: NodalMatrix, inside: NDArray[np.bool_], nodes: NDArray[np.int64], null: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(N, d, k') those of the fields without boundary terms inside."""
-    n, d, k = null.shape
-    place = np.full(nodal.n, -1)
-    place[nodes] = np.arange(n)
-    scalar = identities(nodal, inside, nodes, no_terms(d))
-    residual = scalar.residual(null[place[scalar.columns]]).reshape(-1, k)
-    _, values, v = svd(np.linalg.qr(residual, mode="r"))
-    kept = np.concatenate([values, np.zeros(k - len(values))]) <= 10 * EXACT
-    return np.asarray(null.reshape(-1, k) @ v[kept].T).reshape(n, d, -1)
+    fields = int((scipy.linalg.svdvals(null[held].reshape(-1, null.shape[2])) > _NONE).sum())
+    return _Picture(held, functions, fields)
 
 
 def _functions(null: NDArray[np.float64]) -> NDArray[np.float64]:
