@@ -51,7 +51,6 @@ def shape(
     fields: NDArray[np.float64],
     values: NDArray[np.float64],
     told: NDArray[np.bool_],
-    common: int | None = None,
 ) -> Shape:
     """Find the coordinates among the least singular fields.
 
@@ -63,8 +62,6 @@ def shape(
         Increasing singular values.
     told : (n,) bool
         Nodes with a valid row of their own; supports do not leave these loose.
-    common : int, optional
-        Fields that the nodes share which are not loose: d + 1, translations and scale, where not given.
 
     Raises
     ------
@@ -74,7 +71,7 @@ def shape(
     n, d, k = fields.shape
     if k <= d:
         raise GeometryError(f"{n} nodes with valid rows are too few to tell their positions")
-    common = d + 1 if common is None else common
+    common = d + 1  # translations and scale
     exact = values[d] <= EXACT
     count = int((values <= EXACT).sum()) if exact else d + 1
     null, loose = fields[..., :count], np.zeros(n, dtype=bool)
