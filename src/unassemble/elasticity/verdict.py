@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
+from ..tolerances import CERTIFIED
 from ..words import count_of
 from .materials.cells import Cells
 from .nodal import NodalMatrix, without_trace
@@ -13,7 +14,6 @@ from .nullspace.solution import Solution
 from .ordered.rounded import Rounding
 from .rows.numbering import Numbering
 
-CERTIFIED = 1e-9
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
 NOTHING_SHOWN = "no node is left whose rows are shown to be its own and whose coordinates hang on no assumption"
 NOTHING_LEFT = (

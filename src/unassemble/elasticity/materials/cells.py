@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from ...elements.candidates import Block, candidates
 from ...elements.cliques import Graph
 from ...elements.surface import tiles
+from ...tolerances import CERTIFIED
 from ..nodal import NodalMatrix, determined, surrounded, valid_pairs
-from .entries import FITS, Entries, Pairs
+from .entries import Entries, Pairs
 from .fits import Fit, fits
 
 _EMPTY = 1e-7  # of the largest coefficient; candidates below carry no material
@@ -169,7 +170,7 @@ def _accepted(fit: Fit) -> Cells | None:
     A quadratic triangle, for one, is a combination of small linear ones and a large one with a negative modulus.
     """
     lame = fit.lame
-    if not fit.misfit <= FITS or not lame.any():
+    if not fit.misfit <= CERTIFIED or not lame.any():
         return None
     carries = np.abs(lame).max(axis=1) > _EMPTY * np.abs(lame).max()
     parts = np.split(carries, np.cumsum([len(one.cells) for one in fit.blocks])[:-1])

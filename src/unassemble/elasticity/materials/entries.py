@@ -13,9 +13,9 @@ from ...elements.cliques import Graph
 from ...elements.kinds import Kind
 from ...elements.matrices import elasticity
 from ...elements.reference import Rule
+from ...tolerances import CERTIFIED
 from ..nodal import NodalMatrix, valid_pairs
 
-FITS = 1e-9  # relative misfit of an entry that is rounding
 _AT_ONCE = 8_000_000  # numbers in the blocks and gradients of one batch of cells
 
 
@@ -94,7 +94,7 @@ class Entries:
         """(n, d) unknowns whose rows have one of these entries that is not zero."""
         seen = np.zeros((self.n, self.value.shape[1]), dtype=bool)
         i, j = np.divmod(self.key, self.n)
-        entry = np.abs(self.value) > FITS * self.size[:, None, None]
+        entry = np.abs(self.value) > CERTIFIED * self.size[:, None, None]
         np.logical_or.at(seen, i, entry.any(axis=2))
         np.logical_or.at(seen, j, entry.any(axis=1))
         return seen
@@ -106,7 +106,7 @@ class Entries:
         quadratic triangle, and the corner facing it; or two nodes on rollers. Its entries with others of that cell
         tell, and what both ends of such an entry couple to are the nodes of the cell.
         """
-        outside = np.abs(self.value).max(axis=(1, 2)) > FITS * self.size
+        outside = np.abs(self.value).max(axis=(1, 2)) > CERTIFIED * self.size
         for own in pairs:
             outside[own.place[own.there]] = False
         i, j = np.divmod(self.key, self.n)

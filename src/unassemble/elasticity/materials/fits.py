@@ -19,7 +19,8 @@ from ...errors import SolverError
 from ...linalg import threads
 from ...linalg.factorisation import factorisation
 from ...linalg.upper import UpperTriangle
-from .entries import FITS, Entries, Model, Pairs, added, claims
+from ...tolerances import CERTIFIED
+from .entries import Entries, Model, Pairs, added, claims
 
 _ROUNDS = 6  # cells next to supports may wait for their neighbours
 _INDEPENDENT = 1e-10  # least eigenvalue of the scaled normal equations of a cell whose coefficients show
@@ -94,7 +95,7 @@ def _likely_rule(points: NDArray, block: Block, entries: Entries, beside: Sequen
     rich = np.flatnonzero(own.sum(axis=1) >= np.median(own.sum(axis=1)))
     some = rich[:: max(len(rich) // _SAMPLE, 1)]
     few = entries.at(np.unique(pairs.place[some][own[some]]))
-    best, chosen = FITS, None
+    best, chosen = CERTIFIED, None
     for rule in rules(block.kind) if len(few.key) else ():
         found, rest = cell_by_cell(Model(points, block.cells[some], block.kind, rule), few)
         if np.isfinite(found).all() and rest.largest < 0.1 * best:  # where geometry is affine they all fit
@@ -160,7 +161,7 @@ def one_material(model: Model, entries: Entries, ratio: float) -> tuple[NDArray[
     full = model.assembled(pairs, entries, np.ones((len(model.cells), 1)) * [ratio, 1])
     mu = _usual_factor(full, entries.value)
     rest = replace(entries, value=entries.value - mu * full)
-    poor = np.abs(rest.value).max(axis=(1, 2)) > FITS * entries.size
+    poor = np.abs(rest.value).max(axis=(1, 2)) > CERTIFIED * entries.size
     suspects = np.flatnonzero((poor[pairs.place] | ~pairs.there).all(axis=1))
     moduli = np.full(len(model.cells), mu)
     if mu == 0 or not 0 < len(suspects) < _FEW * len(model.cells):

@@ -27,8 +27,9 @@ from numpy.typing import NDArray
 from ...elements.candidates import Block, candidates
 from ...elements.reference import rules
 from ...elements.surface import contested
+from ...tolerances import CERTIFIED
 from ..materials.cells import coupled
-from ..materials.entries import FITS, Entries, Model, Pairs
+from ..materials.entries import Entries, Model, Pairs
 from ..nodal import NodalMatrix, determined
 
 _ROWS = 2000  # nodes whose rows are fitted; re-assembly looks at all of them
@@ -96,7 +97,7 @@ def _tensors(tables: NDArray, values: NDArray) -> NDArray[np.float64] | None:
     if len(design) < d * d:
         return None
     solution, _, rank, size = scipy.linalg.lstsq(design, right, cond=_INDEPENDENT)
-    if rank < d * (d + 1) // 2 or size[0] == 0 or np.abs(design @ solution - right).max() > FITS:
+    if rank < d * (d + 1) // 2 or size[0] == 0 or np.abs(design @ solution - right).max() > CERTIFIED:
         return None
     t = solution.T.reshape(d, d, d, d)
     return np.asarray((t + t.swapaxes(2, 3)) / 2)
@@ -124,6 +125,6 @@ def _isotropic(tensors: NDArray[np.float64]) -> tuple[NDArray[np.float64], float
     u = scipy.linalg.polar(u)[0]
     model = kappa / 2 * (np.einsum("ca,be->cbae", u, u) + np.einsum("ba,ce->cbae", u, u))
     model += mu * np.einsum("cb,ae->cbae", np.eye(d), np.eye(d))
-    if not (mu > 0 and np.abs(r - model).max() <= FITS * kappa):
+    if not (mu > 0 and np.abs(r - model).max() <= CERTIFIED * kappa):
         return None
     return u @ inverse, float(kappa / mu - 1)
