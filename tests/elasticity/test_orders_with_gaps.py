@@ -141,7 +141,7 @@ def test_no_direction_that_sums_prove_is_wrong():
 @pytest.mark.parametrize(("kind", "seed"), [("tet-p1", 29), ("hex-s2", 7)])
 def test_small_bodies_in_which_order_misleads(kind, seed):
     """Rows of two nodes taken for one, and a node whose rows came apart by directions that were found anew later."""
-    body = stiffness(kind, box(kind, (3, 3, 3)), lam=heterogeneous, mu=lambda x: 1 + x[1] + x[0] * x[1])
+    body = stiffness(kind, box(kind, (3, 3, 3)), lam=heterogeneous, mu=lambda x: 1 + x[1] + x[0] * x[1], within=True)
     case = given(permuted_nodes(body, seed=seed), "symmetry", "interleaved", "stored")
     found = recover_elasticity(case.matrix)
     assert found.certified
@@ -244,4 +244,4 @@ def test_an_order_without_gaps_is_not_given_up_for_patterns_that_leave_rows_open
     """Rows of the identity stand among the others, and entries that vanished are not stored."""
     body = permuted_nodes(stiffness("hex-s2", box("hex-s2", (3, 4, 4), perturb=0.2), **material), seed=1)
     case = given(body, "identity rollers", "by component", "dropped")
-    assert_certified(case, 1e-11, 0.0, split=0)
+    assert_certified(case, 1e-11, 0.03, split=0)  # without those next to the corner

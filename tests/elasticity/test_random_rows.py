@@ -58,7 +58,7 @@ def test_supports_hide_no_direction(kind, support, perturb):
     assert_certified(case, 1e-9, 0.0)
 
 
-@pytest.mark.parametrize(("support", "missing"), [("roller", 0.0), ("symmetry", 0.03)])
+@pytest.mark.parametrize(("support", "missing"), [("roller", 0.0), ("symmetry", 0.05)])
 def test_rows_with_the_same_neighbours_are_joined_in_the_only_way_that_fits(support, missing):
     """Rows at the corners of quadratic triangles: whether a node lacks a row, or it is another's, trial tells."""
     case = given(body("tri-p2"), support, "at random", "stored")

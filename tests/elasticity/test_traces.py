@@ -8,7 +8,7 @@ from assembled import box, permuted_nodes, stiffness
 from supported import given
 
 from unassemble.elasticity.doubts import unconfirmed
-from unassemble.elasticity.elements.cells import recognise_cells
+from unassemble.elasticity.materials.cells import recognise_cells
 from unassemble.elasticity.nodal import nodal_matrix
 from unassemble.elasticity.rows.grouping import by_first_row
 from unassemble.elasticity.rows.traces import unaccounted

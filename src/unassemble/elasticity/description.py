@@ -6,7 +6,7 @@ import numpy as np
 
 from ..clock import Clock
 from .doubts import guessed_directions, unborne, unconfirmed
-from .elements.cells import no_cells, recognise_cells
+from .materials.cells import no_cells, recognise_cells
 from .nodal import NodalMatrix, determined
 from .nullspace.certificate import largest_residual
 from .nullspace.material import lame_ratio, poisson_ratio
@@ -50,7 +50,7 @@ def described(
     found = no_cells()
     if (cells or solution.straight or solution.hanging is not None) and near:
         with clock("cells"):
-            found = recognise_cells(nodal, solution.points, ratio, solution.corners)
+            found = recognise_cells(nodal, solution.points, ratio)
     if solution.cautious is not None and not found.certified:
         return described(nodal, numbering, solution.cautious, clock, cells=cells, rounding=rounding)
     backward = found.backward_error if found.certified else error

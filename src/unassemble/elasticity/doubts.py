@@ -9,23 +9,24 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .elements.cells import Cells
+from .materials.cells import Cells
 from .nodal import NodalMatrix, annihilating, determined, without_trace
 from .nullspace.solution import Solution
 from .rows.grouping import by_first_row
 from .rows.numbering import Numbering
 from .rows.orders import ORDERS
+from .springs import without_springs
 
 
 def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
-    """Mark nodes whose rows may be those of two halves of one: near, with no direction in common.
+    """Take springs out, and mark nodes whose rows may be those of two halves of one: near, no direction in common.
 
     Where all entries are stored the halves of a node couple to the same nodes; and where unknowns stand in order, it
     tells which of them are in doubt. Where order alone joined rows that couple to different nodes, so are theirs.
     """
+    nodal = without_springs(nodal)
     inferred = numbering.common < 1 and numbering.kind != "given"
     mixed = _mixed(nodal) if inferred else np.zeros(nodal.n, dtype=bool)
-    nodal = replace(nodal, sure=_sure(nodal, numbering))
     if numbering.kind in ORDERS and mixed.any():
         nodal = replace(nodal, doubtful=mixed)
     if numbering.open_row is not None:
@@ -73,29 +74,6 @@ def _with_halves(nodal: NodalMatrix, numbering: Numbering, mixed: NDArray[np.boo
 def _doubtful(nodal: NodalMatrix) -> NDArray[np.bool_]:
     """(n,) nodes that are doubtful so far."""
     return np.zeros(nodal.n, dtype=bool) if nodal.doubtful is None else nodal.doubtful
-
-
-def _sure(nodal: NodalMatrix, numbering: Numbering) -> NDArray[np.bool_] | None:
-    """(n,) nodes that are beyond doubt without an equation that shows it; None if all are.
-
-    Node by node these are single rows before and after which others stand that couple to other unknowns. Two rows that
-    couple to the same, in the order of directions, may be two nodes that lack all others. Component by component they
-    are single rows that the order keeps apart from all others that couple to the same, so that they were not left open.
-    """
-    if numbering.kind == "given" or (numbering.kind in ORDERS and not numbering.incomplete):
-        return None
-    sure = np.zeros(nodal.n, dtype=bool)
-    if numbering.kind not in ORDERS or numbering.common < 1 or numbering.odd:
-        return sure
-    count = (nodal.row_of >= 0).sum(axis=1)
-    if numbering.kind == "interleaved":
-        live = np.flatnonzero(count)
-        code = _neighbourhoods(nodal)[live]
-        same = np.concatenate([[False], code[1:] == code[:-1], [False]])
-        sure[live] = (count[live] == 1) & ~same[1:] & ~same[:-1]
-    elif numbering.open_row is not None:
-        sure = (count == 1) & (np.bincount(numbering.node_of_row, numbering.open_row, nodal.n) == 0)
-    return sure
 
 
 def _near(nodal: NodalMatrix, some: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

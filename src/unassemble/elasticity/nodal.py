@@ -35,8 +35,6 @@ class NodalMatrix:
         Nodes coupled to rows that were left out, or whose directions may be others.
     fellows : (n,) int64, optional
         Labels of nodes whose rows couple to the same unknowns and may belong together; each other node has its own.
-    sure : (n,) bool, optional
-        Nodes whose rows are one node's though no equation shows it; all, where not given.
     """
 
     indptr: NDArray[np.int32]
@@ -48,7 +46,6 @@ class NodalMatrix:
     doubtful: NDArray[np.bool_] | None = None
     blurred: NDArray[np.bool_] | None = None
     fellows: NDArray[np.int64] | None = None
-    sure: NDArray[np.bool_] | None = None
 
     @classmethod
     def of(cls, indptr: NDArray, indices: NDArray, data: NDArray, row_of: NDArray[np.int64]) -> NodalMatrix:

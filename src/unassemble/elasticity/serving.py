@@ -10,12 +10,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..clock import Clock
+from ..elements.kinds import KINDS
+from ..elements.surface import boundary_loops
 from ..matrix import OperatorMatrix
 from ..recovery import Body
 from .anchoring import anchored, checked_anchors, digits_lost, near_enough
-from .elements.cells import Cells
-from .elements.kinds import KINDS
-from .elements.surface import boundary_loops
+from .materials.cells import Cells
 from .nodal import NodalMatrix
 from .ordered.rounded import Rounding
 from .recover import place_nodes

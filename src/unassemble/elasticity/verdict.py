@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
+from ..tolerances import CERTIFIED
 from ..words import count_of
-from .elements.cells import Cells
+from .materials.cells import Cells
 from .nodal import NodalMatrix, without_trace
 from .nullspace.shape import SOFT
 from .nullspace.solution import Solution
 from .ordered.rounded import Rounding
 from .rows.numbering import Numbering
 
-CERTIFIED = 1e-9
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
 NOTHING_SHOWN = "no node is left whose rows are shown to be its own and whose coordinates hang on no assumption"
 NOTHING_LEFT = (
@@ -40,20 +40,11 @@ def about_open_rows(numbering: Numbering) -> str:
 def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solution) -> str:
     """Why the fields that are left say nothing of positions; empty where they are few, or nodes are beyond doubt.
 
-    Where it is not known which rows are one node's, those that are left move rows of one direction only, as if there
-    were more nodes; and the points that belong to rows of several nodes are none of the body's.
+    The points that belong to rows of several nodes are none of the body's.
     """
     if not any(solution.freedoms):
         return ""
-    if "hourglass" in solution.freedoms and about_open_rows(numbering):
-        return about_open_rows(numbering)
     odd = int(np.asarray(without_trace(nodal).any(axis=1)).sum()) if numbering.open_row is None else 0
-    inferred = numbering.kind == "pattern" and numbering.incomplete and numbering.open_row is None
-    if not odd and inferred and "hourglass" in solution.freedoms:
-        return (
-            "which rows belong to one node, and to which direction, was inferred, and fields are left that move rows "
-            "of one direction only, as where rows of one node were not joined; give the numbering if it is known"
-        )
     if not odd:
         return ""
     return (
@@ -75,9 +66,6 @@ _MISREAD = ", or to other nodes and directions than was inferred; give the numbe
 _FREEDOMS = {
     "axes": "each axis keeps a scale of its own",
     "affine": "an affine map stays free, since the material around every valid row is homogeneous",
-    "hourglass": "fields that move points in one direction only may be added in each: hourglass modes of reduced "
-    "integration, or smooth ones where a homogeneous body is held on its whole boundary; the points are the smoothest "
-    "that fit",
 }
 
 
@@ -95,71 +83,85 @@ def verdict(
     found : Cells
     numbering : Numbering
     """
+    objection = _to_positions(nodal, solution, numbering)
+    if objection:
+        return "uncertified", objection
+    if found.certified and found.backward_error <= CERTIFIED:
+        return "certified", f"the matrix re-assembled on the {count_of(found.n_cells, 'element')} is the given one"
+    nearly = _softest(solution)
+    objection = _to_identities(nodal, solution, numbering)
+    if objection:
+        return "uncertified", objection
+    if np.isnan(error):
+        return "uncertified", NOTHING_LEFT
+    if error > CERTIFIED:
+        return "uncertified", f"the largest residual of a valid identity is {error:.1e}"
+    if error > _MAGNIFIED * nearly:
+        return "uncertified", (
+            f"the valid identities hold to {error:.1e}, but a field that is no translation or scale satisfies them up "
+            f"to {nearly:.1e}: nodes that it moves may be wrong by more than 1e-8"
+        )
+    return "certified", "the valid identities hold to rounding, and only translations and scale satisfy them"
+
+
+def _softest(solution: Solution) -> float:
+    """Least singular value of a field that is no translation or scale, of pieces that are not settled."""
+    return min((one.gap for one in solution.evidence if one.gap > 0 and not one.settled), default=1.0)
+
+
+def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering) -> str:
+    """Why positions may be wrong whatever elements say; empty where nothing is to be said."""
     remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
     if remaining:
-        return "uncertified", f"the null space is larger than it should be: {remaining[0]}{_unless(nodal, numbering)}"
-    nearly = min((one.gap for one in solution.evidence if one.gap > 0 and not one.settled), default=1.0)
-    if solution.exact and nearly < SOFT:
-        return "uncertified", (
-            f"a field that is no translation or scale satisfies the identities up to {nearly:.1e}: nodes that it moves "
-            "feel the rounding of entries, magnified by as much, and may be wrong by more than 1e-8: nodes that few "
-            "rows hold have such fields, and slender bodies, which bend the more easily the longer they are"
-        )
+        return f"the null space is larger than it should be: {remaining[0]}{_unless(nodal, numbering)}"
     if not solution.exact:
         worst = max(solution.evidence, key=lambda one: one.residual)
-        return "uncertified", (
+        return (
             f"no exact null vector exists (singular value {worst.residual:.1e}, that of the next field "
             f"{worst.gap:.1e}); the points are the best fit, as for materials that are not isotropic, elements that do "
             "not reproduce linear functions, or nodes that constraints tie together"
         )
-    if not solution.strict:
-        return "uncertified", (
-            "supports leave too few rows that are surely whole; rows whose entries add up to zero were taken for "
-            "whole, which they need not be"
+    if _softest(solution) < SOFT:
+        return (
+            f"a field that is no translation or scale satisfies the identities up to {_softest(solution):.1e}, and "
+            "nodes that it moves may be wrong by more than 1e-8; slender bodies have such fields, and nodes that few "
+            "rows hold"
         )
+    if not solution.strict:
+        return "supports leave too few rows that are surely whole; rows that add up to zero were taken for whole"
     if _torn(nodal, solution):
         inferred = numbering.kind == "pattern" or (numbering.kind != "given" and numbering.incomplete)
-        return "uncertified", (
+        return (
             "coupled nodes came out as separate pieces, and how these lie to each other is not known: rows between "
             f"them lack entries, or belong to other axes, as at inclined supports{_MISREAD if inferred else ''}"
         )
-    if found.certified and found.backward_error <= CERTIFIED:
-        return "certified", f"the matrix re-assembled on the {count_of(found.n_cells, 'element')} is the given one"
+    return ""
+
+
+def _to_identities(nodal: NodalMatrix, solution: Solution, numbering: Numbering) -> str:
+    """Why identities alone, without elements that re-assemble, certify nothing; empty where they do."""
     if solution.straight:
-        return "uncertified", (
-            "the identities leave an affine map free, since the material around every valid row is homogeneous; "
-            "elements determined it, but the matrix re-assembled on them is not the given one"
-        )
+        return "elements told the axes of a homogeneous body, but re-assembled on them the matrix is not the given one"
     if numbering.likely:
-        return "uncertified", (
+        return (
             "several nodes couple to the same unknowns, and which rows are theirs was inferred from how like these "
-            "are; only elements that re-assemble to the matrix would show that the inference is right"
+            "are; only elements that re-assemble to the matrix would show that it is right"
         )
     apart = np.asarray(without_trace(nodal).any(axis=1))
     if numbering.open_row is not None and nodal.doubtful is not None:
         apart &= ~nodal.doubtful  # these get no coordinates
     odd = int(apart.sum())
     if odd:
-        return "uncertified", (
-            f"{count_of(odd, 'node lacks', 'nodes lack')} directions although no row next to it misses anything: its "
-            "rows belong to other nodes, and neither pattern nor positions tell to which; give the numbering if it is "
-            "known"
+        return (
+            f"{count_of(odd, 'node lacks', 'nodes lack')} directions although no row next to it misses anything, and "
+            "neither pattern nor positions tell which rows are theirs; give the numbering if it is known"
         )
     if numbering.incomplete and numbering.kind != "given" and numbering.common < 1:
-        return "uncertified", (
+        return (
             "which rows belong to one node was inferred, where some nodes lack rows and others do not store entries "
-            "that vanished; only elements that re-assemble to the matrix would show that the inference is right"
+            "that vanished; only elements that re-assemble to the matrix would show that it is right"
         )
-    if error <= CERTIFIED and error > _MAGNIFIED * nearly:
-        return "uncertified", (
-            f"the valid identities hold to {error:.1e}, but a field that is no translation or scale satisfies them up "
-            f"to {nearly:.1e}: nodes that it moves may be wrong by more than 1e-8"
-        )
-    if error <= CERTIFIED:
-        return "certified", "the valid identities hold to rounding, and only translations and scale satisfy them"
-    if np.isnan(error):
-        return "uncertified", NOTHING_LEFT
-    return "uncertified", f"the largest residual of a valid identity is {error:.1e}"
+    return ""
 
 
 def _unless(nodal: NodalMatrix, numbering: Numbering) -> str:
@@ -177,7 +179,9 @@ def _unless(nodal: NodalMatrix, numbering: Numbering) -> str:
 
 def _torn(nodal: NodalMatrix, solution: Solution) -> bool:
     """Whether nodes of different pieces are connected through the matrix."""
-    label = sp.csgraph.connected_components(nodal.graph, directed=False)[1]
+    live = (nodal.data != 0).any(axis=(1, 2))
+    link = sp.csr_array((np.ones(live.sum()), (nodal.node[live], nodal.indices[live])), shape=(nodal.n, nodal.n))
+    label = sp.csgraph.connected_components(link, directed=False)[1]
     known = solution.component >= 0
     pairs = np.unique(np.column_stack([label, solution.component])[known], axis=0)
     return len(np.unique(pairs[:, 0])) < len(pairs)

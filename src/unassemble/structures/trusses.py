@@ -145,7 +145,7 @@ def place_joints(bars: Bars, n: int) -> Truss:
         links = sp.csr_array(links + links.T)
         try:
             fields, values = null_fields(piece.operator, d)
-            one = shape(fields, values, links, np.zeros(order, dtype=bool))
+            one = shape(fields, values, np.zeros(order, dtype=bool))
         except GeometryError as error:
             failure = failure or error
             warnings.append(f"the piece with node {body[0]}: {error}")

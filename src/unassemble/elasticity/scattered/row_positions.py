@@ -126,7 +126,7 @@ def _row_by_row(
         solution = placed(*equations(nodal, sums, group, node, direction), None)
     except GeometryError:
         return None
-    return solution if solution.exact and "hourglass" not in solution.freedoms else None
+    return solution if solution.exact else None
 
 
 def _joined(

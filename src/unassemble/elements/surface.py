@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ...topology.boundary import loops
+from ..topology.boundary import loops
 from .kinds import KINDS, Kind
 
 Blocks = Mapping[str, NDArray[np.int64]]  # cells by kind

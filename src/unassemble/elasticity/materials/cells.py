@@ -10,16 +10,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..corner_nodes import Corner, with_corner_nodes
+from ...elements.candidates import Block, candidates
+from ...elements.cliques import Graph
+from ...elements.surface import tiles
+from ...tolerances import CERTIFIED
 from ..nodal import NodalMatrix, determined, surrounded, valid_pairs
-from .candidates import Block, candidates, coupled, perhaps_coupled
-from .cliques import Graph
 from .entries import Entries, Pairs
-from .materials import fits
-from .model import FITS, Fit, Model
-from .surface import tiles
+from .fits import Fit, fits
 
 _EMPTY = 1e-7  # of the largest coefficient; candidates below carry no material
 
@@ -38,8 +38,6 @@ class Cells:
     backward_error : float
         Largest difference between an entry and the re-assembled one, relative to the largest off-diagonal entry of
         its row; NaN where the cells were read off the graph only.
-    varying : bool
-        Whether material differs within cells, at the points of the quadrature; `lame` then has the means.
     shown : (n, d) bool, optional
         Unknowns of nodes whose row has an entry that re-assembles and is not zero.
     """
@@ -47,7 +45,6 @@ class Cells:
     blocks: Mapping[str, NDArray[np.int64]]
     lame: NDArray[np.float64]
     backward_error: float
-    varying: bool = False
     shown: NDArray[np.bool_] | None = None
 
     @property
@@ -76,6 +73,11 @@ class Cells:
         """Whether the cells re-assemble to the given matrix."""
         return self.recognised and bool(np.isfinite(self.backward_error))
 
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return sum(map(len, self.blocks.values()))
+
     def among(self, nodes: NDArray[np.bool_]) -> Cells:
         """The cells all of whose nodes are among some, (n,) bool."""
         kept = [nodes[cells].all(axis=1) for cells in self.blocks.values()]
@@ -86,24 +88,24 @@ class Cells:
         lame = self.lame[np.concatenate(kept)] if len(self.lame) else self.lame
         return replace(self, blocks=blocks, lame=lame)
 
-    @property
-    def n_cells(self) -> int:
-        """Number of cells."""
-        return sum(map(len, self.blocks.values()))
-
 
 def no_cells() -> Cells:
     """Nothing recognised."""
     return Cells({}, np.empty((0, 2)), float("nan"))
 
 
-def recognise_cells(
-    nodal: NodalMatrix,
-    points: NDArray[np.float64],
-    ratio: float | None = None,
-    corners: Sequence[Corner] = (),
-) -> Cells:
-    """Find cells that re-assemble to the matrix: simplices or boxes, linear or quadratic; or linear ones of both.
+def coupled(nodal: NodalMatrix, points: NDArray[np.float64]) -> Graph:
+    """Pairs of determined nodes with an entry that is not zero, or that lack some, which may not have been zero."""
+    known, lacking = determined(points), np.asarray((nodal.row_of < 0).any(axis=1))
+    i, j = nodal.node, nodal.indices
+    live = np.abs(nodal.data).max(axis=(1, 2)) > 1e-13 * np.minimum(nodal.size[i], nodal.size[j])  # symmetric
+    live |= lacking[i] | lacking[j]
+    live &= known[i] & known[j]
+    return Graph(sp.csr_array((np.ones(live.sum()), (i[live], j[live])), shape=(nodal.n,) * 2))
+
+
+def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: float | None = None) -> Cells:
+    """Find cells that re-assemble to the matrix: of one kind, or triangles beside quadrilaterals.
 
     With lambda / mu known to be one number, `ratio`, linear simplices of one material are tried first, which is quick.
     Where no material fits, boxes and quadratic cells that lie side by side and of which each entry belongs to one at
@@ -112,61 +114,37 @@ def recognise_cells(
     Entries between two nodes that both miss a neighbour are left out, since cells that lost a node to a support
     contribute to them. Cells all of whose entries are left out cannot be seen and are not reported. First neighbours
     that lack some of their directions only, as on rollers, and those of nodes with a penalty count as being there,
-    which fewer rows can tell. So do the nodes in `corners`, if that explains the matrix: cells that have them are none
-    of those returned, but show that the rows next to them are what they were taken for.
+    which fewer rows can tell.
     """
-    plain = _among_complete(nodal, points, ratio)
-    if not corners:
-        return plain
-    more = np.vstack([points, [one.point for one in corners]])
-    found = _among_complete(with_corner_nodes(nodal, corners), more, ratio, [one.nodes for one in corners])
-    if not found.certified or found.shown is None:
-        return plain
-    shown = found.shown[: nodal.n]
-    if plain.certified and plain.shown is not None and plain.shown.sum() >= shown.sum():  # cells of several kinds hide
-        return plain
-    return replace(found.among(np.arange(len(more)) < nodal.n), shown=shown)
-
-
-def _among_complete(
-    nodal: NodalMatrix, points: NDArray[np.float64], ratio: float | None, complete: Sequence[NDArray[np.int64]] = ()
-) -> Cells:
-    """Cells that explain entries of nodes that lost no neighbour; those named are taken to have lost none."""
     graph, known = coupled(nodal, points), determined(points)
-    likeliest = surrounded(nodal, valid_pairs(nodal, inferred=True))
-    for nodes in complete:
-        likeliest[nodes] = True
-    likely = Entries.of(nodal, known, likeliest)
-    wider = perhaps_coupled(nodal, graph) if (nodal.row_of < 0).any() else None
+    likely = Entries.of(nodal, known, surrounded(nodal, valid_pairs(nodal, inferred=True)))
     found = no_cells()
     # The power of two next to the largest entry: squares of what is measured in it neither overflow nor vanish.
     unit = float(2.0 ** np.frexp(nodal.size.max(initial=0.0))[1])
     for entries in [likely, Entries.of(nodal, known)] if (likely.complete != likely.sure).any() else [likely]:
-        other = _recognised(points, graph, entries.over(unit), ratio, wider)
+        other = _recognised(points, graph, entries.over(unit), ratio)
         if other.certified:
             return replace(other, lame=other.lame * unit)
         found = found if found.recognised else other
     return found
 
 
-def _recognised(
-    points: NDArray[np.float64], graph: Graph, entries: Entries, ratio: float | None, wider: Graph | None
-) -> Cells:
+def _recognised(points: NDArray[np.float64], graph: Graph, entries: Entries, ratio: float | None) -> Cells:
     """Cells that explain most entries.
 
     Cells that hide next to supports are excused, and those of another kind must not pass for such.
     """
     best, most = no_cells(), 0
-    for blocks in candidates(graph, points, entries.complete, wider=wider) if len(entries.key) else ():
-        told = entries.explained_by([Pairs.of(one.cells, entries) for one in blocks], graph, FITS)
+    for blocks in candidates(graph, points) if len(entries.key) else ():
+        told = entries.explained_by([Pairs.of(one.cells, entries) for one in blocks], graph)
         if told is None or len(told.key) <= most:
             continue
         seen = [replace(one, cells=one.cells[Pairs.of(one.cells, told).seen]) for one in blocks]
         if not all(len(one.cells) for one in seen):
             continue
-        found = next((cells for fit in fits(points, seen, told, ratio) if (cells := _accepted(*fit))), None)
+        found = next((cells for fit in fits(points, seen, told, ratio) if (cells := _accepted(fit))), None)
         if found is not None:
-            best, most = replace(found, shown=told.shown(FITS)), len(told.key)
+            best, most = replace(found, shown=told.shown()), len(told.key)
         elif not best.recognised:
             best = _by_graph(seen)
         if most == len(entries.key):
@@ -186,18 +164,18 @@ def _linear(blocks: Sequence[Block]) -> dict[str, NDArray[np.int64]]:
     return {one.kind.base: one.cells[:, : one.kind.corners] for one in blocks}
 
 
-def _accepted(models: Sequence[Model], fit: Fit) -> Cells | None:
+def _accepted(fit: Fit) -> Cells | None:
     """Cells that carry material, if they fit, have shear moduli of one sign and do not overlap; made-up ones do.
 
     A quadratic triangle, for one, is a combination of small linear ones and a large one with a negative modulus.
     """
     lame = fit.lame
-    if not fit.misfit <= FITS or not lame.any():
+    if not fit.misfit <= CERTIFIED or not lame.any():
         return None
     carries = np.abs(lame).max(axis=1) > _EMPTY * np.abs(lame).max()
-    parts = np.split(carries, np.cumsum([len(model.cells) for model in models])[:-1])
-    blocks = [Block(model.kind, model.cells[part]) for model, part in zip(models, parts, strict=True) if part.any()]
+    parts = np.split(carries, np.cumsum([len(one.cells) for one in fit.blocks])[:-1])
+    blocks = [replace(one, cells=one.cells[part]) for one, part in zip(fit.blocks, parts, strict=True) if part.any()]
     mu = lame[carries, 1]
     if not ((mu > 0).all() or (mu < 0).all()) or not tiles(_linear(blocks)):
         return None
-    return Cells({one.kind.name: one.cells for one in blocks}, lame[carries], fit.misfit, models[0].varying)
+    return Cells({one.kind.name: one.cells for one in blocks}, lame[carries], fit.misfit)

@@ -125,8 +125,6 @@ def ordered_boxes(cells: NDArray[np.int64], points: NDArray[np.float64]) -> NDAr
         misfit[(np.sort(corner, axis=1) != np.arange(corners)).any(axis=1)] = np.inf
         better = misfit < best[open_cells]
         best[open_cells[better]], order[open_cells[better]] = misfit[better], trial[better]
-    for odd in np.flatnonzero(~np.isfinite(best)):
-        order[odd] = _assigned(x[odd], bits)
     cube = np.take_along_axis(cells, order, axis=1)
     mirrored = np.linalg.det((affine @ points[cube])[:, 1:]) < 0
     swapped = cube.copy()
@@ -149,15 +147,3 @@ def _rounded(x: NDArray[np.float64]) -> NDArray[np.float64]:
     value, vector = np.linalg.eigh(np.einsum("mka,mkb->mab", centred, centred))
     value = np.maximum(value, 1e-12 * value[:, -1:])
     return np.einsum("mka,mab->mkb", centred, vector / np.sqrt(value)[:, None, :])
-
-
-def _assigned(x: NDArray[np.float64], bits: NDArray) -> NDArray[np.int64]:
-    """The same for one distorted cell (k, d), with the cheapest assignment for each choice."""
-    best, order = np.inf, np.arange(len(x))
-    for choice in combinations(range(1, len(x)), x.shape[1]):
-        predicted = x[0] + bits @ (x[list(choice)] - x[0])
-        distance = np.linalg.norm(predicted[:, None] - x[None], axis=2)
-        rows, columns = linear_sum_assignment(distance)
-        if distance[rows, columns].sum() < best:
-            best, order = distance[rows, columns].sum(), columns
-    return order

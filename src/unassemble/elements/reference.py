@@ -39,16 +39,25 @@ def _exponents(kind: Kind) -> NDArray[np.int64]:
     return every if len(every) == kind.nodes else every[(every == 2).sum(axis=1) <= 1]
 
 
+@cache
+def _coefficients(kind: Kind) -> NDArray[np.float64]:
+    """(k, k) shape functions in columns, by monomials: one in their own node and zero in the others."""
+    return np.linalg.inv((reference_nodes(kind)[:, None, :] ** _exponents(kind)).prod(axis=2))
+
+
+def shape_functions(kind: Kind, at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(q, k) values of the shape functions at points (q, d) of the reference element."""
+    return np.asarray((at[:, None, :] ** _exponents(kind)).prod(axis=2) @ _coefficients(kind))
+
+
 def shape_gradients(kind: Kind, at: NDArray[np.float64]) -> NDArray[np.float64]:
     """(q, k, d) gradients of the shape functions at points (q, d) of the reference element."""
     power = _exponents(kind)
-    nodes = reference_nodes(kind)
-    vandermonde = (nodes[:, None, :] ** power).prod(axis=2)
     slopes = np.empty((len(at), len(power), kind.dim))
     for a in range(kind.dim):
         lower = power - np.eye(kind.dim, dtype=np.int64)[a]
         slopes[:, :, a] = power[:, a] * (at[:, None, :] ** np.maximum(lower, 0)).prod(axis=2)
-    return np.einsum("qea,ek->qka", slopes, np.linalg.inv(vandermonde))
+    return np.einsum("qea,ek->qka", slopes, _coefficients(kind))
 
 
 def rules(kind: Kind) -> Iterator[Rule]:

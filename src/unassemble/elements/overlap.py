@@ -1,4 +1,4 @@
-"""Cliques that are no cells, since an edge of the graph runs through them."""
+"""Cliques that are no cells: those that an edge of the graph runs through, and those inside other cells."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cliques import Graph
+from .kinds import KINDS, Kind
+from .reference import reference_nodes, shape_gradients
 
 _INSIDE = 1e-9  # barycentric coordinates above count as positive
 _AT_ONCE = 2_000_000  # pairs of a corner and a neighbour
@@ -40,3 +42,18 @@ def unpierced(cells: NDArray[np.int64], points: NDArray[np.float64], graph: Grap
             enters = (within > -_INSIDE).all(axis=1) & ((within > _INSIDE).sum(axis=1) > 1)
             whole[start + place[enters]] = False
     return whole
+
+
+def convex(cells: NDArray[np.int64], points: NDArray[np.float64], kind: Kind) -> NDArray[np.bool_]:
+    """(m,) boxes, of any degree, whose linear cell is right side out at each corner."""
+    linear = KINDS[kind.base]
+    at_corners = shape_gradients(linear, reference_nodes(linear))
+    jacobian = np.einsum("mke,qkr->mqer", points[cells[:, : kind.corners]], at_corners)
+    return np.asarray((np.linalg.det(jacobian) > 0).all(axis=1))
+
+
+def without_diagonals(graph: Graph, quads: NDArray[np.int64]) -> Graph:
+    """The graph without the diagonals of quadrilaterals (m, 4): what triangles beside them may have for edges."""
+    ends = np.sort(quads[:, [[0, 2], [1, 3]]].reshape(-1, 2), axis=1) @ [graph.n, 1]
+    own = np.minimum(graph.row, graph.col) * graph.n + np.maximum(graph.row, graph.col)
+    return graph.only(~np.isin(own, ends))

@@ -6,13 +6,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ...elements.cliques import Graph
+from ...elements.kinds import Kind
+from ...elements.matrices import elasticity
+from ...elements.reference import Rule
+from ...tolerances import CERTIFIED
 from ..nodal import NodalMatrix, valid_pairs
-from .cliques import Graph
-from .kinds import Kind
-from .reference import Rule
-from .stiffness import element_blocks, point_blocks
 
 _AT_ONCE = 8_000_000  # numbers in the blocks and gradients of one batch of cells
 
@@ -75,6 +77,11 @@ class Entries:
         size = np.minimum(largest[i], largest[j])
         return cls(nodal.n, i * nodal.n + j, nodal.data[use], told, np.where(size > 0, size, 1.0), complete, sure)
 
+    @property
+    def largest(self) -> float:
+        """Largest of the values relative to their row."""
+        return float(np.abs(self.value / self.size[:, None, None]).max(initial=0))
+
     def at(self, place: NDArray[np.int64]) -> Entries:
         """Some of them."""
         return replace(self, key=self.key[place], value=self.value[place], told=self.told[place], size=self.size[place])
@@ -83,23 +90,23 @@ class Entries:
         """The same in another unit."""
         return replace(self, value=self.value / unit, size=self.size / unit)
 
-    def shown(self, tolerance: float) -> NDArray[np.bool_]:
+    def shown(self) -> NDArray[np.bool_]:
         """(n, d) unknowns whose rows have one of these entries that is not zero."""
         seen = np.zeros((self.n, self.value.shape[1]), dtype=bool)
         i, j = np.divmod(self.key, self.n)
-        entry = np.abs(self.value) > tolerance * self.size[:, None, None]
+        entry = np.abs(self.value) > CERTIFIED * self.size[:, None, None]
         np.logical_or.at(seen, i, entry.any(axis=2))
         np.logical_or.at(seen, j, entry.any(axis=1))
         return seen
 
-    def explained_by(self, pairs: Sequence[Pairs], graph: Graph, tolerance: float) -> Entries | None:
+    def explained_by(self, pairs: Sequence[Pairs], graph: Graph) -> Entries | None:
         """Entries that cells of all kinds explain; None if some belong to no cell, and not since a cell lost a node.
 
         A node may have lost a neighbour without a trace, where their entry was zero: the middle of a straight side of a
         quadratic triangle, and the corner facing it; or two nodes on rollers. Its entries with others of that cell
         tell, and what both ends of such an entry couple to are the nodes of the cell.
         """
-        outside = np.abs(self.value).max(axis=(1, 2)) > tolerance * self.size
+        outside = np.abs(self.value).max(axis=(1, 2)) > CERTIFIED * self.size
         for own in pairs:
             outside[own.place[own.there]] = False
         i, j = np.divmod(self.key, self.n)
@@ -162,31 +169,63 @@ def added(total: NDArray[np.float64], place: NDArray[np.int64], blocks: NDArray[
     total += np.bincount(where.ravel(), blocks.ravel(), len(total))
 
 
-def contributions(
-    points: NDArray[np.float64],
-    cells: NDArray[np.int64],
-    kind: Kind,
-    rule: Rule,
-    flip: NDArray[np.bool_],
-    *,
-    varying: bool = False,
-) -> Iterator[tuple[slice, NDArray[np.float64]]]:
-    """What unit Lame coefficients of each cell add to the entries of its pairs, batch by batch.
+@dataclass(frozen=True, eq=False)
+class Model:
+    """How the matrix depends on the material: cells (m, k) of a kind on points (n, d), integrated by a rule."""
 
-    Yields
-    ------
-    batch : slice
-        Of the cells.
-    unit : (s, b, pairs, d, d) float64
-        For (lambda, mu) = (1, 0) and (0, 1); if `varying`, at one quadrature point after the other, first for lambda.
-    """
-    k, d, q = kind.nodes, kind.dim, len(rule[1])
-    a, b = np.triu_indices(k, 1)
-    step = max(_AT_ONCE // (k * d * (2 * q * k * d if varying else 3 * k * d + 2 * q)), 1)
-    for start in range(0, len(cells), step):
-        batch = slice(start, start + step)
-        blocks = (point_blocks if varying else element_blocks)(points, cells[batch], kind, rule)
-        unit = np.stack([block[:, a, b] for block in blocks])
-        turned = flip[batch]
-        unit[:, turned] = unit[:, turned].swapaxes(-1, -2)
-        yield batch, unit
+    points: NDArray[np.float64]
+    cells: NDArray[np.int64]
+    kind: Kind
+    rule: Rule
+
+    @property
+    def coefficients(self) -> int:
+        """Nonzero numbers of the matrix that takes all coefficients to the entries."""
+        return len(self.cells) * self.kind.nodes * (self.kind.nodes - 1) * self.kind.dim**2
+
+    def contributions(
+        self, pairs: Pairs, entries: Entries, some: NDArray | slice = slice(None)
+    ) -> Iterator[tuple[slice, NDArray[np.float64]]]:
+        """What unit Lame coefficients of some cells add to the entries of their pairs; zero where unknowns lack.
+
+        Yields
+        ------
+        batch : slice
+            Of these cells.
+        unit : (2, b, pairs, d, d) float64
+            For (lambda, mu) = (1, 0) and (0, 1).
+        """
+        own, cells = pairs.at(some), self.cells[some]
+        k, d, partial = self.kind.nodes, self.kind.dim, not entries.told.all()
+        a, b = np.triu_indices(k, 1)
+        step = max(_AT_ONCE // (k * d * (3 * k * d + 2 * len(self.rule[1]))), 1)
+        for start in range(0, len(cells), step):
+            batch = slice(start, start + step)
+            unit = np.stack([one[:, a, b] for one in elasticity(self.points, cells[batch], self.kind, self.rule)])
+            turned = own.flip[batch]
+            unit[:, turned] = unit[:, turned].swapaxes(-1, -2)
+            yield batch, unit * entries.told[own.place[batch]] if partial else unit
+
+    def assembled(self, pairs: Pairs, entries: Entries, lame: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(e, d, d) entries of cells with coefficients (m, 2)."""
+        total = np.zeros(entries.value.size)
+        for batch, unit in self.contributions(pairs, entries):
+            there = pairs.there[batch]
+            part = np.einsum("ms,smpcb->mpcb", lame[batch], unit)
+            added(total, pairs.place[batch][there], part[there])
+        return total.reshape(entries.value.shape)
+
+    def operator(self, pairs: Pairs, entries: Entries, ratio: float | None = None) -> sp.csr_array:
+        """(e d d, 2 m) what coefficients add to the entries, relative to their size; (e d d, m) with lambda / mu."""
+        dd, unknowns = self.kind.dim**2, 2 if ratio is None else 1
+        rows, columns, values = [np.empty(0, np.int64)], [np.empty(0, np.int64)], [np.empty(0)]
+        for batch, unit in self.contributions(pairs, entries):
+            there = pairs.there[batch]
+            place = pairs.place[batch][there]
+            cell = np.arange(len(self.cells))[batch][np.nonzero(there)[0]]
+            for number, part in enumerate(unit if ratio is None else [ratio * unit[0] + unit[1]]):
+                rows.append((place[:, None] * dd + np.arange(dd)).ravel())
+                columns.append(np.repeat(unknowns * cell + number, dd))
+                values.append((part[there] / entries.size[place][:, None, None]).ravel())
+        shape = (entries.value.size, unknowns * len(self.cells))
+        return sp.csr_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)
