@@ -14,7 +14,7 @@ from .matrix.digits import Digits
 
 if TYPE_CHECKING:
     from .elasticity import Numbering
-    from .elasticity.ordered.rounded import Rounding
+    from .elasticity.rounded import Rounding
     from .structures import StructuralNumbering
 
 OPERATORS = ("auto", "laplacian", "elasticity")
@@ -118,7 +118,7 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
 
 def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     """Read a matrix as vector-valued after it turned out not to be a planar mesh; None where little speaks for it."""
-    from .elasticity.ordered.sampling import promising
+    from .elasticity.rows.searching import promising
     from .elasticity.unknowns import find_numbering
     from .structures import find_structure
 
@@ -153,7 +153,7 @@ def about_translations(matrix: OperatorMatrix) -> str:
 
 def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, tuple[sp.csr_array, Rounding] | None]:
     """The matrix to look at, and of entries with few digits what a reading keeps of it."""
-    from .elasticity.ordered.rounded import with_exact_sums
+    from .elasticity.rounded import with_exact_sums
 
     whole, rounding = with_exact_sums(matrix.csr())
     return whole, (whole, rounding) if rounding else None

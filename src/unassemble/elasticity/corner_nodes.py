@@ -39,7 +39,6 @@ def with_corner_nodes(nodal: NodalMatrix, corners: Sequence[Corner]) -> NodalMat
     column = np.concatenate([nodal.indices, new, near, own])
     order = np.lexsort((column, row))
     data = np.concatenate([nodal.data, np.zeros((len(row) - len(nodal.data), d, d))])
-    fellows = nodal.fellows
     return replace(
         nodal,
         indptr=np.concatenate([[0], np.cumsum(np.bincount(row))]).astype(np.int32),
@@ -50,6 +49,5 @@ def with_corner_nodes(nodal: NodalMatrix, corners: Sequence[Corner]) -> NodalMat
         penalised=np.vstack([nodal.penalised, np.zeros((many, d), dtype=bool)]),
         doubtful=None,
         blurred=None,
-        fellows=None if fellows is None else np.append(fellows, fellows.max() + 1 + np.arange(many)),
         sure=None,
     )

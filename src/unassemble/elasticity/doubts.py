@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from .elements.cells import Cells
 from .nodal import NodalMatrix, annihilating, determined, without_trace
 from .nullspace.solution import Solution
-from .rows.grouping import by_first_row
 from .rows.numbering import Numbering
 from .rows.orders import ORDERS
 
@@ -30,7 +29,7 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
         nodal = replace(nodal, doubtful=mixed)
     if numbering.open_row is not None:
         nodal = _with_open_rows(nodal, numbering, numbering.open_row)
-        if not _by_likeness(numbering):
+        if not numbering.likely:
             return nodal
     ordered = numbering.kind != "pattern" and numbering.common == 1 and not numbering.odd
     if numbering.kind == "given" or not numbering.incomplete or ordered:
@@ -47,7 +46,7 @@ def _with_open_rows(nodal: NodalMatrix, numbering: Numbering, unsure: NDArray[np
     doubtful &= (nodal.row_of < 0).any(axis=1)
     if not doubtful.any():
         return nodal
-    return replace(nodal, doubtful=doubtful | _doubtful(nodal), fellows=_fellows(numbering, doubtful))
+    return replace(nodal, doubtful=doubtful | _doubtful(nodal))
 
 
 def _with_halves(nodal: NodalMatrix, numbering: Numbering, mixed: NDArray[np.bool_]) -> NodalMatrix:
@@ -113,19 +112,6 @@ def _near(nodal: NodalMatrix, some: NDArray[np.bool_]) -> tuple[NDArray[np.int64
     return rows[common.row[near]], rows[common.col[near]]
 
 
-def _fellows(numbering: Numbering, doubtful: NDArray[np.bool_]) -> NDArray[np.int64] | None:
-    """(n,) labels of nodes that may belong together: doubtful ones of one pattern. None where patterns do not tell.
-
-    Without them a half of a node would pass for one that lacks what its other half has.
-    """
-    if numbering.group is None:
-        return None
-    label = np.arange(len(doubtful))
-    rows = np.flatnonzero(doubtful[numbering.node_of_row])
-    label[numbering.node_of_row[rows]] = len(doubtful) + numbering.group[rows]
-    return by_first_row(label)
-
-
 def unconfirmed(
     nodal: NodalMatrix, numbering: Numbering, points: NDArray[np.float64], shown: NDArray[np.bool_] | None
 ) -> NDArray[np.bool_]:
@@ -142,15 +128,11 @@ def unconfirmed(
         return determined(points) & ~confirmed
     if nodal.doubtful is None:
         return np.zeros(nodal.n, dtype=bool)
-    if numbering.open_row is not None and not _by_likeness(numbering):  # nothing was joined that order does not join
-        # Of fellows each was placed by itself, and none was taken to lack what another has.
-        return nodal.doubtful & ~confirmed if nodal.fellows is None else np.zeros(nodal.n, dtype=bool)
-    outside = determined(points)
-    if not _by_likeness(numbering):
-        doubtful = nodal.doubtful & ~(confirmed & (nodal.row_of >= 0).all(axis=1))  # all rows of one node are its own
-        doubtful |= without_trace(nodal).any(axis=1)
-        outside &= nodal.graph @ doubtful.astype(float) > 0
-    return np.asarray(outside & ~confirmed)
+    if numbering.open_row is not None:  # nothing was joined that order does not join
+        return nodal.doubtful & ~confirmed
+    doubtful = nodal.doubtful & ~(confirmed & (nodal.row_of >= 0).all(axis=1))  # all rows of one node are its own
+    doubtful |= without_trace(nodal).any(axis=1)
+    return np.asarray(determined(points) & (nodal.graph @ doubtful.astype(float) > 0) & ~confirmed)
 
 
 def unborne(nodal: NodalMatrix, solution: Solution, found: Cells) -> NDArray[np.bool_]:
@@ -160,11 +142,6 @@ def unborne(nodal: NodalMatrix, solution: Solution, found: Cells) -> NDArray[np.
     if not found.certified or found.shown is None:
         return solution.hanging
     return np.asarray(solution.hanging & ~(found.shown | (nodal.row_of < 0)).all(axis=1))
-
-
-def _by_likeness(numbering: Numbering) -> bool:
-    """Whether rows of different patterns were joined for no other reason than being alike."""
-    return numbering.kind == "pattern" and numbering.common < 1
 
 
 def guessed_directions(numbering: Numbering, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:

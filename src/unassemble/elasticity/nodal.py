@@ -33,8 +33,6 @@ class NodalMatrix:
         Nodes whose rows, or directions, may be others; see :mod:`.doubts`.
     blurred : (n,) bool, optional
         Nodes coupled to rows that were left out, or whose directions may be others.
-    fellows : (n,) int64, optional
-        Labels of nodes whose rows couple to the same unknowns and may belong together; each other node has its own.
     sure : (n,) bool, optional
         Nodes whose rows are one node's though no equation shows it; all, where not given.
     """
@@ -47,7 +45,6 @@ class NodalMatrix:
     penalised: NDArray[np.bool_]
     doubtful: NDArray[np.bool_] | None = None
     blurred: NDArray[np.bool_] | None = None
-    fellows: NDArray[np.int64] | None = None
     sure: NDArray[np.bool_] | None = None
 
     @classmethod
@@ -150,7 +147,7 @@ def valid_pairs(nodal: NodalMatrix, *, strict: bool = True, inferred: bool = Fal
     valid = np.asarray(zero & ~penalty & present[:, :, None] & present[:, None, :] & (nodal.size > 0)[:, None, None])
     if not strict:
         return valid
-    whole = _shared(nodal, np.asarray((zero | ~present[:, :, None]).all(axis=1)))
+    whole: NDArray[np.bool_] = np.asarray((zero | ~present[:, :, None]).all(axis=1))
     lacking = nodal.graph @ eliminated(nodal).astype(float)
     if inferred:
         valid |= penalty & valid.any(axis=1, keepdims=True)
@@ -166,26 +163,9 @@ def linked(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def eliminated(nodal: NodalMatrix) -> NDArray[np.bool_]:
-    """(n, d) unknowns that were taken out of nodes of which others are left.
-
-    Of nodes that may belong together some lack a direction if they have fewer rows of it than of another one.
-    """
+    """(n, d) unknowns that were taken out of nodes of which others are left."""
     present = nodal.row_of >= 0
-    gone = ~present & ~without_trace(nodal) & np.asarray(present.any(axis=1))[:, None]
-    if nodal.fellows is not None:
-        count = np.zeros((int(nodal.fellows.max()) + 1, nodal.dim))
-        np.add.at(count, nodal.fellows, present)
-        gone &= (count < count.max(axis=1, keepdims=True))[nodal.fellows]
-    return gone
-
-
-def _shared(nodal: NodalMatrix, told: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(n, d) what holds for a node and for all that may belong to it."""
-    if nodal.fellows is None:
-        return told
-    failing = np.zeros((int(nodal.fellows.max()) + 1, nodal.dim))
-    np.add.at(failing, nodal.fellows, ~told)
-    return np.asarray(failing[nodal.fellows] == 0)
+    return ~present & ~without_trace(nodal) & np.asarray(present.any(axis=1))[:, None]
 
 
 def surrounded(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -201,7 +181,7 @@ def surrounded(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_
     """
     present = nodal.row_of >= 0
     lacking = nodal.graph @ eliminated(nodal).astype(float) > 0
-    whole = _shared(nodal, np.asarray((valid | ~present[:, :, None]).all(axis=1)))
+    whole: NDArray[np.bool_] = np.asarray((valid | ~present[:, :, None]).all(axis=1))
     return np.asarray((whole | lacking | ~present).all(axis=1) & (whole & present & ~lacking).any(axis=1))
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import scipy.sparse as sp
 
@@ -13,14 +11,12 @@ from ..linalg import blas_threads
 from ..matrix import check_matrix
 from .description import described
 from .doubts import with_doubts
-from .halves import joined, taken_apart
 from .nodal import NodalMatrix, nodal_matrix, uncoupled
 from .nullspace.solution import Solution
-from .ordered.rounded import Rounding, with_exact_sums
 from .positions import solve
 from .results import ElasticityRecovery, ScalarParts
+from .rounded import Rounding, with_exact_sums
 from .rows.numbering import Numbering
-from .scattered.scattered import more_careful, told_by_positions
 from .unknowns import find_numbering
 from .verdict import about_made_up_nodes, about_open_rows
 
@@ -76,49 +72,7 @@ def recover_elasticity(
     with clock("numbering"):
         numbering = numbering or find_numbering(whole, block_size)
 
-    def attempt(one: Numbering) -> ElasticityRecovery:
-        return _recovered(whole, one, clock, cells=cells, patch=patch, rounding=rounding)
-
-    return _likeliest(whole, numbering, clock, attempt) if numbering.likely else attempt(numbering)
-
-
-def _likeliest(
-    matrix: sp.csr_array, numbering: Numbering, clock: Clock, attempt: Callable[[Numbering], ElasticityRecovery]
-) -> ElasticityRecovery:
-    """The recovery with nodes that likeness told, however faintly, or with others, if more rows are certified then.
-
-    While rows are left out, others are those told with more care; if nothing is certified, those that positions tell.
-    """
-    failures: list[RecoveryError] = []
-
-    def better(best: ElasticityRecovery | None, one: Numbering) -> ElasticityRecovery | None:
-        try:
-            found = attempt(one)
-        except RecoveryError as error:
-            failures.append(error)
-            return best
-        return found if best is None or _certified_rows(found) > _certified_rows(best) else best
-
-    best = better(None, numbering)
-    others = more_careful(matrix, numbering)
-    while _certified_rows(best) < np.count_nonzero(~numbering.identity_row):
-        with clock("numbering"):
-            one = next(others, None)
-        if one is None:
-            break
-        best = better(best, one)
-    if not _certified_rows(best):
-        with clock("numbering"):
-            one = told_by_positions(matrix, numbering)
-        best = best if one is None else better(best, one)
-    if best is None:
-        raise failures[0]
-    return best
-
-
-def _certified_rows(found: ElasticityRecovery | None) -> int:
-    """How many rows belong to nodes with certified coordinates."""
-    return 0 if found is None or not found.certified else int((found.node_status[found.node_of_row] == 0).sum())
+    return _recovered(whole, numbering, clock, cells=cells, patch=patch, rounding=rounding)
 
 
 def _recovered(
@@ -170,7 +124,6 @@ def place_nodes(
                 "give the numbering if it is known"
             ) from error
         if numbering.kind != "given" and not solution.unique:
-            nodal, numbering, solution = _row_by_row(nodal, numbering, solution, patch)
             why = about_made_up_nodes(nodal, numbering, solution)
             if why:
                 raise GeometryError(f"no positions were found: {why}")
@@ -186,7 +139,6 @@ def place_nodes(
                 "lack rows, and is probably wrong, unless constraints tie unknowns together: give the numbering if it "
                 "is known"
             )
-        nodal, numbering, solution = _rejoined(nodal, numbering, solution, patch)
     return described(nodal, numbering, solution, clock, cells=cells, rounding=rounding)
 
 
@@ -204,37 +156,3 @@ def _solved(
             return nodal, solution
     nodal = with_doubts(nodal_matrix(whole, numbering, left_out=numbering.unnamed), numbering)
     return nodal, solve(nodal, patch)
-
-
-def _row_by_row(
-    nodal: NodalMatrix, numbering: Numbering, solution: Solution, patch: int | None
-) -> tuple[NodalMatrix, Numbering, Solution]:
-    """Rows that may have been joined to the wrong nodes placed each by itself, if all positions are unique then."""
-    apart = taken_apart(nodal, numbering)
-    if apart is not None:
-        other = with_doubts(*apart)
-        try:
-            better = solve(other, patch)
-        except RecoveryError:
-            return nodal, numbering, solution
-        if better.unique:
-            return other, apart[1], better
-    return nodal, numbering, solution
-
-
-def _rejoined(
-    nodal: NodalMatrix, numbering: Numbering, solution: Solution, patch: int | None
-) -> tuple[NodalMatrix, Numbering, Solution]:
-    """Halves of nodes that lie in one place joined, unless positions were unique and are not any more.
-
-    More rows are whole then, among them some that touch halves of which no row told the place.
-    """
-    better = joined(nodal, numbering, solution.points, solution.component)
-    if better is None:
-        return nodal, numbering, solution
-    other = with_doubts(*better)
-    try:
-        again = solve(other, patch)
-    except RecoveryError:
-        return nodal, numbering, solution
-    return (other, better[1], again) if again.unique or not solution.unique else (nodal, numbering, solution)

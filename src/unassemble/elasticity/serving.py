@@ -17,9 +17,9 @@ from .elements.cells import Cells
 from .elements.kinds import KINDS
 from .elements.surface import boundary_loops
 from .nodal import NodalMatrix
-from .ordered.rounded import Rounding
 from .recover import place_nodes
 from .results import ElasticityRecovery
+from .rounded import Rounding
 from .rows.numbering import Numbering
 
 _THIN = 1e-14  # of the largest variance of the coordinates: rounding

@@ -10,7 +10,7 @@ from .elements.cells import Cells
 from .nodal import NodalMatrix, without_trace
 from .nullspace.shape import SOFT
 from .nullspace.solution import Solution
-from .ordered.rounded import Rounding
+from .rounded import Rounding
 from .rows.numbering import Numbering
 
 CERTIFIED = 1e-9

@@ -78,12 +78,6 @@ def annihilated_share(
     return float((zero & own[:, None]).mean())
 
 
-def whole_share(matrix: sp.csr_array, identity: NDArray) -> float:
-    """Share of rows, among those that couple, that add up to zero over all directions together."""
-    zero = adding_up(matrix, row_sizes(matrix))
-    return float(zero[~identity].mean()) if not identity.all() else 0.0
-
-
 def proven_directions(
     matrix: sp.csr_array, direction: NDArray[np.int64], group: NDArray[np.int64], d: int
 ) -> NDArray[np.bool_]:
