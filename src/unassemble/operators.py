@@ -118,7 +118,6 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
 
 def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     """Read a matrix as vector-valued after it turned out not to be a planar mesh; None where little speaks for it."""
-    from .elasticity.rows.searching import promising
     from .elasticity.unknowns import find_numbering
     from .structures import find_structure
 
@@ -129,7 +128,7 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     if structure is not None:
         return VectorReading(structure, f"it is no planar mesh, and {_evidence(structure)}", exact)
     try:
-        found = find_numbering(whole) if promising(whole, (3, 2)) else None
+        found = find_numbering(whole)
     except RecoveryError:
         found = None
     if found is None or found.share < _ANNIHILATED or found.common < _COMMON:

@@ -49,7 +49,7 @@ def test_of_quadratic_simplices_some_nodes_are_missing(kind, support):
 
 
 @pytest.mark.parametrize("support", ["free", "symmetry", "several"])
-@pytest.mark.parametrize("kind", ["quad-s2", "quad-q2", "hex-s2"])
+@pytest.mark.parametrize("kind", ["quad-s2", "quad-q2", pytest.param("hex-s2", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("zeros", ["stored", "dropped"])
 def test_other_quadratic_elements_are_refused_or_right(kind, support, zeros):
     case = body(kind, support, zeros, 0.2, VARYING)

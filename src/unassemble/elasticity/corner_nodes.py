@@ -49,5 +49,4 @@ def with_corner_nodes(nodal: NodalMatrix, corners: Sequence[Corner]) -> NodalMat
         penalised=np.vstack([nodal.penalised, np.zeros((many, d), dtype=bool)]),
         doubtful=None,
         blurred=None,
-        sure=None,
     )

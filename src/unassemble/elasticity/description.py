@@ -89,7 +89,7 @@ def described(
         warnings=(
             *solution.warnings,
             *(about_cells(found) if cells else ()),
-            *about_nodes(nodal, loose, withheld, hanging),
+            *about_nodes(loose, withheld, hanging),
             *about_assumptions(solution),
             *about_directions(int(guessed.sum())),
         ),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -32,9 +32,7 @@ class NodalMatrix:
     doubtful : (n,) bool, optional
         Nodes whose rows, or directions, may be others; see :mod:`.doubts`.
     blurred : (n,) bool, optional
-        Nodes coupled to rows that were left out, or whose directions may be others.
-    sure : (n,) bool, optional
-        Nodes whose rows are one node's though no equation shows it; all, where not given.
+        Nodes coupled to rows whose directions may be others.
     """
 
     indptr: NDArray[np.int32]
@@ -45,7 +43,6 @@ class NodalMatrix:
     penalised: NDArray[np.bool_]
     doubtful: NDArray[np.bool_] | None = None
     blurred: NDArray[np.bool_] | None = None
-    sure: NDArray[np.bool_] | None = None
 
     @classmethod
     def of(cls, indptr: NDArray, indices: NDArray, data: NDArray, row_of: NDArray[np.int64]) -> NodalMatrix:
@@ -91,18 +88,15 @@ class NodalMatrix:
         return np.add.reduceat(entries, self.indptr[:-1], axis=0)  # no node is empty
 
 
-def nodal_matrix(
-    matrix: sp.csr_array, numbering: Numbering, *, left_out: NDArray[np.bool_] | None = None
-) -> NodalMatrix:
+def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
     """Gather the unknowns of each node into blocks.
 
-    Unknowns whose row and column are those of the identity are left out, as if they had been eliminated; so are those
-    that the caller names.
+    Unknowns whose row and column are those of the identity are left out, as if they had been eliminated.
     """
     n, d = numbering.n_nodes, numbering.block_size
     place = numbering.node_of_row * d + numbering.direction_of_row
     row_of = np.full(n * d, -1, dtype=np.int64)
-    live = ~numbering.identity_row if left_out is None else ~(numbering.identity_row | left_out)
+    live = ~numbering.identity_row
     row_of[place[live]] = np.flatnonzero(live)
     coo = matrix.tocoo()
     keep = live[coo.row] & live[coo.col]
@@ -116,12 +110,7 @@ def nodal_matrix(
     )
     blocks = entries.tocsr().tobsr(blocksize=(d, d))
     blocks.sort_indices()
-    found = NodalMatrix.of(blocks.indptr, blocks.indices, blocks.data, row_of.reshape(n, d))
-    if left_out is None:
-        return found
-    blurred = np.zeros(n, dtype=bool)
-    blurred[numbering.node_of_row[coo.row[left_out[coo.col]]]] = True
-    return replace(found, blurred=blurred)
+    return NodalMatrix.of(blocks.indptr, blocks.indices, blocks.data, row_of.reshape(n, d))
 
 
 def valid_pairs(nodal: NodalMatrix, *, strict: bool = True, inferred: bool = False) -> NDArray[np.bool_]:

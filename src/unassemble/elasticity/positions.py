@@ -184,16 +184,13 @@ def _with_corners(nodal: NodalMatrix, found: Solution, ratio: float | None, vali
         new = determined(points) & ~determined(firm)
         if new.any():
             hanging = np.zeros(nodal.n, dtype=bool) if found.hanging is None else found.hanging & ~new
-            if nodal.dim == 2:  # as all that an assumption places there
-                hanging |= new
-            elif nodal.sure is not None:
-                hanging |= new & ~nodal.sure
+            hanging |= new  # rows next to corners may be several nodes'
             found = replace(
                 found,
                 points=np.where(new[:, None], points, found.points),
                 component=np.where(new, component, found.component),
                 planes=True,
                 ratio=found.ratio if used is None else used,
-                hanging=hanging if hanging.any() else None,
+                hanging=hanging,
             )
     return replace(found, corners=corners_of(nodal, valid, found.points, loose))

@@ -12,13 +12,12 @@ from ..matrix import check_matrix
 from .description import described
 from .doubts import with_doubts
 from .nodal import NodalMatrix, nodal_matrix, uncoupled
-from .nullspace.solution import Solution
 from .positions import solve
 from .results import ElasticityRecovery, ScalarParts
 from .rounded import Rounding, with_exact_sums
 from .rows.numbering import Numbering
 from .unknowns import find_numbering
-from .verdict import about_made_up_nodes, about_open_rows
+from .verdict import about_made_up_nodes, about_open_rows, about_rows
 
 
 def scalar_parts(matrix: sp.csr_array, *, block_size: int | None = None) -> ScalarParts | None:
@@ -71,28 +70,12 @@ def recover_elasticity(
         whole, rounding = with_exact_sums(check_matrix(matrix).csr())
     with clock("numbering"):
         numbering = numbering or find_numbering(whole, block_size)
-
-    return _recovered(whole, numbering, clock, cells=cells, patch=patch, rounding=rounding)
-
-
-def _recovered(
-    matrix: sp.csr_array,
-    numbering: Numbering,
-    clock: Clock,
-    *,
-    cells: bool,
-    patch: int | None,
-    rounding: Rounding | None,
-) -> ElasticityRecovery:
-    """The recovery of a matrix that was looked at, with a numbering."""
-    with clock("numbering"):
-        nodal = nodal_matrix(matrix, numbering)
-    unproven = matrix if numbering.unnamed is not None and numbering.unnamed.any() else None
+        nodal = nodal_matrix(whole, numbering)
     if uncoupled(nodal):
         raise GeometryError(
             "the directions are not coupled: these are scalar matrices side by side; recover one of them by itself"
         )
-    return place_nodes(nodal, numbering, clock, cells=cells, patch=patch, rounding=rounding, whole=unproven)
+    return place_nodes(nodal, numbering, clock, cells=cells, patch=patch, rounding=rounding)
 
 
 def place_nodes(
@@ -103,56 +86,22 @@ def place_nodes(
     cells: bool = True,
     patch: int | None = None,
     rounding: Rounding | None = None,
-    whole: sp.csr_array | None = None,
 ) -> ElasticityRecovery:
     """The recovery once the nodes are known: null space, certificate, cells; see :func:`recover_elasticity`.
 
-    `rounding` is that of the entries, where they have few digits; `whole` is the matrix, where the direction of some
-    rows is not proven.
+    `rounding` is that of the entries, where they have few digits.
     """
     with clock("null space"), blas_threads(1):
         nodal = with_doubts(nodal, numbering)
         try:
-            nodal, solution = _solved(nodal, numbering, whole, patch)
+            solution = solve(nodal, patch)
         except RecoveryError as error:
-            if numbering.kind == "given" or (numbering.common == 1 and not numbering.incomplete):
+            if not numbering.inferred:
                 raise
-            if about_open_rows(numbering):
-                raise GeometryError(f"no positions were found: {about_open_rows(numbering)}") from error
             raise GeometryError(
-                f"{error}; but which rows belong to one node, and to which direction, was inferred and may be wrong: "
-                "give the numbering if it is known"
+                f"no positions were found: {about_open_rows(numbering) or about_rows(error)}"
             ) from error
-        if numbering.kind != "given" and not solution.unique:
-            why = about_made_up_nodes(nodal, numbering, solution)
-            if why:
-                raise GeometryError(f"no positions were found: {why}")
-        if (
-            not solution.exact
-            and rounding is None
-            and numbering.kind != "given"
-            and (numbering.odd or numbering.common < 1)
-            and numbering.incomplete
-        ):
-            raise GeometryError(
-                "no positions fit the matrix exactly; which rows belong to one node was inferred, where some nodes "
-                "lack rows, and is probably wrong, unless constraints tie unknowns together: give the numbering if it "
-                "is known"
-            )
+        why = about_made_up_nodes(nodal, numbering, solution, rounding) if numbering.inferred else ""
+        if why:
+            raise GeometryError(f"no positions were found: {why}")
     return described(nodal, numbering, solution, clock, cells=cells, rounding=rounding)
-
-
-def _solved(
-    nodal: NodalMatrix, numbering: Numbering, whole: sp.csr_array | None, patch: int | None
-) -> tuple[NodalMatrix, Solution]:
-    """Positions; where none fit exactly, once more without the rows whose direction nothing proves."""
-    try:
-        solution = solve(nodal, patch)
-    except RecoveryError:
-        if whole is None:
-            raise
-    else:
-        if whole is None or (solution.exact and not any(solution.freedoms)):
-            return nodal, solution
-    nodal = with_doubts(nodal_matrix(whole, numbering, left_out=numbering.unnamed), numbering)
-    return nodal, solve(nodal, patch)

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from ..words import count_of
 from .elements.cells import Cells
-from .nodal import NodalMatrix, without_trace
 from .nullspace.solution import Solution
 
 
@@ -28,14 +27,11 @@ def about_cells(found: Cells) -> list[str]:
     return []
 
 
-def about_nodes(
-    nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[np.bool_], hanging: NDArray[np.bool_]
-) -> list[str]:
+def about_nodes(loose: NDArray[np.bool_], withheld: NDArray[np.bool_], hanging: NDArray[np.bool_]) -> list[str]:
     """Why nodes have no coordinates.
 
     Parameters
     ----------
-    nodal : NodalMatrix
     loose : (n,) bool
         Nodes without coordinates.
     withheld : (n,) bool
@@ -43,19 +39,11 @@ def about_nodes(
     hanging : (n,) bool
         Those whose coordinates rest on an assumption that nothing confirms.
     """
-    apart: NDArray[np.bool_] = np.asarray(without_trace(nodal).any(axis=1))
-    beside = np.zeros(nodal.n, dtype=bool)
-    beside[nodal.node[apart[nodal.indices]]] = True
-    unread, told = loose & ~withheld & ~hanging & beside, []
+    told = []
     if withheld.any():
         told.append(
             f"{count_of(int(withheld.sum()), 'node has', 'nodes have')} rows that no element shows to be theirs; "
             "since it was inferred which rows make up a node, no coordinates are given there"
-        )
-    if unread.any():
-        told.append(
-            f"{count_of(int(unread.sum()), 'node is', 'nodes are')} not determined, since rows there, or next to it, "
-            "belong to nodes that were not recognised; give the numbering if it is known"
         )
     resting = int((hanging & ~withheld).sum())
     if resting:
@@ -64,7 +52,7 @@ def about_nodes(
             "across it, or if Poisson's ratio is the same there, which neither another equation nor an element "
             "confirms; no coordinates are given there"
         )
-    rest = int((loose & ~withheld & ~hanging & ~unread).sum())
+    rest = int((loose & ~withheld & ~hanging).sum())
     if rest:
         told.append(
             f"{count_of(rest, 'node is', 'nodes are')} not determined: rows coupled to {'it' if rest == 1 else 'them'} "

@@ -20,18 +20,7 @@ from .rows.constants import annihilated_share, uncoupled_rows
 from .rows.grouping import by_first_row, coupled_in_common, made_up, same_pattern
 from .rows.numbering import Numbering
 from .rows.orders import ORDERS, regular
-from .rows.searching import in_order, same_cuts, searched
-
-__all__ = [
-    "MORE_THAN_STIFFNESS",
-    "Numbering",
-    "find_numbering",
-    "given_numbering",
-    "nodes_of_pattern",
-    "numbering_at_sight",
-    "regular_numbering",
-    "uncoupled_rows",
-]
+from .rows.searching import same_cuts, searched
 
 _ORDERLY = 0.8  # rows of made-up nodes couple to common nodes less than this
 
@@ -169,8 +158,7 @@ def _with_gaps(matrix: sp.csr_array, regular: Numbering, sizes: tuple[int, ...])
     impossible = int(made_up(matrix, regular.node_of_row, regular.direction_of_row, regular.block_size).sum())
     if regular.kind == "by component" and not impossible and same_cuts(matrix, regular):
         return regular
-    found = [one for one in (in_order(matrix, d, regular.kind) for d in sizes) if one is not None]
-    for one in found:
+    for one in searched(matrix, sizes, as_stored=True):
         if one.common == 1 and not one.odd and (impossible or _contradicts(one, regular)):
             return one
     return replace(regular, odd=impossible)

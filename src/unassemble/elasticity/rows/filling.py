@@ -38,22 +38,7 @@ def filled(matrix: sp.csr_array) -> sp.csr_array:
         if more.nnz == matrix.nnz:
             break
         matrix = more
-    return _shared(matrix, _with_the_same_others(matrix))
-
-
-def _with_the_same_others(matrix: sp.csr_array) -> NDArray[np.int64]:
-    """(N,) labels of rows that couple to the same unknowns but for their own.
-
-    Of two nodes whose directions change places when they do, x of one and y of the other are as like as can be, and
-    nothing may be stored between these two and the other two.
-    """
-    n = matrix.shape[0]
-    group = same_pattern(matrix)
-    onto = sp.csr_array((np.ones(n, np.float32), (np.arange(n), group)), shape=(n, int(group.max()) + 1))
-    around = sp.csr_array(onto.T @ pattern_of(matrix) @ onto)
-    around.setdiag(0)
-    around.eliminate_zeros()
-    return same_pattern(around, np.diff(around.indptr) == 0)[group]
+    return matrix
 
 
 def filled_by_direction(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> sp.csr_array:

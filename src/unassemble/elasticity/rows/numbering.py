@@ -70,9 +70,14 @@ class Numbering:
         return int(np.bincount(self.node_of_row).max()) == self.block_size
 
     @property
+    def inferred(self) -> bool:
+        """Whether it was inferred which rows belong to one node: some are missing, or couple to different unknowns."""
+        return self.kind != "given" and (self.incomplete or self.common < 1)
+
+    @property
     def likely(self) -> bool:
-        """Whether rows of different patterns were joined for being alike: only elements show that this is right."""
-        return self.kind == "pattern" and self.common < 1
+        """Whether rows of different patterns were joined where some are missing: only elements show that this is so."""
+        return self.kind != "given" and self.incomplete and self.common < 1
 
     @property
     def n_nodes(self) -> int:

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...budget import Budget
-from .constants import adding_up, proven_directions, row_sizes, uncoupled_rows, with_penalty
+from .constants import ROUNDING, adding_up, proven_directions, row_sizes, uncoupled_rows, with_penalty
 from .equilibrium import spread_directions
 from .filling import filled, filled_by_direction
 from .grouping import by_direction, by_first_row, same_pattern
@@ -25,17 +25,15 @@ from .numbering import Numbering, measured
 from .orders import Reading, directions_by_component, nodes_by_component, nodes_in_runs
 from .traces import unaccounted
 
-_LARGE = 20_000  # rows in no order beyond which entries that vanished are not put back, and a sample is asked first
+_LARGE = 20_000  # rows beyond which entries that vanished are not put back, which would take minutes
 _WORK = 2e10  # for directions: half a minute or so
 _IN_TURN = 0.1  # by which neighbouring rows have more in common than rows far apart, if they stand node by node
 _ANNIHILATED = 0.9  # share of whole rows that annihilate translations when directions are right
 _HOPEFUL = 0.1  # the same before sums decide on rows next to supports
 _EVEN = 0.6  # share of rows, far from supports, in patterns with as many rows in each direction
-_PLACES = (0.5, 0.2, 0.8)  # of a sample, as parts of the rows
-_SAMPLE = 3000  # rows of a sample beyond which it is no quick look
 
 
-def searched(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[Numbering]:
+def searched(matrix: sp.csr_array, sizes: tuple[int, ...], *, as_stored: bool = False) -> list[Numbering]:
     """Numberings that were found, up to the first that leaves no doubt.
 
     Parameters
@@ -44,35 +42,16 @@ def searched(matrix: sp.csr_array, sizes: tuple[int, ...]) -> list[Numbering]:
         Symmetric.
     sizes : tuple of int
         Block sizes to try.
+    as_stored : bool
+        Whether to believe only what entries as they are stored show, in one of the usual orders.
     """
     live, inner = live_part(matrix)
     found: list[Numbering] = []
-    for kind, d, reading in _readings(inner, sizes):
+    for kind, d, reading in _readings(inner, sizes, as_stored):
         found.append(measured(matrix, _of_all_rows(reading, live, matrix.shape[0]), d, kind))
         if found[-1].settled and found[-1] is max(found, key=lambda one: one.quality):
             break
     return found
-
-
-def in_order(matrix: sp.csr_array, d: int, kind: str) -> Numbering | None:
-    """The numbering with gaps, in one of the usual orders, that entries as they are stored show; None if they do not.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric.
-    d : int
-    kind : {"interleaved", "by component"}
-    """
-    live, inner = live_part(matrix)
-    reading = None
-    if kind == "interleaved":
-        if _shows_runs(same_pattern(inner), d):
-            reading = _by_equilibrium(inner, inner, d, kind)
-    else:
-        direction = directions_by_component(inner, d)
-        reading = None if direction is None else _by_component(inner, direction, d)
-    return None if reading is None else measured(matrix, _of_all_rows(reading, live, matrix.shape[0]), d, kind)
 
 
 def same_cuts(matrix: sp.csr_array, regular: Numbering) -> bool:
@@ -120,38 +99,7 @@ def _of_runs(group: NDArray[np.int64], d: int) -> NDArray[np.int64]:
     return np.where(np.bincount(run)[run] == d, np.arange(len(run)) - np.searchsorted(run, run), -1)
 
 
-def promising(matrix: sp.csr_array, sizes: tuple[int, ...]) -> bool:
-    """Whether directions can be found somewhere for which rows annihilate constants.
-
-    In a sample, some row with its neighbours and theirs, the rows of the inner ones are whole.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-    sizes : tuple of int
-        Block sizes to try.
-    """
-    return any(_directions_show(matrix, int(part * (matrix.shape[0] - 1)), sizes) for part in _PLACES)
-
-
-def _directions_show(matrix: sp.csr_array, seed: int, sizes: tuple[int, ...]) -> bool:
-    inner = np.union1d(matrix[[seed]].indices, seed)
-    rows = np.union1d(matrix[inner].indices, inner)
-    if len(inner) < 4 or len(rows) > _SAMPLE:
-        return len(rows) > _SAMPLE
-    sample = sp.csr_array(matrix[rows][:, rows])
-    whole = filled(sample)
-    nowhere = np.full(len(rows), -1)
-    groups = same_pattern(sp.csr_array(matrix[rows])), same_pattern(whole)
-    for d in sizes:
-        for group in groups:
-            direction, share = spread_directions(whole, group, d, nowhere)
-            if share > _ANNIHILATED and len(np.unique(direction)) == d:
-                return True
-    return False
-
-
-def _readings(inner: sp.csr_array, sizes: tuple[int, ...]) -> Iterator[tuple[str, int, Reading]]:
+def _readings(inner: sp.csr_array, sizes: tuple[int, ...], as_stored: bool) -> Iterator[tuple[str, int, Reading]]:
     """Order, number of directions, and nodes; with entries as they are stored, then with those that vanished."""
     if inner.shape[0] < 2 * min(sizes):
         return
@@ -160,13 +108,15 @@ def _readings(inner: sp.csr_array, sizes: tuple[int, ...]) -> Iterator[tuple[str
         if direction is not None:
             yield "by component", d, _by_component(inner, direction, d)
     kind = "interleaved" if _in_turn(inner) else "pattern"
-    if kind == "pattern" and inner.shape[0] > _LARGE and not promising(inner, sizes):
+    if as_stored and kind == "pattern":
         return
-    for put_back in (False, True):
-        if put_back and inner.shape[0] > _LARGE:
-            return
+    large = inner.shape[0] > _LARGE
+    for put_back in (False,) if as_stored or large else (False, True):
         whole = filled(inner) if put_back else inner
+        group = same_pattern(whole)
         for d in sizes:
+            if kind == "interleaved" and not (put_back or (large and not as_stored) or _shows_runs(group, d)):
+                continue
             reading = _by_equilibrium(inner, whole, d, kind)
             if reading is not None:
                 yield kind, d, reading
@@ -183,18 +133,27 @@ def _in_turn(matrix: sp.csr_array) -> bool:
 
 
 def _by_component(inner: sp.csr_array, direction: NDArray[np.int64], d: int) -> Reading:
+    """Nodes of one pattern; where zeros are not stored, of the patterns with which no node lacks anything."""
     node, open_row = nodes_by_component(same_pattern(inner), direction, d)
-    lost: NDArray[np.bool_] = np.asarray(unaccounted(inner, node, direction, d).any(axis=1))
-    lost[node[open_row]] = False
-    if not lost.any():
+    lost = _came_apart(inner, node, direction, d)
+    if not (lost & ~open_row).any():
         return Reading(node, direction, open_row)
-    whole = filled_by_direction(filled(inner) if inner.shape[0] <= _LARGE else inner, direction, d)
-    group = same_pattern(whole)
-    node, open_row = nodes_by_component(group, direction, d)
-    lost = np.asarray(unaccounted(inner, node, direction, d).any(axis=1))[node]
+    for k in range(2 if inner.shape[0] <= _LARGE else 1):
+        group = same_pattern(filled_by_direction(filled(inner) if k else inner, direction, d))
+        node, open_row = nodes_by_component(group, direction, d)
+        lost = _came_apart(inner, node, direction, d)
+        if not (lost.any() or open_row.any()):
+            break
     if lost.any():  # each belongs to another: these go together one by one between nodes that are known
         node, open_row = nodes_by_component(np.where(lost, len(group), group), direction, d)
     return Reading(node, direction, open_row if open_row.any() else None)
+
+
+def _came_apart(
+    matrix: sp.csr_array, node: NDArray[np.int64], direction: NDArray[np.int64], d: int
+) -> NDArray[np.bool_]:
+    """(N,) rows of nodes that lack a direction without a trace."""
+    return np.asarray(unaccounted(matrix, node, direction, d).any(axis=1))[node]
 
 
 def _by_equilibrium(inner: sp.csr_array, whole: sp.csr_array, d: int, kind: str) -> Reading | None:
@@ -224,7 +183,7 @@ def _annihilated(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> 
     size = row_sizes(matrix)
     whole = adding_up(matrix, size) & ~with_penalty(matrix, size)
     sums = np.abs(matrix @ np.eye(d)[direction])
-    return float((sums <= 1e-9 * size[:, None]).all(axis=1)[whole].mean()) if whole.any() else 0.0
+    return float((sums <= ROUNDING * size[:, None]).all(axis=1)[whole].mean()) if whole.any() else 0.0
 
 
 def _even(matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], d: int) -> float:
