@@ -68,6 +68,7 @@ def reduced(kind, counts, perturb):
     return permuted_nodes(stiffness(kind, mesh, lam=1.5, quadrature=RULES[kind]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "counts", "accuracy"),
     [("quad-q1", (24, 25), 1e-3), ("quad-q2", (13, 13), 1e-5), ("hex-q1", (5, 6, 5), 0.02)],

@@ -36,6 +36,7 @@ def test_symmetry_planes_of_a_pipe(kind, perturb, order):
     assert truth.missing == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["interleaved", "by component"])
 @pytest.mark.parametrize("numbered", ["by the mesh", "at random"])
 @pytest.mark.parametrize("mu", [1.0, lambda x: 1 + x[1] + x[0] * x[1]])

@@ -38,6 +38,7 @@ def found_with_numbering(matrix, d):
     return recover_elasticity(matrix, numbering=given_numbering(matrix, row // d, row % d))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "perturb"), CASES)
 def test_elements_tell_the_axes(kind, perturb):
     matrix, truth = held(kind, perturb, lam=1.5)
@@ -71,6 +72,7 @@ def test_cells_tell_affine_functions_from_others(shape):
     assert error(found.points, case.points[nodes]) < 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("perturb", [0.0, 0.2])
 @pytest.mark.parametrize("kind", ["tet-p1", "hex-q1", "hex-s2"])
 def test_clamped_between_rollers(kind, perturb):
@@ -165,6 +167,7 @@ def anisotropic(d, seed, share):
     return stiff + np.einsum("ae,bc->abce", unit, unit) + share * other
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["tri-p1", "quad-q1", "tri-p2", "tet-p1", "hex-q1"])
 @pytest.mark.parametrize(("share", "perturb"), [(1.0, 0.2), (1e-6, 0.0)])
 def test_other_homogeneous_materials_are_not_certified(kind, share, perturb):

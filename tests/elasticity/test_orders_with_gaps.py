@@ -30,6 +30,7 @@ def test_by_component_on_a_roller_every_node_is_found(kind):
     assert truth.missing == truth.split == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "support"), [("hex-s2", "symmetry"), ("hex-q2", "symmetry"), ("tri-p2", "several"), ("hex-q2", "several")]
 )

@@ -34,6 +34,7 @@ def test_zeros_need_not_be_stored(kind, support):
     assert_certified(body(kind, support, "dropped", 0.2, VARYING), 1e-9, 0.0, split=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("support", ["free", "clamp", "penalty clamp"])
 @pytest.mark.parametrize("kind", ["tri-p1", "quad-q1", "tet-p1", "hex-q1"])
 def test_nor_where_most_of_them_vanish(kind, support):
@@ -48,8 +49,9 @@ def test_of_quadratic_simplices_some_nodes_are_missing(kind, support):
     assert_certified(body(kind, support, "stored", 0.2, VARYING), 1e-9, 0.5, split=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("support", ["free", "symmetry", "several"])
-@pytest.mark.parametrize("kind", ["quad-s2", "quad-q2", pytest.param("hex-s2", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", ["quad-s2", "quad-q2", "hex-s2"])
 @pytest.mark.parametrize("zeros", ["stored", "dropped"])
 def test_other_quadratic_elements_are_refused_or_right(kind, support, zeros):
     case = body(kind, support, zeros, 0.2, VARYING)

@@ -66,7 +66,7 @@ class _Body:
         n, own = matrix.shape[0], matrix.diagonal()
         size = row_sizes(matrix)
         penalised = with_penalty(matrix, size)
-        off = sp.csr_array(matrix * np.sign(own.sum()))
+        off = sp.csr_array(matrix * (np.sign(own.sum()) or 1.0))
         off.setdiag(0)
         off.eliminate_zeros()
         inferred = -np.asarray(off.sum(axis=1)).ravel()

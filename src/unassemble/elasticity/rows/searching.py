@@ -69,7 +69,7 @@ def directions_in_order(
     if direction is not None:
         yield direction
     group = same_pattern(inner)
-    if _shows_runs(group, d):
+    if _shows_runs(group, d) and inner.diagonal().all():
         direction, _ = spread_directions(inner, group, d, _of_runs(group, d))
         yield with_least_sums(inner, group, direction, d, Budget(_WORK))
 
@@ -101,7 +101,7 @@ def _of_runs(group: NDArray[np.int64], d: int) -> NDArray[np.int64]:
 
 def _readings(inner: sp.csr_array, sizes: tuple[int, ...], as_stored: bool) -> Iterator[tuple[str, int, Reading]]:
     """Order, number of directions, and nodes; with entries as they are stored, then with those that vanished."""
-    if inner.shape[0] < 2 * min(sizes):
+    if inner.shape[0] < 2 * min(sizes) or not inner.diagonal().all():  # an elastic body resists every displacement
         return
     for d in sizes:
         direction = directions_by_component(inner, d)
