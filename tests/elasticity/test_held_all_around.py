@@ -48,6 +48,7 @@ def assert_not_certified(matrix, d):
     assert "affine" in found.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "perturb"), CASES)
 def test_elements_tell_the_axes(kind, perturb):
     matrix, truth = held(kind, perturb, lam=1.5)
@@ -148,6 +149,7 @@ def anisotropic(d, seed, share):
     return stiff + np.einsum("ae,bc->abce", unit, unit) + share * other
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["tri-p1", "quad-q1", "tri-p2", "tet-p1", "hex-q1"])
 @pytest.mark.parametrize(("share", "perturb"), [(1.0, 0.2), (1e-6, 0.0)])
 def test_other_homogeneous_materials_are_not_certified(kind, share, perturb):

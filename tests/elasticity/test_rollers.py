@@ -7,7 +7,6 @@ from assembled import box, error, heterogeneous, on_plane, permuted_nodes, stiff
 from supported import assert_certified, given, judged
 
 from unassemble.elasticity import positions, recover_elasticity
-from unassemble.elasticity.scattered.searching import searched
 from unassemble.elasticity.unknowns import find_numbering
 from unassemble.errors import RecoveryError
 
@@ -107,18 +106,6 @@ def test_directions_held_elsewhere_than_on_a_plane_across_them_are_not_believed(
     assert found.certified
     assert np.array_equal(found.node_status == 1, gone.any(axis=1))
     assert judged(found, truth).error < 1e-10
-
-
-def test_rows_of_nodes_with_the_same_neighbours_are_joined_by_position():
-    """Rows at random: the nodes at the corners of quadratic triangles couple to the same ones as their neighbours."""
-    case = given(body("tri-p2"), "free", "at random", "stored")
-    assert find_numbering(case.matrix).n_nodes == len(case.points)
-    numbering = max(searched(case.matrix, (3, 2)), key=lambda one: one.quality)  # by pattern alone
-    assert numbering.odd > 0
-    found = recover_elasticity(case.matrix, numbering=numbering)
-    assert found.certified
-    assert len(found.points) == len(case.points) < numbering.n_nodes
-    assert judged(found, case).error < 1e-9
 
 
 def test_large_matrix_that_is_none_is_refused_without_a_search():

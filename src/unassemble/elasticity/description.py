@@ -11,9 +11,9 @@ from .nodal import NodalMatrix, determined
 from .nullspace.certificate import largest_residual
 from .nullspace.material import lame_ratio, poisson_ratio
 from .nullspace.solution import Solution
-from .ordered.rounded import Rounding
 from .remarks import about_assumptions, about_cells, about_directions, about_nodes
 from .results import ElasticityRecovery
+from .rounded import Rounding
 from .rows.numbering import Numbering
 from .verdict import NOTHING_SHOWN, RESTS_ON_PLANES, of_few_digits, verdict
 

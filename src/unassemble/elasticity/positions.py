@@ -29,10 +29,10 @@ def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
     need elements that show them; where these do not, the solution with doubts is still there.
     """
     found = _solve(nodal, patch)
-    if found.whole or not found.unique or (nodal.doubtful is None and nodal.blurred is None):
+    if found.whole or not found.unique or nodal.doubtful is None:
         return found
     try:
-        other = _solve(replace(nodal, doubtful=None, blurred=None), patch)
+        other = _solve(replace(nodal, doubtful=None), patch)
     except GeometryError:
         return found
     if not other.unique or other.straight or determined(other.points).sum() <= determined(found.points).sum():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from ..tolerances import CERTIFIED
 from ..words import count_of
@@ -11,10 +12,11 @@ from .materials.cells import Cells
 from .nodal import NodalMatrix, without_trace
 from .nullspace.shape import SOFT
 from .nullspace.solution import Solution
-from .ordered.rounded import Rounding
+from .rounded import Rounding
 from .rows.numbering import Numbering
 
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
+_GIVE = "; give the numbering if it is known"
 NOTHING_SHOWN = "no node is left whose rows are shown to be its own and whose coordinates hang on no assumption"
 NOTHING_LEFT = (
     "each row that is whole touches nodes that are not determined, so that no identity is left to certify the others, "
@@ -37,20 +39,23 @@ def about_open_rows(numbering: Numbering) -> str:
     )
 
 
-def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solution) -> str:
-    """Why the fields that are left say nothing of positions; empty where they are few, or nodes are beyond doubt.
+def about_rows(why: object) -> str:
+    """The sentence that says why, and what may be to blame where it was inferred which rows belong to one node."""
+    return f"{why}; which rows belong to one node, and to which direction, was inferred and may be wrong{_GIVE}"
 
-    The points that belong to rows of several nodes are none of the body's.
+
+def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solution, rounding: Rounding | None) -> str:
+    """Why positions say nothing where it was inferred which rows are one node's; empty where they do.
+
+    Fields that are left then move rows of one direction only, as if there were more nodes; and the points that belong
+    to rows of several nodes are none of the body's.
     """
-    if not any(solution.freedoms):
-        return ""
-    odd = int(np.asarray(without_trace(nodal).any(axis=1)).sum()) if numbering.open_row is None else 0
-    if not odd:
-        return ""
-    return (
-        f"{count_of(odd, 'node lacks', 'nodes lack')} directions without a trace, so that rows were not joined to "
-        "nodes as they should be, and no positions of the rows are unique; give the numbering if it is known"
-    )
+    odd = _came_apart(nodal) if any(solution.freedoms) and numbering.open_row is None else 0
+    if odd:
+        return f"{_lacking(odd)}, so that rows were not joined to nodes as they should be{_GIVE}"
+    if not solution.exact and rounding is None and numbering.incomplete and (numbering.odd or numbering.common < 1):
+        return about_rows("none fit the matrix exactly, as where constraints tie unknowns together")
+    return ""
 
 
 def of_few_digits(rounding: Rounding, error: float) -> str:
@@ -60,8 +65,6 @@ def of_few_digits(rounding: Rounding, error: float) -> str:
         "leaves; rows away from supports were made to annihilate translations exactly"
     )
 
-
-_MISREAD = ", or to other nodes and directions than was inferred; give the numbering if it is known"
 
 _FREEDOMS = {
     "axes": "each axis keeps a scale of its own",
@@ -113,7 +116,8 @@ def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering) 
     """Why positions may be wrong whatever elements say; empty where nothing is to be said."""
     remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
     if remaining:
-        return f"the null space is larger than it should be: {remaining[0]}{_unless(nodal, numbering)}"
+        unless = f". Or rows belong to other nodes than was inferred{_GIVE}" if numbering.inferred else ""
+        return f"the null space is larger than it should be: {remaining[0]}{unless}"
     if not solution.exact:
         worst = max(solution.evidence, key=lambda one: one.residual)
         return (
@@ -130,10 +134,9 @@ def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering) 
     if not solution.strict:
         return "supports leave too few rows that are surely whole; rows that add up to zero were taken for whole"
     if _torn(nodal, solution):
-        inferred = numbering.kind == "pattern" or (numbering.kind != "given" and numbering.incomplete)
         return (
             "coupled nodes came out as separate pieces, and how these lie to each other is not known: rows between "
-            f"them lack entries, or belong to other axes, as at inclined supports{_MISREAD if inferred else ''}"
+            f"them lack entries, or belong to other axes, as at inclined supports, or to other nodes{_GIVE}"
         )
     return ""
 
@@ -144,37 +147,21 @@ def _to_identities(nodal: NodalMatrix, solution: Solution, numbering: Numbering)
         return "elements told the axes of a homogeneous body, but re-assembled on them the matrix is not the given one"
     if numbering.likely:
         return (
-            "several nodes couple to the same unknowns, and which rows are theirs was inferred from how like these "
-            "are; only elements that re-assemble to the matrix would show that it is right"
-        )
-    apart = np.asarray(without_trace(nodal).any(axis=1))
-    if numbering.open_row is not None and nodal.doubtful is not None:
-        apart &= ~nodal.doubtful  # these get no coordinates
-    odd = int(apart.sum())
-    if odd:
-        return (
-            f"{count_of(odd, 'node lacks', 'nodes lack')} directions although no row next to it misses anything, and "
-            "neither pattern nor positions tell which rows are theirs; give the numbering if it is known"
-        )
-    if numbering.incomplete and numbering.kind != "given" and numbering.common < 1:
-        return (
             "which rows belong to one node was inferred, where some nodes lack rows and others do not store entries "
             "that vanished; only elements that re-assemble to the matrix would show that it is right"
         )
-    return ""
+    odd = _came_apart(nodal)
+    return f"{_lacking(odd)}: its rows belong to other nodes{_GIVE}" if odd else ""
 
 
-def _unless(nodal: NodalMatrix, numbering: Numbering) -> str:
-    """What may be to blame instead, where it was inferred which rows make up a node."""
-    if numbering.open_row is not None and numbering.open_row.any():
-        return f"; {about_open_rows(numbering)}"
-    odd = int(np.asarray(without_trace(nodal).any(axis=1)).sum())
-    if numbering.kind == "given" or not (odd or (numbering.kind == "pattern" and numbering.common < 1)):
-        return ""
-    lacking = f" {count_of(odd, 'node lacks', 'nodes lack')} directions without a trace, and" if odd else ""
-    return (
-        f". Or rows were not joined to nodes as they should be:{lacking} it was inferred which rows belong to one node"
-    )
+def _came_apart(nodal: NodalMatrix) -> int:
+    """How many nodes lack directions without a trace, doubtful ones aside, which get no coordinates."""
+    apart: NDArray[np.bool_] = np.asarray(without_trace(nodal).any(axis=1))
+    return int(np.count_nonzero(apart if nodal.doubtful is None else apart & ~nodal.doubtful))
+
+
+def _lacking(odd: int) -> str:
+    return f"{count_of(odd, 'node lacks', 'nodes lack')} directions although no row next to it misses anything"
 
 
 def _torn(nodal: NodalMatrix, solution: Solution) -> bool:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..clock import Clock
 from ..elasticity.anchoring import checked_anchors, digits_lost, near_enough
 from ..elasticity.nodal import determined
-from ..elasticity.ordered.rounded import Rounding, with_exact_sums
+from ..elasticity.rounded import Rounding, with_exact_sums
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..recovery import Structure

@@ -1,4 +1,4 @@
-"""Directions of rows that stand in no order, spread from the rows of one node by solving for translations.
+"""Directions of rows, spread from the rows of one node, or of many, by solving for translations.
 
 A translation is in equilibrium: with the unknowns of a few nodes held at 1 in one direction and at 0 in the others, all
 rows coupled to them take the same values if they are whole. So directions are read off d solutions of a sparse system
@@ -9,59 +9,52 @@ since all their entries add up to zero, whatever their directions; so it is know
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import permutations
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...linalg import solved
-from ..rows.constants import ROUNDING, adding_up, row_sizes, with_penalty
-from .sums import names_of
+from .constants import ROUNDING, adding_up, row_sizes, with_penalty
 
-_SHIFT = 1e-2  # of the diagonal: keeps bodies that are held in one node only from turning
+_SHIFT = 1e-3  # of the diagonal: keeps bodies that are held in one node only from turning
 _GROWTH = 0.4  # share of rows to add at a time
 _CLEAR = 0.8  # how far apart the values of a row's two best directions are where there is no doubt
-_SEEDS = (0.5, 0.4, 0.6, 0.3, 0.7, 0.15, 0.85, 0.05, 0.95)  # nodes to start from, as parts of the way through a body
+_SEEDS = (0.5, 0.4, 0.6, 0.3, 0.7, 0.15, 0.85)  # nodes to start from, as parts of the way through a body
 _ROUNDS = 6
-SETTLED = 0.98  # share of the whole rows whose sums vanish in all directions: single ones may add up by chance
+_SETTLED = 0.98  # share of the whole rows whose sums vanish in all directions: single ones may add up by chance
 
 
-def extended_directions(
-    matrix: sp.csr_array,
-    group: NDArray[np.int64],
-    live: NDArray[np.bool_],
-    d: int,
-    *,
-    sure: bool = True,
-    known: NDArray[np.int64] | None = None,
+def spread_directions(
+    matrix: sp.csr_array, group: NDArray[np.int64], d: int, known: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], float]:
     """Directions of all rows, and the share of the whole rows that annihilate translations with them.
 
     Parameters
     ----------
     matrix : (N, N) sparse
-        Symmetric.
+        Symmetric, every row coupled to another one.
     group : (N,) int64
-        Rows that couple to the same unknowns. Those of d whole rows are nodes; if that is not `sure`, they are places
-        to start from and no more.
-    live : (N,) bool
-        Rows that count; those of the identity do not.
+        Rows that couple to the same unknowns; those of d whole rows are nodes.
     d : int
-    sure : bool
-    known : (N,) int64, optional
+    known : (N,) int64
         Directions to start from, -1 where they are not known.
+
+    Returns
+    -------
+    direction : (N,) int64
+    share : float
     """
-    known = np.full(len(group), -1) if known is None else known
     direction = np.zeros(len(group), np.int64)
-    rows = np.flatnonzero(live)
-    inner = sp.csr_array(matrix[rows][:, rows])
+    inner = matrix.copy()
     inner.eliminate_zeros()
     label = sp.csgraph.connected_components(inner, directed=False)[1]
     right = total = 0
     for piece in range(int(label.max(initial=-1)) + 1):
         part = np.flatnonzero(label == piece)
-        body = _Body(inner[part][:, part], np.unique(group[rows[part]], return_inverse=True)[1], d, sure)
-        direction[rows[part]], count = body.directions(known[rows[part]])
+        body = _Body(sp.csr_array(inner[part][:, part]), np.unique(group[part], return_inverse=True)[1], d)
+        direction[part], count = body.directions(known[part])
         right, total = right + count, total + int(body.telling.sum())
     return direction, right / total if total else 0.0
 
@@ -69,11 +62,11 @@ def extended_directions(
 class _Body:
     """One piece: its matrix with the signs of a stiffness, penalties replaced by what makes their rows whole."""
 
-    def __init__(self, matrix: sp.csr_array, group: NDArray[np.int64], d: int, sure: bool):
+    def __init__(self, matrix: sp.csr_array, group: NDArray[np.int64], d: int) -> None:
         n, own = matrix.shape[0], matrix.diagonal()
         size = row_sizes(matrix)
         penalised = with_penalty(matrix, size)
-        off = sp.csr_array(matrix * np.sign(own.sum()))
+        off = sp.csr_array(matrix * (np.sign(own.sum()) or 1.0))
         off.setdiag(0)
         off.eliminate_zeros()
         inferred = -np.asarray(off.sum(axis=1)).ravel()
@@ -84,22 +77,17 @@ class _Body:
         self._pattern = sp.csr_array((np.ones(off.nnz, np.int32), off.indices, off.indptr), shape=off.shape)
         adds_up = adding_up(self._whole, self._size)
         self.telling: NDArray[np.bool_] = np.asarray(adds_up & ~penalised)
-        many = np.bincount(group)[group]
         order = np.argsort(group, kind="stable")
-        nodes = order[many[order] == d].reshape(-1, d)
+        nodes = order[np.bincount(group)[group[order]] == d].reshape(-1, d)
         self._nodes = nodes[adds_up[nodes].all(axis=1)]
         alone = np.ones(n, dtype=bool)
-        alone[self._nodes] = not sure
-        self._sure = sure
-        self._members = [np.flatnonzero(alone)[:, None], self._nodes[: len(self._nodes) if sure else 0]]
-        self._names = [names_of(d)[0], names_of(d)[-1]]
+        alone[self._nodes] = False
+        self._members = [np.flatnonzero(alone)[:, None], self._nodes]
+        self._names = [np.arange(d)[:, None], np.array(list(permutations(range(d))))]
 
     def directions(self, given: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
-        """Directions with which most rows annihilate translations, and how many do.
-
-        First are tried those around what is given, unless that is nothing.
-        """
-        best, most = np.zeros(len(self._size), np.int64), 0
+        """Directions with which most rows annihilate translations, and how many do."""
+        best, most = np.zeros(len(self._size), np.int64), -1
         hope = int(self.telling.sum())
         for start in self._starts(given):
             known, before = start, -1
@@ -112,24 +100,15 @@ class _Body:
                 if count <= before or count == hope or not count:
                     break
                 before, known = count, np.where(self._vouched(good), direction, -1)
-            if not self._sure and most and _merged(best, self._d):
-                best, most = np.zeros(len(self._size), np.int64), 0
-            if most >= SETTLED * hope:
+            if most >= _SETTLED * hope:
                 break
-        return best, most
+        return best, max(most, 0)
 
     def _starts(self, given: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
-        """Directions to start from: those given, and then those of one node each."""
+        """Directions to start from: those given, or else those of one node each, in the middle of the piece first."""
         if (given >= 0).any():
             yield given
-        for seed in self._seeds():
-            known = np.full(len(given), -1)
-            known[seed] = np.arange(self._d)
-            yield known
-
-    def _seeds(self) -> Iterator[NDArray[np.int64]]:
-        """Nodes to start from, those in the middle of the piece first."""
-        if not len(self._nodes):
+        if (given >= 0).any() or not len(self._nodes):
             return
         breadth_first = sp.csgraph.breadth_first_order
         order = breadth_first(self._pattern, 0, directed=False, return_predecessors=False)
@@ -138,7 +117,9 @@ class _Body:
         rank[order] = np.arange(len(order))
         nodes = self._nodes[np.argsort(rank[self._nodes[:, 0]])]
         for part in _SEEDS:
-            yield nodes[int(part * (len(nodes) - 1))]
+            known = np.full(len(given), -1)
+            known[nodes[int(part * (len(nodes) - 1))]] = np.arange(self._d)
+            yield known
 
     def _extended(self, known: NDArray[np.int64]) -> NDArray[np.int64]:
         """Fill in directions of -1, those coupled to what is known first."""
@@ -148,12 +129,14 @@ class _Body:
             if not near.any():  # nothing is coupled to what is left
                 return direction
             best, margin = self._guessed(np.flatnonzero(near), direction)
-            count = int(np.clip(_GROWTH * (direction >= 0).sum(), self._d, near.sum()))
+            count = int(np.clip(_GROWTH * (direction >= 0).sum(), min(self._d, near.sum()), near.sum()))
             least = min(np.partition(margin[near], -count)[-count], _CLEAR)
             direction = np.where(near & (margin >= least), best, direction)
         return direction
 
-    def _guessed(self, rows: NDArray[np.int64], direction: NDArray) -> tuple[NDArray, NDArray]:
+    def _guessed(
+        self, rows: NDArray[np.int64], direction: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Likeliest directions of all rows, and by how much they beat the next, if the others are as they are."""
         held = np.flatnonzero(direction >= 0)
         field = np.zeros((len(direction), self._d))
@@ -181,12 +164,3 @@ class _Body:
         link = sp.csr_array((np.ones(told.sum(), np.int8), (entry.row[told] + n, entry.col[told])), shape=(2 * n,) * 2)
         label = sp.csgraph.connected_components(link, directed=False)[1][:n]
         return np.asarray(label == np.argmax(np.bincount(label)))
-
-
-def _merged(direction: NDArray[np.int64], d: int) -> bool:
-    """Whether there are far more rows of one direction than of another: two were taken for one, whose sums vanish too.
-
-    That is what comes of rows to start from that are not those of one node.
-    """
-    count = np.bincount(direction, minlength=d)
-    return bool(2 * count.min() < count.max())

@@ -14,11 +14,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...matrix.digits import Digits
-from ..rows.constants import ROUNDING, uncoupled_rows
-from ..rows.orders import ORDERS, regular
-from .components import directions_by_component
-from .runs import directions_node_by_node
+from ..matrix.digits import Digits
+from .rows.constants import ROUNDING
+from .rows.orders import ORDERS, regular
+from .rows.searching import directions_in_order, live_part
 
 _LAYOUTS = {3: (3, 2, 1), 2: (2,), 6: (3,)}  # unknowns of a node, and how many of these may be displacements
 _SPREADS = 20  # times the rounding of the entries: what an identity, or a sum of forces, may be off by
@@ -95,15 +94,12 @@ def _readings(matrix: sp.csr_array, off: NDArray[np.float64]) -> Iterator[tuple[
         for kind in ORDERS:
             if order % b == 0:
                 yield regular(order, b, kind)[1], b
-    live = np.flatnonzero(~uncoupled_rows(matrix))
-    inner = sp.csr_array(matrix[live][:, live])
-    inner.sort_indices()
+    live, inner = live_part(matrix)
     for d in (3, 2):
-        for found in (directions_by_component(inner, d, off[live]), directions_node_by_node(inner, d, off[live])):
-            if found is not None:
-                direction = np.full(order, -1)
-                direction[live] = found
-                yield direction, d
+        for found in directions_in_order(inner, d, off[live]):
+            direction = np.full(order, -1)
+            direction[live] = found
+            yield direction, d
 
 
 def _without(matrix: sp.csr_array, direction: NDArray[np.int64], excess: NDArray[np.float64]) -> sp.csr_array:
