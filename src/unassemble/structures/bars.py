@@ -29,11 +29,14 @@ class Bars:
         Unit vectors, sign arbitrary.
     known : (m,) bool
         False for bars both of whose ends lack unknowns, so that only a part of the direction shows.
+    whole : (m,) bool
+        False for bars one of whose ends lacks unknowns.
     """
 
     ends: NDArray[np.int64]
     directions: NDArray[np.float64]
     known: NDArray[np.bool_]
+    whole: NDArray[np.bool_]
 
 
 def bars_of(nodal: NodalMatrix) -> Bars | None:
@@ -66,7 +69,7 @@ def bars_of(nodal: NodalMatrix) -> Bars | None:
     pulls = np.trace(blocks[both], axis1=1, axis2=2) > 0
     if spread[0] < _RANK_ONE or 0 < pulls.sum() < len(pulls):  # bars all in line or in a plane; of stiffness below zero
         return None
-    return Bars(np.column_stack([i, j]), directions, known)
+    return Bars(np.column_stack([i, j]), directions, known, both)
 
 
 def truss_numbering(matrix: sp.csr_array, block_size: int | None = None, kind: str | None = None) -> Numbering | None:

@@ -67,7 +67,7 @@ class Nodes:
             some.append(size > 0)
         return np.stack(zero, axis=1), np.stack(some, axis=1)
 
-    def whole(self, *, strict: bool = True) -> NDArray[np.bool_]:
+    def whole(self) -> NDArray[np.bool_]:
         """(n, b, rotations) rows in which the equation of a rotation holds every coefficient that assembly gave it.
 
         It needs the displacements across the axis, and the rotation, of all coupled nodes. Displacements that were
@@ -75,32 +75,23 @@ class Nodes:
         A penalty on a rotation spoils the equations of its own row.
 
         An eliminated neighbour may act on the moments of a node like a spring that resists rotations only, as the
-        torsion of a column does; but its forces show. So the strict rule takes moments of those nodes only of which no
-        force depends on translations, and forces only if they do not depend on the translation along themselves.
+        torsion of a column does; but its forces show. So moments count only of nodes no force of which depends on
+        translations, and forces only if they do not depend on the translation along themselves.
         """
         layout, b = self.layout, self.layout.block_size
+        moves = len(layout.displacements)
         zero = self.annihilates()[0].reshape(self.n, b, b)
         lacking = self.graph @ (~self.present).astype(np.int32) > 0
-        sound = self.present & ~self._penalised()
-        if strict:
-            sound &= self._untouched(zero, sound)
+        sound: NDArray[np.bool_] = self.present & ~self._penalised()
+        still = np.asarray(zero[:, :moves, :moves].all(axis=(1, 2)) & sound[:, :moves].all(axis=1))
+        sound[:, :moves] &= zero[:, range(moves), range(moves)]
+        sound[:, moves:] &= still[:, None]
         valid = np.zeros((self.n, b, len(layout.rotations)), dtype=bool)
         for k, axis in enumerate(layout.rotations):
             across = [direction for direction, _, _ in layout.turned(axis)]
-            needed = [*across, len(layout.displacements) + k]
             rows = zero[:, :, across].all(axis=2) & sound
-            valid[:, :, k] = rows & ~lacking[:, needed].any(axis=1)[:, None]
+            valid[:, :, k] = rows & ~lacking[:, [*across, moves + k]].any(axis=1)[:, None]
         return valid
-
-    def _untouched(self, zero: NDArray[np.bool_], sound: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """(n, b) forces that do not depend on the translation along them, and moments of nodes away from supports."""
-        moves = len(self.layout.displacements)
-        forces = range(moves)
-        untouched = np.ones((self.n, self.layout.block_size), dtype=bool)
-        untouched[:, :moves] = zero[:, forces, forces]
-        still = zero[:, :moves, :moves].reshape(self.n, -1)
-        untouched[:, moves:] = np.column_stack([still, sound[:, :moves]]).all(axis=1, keepdims=True)
-        return untouched
 
     def _penalised(self) -> NDArray[np.bool_]:
         """(n, b) unknowns with a penalty on the diagonal."""
