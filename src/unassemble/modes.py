@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from .elasticity.modes import rigid_body_modes
 from .errors import InputError
 from .recovery import Recovery
-from .structures.layouts import layout_named
-from .structures.modes import turning_modes
+from .structures.layouts import layout_named, turning_modes
 
 
 def modes_of(recovery: Recovery) -> NDArray[np.float64]:

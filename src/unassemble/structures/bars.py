@@ -14,7 +14,7 @@ from ..elasticity.rows.numbering import Numbering
 from ..elasticity.rows.orders import ORDERS, regular
 
 _RANK_ONE = 1e-9  # how much of a bar's block may be left, relative to the bar
-_SAMPLE = 64  # nodes, or blocks, to look at before all are
+_SAMPLE = 64  # blocks to look at before all are
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,24 +87,7 @@ def truss_numbering(matrix: sp.csr_array, block_size: int | None = None, kind: s
             continue
         for name in ORDERS if kind is None else (kind,):
             node, direction = regular(order, d, name)
-            if not _like_bars(matrix, node, direction, d):
-                continue
             numbering = Numbering(d, node, direction, uncoupled_rows(matrix), name, 0.0, 1.0)
             if bars_of(nodal_matrix(matrix, numbering)) is not None:
                 return numbering
     return None
-
-
-def _like_bars(matrix: sp.csr_array, node: NDArray, direction: NDArray, d: int) -> bool:
-    """Whether the blocks of a few nodes are those of bars, not all of them along the axes."""
-    n = matrix.shape[0] // d
-    place = np.empty((n, d), np.int64)
-    place[node, direction] = np.arange(len(node))
-    some = np.random.default_rng(0).choice(n, min(n, _SAMPLE), replace=False)
-    blocks = sp.csr_array(matrix[place[some].ravel()][:, place.ravel()]).tobsr((d, d))
-    row = np.repeat(some, np.diff(blocks.indptr))
-    size = np.linalg.svd(blocks.data[row != blocks.indices], compute_uv=False)
-    if not size.size or (size[:, 1] > _RANK_ONE * size[:, 0]).any():
-        return False
-    off = np.abs(blocks.data[row != blocks.indices]) > _RANK_ONE * size[:, :1, None]
-    return bool((off.sum(axis=(1, 2)) > 1).any())

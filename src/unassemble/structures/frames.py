@@ -62,11 +62,10 @@ def serve_structure(
     whole, rounding = with_exact_sums(matrix.csr())
     nodes = nodes_of(whole, layout, node, direction)
     with clock("solve"), blas_threads(1):
-        turned = turning_positions(nodes)
-    found = turned.placed
+        found, valid = turning_positions(nodes)
     with clock("certify"):
         counted = np.zeros((len(node), len(layout.rotations)), dtype=bool)
-        counted[nodes.row_of[nodes.present]] = turned.counted[nodes.present]
+        counted[nodes.row_of[nodes.present]] = valid[nodes.present]
         force, used = forces(whole, layout, node, direction, found.points, counted)
         error = float(force.max()) if len(force) else float("inf")
         status, reason = _verdict(error, found, rounding)
@@ -86,8 +85,9 @@ def serve_structure(
         with clock("members"):
             fields = members_and_cells(nodes, found.points)
         notes.append("members and cells were read off the graph; what is certified is the coordinates")
-    if turned.springs:
-        notes.append("moments do not balance alone: rotations are tied to the ground by springs, as against drilling")
+    if not valid[:, len(layout.displacements) :].any():
+        notes.append("moments do not balance alone: forces alone were used, as springs "
+                     "between rotations and the ground, against drilling say, leave them alone")  # fmt: skip
     untold = np.unique(node[direction < 0])
     if len(untold):
         notes.append(f"which unknowns {count_of(len(untold), 'node')} lack the pattern does not tell: their rows were "
@@ -138,11 +138,10 @@ def _moved(found: Placed, anchors: tuple[NDArray, NDArray]) -> tuple[NDArray[np.
 
 def _verdict(error: float, found: Placed, rounding: Rounding | None) -> tuple[str, str]:
     d = found.points.shape[1]
-    free = [one.null_dimension for one in found.evidence if one.null_dimension > d]
-    if free:
+    if found.null_dimension > d:
         return "uncertified", (
-            f"the null space has dimension {free[0]} where {d} translations are expected: supports leave too few whole "
-            "rows"
+            f"the null space has dimension {found.null_dimension} where {d} translations are expected: supports leave "
+            "too few whole rows"
         )
     if rounding and error < rounding.spread:
         return "uncertified", (

@@ -57,16 +57,6 @@ class Nodes:
         """(n b, n) the columns of one direction."""
         return sp.csr_array(self.matrix[:, k :: self.layout.block_size])
 
-    def annihilates(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """(n b, b) rows whose entries of one direction add up to zero, and those that have such entries."""
-        zero, some = [], []
-        for k in range(self.layout.block_size):
-            columns = self.direction(k)
-            size = np.asarray(abs(columns).sum(axis=1)).ravel()
-            zero.append(np.abs(np.asarray(columns.sum(axis=1)).ravel()) <= _ROUNDING * size)
-            some.append(size > 0)
-        return np.stack(zero, axis=1), np.stack(some, axis=1)
-
     def whole(self) -> NDArray[np.bool_]:
         """(n, b, rotations) rows in which the equation of a rotation holds every coefficient that assembly gave it.
 
@@ -80,7 +70,10 @@ class Nodes:
         """
         layout, b = self.layout, self.layout.block_size
         moves = len(layout.displacements)
-        zero = self.annihilates()[0].reshape(self.n, b, b)
+        columns = [self.direction(k) for k in range(b)]
+        sums = np.column_stack([part.sum(axis=1) for part in columns])
+        size = np.column_stack([abs(part).sum(axis=1) for part in columns])
+        zero = (np.abs(sums) <= _ROUNDING * size).reshape(self.n, b, b)
         lacking = self.graph @ (~self.present).astype(np.int32) > 0
         sound: NDArray[np.bool_] = self.present & ~self._penalised()
         still = np.asarray(zero[:, :moves, :moves].all(axis=(1, 2)) & sound[:, :moves].all(axis=1))

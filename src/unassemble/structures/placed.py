@@ -14,6 +14,7 @@ from ..elasticity.nodal import determined
 from ..elasticity.results import Evidence
 from ..elasticity.rows.numbering import Numbering
 from ..errors import GeometryError
+from ..tolerances import CERTIFIED
 from .pieces import Piece, pieces
 from .recognise import StructuralNumbering
 
@@ -31,14 +32,11 @@ class Positions:
     evidence : Evidence
     unnoticed : (m,) bool
         Equations that a disturbance would change without being noticed; see :mod:`.redundancy`.
-    freedom : str
-        What remains free beyond what always does; mostly empty.
     """
 
     points: NDArray[np.float64]
     evidence: Evidence
     unnoticed: NDArray[np.bool_]
-    freedom: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +51,6 @@ class Placed:
         Piece of each node, -1 where not determined.
     evidence : tuple of Evidence
         One per piece.
-    freedom : str
-        What remains free in one of the pieces; mostly empty.
     used : (m,) bool
         Equations that these positions rest on.
     unnoticed : (m,) bool
@@ -65,7 +61,6 @@ class Placed:
     points: NDArray[np.float64]
     component: NDArray[np.int64]
     evidence: tuple[Evidence, ...]
-    freedom: str
     used: NDArray[np.bool_]
     unnoticed: NDArray[np.bool_]
     notes: tuple[str, ...]
@@ -87,16 +82,19 @@ class Placed:
         """Largest residual of a piece."""
         return max(one.residual for one in self.evidence)
 
+    @property
+    def null_dimension(self) -> int:
+        """Largest dimension of the null space of a piece."""
+        return max(one.null_dimension for one in self.evidence)
+
 
 def covered(rows: NDArray[np.bool_], columns: NDArray[np.bool_]) -> str:
     """How much of a matrix speaks for the coordinates, in words: masks of its rows, and of the unknowns they touch."""
     return f"{rows.mean():.0%} of the rows say so, of {columns.mean():.0%} of the unknowns"
 
 
-def placed(
-    operator: sp.csr_array, d: int, edges: NDArray[np.int64], solve: Callable[[Piece], Positions], bound: float
-) -> Placed:
-    """Positions from equations that others would contradict; where too few are left, from all.
+def placed(operator: sp.csr_array, d: int, edges: NDArray[np.int64], solve: Callable[[Piece], Positions]) -> Placed:
+    """Positions from equations that others would contradict; where too few are left, or all contradict, from all.
 
     Equations that would be disturbed without being noticed are left out, and what only they determine with them.
 
@@ -108,8 +106,6 @@ def placed(
         Coupled nodes.
     solve : callable
         Positions of one piece.
-    bound : float
-        Residual above which equations contradict each other, so that it makes no difference which are left out.
 
     Raises
     ------
@@ -118,7 +114,7 @@ def placed(
     """
     every = _placed(operator, d, edges, solve, np.ones(operator.shape[0], dtype=bool))
     best = every
-    while best.residual <= bound and best.unnoticed.any():
+    while best.residual <= CERTIFIED and best.unnoticed.any():
         try:
             best = _placed(operator, d, edges, solve, best.used & ~best.unnoticed)
         except GeometryError:
@@ -152,5 +148,4 @@ def _placed(
         found.append(one)
     if not found:
         raise failure or GeometryError("no node has an equation that supports leave whole")
-    freedom = next((one.freedom for one in found if one.freedom), "")
-    return Placed(points, component, tuple(one.evidence for one in found), freedom, used, unnoticed, tuple(notes))
+    return Placed(points, component, tuple(one.evidence for one in found), used, unnoticed, tuple(notes))

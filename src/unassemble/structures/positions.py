@@ -34,8 +34,8 @@ def least_squares(
     -------
     solution : (n d,) float64
         Without what is free.
-    probes : (m, k) float64
-        Residuals of the right-hand side, first, and of random ones.
+    residuals : (m, k) float64
+        Of the right-hand side, first, and of random ones.
     fields : (n, d, k) float64
         Orthonormal: all null fields, and some more.
     values : (k,) float64
@@ -58,7 +58,7 @@ def least_squares(
             step = solver.solve(operator.T @ (sides - operator @ x))
             step -= free @ (free.T @ step)
             x += step
-            if (np.abs(step).max(axis=0) <= 1e-15 * np.abs(x).max(axis=0)).all():
+            if np.abs(step[:, 0]).max() <= 1e-15 * np.abs(x[:, 0]).max():
                 break
     return x[:, 0], sides - operator @ x, fields, values
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from .equations import Equations
 from .layouts import Layout
 
+_ROUNDING = 1e-9  # of the largest force of equal springs: what cancels between neighbours on both sides
 NOTICED = 1e-4  # how much of a disturbance has to be left in the residuals
 
 
@@ -49,26 +50,24 @@ def unnoticed(
     """
     blind = _small(probes)
     b, moves, turns = layout.block_size, len(layout.displacements), len(layout.rotations)
-    single = np.flatnonzero(given.row >= 0)
-    place = np.full((len(points), b, turns), -1)
-    place[given.row[single] // b, given.row[single] % b, given.rotation[single]] = single
-    weighted = np.vstack(
-        [probes / given.size[:, None], np.zeros(probes.shape[1])]
-    )  # the last for rows without equation
+    inside = np.flatnonzero(given.row >= 0)
+    place = np.full((len(points), b, turns), -1)  # of rows without equation the last, which has no weight
+    place[given.row[inside] // b, given.row[inside] % b, given.rotation[inside]] = inside
     weight = np.append(1 / given.size, 0.0)
+    weighted = np.vstack([probes, np.zeros(probes.shape[1])]) * weight[:, None]
     step = layout.rigid_motions(points[edges[:, 0]] - points[edges[:, 1]])[:, :, moves:]
     for a in range(moves):
         one, other = place[edges[:, 0], a], place[edges[:, 1], a]  # (e, turns)
-        scale = np.hypot(weight[one], weight[other])
-        pull = weighted[one] - weighted[other]
-        lone = _small(pull / np.where(scale > 0, scale, 1)[..., None]) & (one >= 0) & (other >= 0)
+        both = (one >= 0) & (other >= 0)
+        scale = np.where(both, np.hypot(weight[one], weight[other]), 1)[..., None]
+        lone = _small((weighted[one] - weighted[other]) / scale) & both
         blind[one[lone]] = blind[other[lone]] = True
-        forces = np.zeros((len(points), turns))
-        for end, sign in ((0, 1), (1, -1)):
-            np.add.at(forces, edges[:, end], sign * step[:, a])
-        _blind_together(blind, place[:, a], forces, weighted)
-    for k in range(turns) if (given.row % b >= moves)[single].any() else ():
-        _blind_together(blind, place[:, moves + k, [k]], np.ones((len(points), 1)), weighted)
+        pull = np.zeros((len(points), turns))
+        np.add.at(pull, edges[:, 0], step[:, a])
+        np.add.at(pull, edges[:, 1], -step[:, a])
+        _blind_together(blind, place[:, a], pull, weighted)
+    for k in range(turns):
+        _blind_together(blind, place[:, moves + k, k], np.ones(len(points)), weighted)
     return blind
 
 
@@ -78,10 +77,7 @@ def _small(seen: NDArray) -> NDArray[np.bool_]:
 
 def _blind_together(blind: NDArray, place: NDArray, forces: NDArray, weighted: NDArray) -> None:
     """Mark equations as unnoticed, if one disturbance of them all is."""
-    there = (place >= 0) & (np.abs(forces) > 1e-9 * np.abs(forces).max(initial=0.0))
-    which, force = place[there], forces[there]
-    if not len(which):
-        return
-    pull = weighted[which] * force[:, None]
-    if _small(pull.sum(axis=0) / np.linalg.norm(pull)):
-        blind[which] = True
+    there = (place >= 0) & (np.abs(forces) > _ROUNDING * np.abs(forces).max(initial=0.0))
+    pull = weighted[place[there]] * forces[there][:, None]
+    if _small(pull.sum(axis=0) / (np.linalg.norm(pull) or 1.0)):
+        blind[place[there]] = True

@@ -83,7 +83,7 @@ def serve_truss(
 
 
 def _verdict(error: float, found: Placed) -> tuple[str, str]:
-    if found.freedom:
+    if found.null_dimension > found.points.shape[1] + 1:
         return "uncertified", "the directions of the bars leave more free than translations and size"
     if not error <= CERTIFIED:
         return "uncertified", f"a block differs from that of a bar by {error:.1e} of the row's largest entry"
@@ -124,9 +124,9 @@ def place_joints(bars: Bars, n: int) -> Placed:
         blind = ~whole[which] & (np.linalg.svd(seen, compute_uv=False)[:, d - 2] < NOTICED)
         gap = values[values > EXACT]
         evidence = Evidence(one.dimension, float(values[d]), float(gap[0]) if len(gap) else float("inf"), len(which))
-        return Positions(in_gauge(one.points, links), evidence, np.repeat(blind, d), one.freedom)
+        return Positions(in_gauge(one.points, links), evidence, np.repeat(blind, d))
 
-    return placed(_across(ends, directions, n), d, ends, solve, CERTIFIED)
+    return placed(_across(ends, directions, n), d, ends, solve)
 
 
 def _across_one(directions: NDArray[np.float64]) -> NDArray[np.float64]:
