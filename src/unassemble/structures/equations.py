@@ -10,13 +10,16 @@ of length. Whatever the elements are, beams, plates or shells, of any section an
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from itertools import combinations
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .nodes import Nodes
+
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +35,7 @@ class Equations:
     lever : (m,) float64
         Sum of the terms of the right-hand side, without signs.
     row : (m,) int64
-        Row ``i b + k`` of direction k of node i.
+        Row ``i b + k`` of direction k of node i; -1 for differences of two rows.
     rotation : (m,) int64
         Which of the layout's rotations it is.
     """
@@ -49,22 +52,54 @@ class Equations:
         return Equations(*(getattr(self, one.name)[which] for one in fields(self)))
 
 
-def equations(nodes: Nodes, valid: NDArray[np.bool_]) -> Equations:
-    """Collect the valid equations, without those that have no coefficients.
+def equations(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool) -> Equations:
+    """Collect the valid equations.
 
     Parameters
     ----------
     nodes : Nodes
     valid : (n, b, rotations) bool
         See :meth:`.nodes.Nodes.whole`.
+    springs : bool
+        Allow for springs between the rotations of a node and the ground, as programs add them where a flat shell has
+        no stiffness against drilling. They add an unknown symmetric matrix to the three moments' rows; what is left
+        are the differences of its two triangles.
     """
-    parts = [_rotation(nodes, k, np.flatnonzero(valid[:, :, k])) for k in range(valid.shape[2])]
+    b, moves = nodes.layout.block_size, len(nodes.layout.displacements)
+    every = [_rotation(nodes, k) for k in range(valid.shape[2])]
+    forces = np.arange(nodes.n * b) % b < moves
+    parts = [one[valid[:, :, k].ravel() & (forces | (not springs))] for k, one in enumerate(every)]
+    for k, m in combinations(range(len(every)), 2) if springs else ():
+        both = np.flatnonzero(valid[:, moves + m, k] & valid[:, moves + k, m]) * b + moves
+        one, other = every[k][both + m], every[m][both + k]
+        parts.append(
+            Equations(
+                sp.csr_array(one.operator - other.operator),
+                one.right - other.right,
+                one.size + other.size,
+                one.lever + other.lever,
+                np.full(len(both), -1),
+                one.rotation,
+            )
+        )
     joined = [[getattr(part, one.name) for part in parts] for one in fields(Equations)]
-    return Equations(sp.vstack(joined[0], format="csr"), *map(np.concatenate, joined[1:]))
+    return _relative(Equations(sp.vstack(joined[0], format="csr"), *map(np.concatenate, joined[1:])))
 
 
-def _rotation(nodes: Nodes, k: int, used: NDArray[np.int64]) -> Equations:
-    """Equations of some rows for rotation k."""
+def _relative(given: Equations) -> Equations:
+    """Equations relative to the size of their coefficients; those without any, or none but rounding, are left out.
+
+    What comes in has the size of what the coefficients are differences of.
+    """
+    size = np.asarray(abs(given.operator).sum(axis=1)).ravel()
+    tells = np.flatnonzero(size > _ROUNDING * given.size)
+    some, size = given[tells], size[tells]
+    operator = sp.csr_array(sp.diags_array(1 / size) @ some.operator)
+    return replace(some, operator=operator, right=some.right / size, size=size, lever=some.lever / size)
+
+
+def _rotation(nodes: Nodes, k: int) -> Equations:
+    """All rows' equation for rotation k, as it stands."""
     layout, order = nodes.layout, nodes.matrix.shape[0]
     rows, columns, values = [], [], []
     for direction, coordinate, sign in layout.turned(layout.rotations[k]):
@@ -76,7 +111,4 @@ def _rotation(nodes: Nodes, k: int, used: NDArray[np.int64]) -> Equations:
     operator = sp.csr_array((np.concatenate(values), place), shape=(order, nodes.n * layout.dim))
     own = nodes.direction(len(layout.displacements) + k)
     right, lever, size = (np.asarray(part.sum(axis=1)).ravel() for part in (-own, abs(own), abs(operator)))
-    used = used[size[used] > 0]
-    size = size[used]
-    scaled = sp.csr_array(sp.diags_array(1 / size) @ operator[used])
-    return Equations(scaled, right[used] / size, size, lever[used] / size, used, np.full(len(used), k))
+    return Equations(operator, right, size, lever, np.arange(order), np.full(order, k))

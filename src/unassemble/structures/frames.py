@@ -86,8 +86,8 @@ def serve_structure(
             fields = members_and_cells(nodes, found.points)
         notes.append("members and cells were read off the graph; what is certified is the coordinates")
     if not valid[:, len(layout.displacements) :].any():
-        notes.append("moments do not balance alone: forces alone were used, as springs "
-                     "between rotations and the ground, against drilling say, leave them alone")  # fmt: skip
+        notes.append("moments are not used alone: springs between rotations and the ground, as against drilling, would "
+                     "spoil them")  # fmt: skip
     untold = np.unique(node[direction < 0])
     if len(untold):
         notes.append(f"which unknowns {count_of(len(untold), 'node')} lack the pattern does not tell: their rows were "

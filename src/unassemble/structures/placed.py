@@ -112,14 +112,13 @@ def placed(operator: sp.csr_array, d: int, edges: NDArray[np.int64], solve: Call
     GeometryError
         If no node is determined.
     """
-    every = _placed(operator, d, edges, solve, np.ones(operator.shape[0], dtype=bool))
-    best = every
+    best = every = _placed(operator, d, edges, solve, np.ones(operator.shape[0], dtype=bool))
     while best.residual <= CERTIFIED and best.unnoticed.any():
         try:
             best = _placed(operator, d, edges, solve, best.used & ~best.unnoticed)
         except GeometryError:
             return every
-    return best
+    return best if best.null_dimension <= every.null_dimension else every
 
 
 def _placed(

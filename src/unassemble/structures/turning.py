@@ -25,7 +25,7 @@ _NOTHING = 1e-9  # of what rotations of nodes contribute: displacements between 
 
 
 def turning_positions(nodes: Nodes) -> tuple[Placed, NDArray[np.bool_]]:
-    """Positions from all rows; where these contradict or do not check each other, from forces, which no spring spoils.
+    """Positions from all rows; where these contradict or do not check each other, from those that no spring spoils.
 
     Returns
     -------
@@ -42,16 +42,16 @@ def turning_positions(nodes: Nodes) -> tuple[Placed, NDArray[np.bool_]]:
     failure: GeometryError | None = None
     layout, valid = nodes.layout, nodes.whole()
     edges = np.column_stack(sp.triu(nodes.graph, 1).nonzero())
-    for without in (layout.block_size, len(layout.displacements)):
-        counted = valid.copy()
-        counted[:, without:] = False
-        given = equations(nodes, counted)
+    for springs in (False, True):
+        given, counted = equations(nodes, valid, springs=springs), valid.copy()
+        if springs:
+            counted[:, len(layout.displacements) :] = False
         try:
             found = placed(given.operator, layout.dim, edges, partial(_positions, given, layout))
         except GeometryError as error:
             failure = failure or error
             continue
-        left = given[~found.used]
+        left = given[~found.used & (given.row >= 0)]
         counted.reshape(-1, counted.shape[2])[left.row, left.rotation] = False
         attempts.append((found, counted))
         if not any(_doubts(found)[:3]) and found.used.all():
@@ -89,7 +89,9 @@ def _positions(given: Equations, layout: Layout, piece: Piece) -> Positions:
     if null.shape[2] > d:
         null, loose = set_aside(null, d)
     place = np.searchsorted(piece.nodes, part.row // b)
-    own = piece.nodes[np.minimum(place, n - 1)] == part.row // b  # a row may not depend on its own node
+    own = (part.row >= 0) & (
+        piece.nodes[np.minimum(place, n - 1)] == part.row // b
+    )  # a row may not depend on its own node
     local = replace(part, operator=piece.operator, row=np.where(own, place * b + part.row % b, -1))
     blind = unnoticed(local, residuals[:, 1:], layout, x, piece.edges)
     residual = float(np.abs(residuals[:, 0]).max()) / span
