@@ -103,6 +103,16 @@ def test_rows_of_a_direction_in_another_order(make, few):
         assert not sound(given.matrix[order][:, order], rows_per_node(given)[order])
 
 
+@pytest.mark.parametrize("counts", [(2, 2), (4, 3)])
+@pytest.mark.parametrize("direction", [0, 1])
+def test_rows_of_a_direction_in_reverse(counts, direction):
+    """The graph of a regular frame is the same from the other end."""
+    given = plane_frame(counts, off=0.0)
+    order = np.arange(given.matrix.shape[0])
+    order[direction::3] = order[direction::3][::-1]
+    assert not sound(given.matrix[order][:, order], rows_per_node(given)[order])
+
+
 def test_condensed_truss_is_no_point():
     """A plate none of whose displacements depends on rotations would have all its nodes in one place."""
     given = truss(3, 6)
