@@ -46,9 +46,17 @@ class Nodes:
     @cached_property
     def graph(self) -> sp.csr_array:
         """(n, n) pattern of coupled nodes, with the diagonal."""
-        coo, b = self.matrix.tocoo(), self.layout.block_size
-        own = np.arange(self.n)
-        place = np.concatenate([coo.row // b, own]), np.concatenate([coo.col // b, own])
+        return self._pattern(self.layout.block_size)
+
+    @cached_property
+    def moving(self) -> sp.csr_array:
+        """(n, n) pattern of nodes whose displacements are coupled, with the diagonal."""
+        return self._pattern(len(self.layout.displacements))
+
+    def _pattern(self, directions: int) -> sp.csr_array:
+        coo, b, own = self.matrix.tocoo(), self.layout.block_size, np.arange(self.n)
+        some = (coo.row % b < directions) & (coo.col % b < directions)
+        place = np.concatenate([coo.row[some] // b, own]), np.concatenate([coo.col[some] // b, own])
         pattern = sp.csr_array((np.ones(len(place[0]), np.int32), place), shape=(self.n, self.n))
         pattern.data[:] = 1
         return pattern

@@ -24,7 +24,7 @@ def mispaired(nodes: Nodes, points: NDArray[np.float64]) -> tuple[int, int] | No
 
     In space each coordinate acts on two directions, which contradict each other where their rows are not one node's;
     the coordinates of a plate act on one direction. Those of a plane frame have a direction each, so that all depends
-    on the pairing: its nodes have to be joined by members, and more than two of them.
+    on the pairing: its nodes have to be joined by members, and no two of them to have the same neighbours.
 
     Parameters
     ----------
@@ -41,8 +41,10 @@ def mispaired(nodes: Nodes, points: NDArray[np.float64]) -> tuple[int, int] | No
     shared = (nodes.present[first] & nodes.present[second]).sum(axis=1)
     strange = np.asarray(meeting[first, second]).ravel() < np.minimum(shared, 2)
     if nodes.layout == PLANE:
-        degree = np.diff(near.indptr)
-        strange |= (degree[first] <= 2) & (degree[second] <= 2) | ~_balanced(nodes, points, first, second)
+        pattern = (near > 0).astype(np.int32)
+        degree, common = np.diff(near.indptr), np.asarray((pattern @ pattern)[first, second]).ravel()
+        twins = (common == degree[first]) & (common == degree[second])
+        strange |= twins | ~_balanced(nodes, points, first, second)
     k = int(np.argmax(strange)) if strange.any() else None
     return None if k is None else (int(first[k]), int(second[k]))
 

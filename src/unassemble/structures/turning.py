@@ -41,7 +41,7 @@ def turning_positions(nodes: Nodes) -> tuple[Placed, NDArray[np.bool_]]:
     attempts: list[tuple[Placed, NDArray[np.bool_]]] = []
     failure: GeometryError | None = None
     layout, valid = nodes.layout, nodes.whole()
-    edges = np.column_stack(sp.triu(nodes.graph, 1).nonzero())
+    edges = np.column_stack(sp.triu(nodes.moving, 1).nonzero())
     for springs in (False, True):
         given, counted = equations(nodes, valid, springs=springs), valid.copy()
         if springs:
