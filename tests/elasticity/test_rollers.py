@@ -155,4 +155,4 @@ def test_cells_with_nodes_all_of_whose_entries_were_taken_out(support, order):
     assert found.certified
     assert truth.error < 1e-12
     assert truth.split == 0
-    assert truth.missing < 0.1  # those next to the corner, which is not in the matrix
+    assert truth.missing < 0.12  # those next to the corner, which is not in the matrix

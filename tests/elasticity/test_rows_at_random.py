@@ -46,7 +46,7 @@ def test_nor_where_most_of_them_vanish(kind, support):
 @pytest.mark.parametrize("kind", ["tri-p2", "tet-p2"])
 def test_of_quadratic_simplices_some_nodes_are_missing(kind, support):
     """Nodes that belong to one cell only couple to the same unknowns: nothing tells which rows are theirs."""
-    assert_certified(body(kind, support, "stored", 0.2, VARYING), 1e-9, 0.5, split=0)
+    assert_certified(body(kind, support, "stored", 0.2, VARYING), 1e-9, 0.56, split=0)
 
 
 @pytest.mark.slow

@@ -28,8 +28,8 @@ _SETTLED = 0.98  # share of the whole rows whose sums vanish in all directions: 
 
 def spread_directions(
     matrix: sp.csr_array, group: NDArray[np.int64], d: int, known: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], float]:
-    """Directions of all rows, and the share of the whole rows that annihilate translations with them.
+) -> NDArray[np.int64]:
+    """(N,) directions of all rows, with which most of the whole rows annihilate translations.
 
     Parameters
     ----------
@@ -40,23 +40,16 @@ def spread_directions(
     d : int
     known : (N,) int64
         Directions to start from, -1 where they are not known.
-
-    Returns
-    -------
-    direction : (N,) int64
-    share : float
     """
     direction = np.zeros(len(group), np.int64)
     inner = matrix.copy()
     inner.eliminate_zeros()
     label = sp.csgraph.connected_components(inner, directed=False)[1]
-    right = total = 0
     for piece in range(int(label.max(initial=-1)) + 1):
         part = np.flatnonzero(label == piece)
         body = _Body(sp.csr_array(inner[part][:, part]), np.unique(group[part], return_inverse=True)[1], d)
-        direction[part], count = body.directions(known[part])
-        right, total = right + count, total + int(body.telling.sum())
-    return direction, right / total if total else 0.0
+        direction[part] = body.directions(known[part])
+    return direction
 
 
 class _Body:
@@ -85,9 +78,9 @@ class _Body:
         self._members = [np.flatnonzero(alone)[:, None], self._nodes]
         self._names = [np.arange(d)[:, None], np.array(list(permutations(range(d))))]
 
-    def directions(self, given: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
-        """Directions with which most rows annihilate translations, and how many do."""
-        best, most = np.zeros(len(self._size), np.int64), -1
+    def directions(self, given: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(n,) directions with which most rows annihilate translations, and of several those of least sums."""
+        best, most, least = np.zeros(len(self._size), np.int64), -1, np.inf
         hope = int(self.telling.sum())
         for start in self._starts(given):
             known, before = start, -1
@@ -95,14 +88,15 @@ class _Body:
                 direction = self._extended(known)
                 good = self._good(direction)
                 count = int(good.sum())
-                if count > most:
-                    best, most = direction, count
+                total = self._total(direction)
+                if (count, -total) > (most, -least):
+                    best, most, least = direction, count, total
                 if count <= before or count == hope or not count:
                     break
                 before, known = count, np.where(self._vouched(good), direction, -1)
             if most >= _SETTLED * hope:
                 break
-        return best, max(most, 0)
+        return best
 
     def _starts(self, given: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
         """Directions to start from: those given, or else those of one node each, in the middle of the piece first."""
@@ -150,6 +144,10 @@ class _Body:
             two = np.partition(fit, -2, axis=1)[:, -2:]
             margin[members] = (two[:, 1] - two[:, 0])[:, None]
         return best, margin
+
+    def _total(self, direction: NDArray[np.int64]) -> float:
+        """Absolute sums over each direction, in all rows, of their sizes."""
+        return float((np.abs(self._whole @ np.eye(self._d)[direction]) / self._size[:, None]).sum())
 
     def _good(self, direction: NDArray[np.int64]) -> NDArray[np.bool_]:
         """(n,) rows whose entries add up to zero in each direction."""

@@ -52,7 +52,7 @@ def with_least_sums(
         unnamed = ~proven_directions(matrix, direction, group, d)
         if not unnamed.any() or unnamed.all():  # if all rows had one direction, sums would be least
             break
-        other, _ = spread_directions(matrix, group, d, np.where(unnamed, -1, direction))
+        other = spread_directions(matrix, group, d, np.where(unnamed, -1, direction))
         trials = [_named(scaled, one, unnamed, d, budget) for one in (direction, other)]
         best = min([other, *trials], key=total)
         if total(best) >= (1 - _SMALLER) * total(direction):

@@ -29,7 +29,6 @@ _LARGE = 20_000  # rows beyond which entries that vanished are not put back, whi
 _WORK = 2e10  # for directions: half a minute or so
 _IN_TURN = 0.1  # by which neighbouring rows have more in common than rows far apart, if they stand node by node
 _ANNIHILATED = 0.9  # share of whole rows that annihilate translations when directions are right
-_HOPEFUL = 0.1  # the same before sums decide on rows next to supports
 _EVEN = 0.6  # share of rows, far from supports, in patterns with as many rows in each direction
 
 
@@ -70,7 +69,7 @@ def directions_in_order(
         yield direction
     group = same_pattern(inner)
     if _shows_runs(group, d) and inner.diagonal().all():
-        direction, _ = spread_directions(inner, group, d, _of_runs(group, d))
+        direction = spread_directions(inner, group, d, _of_runs(group, d))
         yield with_least_sums(inner, group, direction, d, Budget(_WORK))
 
 
@@ -160,9 +159,7 @@ def _by_equilibrium(inner: sp.csr_array, whole: sp.csr_array, d: int, kind: str)
     """Directions spread from whole nodes, and nodes; None where translations are not annihilated."""
     group = same_pattern(whole)
     known = _of_runs(group, d) if kind == "interleaved" else np.full(len(group), -1)
-    direction, share = spread_directions(whole, group, d, known)
-    if kind == "pattern" and share <= _HOPEFUL:
-        return None
+    direction = spread_directions(whole, group, d, known)
     direction = with_least_sums(whole, group, direction, d, Budget(_WORK))
     if kind == "pattern" and _annihilated(whole, direction, d) <= _ANNIHILATED:
         return None
