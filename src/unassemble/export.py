@@ -155,7 +155,7 @@ def _boundary_flag(recovery: Recovery) -> NDArray[np.int64]:
     flag = np.zeros(recovery.n_points, dtype=np.int64)
     flag[recovery.boundary] = 1
     if recovery.dim == 3:
-        from .elasticity.elements.surface import outer_nodes
+        from .elements.surface import outer_nodes
 
         solid = dict(recovery.cells)
         flag[solid.pop("line", [])] = 1

@@ -21,8 +21,7 @@ def modes_of(recovery: Recovery) -> NDArray[np.float64]:
         If the matrix is scalar.
     """
     from .elasticity.modes import rigid_body_modes
-    from .structures.layouts import layout_named
-    from .structures.modes import turning_modes
+    from .structures.layouts import layout_named, turning_modes
 
     node, direction = recovery.node_of_row, recovery.direction_of_row
     if node is None or direction is None:

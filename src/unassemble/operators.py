@@ -15,7 +15,7 @@ from .tolerances import ROUNDED
 
 if TYPE_CHECKING:
     from .elasticity import Numbering
-    from .elasticity.ordered.rounded import Rounding
+    from .elasticity.rounded import Rounding
     from .structures import StructuralNumbering
 
 
@@ -115,7 +115,6 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
 
 def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     """Read a matrix as vector-valued after it turned out not to be a planar mesh; None where little speaks for it."""
-    from .elasticity.ordered.sampling import promising
     from .elasticity.unknowns import find_numbering
     from .structures import find_structure
 
@@ -126,7 +125,7 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     if structure is not None:
         return VectorReading(structure, f"it is no planar mesh, and {_evidence(structure)}", exact)
     try:
-        found = find_numbering(whole) if promising(whole, (3, 2)) else None
+        found = find_numbering(whole)
     except RecoveryError:
         found = None
     if not _convinces(found):
@@ -150,7 +149,7 @@ def about_translations(matrix: OperatorMatrix) -> str:
 
 def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, tuple[sp.csr_array, Rounding] | None]:
     """The matrix to look at, and of entries with few digits what a reading keeps of it."""
-    from .elasticity.ordered.rounded import with_exact_sums
+    from .elasticity.rounded import with_exact_sums
 
     whole, rounding = with_exact_sums(matrix.csr())
     return whole, (whole, rounding) if rounding else None

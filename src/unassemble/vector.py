@@ -9,7 +9,7 @@ from typing import Any
 from .clock import Clock
 from .elasticity.nodal import nodal_matrix, uncoupled
 from .elasticity.recover import parts_of
-from .elasticity.serving import serve_body
+from .elasticity.serving import Request, serve_body
 from .matrix import OperatorMatrix
 from .operators import VectorReading
 from .recovery import Recovery
@@ -60,9 +60,5 @@ def recover_vector(
     bars = bars_of(nodal)
     if bars is not None:
         return serve_truss(matrix, nodal, numbering, bars, clock, anchors=anchors, choice=choice)
-    unnamed = numbering.unnamed is not None and bool(numbering.unnamed.any())
-    kept = whole if unnamed else None
     del whole  # of a large body, memory that the long work can use
-    return serve_body(
-        matrix, nodal, numbering, clock, rounding=rounding, whole=kept, anchors=anchors, cells=cells, choice=choice
-    )
+    return serve_body(matrix, nodal, numbering, clock, Request(anchors, cells, choice, rounding))

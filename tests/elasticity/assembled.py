@@ -61,8 +61,12 @@ def box(kind: str, counts, *, perturb: float = 0.0, seed: int = 0, grading: floa
     return mesh_type(p, mesh.t)
 
 
-def stiffness(kind: str, mesh, *, lam=1.0, mu=1.0, tensor=None, form=None, intorder=None, quadrature=None) -> Assembled:
+def stiffness(
+    kind: str, mesh, *, lam=1.0, mu=1.0, within=False, tensor=None, form=None, intorder=None, quadrature=None
+) -> Assembled:
     """Assemble; lam and mu are numbers, (m, 1) numbers of each cell, or functions of the position.
+
+    A function is that of the cells' centres, or of the points of the quadrature where material varies `within` cells.
 
     Other material has a `tensor` of elasticity (d, d, d, d), another operator a `form` of vector-valued functions.
     A quadrature is given as its points and weights.
@@ -80,7 +84,7 @@ def stiffness(kind: str, mesh, *, lam=1.0, mu=1.0, tensor=None, form=None, intor
     elif tensor is not None:
         matrix = _of_tensor(tensor, _gradients(basis, 1.0))
     else:
-        x = basis.global_coordinates()
+        x = basis.global_coordinates() if within else mesh.p[:, mesh.t].mean(axis=1)[:, :, None]
         first, second = (_gradients(basis, one(x) if callable(one) else one) for one in (lam, mu))
         matrix = _isotropic(first, second)
     order = dofs.T.ravel() if form is not None else (dofs[0][:, None] + np.arange(mesh.dim()) * basis.N).ravel()

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-import skfem
 from assembled import ELEMENTS, Assembled, box, stiffness
 from scipy.spatial import cKDTree
 
-KIND = {"tri-p1": "triangle", "quad-q1": "quad", "tet-p1": "tetra", "hex-q1": "hexahedron"}
+KIND = {"tri-p1": "triangle", "quad-q1": "quad"}
 
 
 @dataclass(frozen=True)
@@ -22,24 +21,17 @@ class Mixed:
     cells: dict[str, set[frozenset[int]]]
 
 
-def mixed(d: int, counts, *, perturb=0.0, seed=0, layered=False, vary=False, lam=1.5) -> Mixed:
-    """A box of which about half the quadrilaterals or hexahedra are cut into simplices; nodes in random order.
-
-    Cut hexahedra have facets of two triangles against those of four corners of their neighbours: the shape functions
-    do not match there, but the matrix is a sum over cells all the same.
-    """
+def mixed(counts, *, perturb=0.0, seed=0, layered=False, vary=False, lam=1.5) -> Mixed:
+    """A box of which about half the quadrilaterals are cut into triangles; nodes in random order."""
     rng = np.random.default_rng(seed)
-    base = box("quad-q1" if d == 2 else "hex-q1", counts, perturb=perturb, seed=seed)
+    base = box("quad-q1", counts, perturb=perturb, seed=seed)
     centre = base.p[0, base.t].mean(axis=0)
     cut = centre > 0.5 if layered else rng.random(base.nelements) < 0.5
     boxes, pieces = base.t[:, ~cut], base.t[:, cut]
-    if d == 2:
-        flip = rng.random(pieces.shape[1]) < 0.5
-        halves = [pieces[rows][:, flip == turned] for turned, rows in _HALVES]
-        parts = {"tri-p1": np.hstack(halves), "quad-q1": boxes}
-    else:
-        parts = {"tet-p1": skfem.MeshHex(base.p, pieces).to_meshtet().t, "hex-q1": boxes}
-    n = base.p.shape[1]
+    flip = rng.random(pieces.shape[1]) < 0.5
+    halves = [pieces[rows][:, flip == turned] for turned, rows in _HALVES]
+    parts = {"tri-p1": np.hstack(halves), "quad-q1": boxes}
+    d, n = base.p.shape
     total = sp.csr_array((n * d, n * d))
     for kind, cells in parts.items():
         total = total + _part(kind, base.p, cells, rng if vary else None, lam)

@@ -142,20 +142,6 @@ def test_regions_that_were_labelled_from_different_sides_are_reconciled():
     assert len(np.unique(np.column_stack([found.direction_of_row, rows % 2]), axis=0)) == 2
 
 
-def test_directions_that_contradict_each_other_are_not_certified(monkeypatch):
-    for name in ("scattered", "scattered_without_zeros"):
-        monkeypatch.setattr(f"unassemble.elasticity.unknowns.{name}", lambda matrix, sizes: None)
-    for room in ("directions.directions", "scattered.searching"):
-        monkeypatch.setattr(
-            f"unassemble.elasticity.{room}.set_right", lambda matrix, group, members, live, found, names: found
-        )
-    given = wing()
-    rows = np.random.default_rng(0).permutation(2 * len(given.points))
-    found = recover_elasticity(given.matrix[rows][:, rows])
-    assert found.status == "uncertified"
-    assert "separate pieces" in found.reason
-
-
 def test_given_numbering_is_used():
     given = body("tet-p1")
     d = given.dim

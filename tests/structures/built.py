@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -47,6 +47,27 @@ class Built:
         place = np.argsort(order)
         return Built(self.matrix[rows][:, rows], self.points[order], place[self.members], self.unknowns)
 
+    def with_springs(self, rows, others=None, share: float = 0.2) -> Built:
+        """Equal springs at unknowns, to the ground or to others, as stiff as a share of a typical diagonal entry."""
+        stiffness = np.full(len(rows), share * self.matrix.diagonal()[rows].mean())
+        ends = [rows] if others is None else [rows, others]
+        matrix = self.matrix
+        for one in ends:
+            for other in ends:
+                values = stiffness if one is other else -stiffness
+                matrix = matrix + sp.csr_array((values, (one, other)), shape=matrix.shape)
+        return replace(self, matrix=sp.csr_array(matrix))
+
+    def condensed(self, rows) -> tuple[sp.csr_array, np.ndarray]:
+        """Without some unknowns, statically condensed; and which rows are left."""
+        kept = np.setdiff1d(np.arange(self.matrix.shape[0]), rows)
+        full = self.matrix.toarray()
+        left = full[np.ix_(kept, kept)] - full[np.ix_(kept, rows)] @ np.linalg.solve(
+            full[np.ix_(rows, rows)], full[np.ix_(rows, kept)]
+        )
+        left = np.where(np.abs(left) < 1e-15 * np.abs(left).max(), 0, left)
+        return sp.csr_array((left + left.T) / 2), kept
+
     def by_component(self) -> sp.csr_array:
         rows = np.arange(self.matrix.shape[0]).reshape(-1, self.block).T.ravel()
         return self.matrix[rows][:, rows]
@@ -78,11 +99,13 @@ def assembled(model: FEModel3D, points, members=()) -> Built:
     )
 
 
-def add_members(model: FEModel3D, ends, seed: int, *, turned: bool = True, pinned: bool = False) -> None:
-    """Members of different sections, turned about their axes."""
+def add_members(
+    model: FEModel3D, ends, seed: int, *, turned: bool = True, pinned: bool = False, equal: bool = False
+) -> None:
+    """Members of different sections, or of equal ones, turned about their axes."""
     rng = np.random.default_rng(seed)
     for k, (i, j) in enumerate(ends):
-        factor = rng.uniform(1, 3)
+        factor = 1.0 if equal else rng.uniform(1, 3)
         model.add_section(str(k), 1e-2 * factor, 1e-4 * factor, 2e-4 * factor, 2.5e-4)
         angle = float(rng.uniform(0, 90)) if turned else 0.0
         model.add_member(str(k), str(i), str(j), "steel", str(k), rotation=angle)
@@ -101,21 +124,30 @@ def grid(counts) -> tuple[np.ndarray, np.ndarray]:
     return points, np.concatenate(near)
 
 
-def frame(counts=(4, 3, 3), seed: int = 0) -> Built:
-    """A building of rigid joints, out of plumb."""
+def frame(counts=(4, 3, 3), seed: int = 0, off: float = 0.4) -> Built:
+    """A building of rigid joints, out of plumb; of equal members in one that is not."""
     points, ends = grid(counts)
-    points = 3 * points + np.random.default_rng(seed).uniform(-0.4, 0.4, points.shape)
+    points = 3 * points + np.random.default_rng(seed).uniform(-off, off, points.shape)
     model = model_on(points)
-    add_members(model, ends, seed)
+    add_members(model, ends, seed, turned=off > 0, equal=off == 0)
     return assembled(model, points, ends)
 
 
-def plane_frame(counts=(5, 4), seed: int = 0) -> Built:
+def plane_frame(counts=(5, 4), seed: int = 0, off: float = 0.4) -> Built:
     points, ends = grid(counts)
-    points = 3 * points + np.random.default_rng(seed).uniform(-0.4, 0.4, points.shape)
+    points = 3 * points + np.random.default_rng(seed).uniform(-off, off, points.shape)
     model = model_on(points)
-    add_members(model, ends, seed, turned=False)
+    add_members(model, ends, seed, turned=False, equal=off == 0)
     return assembled(model, points, ends).only(PLANE, 2)
+
+
+def grillage(counts=(4, 3), seed: int = 0, off: float = 0.4) -> Built:
+    """Beams in a plane that bend and twist out of it."""
+    points, ends = grid(counts)
+    points = 3 * points + np.random.default_rng(seed).uniform(-off, off, points.shape)
+    model = model_on(points)
+    add_members(model, ends, seed, turned=False, equal=off == 0)
+    return assembled(model, points, ends).only(PLATE, 2)
 
 
 def truss(d: int, n: int, seed: int = 0) -> Built:

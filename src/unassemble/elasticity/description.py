@@ -6,14 +6,14 @@ import numpy as np
 
 from ..clock import Clock
 from .doubts import guessed_directions, unborne, unconfirmed
-from .elements.cells import no_cells, recognise_cells
+from .materials.cells import no_cells, recognise_cells
 from .nodal import NodalMatrix, determined
 from .nullspace.certificate import largest_residual
 from .nullspace.material import lame_ratio, poisson_ratio
 from .nullspace.solution import Solution
-from .ordered.rounded import Rounding
 from .remarks import about_assumptions, about_cells, about_directions, about_nodes
 from .results import ElasticityRecovery
+from .rounded import Rounding
 from .rows.numbering import Numbering
 from .verdict import NOTHING_SHOWN, RESTS_ON_PLANES, of_few_digits, verdict
 
@@ -50,7 +50,7 @@ def described(
     found = no_cells()
     if (cells or solution.straight or solution.hanging is not None) and near:
         with clock("cells"):
-            found = recognise_cells(nodal, solution.points, ratio, solution.corners)
+            found = recognise_cells(nodal, solution.points, ratio)
     if solution.cautious is not None and not found.certified:
         return described(nodal, numbering, solution.cautious, clock, cells=cells, rounding=rounding)
     backward = found.backward_error if found.certified else error

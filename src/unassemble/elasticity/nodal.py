@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -31,12 +31,6 @@ class NodalMatrix:
         Unknowns with a penalty on the diagonal.
     doubtful : (n,) bool, optional
         Nodes whose rows, or directions, may be others; see :mod:`.doubts`.
-    blurred : (n,) bool, optional
-        Nodes coupled to rows that were left out, or whose directions may be others.
-    fellows : (n,) int64, optional
-        Labels of nodes whose rows couple to the same unknowns and may belong together; each other node has its own.
-    sure : (n,) bool, optional
-        Nodes whose rows are one node's though no equation shows it; all, where not given.
     """
 
     indptr: NDArray[np.int32]
@@ -46,9 +40,6 @@ class NodalMatrix:
     size: NDArray[np.float64]
     penalised: NDArray[np.bool_]
     doubtful: NDArray[np.bool_] | None = None
-    blurred: NDArray[np.bool_] | None = None
-    fellows: NDArray[np.int64] | None = None
-    sure: NDArray[np.bool_] | None = None
 
     @classmethod
     def of(cls, indptr: NDArray, indices: NDArray, data: NDArray, row_of: NDArray[np.int64]) -> NodalMatrix:
@@ -94,18 +85,15 @@ class NodalMatrix:
         return np.add.reduceat(entries, self.indptr[:-1], axis=0)  # no node is empty
 
 
-def nodal_matrix(
-    matrix: sp.csr_array, numbering: Numbering, *, left_out: NDArray[np.bool_] | None = None
-) -> NodalMatrix:
+def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
     """Gather the unknowns of each node into blocks.
 
-    Unknowns whose row and column are those of the identity are left out, as if they had been eliminated; so are those
-    that the caller names.
+    Unknowns whose row and column are those of the identity are left out, as if they had been eliminated.
     """
     n, d = numbering.n_nodes, numbering.block_size
     place = numbering.node_of_row * d + numbering.direction_of_row
     row_of = np.full(n * d, -1, dtype=np.int64)
-    live = ~numbering.identity_row if left_out is None else ~(numbering.identity_row | left_out)
+    live = ~numbering.identity_row
     row_of[place[live]] = np.flatnonzero(live)
     coo = matrix.tocoo()
     keep = live[coo.row] & live[coo.col]
@@ -119,12 +107,7 @@ def nodal_matrix(
     )
     blocks = entries.tocsr().tobsr(blocksize=(d, d))
     blocks.sort_indices()
-    found = NodalMatrix.of(blocks.indptr, blocks.indices, blocks.data, row_of.reshape(n, d))
-    if left_out is None:
-        return found
-    blurred = np.zeros(n, dtype=bool)
-    blurred[numbering.node_of_row[coo.row[left_out[coo.col]]]] = True
-    return replace(found, blurred=blurred)
+    return NodalMatrix.of(blocks.indptr, blocks.indices, blocks.data, row_of.reshape(n, d))
 
 
 def valid_pairs(nodal: NodalMatrix, *, strict: bool = True, inferred: bool = False) -> NDArray[np.bool_]:
@@ -150,7 +133,7 @@ def valid_pairs(nodal: NodalMatrix, *, strict: bool = True, inferred: bool = Fal
     valid = np.asarray(zero & ~penalty & present[:, :, None] & present[:, None, :] & (nodal.size > 0)[:, None, None])
     if not strict:
         return valid
-    whole = _shared(nodal, np.asarray((zero | ~present[:, :, None]).all(axis=1)))
+    whole: NDArray[np.bool_] = np.asarray((zero | ~present[:, :, None]).all(axis=1))
     lacking = nodal.graph @ eliminated(nodal).astype(float)
     if inferred:
         valid |= penalty & valid.any(axis=1, keepdims=True)
@@ -166,26 +149,9 @@ def linked(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def eliminated(nodal: NodalMatrix) -> NDArray[np.bool_]:
-    """(n, d) unknowns that were taken out of nodes of which others are left.
-
-    Of nodes that may belong together some lack a direction if they have fewer rows of it than of another one.
-    """
+    """(n, d) unknowns that were taken out of nodes of which others are left."""
     present = nodal.row_of >= 0
-    gone = ~present & ~without_trace(nodal) & np.asarray(present.any(axis=1))[:, None]
-    if nodal.fellows is not None:
-        count = np.zeros((int(nodal.fellows.max()) + 1, nodal.dim))
-        np.add.at(count, nodal.fellows, present)
-        gone &= (count < count.max(axis=1, keepdims=True))[nodal.fellows]
-    return gone
-
-
-def _shared(nodal: NodalMatrix, told: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(n, d) what holds for a node and for all that may belong to it."""
-    if nodal.fellows is None:
-        return told
-    failing = np.zeros((int(nodal.fellows.max()) + 1, nodal.dim))
-    np.add.at(failing, nodal.fellows, ~told)
-    return np.asarray(failing[nodal.fellows] == 0)
+    return ~present & ~without_trace(nodal) & np.asarray(present.any(axis=1))[:, None]
 
 
 def surrounded(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -201,7 +167,7 @@ def surrounded(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_
     """
     present = nodal.row_of >= 0
     lacking = nodal.graph @ eliminated(nodal).astype(float) > 0
-    whole = _shared(nodal, np.asarray((valid | ~present[:, :, None]).all(axis=1)))
+    whole: NDArray[np.bool_] = np.asarray((valid | ~present[:, :, None]).all(axis=1))
     return np.asarray((whole | lacking | ~present).all(axis=1) & (whole & present & ~lacking).any(axis=1))
 
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from ..errors import GeometryError
 from .nodal import NodalMatrix, determined, valid_pairs
 from .nullspace.control import uncontrolled
-from .nullspace.corners import corners_of, with_corners
 from .nullspace.identities import boundary_terms
 from .nullspace.material import lame_ratio
 from .nullspace.placing import placed
@@ -30,10 +29,10 @@ def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
     need elements that show them; where these do not, the solution with doubts is still there.
     """
     found = _solve(nodal, patch)
-    if found.whole or not found.unique or (nodal.doubtful is None and nodal.blurred is None):
+    if found.whole or not found.unique or nodal.doubtful is None:
         return found
     try:
-        other = _solve(replace(nodal, doubtful=None, blurred=None), patch)
+        other = _solve(replace(nodal, doubtful=None), patch)
     except GeometryError:
         return found
     if not other.unique or other.straight or determined(other.points).sum() <= determined(found.points).sum():
@@ -63,7 +62,7 @@ def _solve(nodal: NodalMatrix, patch: int | None) -> Solution:
             if completed is not None:
                 found = _with_planes(*completed, found, rows, patch)
         if strict and not (found is not None and found.unique):
-            found = straightened(nodal, found, valid, completed, patch)
+            found = straightened(nodal, found, valid, patch)
             if found is not None and found.straight and found.planes:  # elements told axes only
                 found = replace(found, hanging=determined(found.points))
         if found is None:
@@ -72,8 +71,6 @@ def _solve(nodal: NodalMatrix, patch: int | None) -> Solution:
         if ratio is not None:
             found = _with_ratio(nodal, found, ratio, completed, patch)
         found = replace(found, strict=strict)
-        if strict:
-            found = _with_corners(nodal, found, ratio, rows)
         if found.unique:
             return found
         best = best or found
@@ -170,30 +167,3 @@ def _with_ratio(
     assumed = ~found.valid | (nodal.graph @ new.astype(float) > 0)[:, None, None]
     valid = valid if valid.ndim == 4 else np.repeat(valid[..., None], nodal.dim, axis=3)
     return _better(found, other, rows, valid, valid & assumed[..., None], terms)
-
-
-def _with_corners(nodal: NodalMatrix, found: Solution, ratio: float | None, valid: NDArray[np.bool_]) -> Solution:
-    """Once more where planes of rollers meet, with lambda / mu if that is what it takes."""
-    if found.whole or not found.unique or found.straight:
-        return found
-    loose = ~determined(found.firm_points)
-    for used in (None,) if ratio is None else (None, ratio):
-        terms = None if used is None else boundary_terms(nodal.dim, used)
-        firm = found.firm_points
-        points, component = with_corners(nodal, valid, firm, found.component, terms)
-        new = determined(points) & ~determined(firm)
-        if new.any():
-            hanging = np.zeros(nodal.n, dtype=bool) if found.hanging is None else found.hanging & ~new
-            if nodal.dim == 2:  # as all that an assumption places there
-                hanging |= new
-            elif nodal.sure is not None:
-                hanging |= new & ~nodal.sure
-            found = replace(
-                found,
-                points=np.where(new[:, None], points, found.points),
-                component=np.where(new, component, found.component),
-                planes=True,
-                ratio=found.ratio if used is None else used,
-                hanging=hanging if hanging.any() else None,
-            )
-    return replace(found, corners=corners_of(nodal, valid, found.points, loose))

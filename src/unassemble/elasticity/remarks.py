@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..words import count_of
-from .elements.cells import Cells
-from .nodal import NodalMatrix, without_trace
+from .materials.cells import Cells
+from .nodal import NodalMatrix
 from .nullspace.solution import Solution
 
 
@@ -16,15 +16,13 @@ def about_cells(found: Cells) -> list[str]:
     if not found.recognised:
         return [
             "no elements were recognised: looked for are triangles and quadrilaterals, tetrahedra and hexahedra, "
-            "linear, or quadratic and of one kind throughout"
+            "of one kind throughout, or linear triangles beside quadrilaterals"
         ]
     if not found.certified:
         return [
             "the elements were read off the graph and are not certified: no material was found with which they "
             "re-assemble to the matrix"
         ]
-    if found.varying:
-        return ["the material differs within elements: their Lame coefficients are means"]
     return []
 
 
@@ -43,19 +41,17 @@ def about_nodes(
     hanging : (n,) bool
         Those whose coordinates rest on an assumption that nothing confirms.
     """
-    apart: NDArray[np.bool_] = np.asarray(without_trace(nodal).any(axis=1))
-    beside = np.zeros(nodal.n, dtype=bool)
-    beside[nodal.node[apart[nodal.indices]]] = True
-    unread, told = loose & ~withheld & ~hanging & beside, []
+    sprung = (nodal.size == 0) & (nodal.row_of >= 0).any(axis=1)
+    told = []
+    if (loose & sprung).any():
+        told.append(
+            f"{count_of(int((loose & sprung).sum()), 'node hangs', 'nodes hang')} on springs, or on nothing, and have "
+            "no position: no linear field knows a spring"
+        )
     if withheld.any():
         told.append(
             f"{count_of(int(withheld.sum()), 'node has', 'nodes have')} rows that no element shows to be theirs; "
             "since it was inferred which rows make up a node, no coordinates are given there"
-        )
-    if unread.any():
-        told.append(
-            f"{count_of(int(unread.sum()), 'node is', 'nodes are')} not determined, since rows there, or next to it, "
-            "belong to nodes that were not recognised; give the numbering if it is known"
         )
     resting = int((hanging & ~withheld).sum())
     if resting:
@@ -64,7 +60,7 @@ def about_nodes(
             "across it, or if Poisson's ratio is the same there, which neither another equation nor an element "
             "confirms; no coordinates are given there"
         )
-    rest = int((loose & ~withheld & ~hanging & ~unread).sum())
+    rest = int((loose & ~withheld & ~hanging & ~sprung).sum())
     if rest:
         told.append(
             f"{count_of(rest, 'node is', 'nodes are')} not determined: rows coupled to {'it' if rest == 1 else 'them'} "

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..recovery import Evidence as Evidence
-from .elements.cells import Cells
+from .materials.cells import Cells
 from .modes import rigid_body_modes
 from .rows.numbering import Numbering
 

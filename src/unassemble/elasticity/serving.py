@@ -3,57 +3,53 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..clock import Clock
+from ..elements.kinds import KINDS
+from ..elements.surface import boundary_loops
 from ..matrix import OperatorMatrix
 from ..recovery import Body
 from .anchoring import anchored, checked_anchors, digits_lost, near_enough
-from .elements.cells import Cells
-from .elements.kinds import KINDS
-from .elements.surface import boundary_loops
+from .materials.cells import Cells
 from .nodal import NodalMatrix
-from .ordered.rounded import Rounding
 from .recover import place_nodes
 from .results import ElasticityRecovery
+from .rounded import Rounding
 from .rows.numbering import Numbering
 
 _THIN = 1e-14  # of the largest variance of the coordinates: rounding
 
 
-def serve_body(
-    matrix: OperatorMatrix,
-    nodal: NodalMatrix,
-    numbering: Numbering,
-    clock: Clock,
-    *,
-    rounding: Rounding | None,
-    whole: sp.csr_array | None,
-    anchors: Sequence[Any] | None,
-    cells: bool,
-    choice: str,
-) -> Body:
-    """Recover a solid body whose numbering is known.
+@dataclass(frozen=True)
+class Request:
+    """What is asked for, and what is known beside the matrix.
 
-    Parameters
+    Attributes
     ----------
-    matrix : OperatorMatrix
-    nodal : NodalMatrix
-    numbering : Numbering
-    clock : Clock
-    rounding : Rounding, optional
-        Of the entries, where they have few digits.
-    whole : (N, N) sparse, optional
-        The matrix, where some rows have no name for their direction yet.
     anchors : sequence of (row, x, y) or (row, x, y, z), optional
     cells : bool
         Look for elements too.
     choice : str
         Why the matrix was taken for one of elasticity.
+    rounding : Rounding, optional
+        Of the entries, where they have few digits.
+    """
+
+    anchors: Sequence[Any] | None
+    cells: bool
+    choice: str
+    rounding: Rounding | None
+
+
+def serve_body(
+    matrix: OperatorMatrix, nodal: NodalMatrix, numbering: Numbering, clock: Clock, request: Request
+) -> Body:
+    """Recover a solid body whose numbering is known.
 
     Raises
     ------
@@ -62,9 +58,9 @@ def serve_body(
     RecoveryError
         If no piece is determined.
     """
-    checked_anchors(anchors, numbering.node_of_row, numbering.block_size)  # before the long work
-    found = place_nodes(nodal, numbering, clock, cells=cells, rounding=rounding, whole=whole)
-    known = checked_anchors(anchors, found.node_of_row, numbering.block_size)
+    checked_anchors(request.anchors, numbering.node_of_row, numbering.block_size)  # before the long work
+    found = place_nodes(nodal, numbering, clock, cells=request.cells, rounding=request.rounding)
+    known = checked_anchors(request.anchors, found.node_of_row, numbering.block_size)
     points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
     status, reason = found.status, found.reason
     if status == "certified" and _flat(found):
@@ -89,7 +85,7 @@ def serve_body(
         node_of_row=found.node_of_row,
         direction_of_row=found.direction_of_row,
         numbering=found.numbering,
-        choice=choice,
+        choice=request.choice,
         poisson_ratio=found.poisson_ratio,
         lame=lame,
         evidence=found.evidence,

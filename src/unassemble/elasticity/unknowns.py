@@ -16,27 +16,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError, RecoveryError
-from .ordered.gaps import by_component_with_gaps, interleaved_by_pattern, interleaved_with_gaps, same_cuts
-from .ordered.sampling import promising
 from .rows.constants import annihilated_share, uncoupled_rows
 from .rows.grouping import by_first_row, coupled_in_common, made_up, same_pattern
 from .rows.numbering import Numbering
 from .rows.orders import ORDERS, regular
-from .scattered.scattered import scattered, scattered_without_zeros
-from .scattered.searching import searched
+from .rows.searching import same_cuts, searched
 
-__all__ = [
-    "MORE_THAN_STIFFNESS",
-    "Numbering",
-    "find_numbering",
-    "given_numbering",
-    "nodes_of_pattern",
-    "numbering_at_sight",
-    "regular_numbering",
-    "uncoupled_rows",
-]
-
-_LARGE = 20_000  # rows beyond which a few places are looked at before every row is asked
 _ORDERLY = 0.8  # rows of made-up nodes couple to common nodes less than this
 
 
@@ -65,16 +50,7 @@ def find_numbering(matrix: sp.csr_array, block_size: int | None = None) -> Numbe
     sizes = _sizes(block_size)
     best = _in_order(matrix, sizes)
     if best is None or not best.clear:
-        best = _best([best, *by_component_with_gaps(matrix, sizes)])
-        clear = best is not None and best.sound and best.common == 1
-        apart = None if clear else scattered(matrix, sizes)
-        if apart is not None and not (best is not None and best.sound and best.quality > apart.quality):
-            best, clear = apart, True
-        if not clear and (matrix.shape[0] <= _LARGE or promising(matrix, sizes)):
-            best = _best([best, *interleaved_with_gaps(matrix, sizes)])
-            if best is None or not best.sound:
-                apart = scattered_without_zeros(matrix, sizes)
-                best = _best([best, *searched(matrix, sizes)]) if apart is None else apart
+        best = _best([best, *searched(matrix, sizes)])
     if best is None:
         raise RecoveryError(
             f"no numbering with {block_size or '2 or 3'} unknowns per node makes the rows annihilate translations: "
@@ -109,7 +85,7 @@ def nodes_of_pattern(matrix: sp.csr_array) -> tuple[int, int] | None:
     """
     order = matrix.shape[0]
     for d, kind in product((3, 2), ORDERS):
-        if order % d == 0 and coupled_in_common(matrix, *regular(order, d, kind)) > _ORDERLY:
+        if order % d == 0 and coupled_in_common(matrix, regular(order, d, kind)[0]) > _ORDERLY:
             return order // d, d
     group = same_pattern(matrix, uncoupled_rows(matrix))
     of_size = np.bincount(np.bincount(group)[group], minlength=4)
@@ -180,14 +156,9 @@ def _with_gaps(matrix: sp.csr_array, regular: Numbering, sizes: tuple[int, ...])
     rows that couple to different nodes can be one node's all the same, as entries that vanished need not be stored.
     """
     impossible = int(made_up(matrix, regular.node_of_row, regular.direction_of_row, regular.block_size).sum())
-    if regular.kind == "interleaved":
-        told = interleaved_by_pattern(matrix, sizes)
-        found = [] if told is None else [told]
-    elif not impossible and same_cuts(matrix, regular):
+    if regular.kind == "by component" and not impossible and same_cuts(matrix, regular):
         return regular
-    else:
-        found = by_component_with_gaps(matrix, sizes)
-    for one in found:
+    for one in searched(matrix, sizes, as_stored=True):
         if one.common == 1 and not one.odd and (impossible or _contradicts(one, regular)):
             return one
     return replace(regular, odd=impossible)
@@ -205,7 +176,7 @@ def _regular(matrix: sp.csr_array, d: int, kind: str, *, checked: bool = True) -
     if order % d:
         return None
     node, direction = regular(order, d, kind)
-    common = coupled_in_common(matrix, node, direction)
+    common = coupled_in_common(matrix, node)
     if checked and common < 0.6:
         return None
     identity = uncoupled_rows(matrix)
@@ -232,5 +203,5 @@ def given_numbering(matrix: sp.csr_array, node_of_row: NDArray, direction_of_row
         raise InputError("two rows have the same node and direction")
     identity = uncoupled_rows(matrix)
     share = annihilated_share(matrix, identity, direction, d, searched=True)
-    common = coupled_in_common(matrix, node, direction)
+    common = coupled_in_common(matrix, node)
     return Numbering(d, node, direction, identity, "given", share, common)

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
+from ..tolerances import CERTIFIED
 from ..words import count_of
-from .elements.cells import Cells
+from .materials.cells import Cells
 from .nodal import NodalMatrix, without_trace
 from .nullspace.shape import SOFT
 from .nullspace.solution import Solution
-from .ordered.rounded import Rounding
+from .rounded import Rounding
 from .rows.numbering import Numbering
 
-CERTIFIED = 1e-9
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
+_GIVE = "; give the numbering if it is known"
 NOTHING_SHOWN = "no node is left whose rows are shown to be its own and whose coordinates hang on no assumption"
 NOTHING_LEFT = (
     "each row that is whole touches nodes that are not determined, so that no identity is left to certify the others, "
@@ -37,29 +39,23 @@ def about_open_rows(numbering: Numbering) -> str:
     )
 
 
-def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solution) -> str:
-    """Why the fields that are left say nothing of positions; empty where they are few, or nodes are beyond doubt.
+def about_rows(why: object) -> str:
+    """The sentence that says why, and what may be to blame where it was inferred which rows belong to one node."""
+    return f"{why}; which rows belong to one node, and to which direction, was inferred and may be wrong{_GIVE}"
 
-    Where it is not known which rows are one node's, those that are left move rows of one direction only, as if there
-    were more nodes; and the points that belong to rows of several nodes are none of the body's.
+
+def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solution, rounding: Rounding | None) -> str:
+    """Why positions say nothing where it was inferred which rows are one node's; empty where they do.
+
+    Fields that are left then move rows of one direction only, as if there were more nodes; and the points that belong
+    to rows of several nodes are none of the body's.
     """
-    if not any(solution.freedoms):
-        return ""
-    if "hourglass" in solution.freedoms and about_open_rows(numbering):
-        return about_open_rows(numbering)
-    odd = int(np.asarray(without_trace(nodal).any(axis=1)).sum()) if numbering.open_row is None else 0
-    inferred = numbering.kind == "pattern" and numbering.incomplete and numbering.open_row is None
-    if not odd and inferred and "hourglass" in solution.freedoms:
-        return (
-            "which rows belong to one node, and to which direction, was inferred, and fields are left that move rows "
-            "of one direction only, as where rows of one node were not joined; give the numbering if it is known"
-        )
-    if not odd:
-        return ""
-    return (
-        f"{count_of(odd, 'node lacks', 'nodes lack')} directions without a trace, so that rows were not joined to "
-        "nodes as they should be, and no positions of the rows are unique; give the numbering if it is known"
-    )
+    odd = _came_apart(nodal) if any(solution.freedoms) and numbering.open_row is None else 0
+    if odd:
+        return f"{_lacking(odd)}, so that rows were not joined to nodes as they should be{_GIVE}"
+    if not solution.exact and rounding is None and numbering.incomplete and (numbering.odd or numbering.common < 1):
+        return about_rows("none fit the matrix exactly, as where constraints tie unknowns together")
+    return ""
 
 
 def of_few_digits(rounding: Rounding, error: float) -> str:
@@ -70,14 +66,9 @@ def of_few_digits(rounding: Rounding, error: float) -> str:
     )
 
 
-_MISREAD = ", or to other nodes and directions than was inferred; give the numbering if it is known"
-
 _FREEDOMS = {
     "axes": "each axis keeps a scale of its own",
     "affine": "an affine map stays free, since the material around every valid row is homogeneous",
-    "hourglass": "fields that move points in one direction only may be added in each: hourglass modes of reduced "
-    "integration, or smooth ones where a homogeneous body is held on its whole boundary; the points are the smoothest "
-    "that fit",
 }
 
 
@@ -95,89 +86,89 @@ def verdict(
     found : Cells
     numbering : Numbering
     """
-    remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
-    if remaining:
-        return "uncertified", f"the null space is larger than it should be: {remaining[0]}{_unless(nodal, numbering)}"
-    nearly = min((one.gap for one in solution.evidence if one.gap > 0 and not one.settled), default=1.0)
-    if solution.exact and nearly < SOFT:
-        return "uncertified", (
-            f"a field that is no translation or scale satisfies the identities up to {nearly:.1e}: nodes that it moves "
-            "feel the rounding of entries, magnified by as much, and may be wrong by more than 1e-8: nodes that few "
-            "rows hold have such fields, and slender bodies, which bend the more easily the longer they are"
-        )
-    if not solution.exact:
-        worst = max(solution.evidence, key=lambda one: one.residual)
-        return "uncertified", (
-            f"no exact null vector exists (singular value {worst.residual:.1e}, that of the next field "
-            f"{worst.gap:.1e}); the points are the best fit, as for materials that are not isotropic, elements that do "
-            "not reproduce linear functions, or nodes that constraints tie together"
-        )
-    if not solution.strict:
-        return "uncertified", (
-            "supports leave too few rows that are surely whole; rows whose entries add up to zero were taken for "
-            "whole, which they need not be"
-        )
-    if _torn(nodal, solution):
-        inferred = numbering.kind == "pattern" or (numbering.kind != "given" and numbering.incomplete)
-        return "uncertified", (
-            "coupled nodes came out as separate pieces, and how these lie to each other is not known: rows between "
-            f"them lack entries, or belong to other axes, as at inclined supports{_MISREAD if inferred else ''}"
-        )
+    objection = _to_positions(nodal, solution, numbering)
+    if objection:
+        return "uncertified", objection
     if found.certified and found.backward_error <= CERTIFIED:
         return "certified", f"the matrix re-assembled on the {count_of(found.n_cells, 'element')} is the given one"
-    if solution.straight:
-        return "uncertified", (
-            "the identities leave an affine map free, since the material around every valid row is homogeneous; "
-            "elements determined it, but the matrix re-assembled on them is not the given one"
-        )
-    if numbering.likely:
-        return "uncertified", (
-            "several nodes couple to the same unknowns, and which rows are theirs was inferred from how like these "
-            "are; only elements that re-assemble to the matrix would show that the inference is right"
-        )
-    apart = np.asarray(without_trace(nodal).any(axis=1))
-    if numbering.open_row is not None and nodal.doubtful is not None:
-        apart &= ~nodal.doubtful  # these get no coordinates
-    odd = int(apart.sum())
-    if odd:
-        return "uncertified", (
-            f"{count_of(odd, 'node lacks', 'nodes lack')} directions although no row next to it misses anything: its "
-            "rows belong to other nodes, and neither pattern nor positions tell to which; give the numbering if it is "
-            "known"
-        )
-    if numbering.incomplete and numbering.kind != "given" and numbering.common < 1:
-        return "uncertified", (
-            "which rows belong to one node was inferred, where some nodes lack rows and others do not store entries "
-            "that vanished; only elements that re-assemble to the matrix would show that the inference is right"
-        )
-    if error <= CERTIFIED and error > _MAGNIFIED * nearly:
+    nearly = _softest(solution)
+    objection = _to_identities(nodal, solution, numbering)
+    if objection:
+        return "uncertified", objection
+    if np.isnan(error):
+        return "uncertified", NOTHING_LEFT
+    if error > CERTIFIED:
+        return "uncertified", f"the largest residual of a valid identity is {error:.1e}"
+    if error > _MAGNIFIED * nearly:
         return "uncertified", (
             f"the valid identities hold to {error:.1e}, but a field that is no translation or scale satisfies them up "
             f"to {nearly:.1e}: nodes that it moves may be wrong by more than 1e-8"
         )
-    if error <= CERTIFIED:
-        return "certified", "the valid identities hold to rounding, and only translations and scale satisfy them"
-    if np.isnan(error):
-        return "uncertified", NOTHING_LEFT
-    return "uncertified", f"the largest residual of a valid identity is {error:.1e}"
+    return "certified", "the valid identities hold to rounding, and only translations and scale satisfy them"
 
 
-def _unless(nodal: NodalMatrix, numbering: Numbering) -> str:
-    """What may be to blame instead, where it was inferred which rows make up a node."""
-    if numbering.open_row is not None and numbering.open_row.any():
-        return f"; {about_open_rows(numbering)}"
-    odd = int(np.asarray(without_trace(nodal).any(axis=1)).sum())
-    if numbering.kind == "given" or not (odd or (numbering.kind == "pattern" and numbering.common < 1)):
-        return ""
-    lacking = f" {count_of(odd, 'node lacks', 'nodes lack')} directions without a trace, and" if odd else ""
-    return (
-        f". Or rows were not joined to nodes as they should be:{lacking} it was inferred which rows belong to one node"
-    )
+def _softest(solution: Solution) -> float:
+    """Least singular value of a field that is no translation or scale, of pieces that are not settled."""
+    return min((one.gap for one in solution.evidence if one.gap > 0 and not one.settled), default=1.0)
+
+
+def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering) -> str:
+    """Why positions may be wrong whatever elements say; empty where nothing is to be said."""
+    remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
+    if remaining:
+        unless = f". Or rows belong to other nodes than was inferred{_GIVE}" if numbering.inferred else ""
+        return f"the null space is larger than it should be: {remaining[0]}{unless}"
+    if not solution.exact:
+        worst = max(solution.evidence, key=lambda one: one.residual)
+        return (
+            f"no exact null vector exists (singular value {worst.residual:.1e}, that of the next field "
+            f"{worst.gap:.1e}); the points are the best fit, as for materials that are not isotropic, elements that do "
+            "not reproduce linear functions, or nodes that constraints tie together"
+        )
+    if _softest(solution) < SOFT:
+        return (
+            f"a field that is no translation or scale satisfies the identities up to {_softest(solution):.1e}, and "
+            "nodes that it moves may be wrong by more than 1e-8; slender bodies have such fields, and nodes that few "
+            "rows hold"
+        )
+    if not solution.strict:
+        return "supports leave too few rows that are surely whole; rows that add up to zero were taken for whole"
+    if _torn(nodal, solution):
+        return (
+            "coupled nodes came out as separate pieces, and how these lie to each other is not known: rows between "
+            f"them lack entries, or belong to other axes, as at inclined supports, or to other nodes{_GIVE}"
+        )
+    return ""
+
+
+def _to_identities(nodal: NodalMatrix, solution: Solution, numbering: Numbering) -> str:
+    """Why identities alone, without elements that re-assemble, certify nothing; empty where they do."""
+    if solution.straight:
+        return "elements told the axes of a homogeneous body, but re-assembled on them the matrix is not the given one"
+    if numbering.likely:
+        return (
+            "which rows belong to one node was inferred, where some nodes lack rows and others do not store entries "
+            "that vanished; only elements that re-assemble to the matrix would show that it is right"
+        )
+    odd = _came_apart(nodal)
+    return f"{_lacking(odd)}: its rows belong to other nodes{_GIVE}" if odd else ""
+
+
+def _came_apart(nodal: NodalMatrix) -> int:
+    """How many nodes lack directions without a trace, doubtful ones aside, which get no coordinates."""
+    apart: NDArray[np.bool_] = np.asarray(without_trace(nodal).any(axis=1))
+    return int(np.count_nonzero(apart if nodal.doubtful is None else apart & ~nodal.doubtful))
+
+
+def _lacking(odd: int) -> str:
+    return f"{count_of(odd, 'node lacks', 'nodes lack')} directions although no row next to it misses anything"
 
 
 def _torn(nodal: NodalMatrix, solution: Solution) -> bool:
     """Whether nodes of different pieces are connected through the matrix."""
-    label = sp.csgraph.connected_components(nodal.graph, directed=False)[1]
+    live = (nodal.data != 0).any(axis=(1, 2))
+    link = sp.csr_array((np.ones(live.sum()), (nodal.node[live], nodal.indices[live])), shape=(nodal.n, nodal.n))
+    label = sp.csgraph.connected_components(link, directed=False)[1]
     known = solution.component >= 0
     pairs = np.unique(np.column_stack([label, solution.component])[known], axis=0)
     return len(np.unique(pairs[:, 0])) < len(pairs)

@@ -74,7 +74,7 @@ def _side_by_side(flat: NDArray, recovery: Recovery) -> NDArray:
 
 def _faces(recovery: Recovery) -> list[NDArray]:
     """Polygons of nodes (m, k) to be filled; of bodies in space the outer facets that face the eye."""
-    from ..elasticity.elements.surface import outer_facets, planar_outlines
+    from ..elements.surface import outer_facets, planar_outlines
 
     cells = {kind: cells for kind, cells in recovery.cells.items() if kind != "line"}
     if not isinstance(recovery, Body):

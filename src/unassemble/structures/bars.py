@@ -14,7 +14,7 @@ from ..elasticity.rows.numbering import Numbering
 from ..elasticity.rows.orders import ORDERS, regular
 
 _RANK_ONE = 1e-9  # how much of a bar's block may be left, relative to the bar
-_SAMPLE = 64  # nodes, or blocks, to look at before all are
+_SAMPLE = 64  # blocks to look at before all are
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +29,14 @@ class Bars:
         Unit vectors, sign arbitrary.
     known : (m,) bool
         False for bars both of whose ends lack unknowns, so that only a part of the direction shows.
+    whole : (m,) bool
+        False for bars one of whose ends lacks unknowns.
     """
 
     ends: NDArray[np.int64]
     directions: NDArray[np.float64]
     known: NDArray[np.bool_]
+    whole: NDArray[np.bool_]
 
 
 def bars_of(nodal: NodalMatrix) -> Bars | None:
@@ -66,7 +69,7 @@ def bars_of(nodal: NodalMatrix) -> Bars | None:
     pulls = np.trace(blocks[both], axis1=1, axis2=2) > 0
     if spread[0] < _RANK_ONE or 0 < pulls.sum() < len(pulls):  # bars all in line or in a plane; of stiffness below zero
         return None
-    return Bars(np.column_stack([i, j]), directions, known)
+    return Bars(np.column_stack([i, j]), directions, known, both)
 
 
 def truss_numbering(matrix: sp.csr_array, block_size: int | None = None, kind: str | None = None) -> Numbering | None:
@@ -84,24 +87,7 @@ def truss_numbering(matrix: sp.csr_array, block_size: int | None = None, kind: s
             continue
         for name in ORDERS if kind is None else (kind,):
             node, direction = regular(order, d, name)
-            if not _like_bars(matrix, node, direction, d):
-                continue
             numbering = Numbering(d, node, direction, uncoupled_rows(matrix), name, 0.0, 1.0)
             if bars_of(nodal_matrix(matrix, numbering)) is not None:
                 return numbering
     return None
-
-
-def _like_bars(matrix: sp.csr_array, node: NDArray, direction: NDArray, d: int) -> bool:
-    """Whether the blocks of a few nodes are those of bars, not all of them along the axes."""
-    n = matrix.shape[0] // d
-    place = np.empty((n, d), np.int64)
-    place[node, direction] = np.arange(len(node))
-    some = np.random.default_rng(0).choice(n, min(n, _SAMPLE), replace=False)
-    blocks = sp.csr_array(matrix[place[some].ravel()][:, place.ravel()]).tobsr((d, d))
-    row = np.repeat(some, np.diff(blocks.indptr))
-    size = np.linalg.svd(blocks.data[row != blocks.indices], compute_uv=False)
-    if not size.size or (size[:, 1] > _RANK_ONE * size[:, 0]).any():
-        return False
-    off = np.abs(blocks.data[row != blocks.indices]) > _RANK_ONE * size[:, :1, None]
-    return bool((off.sum(axis=(1, 2)) > 1).any())

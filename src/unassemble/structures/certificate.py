@@ -10,15 +10,18 @@ from ..elasticity.nodal import determined
 from .layouts import Layout
 
 
-def largest_force(
+def forces(
     matrix: sp.csr_array,
     layout: Layout,
     node_of_row: NDArray[np.int64],
     direction_of_row: NDArray[np.int64],
     points: NDArray[np.float64],
     counted: NDArray[np.bool_],
-) -> float:
-    """Largest force that a rigid rotation of the nodes brings about, relative to the sum of those that make it up.
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Forces that rigid rotations of the nodes bring about, relative to what makes them up.
+
+    That is bounded, without signs, by nodes that move by their distance from the centroid and turn by one: about
+    single axes both may be nothing but rounding.
 
     Parameters
     ----------
@@ -30,13 +33,21 @@ def largest_force(
     points : (n, d) float64
         NaN where not determined; rows that touch such nodes do not count.
     counted : (N, rotations) bool
-        Rows and rotations away from supports; without any the answer is infinite.
+        Rows and rotations away from supports.
+
+    Returns
+    -------
+    force : (k,) float64
+        Of all rows and rotations that count.
+    used : (N,) bool
+        Rows with one that counts.
     """
     moves = len(layout.displacements)
-    known = determined(points)
+    known, moving = determined(points), direction_of_row >= 0
     motions = layout.rigid_motions(np.where(known[:, None], points, 0.0))[:, :, moves:]
-    field = motions[node_of_row, direction_of_row] * (direction_of_row >= 0)[:, None]
-    force, size = matrix @ field, abs(matrix) @ np.abs(field)
+    force = np.abs(matrix @ (motions[node_of_row, direction_of_row] * moving[:, None]))
+    lever = np.where(direction_of_row < moves, np.linalg.norm(points, axis=1)[node_of_row], 1.0)
+    size = abs(matrix) @ np.where(moving & known[node_of_row], lever, 0.0)
     touched = abs(matrix) @ (~known[node_of_row]).astype(float) > 0
-    used = counted & ~touched[:, None] & (size > 0)
-    return float((np.abs(force[used]) / size[used]).max(initial=0.0)) if used.any() else float("inf")
+    used = counted & (~touched & (size > 0))[:, None]
+    return (force / np.where(size > 0, size, 1)[:, None])[used], used.any(axis=1)

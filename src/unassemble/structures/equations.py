@@ -10,7 +10,7 @@ of length. Whatever the elements are, beams, plates or shells, of any section an
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from itertools import combinations
 
 import numpy as np
@@ -30,13 +30,26 @@ class Equations:
     ----------
     operator : (m, n dim) sparse
     right : (m,) float64
-    trusting : (m,) bool
-        Equations of moments, which hold only if no spring ties the rotation to the ground.
+    size : (m,) float64
+        What the equation was divided by.
+    lever : (m,) float64
+        Sum of the terms of the right-hand side, without signs.
+    row : (m,) int64
+        Row ``i b + k`` of direction k of node i; -1 for differences of two rows.
+    rotation : (m,) int64
+        Which of the layout's rotations it is.
     """
 
     operator: sp.csr_array
     right: NDArray[np.float64]
-    trusting: NDArray[np.bool_]
+    size: NDArray[np.float64]
+    lever: NDArray[np.float64]
+    row: NDArray[np.int64]
+    rotation: NDArray[np.int64]
+
+    def __getitem__(self, which: NDArray) -> Equations:
+        """Some of the equations, by their indices or a mask."""
+        return Equations(*(getattr(self, one.name)[which] for one in fields(self)))
 
 
 def equations(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool) -> Equations:
@@ -52,59 +65,50 @@ def equations(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool) -> Equat
         no stiffness against drilling. They add an unknown symmetric matrix to the three moments' rows; what is left
         are the differences of its two triangles.
     """
-    layout = nodes.layout
-    b, moves = layout.block_size, len(layout.displacements)
-    fields = [_rotation(nodes, k) for k in range(len(layout.rotations))]
-    direction = np.arange(nodes.n * b) % b
-    parts, trusting = [], []
-    for k, field in enumerate(fields):
-        for moments in (False,) if springs else (False, True):
-            used = valid[:, :, k].ravel() & ((direction >= moves) == moments)
-            parts.append(_relative(*_rows(field, used)))
-            trusting.append(np.full(len(parts[-1][1]), moments))
-    for k, m in combinations(range(len(fields)), 2) if springs else ():
+    b, moves = nodes.layout.block_size, len(nodes.layout.displacements)
+    every = [_rotation(nodes, k) for k in range(valid.shape[2])]
+    forces = np.arange(nodes.n * b) % b < moves
+    parts = [one[valid[:, :, k].ravel() & (forces | (not springs))] for k, one in enumerate(every)]
+    for k, m in combinations(range(len(every)), 2) if springs else ():
         both = np.flatnonzero(valid[:, moves + m, k] & valid[:, moves + k, m]) * b + moves
-        one, other = _rows(fields[k], both + m), _rows(fields[m], both + k)
-        parts.append(_relative(one[0] - other[0], one[1] - other[1], _size(one[0]) + _size(other[0])))
-        trusting.append(np.zeros(len(parts[-1][1]), dtype=bool))
-    return Equations(
-        sp.vstack([operator for operator, _ in parts], format="csr"),
-        np.concatenate([right for _, right in parts]),
-        np.concatenate(trusting),
-    )
+        one, other = every[k][both + m], every[m][both + k]
+        parts.append(
+            Equations(
+                sp.csr_array(one.operator - other.operator),
+                one.right - other.right,
+                one.size + other.size,
+                one.lever + other.lever,
+                np.full(len(both), -1),
+                one.rotation,
+            )
+        )
+    joined = [[getattr(part, one.name) for part in parts] for one in fields(Equations)]
+    return _relative(Equations(sp.vstack(joined[0], format="csr"), *map(np.concatenate, joined[1:])))
 
 
-_Rows = tuple[sp.csr_array, NDArray[np.float64]]
-
-
-def _rows(field: _Rows, which: NDArray) -> _Rows:
-    rows = np.flatnonzero(which) if which.dtype == bool else which
-    return sp.csr_array(field[0][rows]), field[1][rows]
-
-
-def _size(operator: sp.csr_array) -> NDArray[np.float64]:
-    return np.asarray(abs(operator).sum(axis=1)).ravel()
-
-
-def _relative(operator: sp.csr_array, right: NDArray, terms: NDArray | None = None) -> _Rows:
+def _relative(given: Equations) -> Equations:
     """Equations relative to the size of their coefficients; those without any, or none but rounding, are left out.
 
-    `terms` is the size of what the coefficients are differences of.
+    What comes in has the size of what the coefficients are differences of.
     """
-    size = _size(operator)
-    tells = np.flatnonzero(size > _ROUNDING * (size if terms is None else terms))
-    return sp.csr_array(sp.diags_array(1 / size[tells]) @ operator[tells]), right[tells] / size[tells]
+    size = np.asarray(abs(given.operator).sum(axis=1)).ravel()
+    tells = np.flatnonzero(size > _ROUNDING * given.size)
+    some, size = given[tells], size[tells]
+    operator = sp.csr_array(sp.diags_array(1 / size) @ some.operator)
+    return replace(some, operator=operator, right=some.right / size, size=size, lever=some.lever / size)
 
 
-def _rotation(nodes: Nodes, k: int) -> _Rows:
-    """All rows' equation for rotation k: coefficients (n b, n dim) and right-hand side."""
-    layout, shape = nodes.layout, (nodes.matrix.shape[0], nodes.n * nodes.layout.dim)
+def _rotation(nodes: Nodes, k: int) -> Equations:
+    """All rows' equation for rotation k, as it stands."""
+    layout, order = nodes.layout, nodes.matrix.shape[0]
     rows, columns, values = [], [], []
     for direction, coordinate, sign in layout.turned(layout.rotations[k]):
         part = nodes.direction(direction).tocoo()
         rows.append(part.row)
         columns.append(part.col * layout.dim + coordinate)
         values.append(sign * part.data)
-    operator = sp.csr_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)
+    place = np.concatenate(rows), np.concatenate(columns)
+    operator = sp.csr_array((np.concatenate(values), place), shape=(order, nodes.n * layout.dim))
     own = nodes.direction(len(layout.displacements) + k)
-    return operator, -np.asarray(own.sum(axis=1)).ravel()
+    right, lever, size = (np.asarray(part.sum(axis=1)).ravel() for part in (-own, abs(own), abs(operator)))
+    return Equations(operator, right, size, lever, np.arange(order), np.full(order, k))

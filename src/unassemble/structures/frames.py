@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 
 from ..clock import Clock
 from ..elasticity.anchoring import checked_anchors, digits_lost, near_enough
-from ..elasticity.nodal import determined
-from ..elasticity.ordered.rounded import Rounding, with_exact_sums
+from ..elasticity.rounded import Rounding, with_exact_sums
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..recovery import Structure
+from ..tolerances import CERTIFIED
 from ..words import count_of
-from .certificate import largest_force
+from .certificate import forces
 from .members import members_and_cells
 from .nodes import Nodes, nodes_of
-from .placed import CERTIFIED, Placed, best_positions
+from .pairing import mispaired
+from .placed import SURE, Placed, covered
 from .recognise import StructuralNumbering
-
-_SURE = 1e-6  # of the diameter: how far off the points of a certified structure may be
+from .turning import turning_positions
 
 
 def serve_structure(
@@ -62,42 +62,46 @@ def serve_structure(
     whole, rounding = with_exact_sums(matrix.csr())
     nodes = nodes_of(whole, layout, node, direction)
     with clock("solve"), blas_threads(1):
-        found = best_positions(nodes)
-    points, component, evidence, notes, springs = (
-        found.points, found.component, found.evidence, found.notes, found.springs
-    )  # fmt: skip
+        found, valid = turning_positions(nodes)
     with clock("certify"):
-        valid = found.valid.copy()
-        if springs:
-            valid[:, len(layout.displacements) :] = False
         counted = np.zeros((len(node), len(layout.rotations)), dtype=bool)
-        present = nodes.present
-        counted[nodes.row_of[present]] = valid[present]
-        error = largest_force(whole, layout, node, direction, points, counted)
+        counted[nodes.row_of[nodes.present]] = valid[nodes.present]
+        force, used = forces(whole, layout, node, direction, found.points, counted)
+        error = float(force.max()) if len(force) else float("inf")
+        status, reason = _verdict(error, found, rounding)
+        pair = mispaired(nodes, found.points) if status == "certified" and numbering.kind != "given" else None
+    if pair is not None:
+        first, second = (np.flatnonzero(node == one)[0] for one in pair)
+        status = "uncertified"
+        reason = (
+            f"which rows belong to one node is not certain: those of rows {first} and {second}, as numbered, do not "
+            "couple like the rows of two nodes; give the numbering if it is known"
+        )
+    elif status == "certified":
+        reason += f": {covered(used, abs(whole[used]).sum(axis=0) > 0)}"
+    notes = list(found.notes)
     fields: dict[str, Any] = {}
     if cells and error < 1e-6:
         with clock("members"):
-            fields = members_and_cells(nodes, points)
+            fields = members_and_cells(nodes, found.points)
         notes.append("members and cells were read off the graph; what is certified is the coordinates")
-    if springs:
-        notes.append("moments do not balance alone: rotations are tied to the ground by springs, as against drilling")
+    if not valid[:, len(layout.displacements) :].any():
+        notes.append("moments are not used alone: springs between rotations and the ground, as against drilling, would "
+                     "spoil them")  # fmt: skip
     untold = np.unique(node[direction < 0])
     if len(untold):
         notes.append(f"which unknowns {count_of(len(untold), 'node')} lack the pattern does not tell: their rows were "
                      "left out; give the numbering if it is known")  # fmt: skip
-    loose = ~determined(points)
-    if loose.any():
-        notes.append(f"{loose.sum()} of {count_of(nodes.n, 'node')} cannot be determined: at supports, or tied to "
-                     "these only")  # fmt: skip
-    points, more = _moved(points, component, known)
-    lost = digits_lost(points, found.points, component, np.ones(len(evidence))) / _edge_length(nodes, found.points)
-    status, reason = near_enough(*_verdict(error, found, layout.dim, rounding), lost)
+    if (found.component < 0).any():
+        notes.append(f"{(found.component < 0).sum()} of {count_of(nodes.n, 'node')} cannot be determined: at supports, "
+                     "or tied to these only")  # fmt: skip
+    points, more = _moved(found, known)
+    lost = digits_lost(points, found.points, found.component, np.ones(len(found.evidence))) / _edge_length(nodes, found)
+    status, reason = near_enough(status, reason, lost)
     return Structure(
         **fields,
+        **found.fields(numbering),
         points=points,
-        component=component,
-        scale=np.full(len(evidence), np.nan),
-        node_status=np.asarray(loose, dtype=np.int8),
         status=status,
         uniqueness="searched" if status == "certified" else None,
         reason=reason,
@@ -105,75 +109,56 @@ def serve_structure(
         backward_error=error,
         timings=clock.timings,
         warnings=(*matrix.warnings, *notes, *more),
-        node_of_row=node,
-        direction_of_row=direction,
-        numbering=numbering.kind,
         choice=choice,
-        evidence=evidence,
     )
 
 
-def _edge_length(nodes: Nodes, points: NDArray[np.float64]) -> float:
+def _edge_length(nodes: Nodes, found: Placed) -> float:
     """Mean distance of coupled nodes."""
     i, j = sp.triu(nodes.graph, 1).nonzero()
-    length = np.linalg.norm(points[i] - points[j], axis=1)
-    return float(np.nanmean(length)) if np.isfinite(length).any() else 1.0
+    length = np.linalg.norm(found.points[i] - found.points[j], axis=1)
+    return float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
 
 
-def _moved(
-    points: NDArray[np.float64], component: NDArray[np.int64], anchors: tuple[NDArray, NDArray]
-) -> tuple[NDArray[np.float64], list[str]]:
+def _moved(found: Placed, anchors: tuple[NDArray, NDArray]) -> tuple[NDArray[np.float64], list[str]]:
     """Pieces moved to their anchors, and how far these are missed."""
     nodes, places = anchors
-    points, notes = points.copy(), []
-    lost = nodes[component[nodes] < 0]
+    points, piece, notes = found.points.copy(), found.component, []
+    lost = nodes[piece[nodes] < 0]
     if len(lost):
         notes.append(f"the anchored nodes {', '.join(map(str, lost))} are not determined and were not used")
-    for piece in np.unique(component[nodes][component[nodes] >= 0]):
-        here = nodes[component[nodes] == piece]
-        wanted = places[component[nodes] == piece]
-        points[component == piece] += (wanted - points[here]).mean(axis=0)
+    for one in np.unique(piece[nodes][piece[nodes] >= 0]):
+        here, wanted = nodes[piece[nodes] == one], places[piece[nodes] == one]
+        points[piece == one] += (wanted - points[here]).mean(axis=0)
         misfit = float(np.linalg.norm(points[here] - wanted, axis=1).max())
-        if len(here) > 1 and misfit > 1e-6 * np.linalg.norm(wanted - wanted.mean(axis=0), axis=1).max():
+        if len(here) > 1 and misfit > SURE * np.linalg.norm(wanted - wanted.mean(axis=0), axis=1).max():
             notes.append(f"the anchors do not fit the structure, whose size and axes the matrix knows: one is missed "
                          f"by {misfit:.3g}")  # fmt: skip
     return points, notes
 
 
-def _verdict(error: float, found: Placed, d: int, rounding: Rounding | None) -> tuple[str, str]:
-    evidence = found.evidence
-    free = [one.null_dimension for one in evidence if one.null_dimension > d]
-    if free:
+def _verdict(error: float, found: Placed, rounding: Rounding | None) -> tuple[str, str]:
+    d = found.points.shape[1]
+    if found.null_dimension > d:
         return "uncertified", (
-            f"the null space has dimension {free[0]} where {d} translations are expected: supports leave too few whole "
-            "rows"
+            f"the null space has dimension {found.null_dimension} where {d} translations are expected: supports leave "
+            "too few whole rows"
         )
     if rounding and error < rounding.spread:
         return "uncertified", (
             f"the entries are rounded to {rounding.name}, and rigid rotations cause forces of {error:.1e} of those "
             "that make them up, which is what that leaves"
         )
-    loosest = min(evidence, key=lambda one: one.gap / np.sqrt(one.rows))
+    loosest = min(found.evidence, key=lambda one: one.gap / np.sqrt(one.rows))
     doubt = error * np.sqrt(loosest.rows) / loosest.gap  # each equation may be off by as much
-    if doubt > _SURE:
+    if not error <= CERTIFIED or doubt > SURE:
         return "uncertified", (
             f"rigid rotations of the nodes cause forces of {error:.1e} of those that make them up, and another field, "
             f"no translation, only {loosest.gap:.1e}: positions may be off by {doubt:.0e} of the size"
         )
-    if not error <= CERTIFIED:
+    if found.unnoticed.any():
+        count = count_of(int(np.count_nonzero(found.unnoticed)), "equation has", "equations have")
         return "uncertified", (
-            f"no positions make rigid rotations free of forces: the largest is {error:.1e} of those that make it up; "
-            "the points are the best fit"
-        )
-    if found.unchecked:
-        count = count_of(found.unchecked, "equation of moments has", "equations of moments have")
-        return "uncertified", (
-            f"{count} no other to check against, so that springs between rotations and the ground would go unnoticed: "
-            "supports leave too few whole rows"
-        )
-    if not found.strict:
-        return "uncertified", (
-            "rigid rotations of the nodes cause no forces, but without moments of nodes next to supports too few rows "
-            "are left, and supports may resist the rotations of these nodes"
+            f"{count} no other to check against, so that springs would go unnoticed: too few whole rows are left"
         )
     return "certified", "rigid rotations of the nodes cause no forces, and only translations change nothing"

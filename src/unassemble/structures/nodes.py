@@ -46,9 +46,17 @@ class Nodes:
     @cached_property
     def graph(self) -> sp.csr_array:
         """(n, n) pattern of coupled nodes, with the diagonal."""
-        coo, b = self.matrix.tocoo(), self.layout.block_size
-        own = np.arange(self.n)
-        place = np.concatenate([coo.row // b, own]), np.concatenate([coo.col // b, own])
+        return self._pattern(self.layout.block_size)
+
+    @cached_property
+    def moving(self) -> sp.csr_array:
+        """(n, n) pattern of nodes whose displacements are coupled, with the diagonal."""
+        return self._pattern(len(self.layout.displacements))
+
+    def _pattern(self, directions: int) -> sp.csr_array:
+        coo, b, own = self.matrix.tocoo(), self.layout.block_size, np.arange(self.n)
+        some = (coo.row % b < directions) & (coo.col % b < directions)
+        place = np.concatenate([coo.row[some] // b, own]), np.concatenate([coo.col[some] // b, own])
         pattern = sp.csr_array((np.ones(len(place[0]), np.int32), place), shape=(self.n, self.n))
         pattern.data[:] = 1
         return pattern
@@ -57,17 +65,7 @@ class Nodes:
         """(n b, n) the columns of one direction."""
         return sp.csr_array(self.matrix[:, k :: self.layout.block_size])
 
-    def annihilates(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """(n b, b) rows whose entries of one direction add up to zero, and those that have such entries."""
-        zero, some = [], []
-        for k in range(self.layout.block_size):
-            columns = self.direction(k)
-            size = np.asarray(abs(columns).sum(axis=1)).ravel()
-            zero.append(np.abs(np.asarray(columns.sum(axis=1)).ravel()) <= _ROUNDING * size)
-            some.append(size > 0)
-        return np.stack(zero, axis=1), np.stack(some, axis=1)
-
-    def whole(self, *, strict: bool = True) -> NDArray[np.bool_]:
+    def whole(self) -> NDArray[np.bool_]:
         """(n, b, rotations) rows in which the equation of a rotation holds every coefficient that assembly gave it.
 
         It needs the displacements across the axis, and the rotation, of all coupled nodes. Displacements that were
@@ -75,32 +73,26 @@ class Nodes:
         A penalty on a rotation spoils the equations of its own row.
 
         An eliminated neighbour may act on the moments of a node like a spring that resists rotations only, as the
-        torsion of a column does; but its forces show. So the strict rule takes moments of those nodes only of which no
-        force depends on translations, and forces only if they do not depend on the translation along themselves.
+        torsion of a column does; but its forces show. So moments count only of nodes no force of which depends on
+        translations, and forces only if they do not depend on the translation along themselves.
         """
         layout, b = self.layout, self.layout.block_size
-        zero = self.annihilates()[0].reshape(self.n, b, b)
+        moves = len(layout.displacements)
+        columns = [self.direction(k) for k in range(b)]
+        sums = np.column_stack([part.sum(axis=1) for part in columns])
+        size = np.column_stack([abs(part).sum(axis=1) for part in columns])
+        zero = (np.abs(sums) <= _ROUNDING * size).reshape(self.n, b, b)
         lacking = self.graph @ (~self.present).astype(np.int32) > 0
-        sound = self.present & ~self._penalised()
-        if strict:
-            sound &= self._untouched(zero, sound)
+        sound: NDArray[np.bool_] = self.present & ~self._penalised()
+        still = np.asarray(zero[:, :moves, :moves].all(axis=(1, 2)) & sound[:, :moves].all(axis=1))
+        sound[:, :moves] &= zero[:, range(moves), range(moves)]
+        sound[:, moves:] &= still[:, None]
         valid = np.zeros((self.n, b, len(layout.rotations)), dtype=bool)
         for k, axis in enumerate(layout.rotations):
             across = [direction for direction, _, _ in layout.turned(axis)]
-            needed = [*across, len(layout.displacements) + k]
             rows = zero[:, :, across].all(axis=2) & sound
-            valid[:, :, k] = rows & ~lacking[:, needed].any(axis=1)[:, None]
+            valid[:, :, k] = rows & ~lacking[:, [*across, moves + k]].any(axis=1)[:, None]
         return valid
-
-    def _untouched(self, zero: NDArray[np.bool_], sound: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """(n, b) forces that do not depend on the translation along them, and moments of nodes away from supports."""
-        moves = len(self.layout.displacements)
-        forces = range(moves)
-        untouched = np.ones((self.n, self.layout.block_size), dtype=bool)
-        untouched[:, :moves] = zero[:, forces, forces]
-        still = zero[:, :moves, :moves].reshape(self.n, -1)
-        untouched[:, moves:] = np.column_stack([still, sound[:, :moves]]).all(axis=1, keepdims=True)
-        return untouched
 
     def _penalised(self) -> NDArray[np.bool_]:
         """(n, b) unknowns with a penalty on the diagonal."""

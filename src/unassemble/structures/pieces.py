@@ -31,7 +31,9 @@ class Piece:
     edges: NDArray[np.int64]
 
 
-def pieces(operator: sp.csr_array, d: int, edges: NDArray[np.int64]) -> Iterator[Piece]:
+def pieces(
+    operator: sp.csr_array, d: int, edges: NDArray[np.int64], rows: NDArray[np.int64] | None = None
+) -> Iterator[Piece]:
     """Connected pieces, in the order of their first nodes; nodes in no equation are in none.
 
     The work is that of one pass over the equations, however many pieces there are.
@@ -43,7 +45,11 @@ def pieces(operator: sp.csr_array, d: int, edges: NDArray[np.int64]) -> Iterator
         Coordinates of a node.
     edges : (e, 2) int64
         Coupled nodes; those of different pieces are left out.
+    rows : (k,) int64, optional
+        The equations to use; all by default.
     """
+    rows = np.arange(operator.shape[0]) if rows is None else rows
+    operator = sp.csr_array(operator[rows])
     m, n = operator.shape[0], operator.shape[1] // d
     node = operator.indices // d
     row = np.repeat(np.arange(m), np.diff(operator.indptr))
@@ -62,7 +68,7 @@ def pieces(operator: sp.csr_array, d: int, edges: NDArray[np.int64]) -> Iterator
         columns = place[part.indices // d] * d + part.indices % d
         shape = (len(equations[k]), len(bodies[k]) * d)
         local = sp.csr_array((part.data, columns, part.indptr), shape=shape)
-        yield Piece(bodies[k], equations[k], local, place[inside[links[k]]])
+        yield Piece(bodies[k], rows[equations[k]], local, place[inside[links[k]]])
 
 
 def _groups(label: NDArray, count: int) -> list[NDArray[np.int64]]:

@@ -1,22 +1,42 @@
-"""Positions of all pieces of a structure, from the equations that deserve most trust."""
+"""Positions of all pieces that linear equations hold together, from equations that others would contradict."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..elasticity.nodal import determined
-from ..errors import GeometryError, RecoveryError
+from ..elasticity.rows.numbering import Numbering
+from ..errors import GeometryError
 from ..recovery import Evidence
-from .equations import Equations, equations
-from .nodes import Nodes
-from .pieces import pieces
-from .positions import positions
+from ..tolerances import CERTIFIED
+from .pieces import Piece, pieces
+from .recognise import StructuralNumbering
 
-CERTIFIED = 1e-9
+SURE = 1e-6  # of the diameter: how far off the points of a certified structure may be
+
+
+@dataclass(frozen=True, eq=False)
+class Positions:
+    """Coordinates of one piece.
+
+    Attributes
+    ----------
+    points : (n, d) float64
+        Centroid at the origin; NaN where loose.
+    evidence : Evidence
+    unnoticed : (m,) bool
+        Equations that a disturbance would change without being noticed; see :mod:`.redundancy`.
+    """
+
+    points: NDArray[np.float64]
+    evidence: Evidence
+    unnoticed: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,85 +51,100 @@ class Placed:
         Piece of each node, -1 where not determined.
     evidence : tuple of Evidence
         One per piece.
-    unchecked : int
-        See :class:`.positions.Positions`.
-    notes : list of str
-    springs : bool
-        Whether only equations were used that springs between rotations and the ground leave alone.
-    strict : bool
-        Whether only equations were used that no support can have spoiled; see :meth:`.nodes.Nodes.whole`.
-    valid : (n, b, rotations) bool
-        The equations that hold all that assembly gave them, by that rule.
+    used : (m,) bool
+        Equations that these positions rest on.
+    unnoticed : (m,) bool
+        Those of them that a disturbance would change without being noticed.
+    notes : tuple of str
     """
 
     points: NDArray[np.float64]
     component: NDArray[np.int64]
     evidence: tuple[Evidence, ...]
-    unchecked: int
-    notes: list[str]
-    springs: bool
-    strict: bool
-    valid: NDArray[np.bool_]
+    used: NDArray[np.bool_]
+    unnoticed: NDArray[np.bool_]
+    notes: tuple[str, ...]
+
+    def fields(self, numbering: Numbering | StructuralNumbering) -> dict[str, Any]:
+        """What every structure's recovery says of nodes, rows and pieces."""
+        return {
+            "component": self.component,
+            "scale": np.full(len(self.evidence), np.nan),
+            "node_status": (self.component < 0).astype(np.int8),
+            "evidence": self.evidence,
+            "node_of_row": numbering.node_of_row,
+            "direction_of_row": numbering.direction_of_row,
+            "numbering": numbering.kind,
+        }
 
     @property
-    def doubts(self) -> tuple[bool, bool, bool, float]:
-        """What speaks against these positions, the gravest first."""
-        worst = max(one.residual for one in self.evidence)
-        free = any(one.null_dimension > self.points.shape[1] for one in self.evidence)
-        return worst > CERTIFIED, free, self.unchecked > 0 or not self.strict, worst
+    def residual(self) -> float:
+        """Largest residual of a piece."""
+        return max(one.residual for one in self.evidence)
+
+    @property
+    def null_dimension(self) -> int:
+        """Largest dimension of the null space of a piece."""
+        return max(one.null_dimension for one in self.evidence)
 
 
-def best_positions(nodes: Nodes) -> Placed:
-    """Positions from all rows; where these contradict or do not check each other, from those that no spring spoils.
+def covered(rows: NDArray[np.bool_], columns: NDArray[np.bool_]) -> str:
+    """How much of a matrix speaks for the coordinates, in words: masks of its rows, and of the unknowns they touch."""
+    return f"{rows.mean():.0%} of the rows say so, of {columns.mean():.0%} of the unknowns"
 
-    Where supports leave too few of either, from rows that supports may have spoiled.
+
+def placed(operator: sp.csr_array, d: int, edges: NDArray[np.int64], solve: Callable[[Piece], Positions]) -> Placed:
+    """Positions from equations that others would contradict; where too few are left, or all contradict, from all.
+
+    Equations that would be disturbed without being noticed are left out, and what only they determine with them.
+
+    Parameters
+    ----------
+    operator : (m, n d) sparse
+    d : int
+    edges : (e, 2) int64
+        Coupled nodes.
+    solve : callable
+        Positions of one piece.
 
     Raises
     ------
     GeometryError
         If no node is determined.
     """
-    attempts: list[Placed] = []
-    failure: RecoveryError | None = None
-    for strict in (True, False):
-        valid = nodes.whole(strict=strict)
-        for springs in (False, True):
-            try:
-                attempts.append(_placed(nodes, valid, springs=springs, strict=strict))
-            except RecoveryError as error:
-                failure = failure or error
-                continue
-            if not any(attempts[-1].doubts[:3]):
-                return attempts[-1]
-    if not attempts:
-        raise failure or GeometryError("no row annihilates translations: no node has a valid equation")
-    return min(attempts, key=lambda one: one.doubts)
-
-
-def _placed(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool, strict: bool) -> Placed:
-    """Positions piece by piece."""
-    d = nodes.layout.dim
-    given = equations(nodes, valid, springs=springs)
-    points, component = np.full((nodes.n, d), np.nan), np.full(nodes.n, -1)
-    evidence: list[Evidence] = []
-    notes: list[str] = []
-    unchecked = 0
-    failure: GeometryError | None = None
-    edges = np.column_stack(sp.triu(nodes.graph, 1).nonzero())
-    for piece in pieces(given.operator, d, edges):
-        part = Equations(piece.operator, given.right[piece.rows], given.trusting[piece.rows])
+    best = every = _placed(operator, d, edges, solve, np.ones(operator.shape[0], dtype=bool))
+    while best.residual <= CERTIFIED and best.unnoticed.any():
         try:
-            one = positions(part, d, piece.edges)
+            best = _placed(operator, d, edges, solve, best.used & ~best.unnoticed)
+        except GeometryError:
+            return every
+    return best if best.null_dimension <= every.null_dimension else every
+
+
+def _placed(
+    operator: sp.csr_array,
+    d: int,
+    edges: NDArray[np.int64],
+    solve: Callable[[Piece], Positions],
+    used: NDArray[np.bool_],
+) -> Placed:
+    n = operator.shape[1] // d
+    points, component = np.full((n, d), np.nan), np.full(n, -1)
+    unnoticed = np.zeros(len(used), dtype=bool)
+    found: list[Positions] = []
+    notes: list[str] = []
+    failure: GeometryError | None = None
+    for piece in pieces(operator, d, edges, np.flatnonzero(used)):
+        try:
+            one = solve(piece)
         except GeometryError as error:
             failure = failure or error
             notes.append(f"the piece with node {piece.nodes[0]}: {error}")
             continue
         points[piece.nodes] = one.points
-        component[piece.nodes[determined(one.points)]] = len(evidence)
-        unchecked += one.unchecked
-        evidence.append(Evidence(one.dimension, one.residual, one.gap, len(piece.rows)))
-    if not evidence:
-        raise failure or GeometryError(
-            "no row annihilates translations and couples to no support: no node has a valid equation"
-        )
-    return Placed(points, component, tuple(evidence), unchecked, notes, springs, strict, valid)
+        component[piece.nodes[determined(one.points)]] = len(found)
+        unnoticed[piece.rows] = one.unnoticed
+        found.append(one)
+    if not found:
+        raise failure or GeometryError("no node has an equation that supports leave whole")
+    return Placed(points, component, tuple(one.evidence for one in found), used, unnoticed, tuple(notes))

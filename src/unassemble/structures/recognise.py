@@ -6,6 +6,7 @@ all the same and without displacements, bend everything. This tells the layouts 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,7 @@ _ROUNDING = 1e-9
 _SAMPLE = 2000  # rows to ask
 # On regular meshes some of a solid's rows annihilate whatever is asked; read as what it is it has more of them.
 _SOLIDS = (Layout("solid", 3, (0, 1, 2), ()), Layout("solid", 2, (0, 1), ()))
+_SIZES = (2, 3, 6)  # of the blocks of all of these
 _MOST = 0.1  # of that share: rows that annihilate their rotation by chance; where they are solids' all do
 _LEAST = 0.05  # rows that have to annihilate translations
 
@@ -69,32 +71,33 @@ def find_structure(
     kind : {None, "interleaved", "by component"}
     block_size : int, optional
     """
-    order = matrix.shape[0]
-    best, most = None, _LEAST
-    for layout in (*_SOLIDS, *LAYOUTS):
-        b = layout.block_size
-        if order % b or order < 2 * b or block_size not in (None, b):
-            continue
-        for name in ORDERS if kind is None else (kind,):
-            node, direction = regular(order, b, name)
-            share = _share(matrix, layout, direction)
-            if share > most:
-                best, most = StructuralNumbering(layout, node, direction, name, share), share
+    orders = ORDERS if kind is None else (kind,)
+    usual = {
+        (b, name): regular(matrix.shape[0], b, name)
+        for b in _SIZES
+        for name in orders
+        if matrix.shape[0] % b == 0 and matrix.shape[0] >= 2 * b
+    }
+    best = _best(matrix, usual, block_size)
     if best is None and kind != "by component":
-        best = _interleaved_with_gaps(matrix, block_size)
+        best = _best(matrix, {(b, "interleaved"): with_gaps(matrix, b) for b in (3, 6)}, block_size)
     return best if best is not None and best.layout.rotations else None
 
 
-def _interleaved_with_gaps(matrix: sp.csr_array, block_size: int | None) -> StructuralNumbering | None:
+def _best(
+    matrix: sp.csr_array,
+    numberings: Mapping[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.int64]] | None],
+    block_size: int | None,
+) -> StructuralNumbering | None:
+    """The layout and the numbering, by its block size and name, with most rows that annihilate translations."""
     best, most = None, _LEAST
-    for b in {layout.block_size for layout in LAYOUTS} & ({block_size} if block_size else {3, 6}):
-        found = with_gaps(matrix, b)
-        if found is None:
-            continue
-        for layout in (*_SOLIDS, *LAYOUTS):
-            share = _share(matrix, layout, found[1]) if layout.block_size == b else 0.0
+    for layout in (*_SOLIDS, *LAYOUTS):
+        for (b, name), numbering in numberings.items():
+            if numbering is None or layout.block_size != b or block_size not in (None, b):
+                continue
+            share = _share(matrix, layout, numbering[1])
             if share > most:
-                best, most = StructuralNumbering(layout, *found, "interleaved", share), share
+                best, most = StructuralNumbering(layout, *numbering, name, share), share
     return best
 
 

@@ -8,7 +8,6 @@ bars' directions; where the truss has enough of them, these are its translations
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,16 +19,15 @@ from ..elasticity.anchoring import anchored, checked_anchors, digits_lost, near_
 from ..elasticity.nodal import NodalMatrix, determined
 from ..elasticity.nullspace.shape import EXACT, in_gauge, shape
 from ..elasticity.rows.numbering import Numbering
-from ..errors import GeometryError
 from ..matrix import OperatorMatrix
 from ..recovery import Evidence, Structure
+from ..tolerances import CERTIFIED
 from ..words import count_of
 from .bars import Bars
-from .pieces import pieces
-from .positions import null_fields
-
-CERTIFIED = 1e-9
-_SURE = 1e-6  # of the diameter: how far off the points of a certified truss may be
+from .pieces import Piece
+from .placed import SURE, Placed, Positions, covered, placed
+from .positions import least_squares
+from .redundancy import NOTICED
 
 
 def serve_truss(
@@ -56,7 +54,7 @@ def serve_truss(
         found = place_joints(bars, nodal.n)
     with clock("certify"):
         error = largest_misfit(nodal, found.points)
-    loose = ~determined(found.points)
+    loose = found.component < 0
     points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
     if loose.any():
         notes.append(f"{loose.sum()} of {count_of(nodal.n, 'node')} cannot be determined: the directions of all bars "
@@ -64,35 +62,35 @@ def serve_truss(
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: the point reflection of a truss has the same matrix")
     lost = digits_lost(points, found.points, found.component, factor)
-    status, reason = near_enough(*_verdict(error, found), lost)
+    status, reason = _verdict(error, found)
+    if status == "certified":
+        rows = ~loose[numbering.node_of_row]
+        reason += f": {covered(rows, rows)}"
+    status, reason = near_enough(status, reason, lost)
     return Structure(
+        **found.fields(numbering),
         points=points,
         lines=bars.ends[~loose[bars.ends].any(axis=1)],
-        component=found.component,
-        scale=np.full(len(found.evidence), np.nan),
-        node_status=np.asarray(loose, dtype=np.int8),
         status=status,
         uniqueness="searched" if status == "certified" else None,
         reason=reason,
         operator="truss",
         backward_error=error,
         timings=clock.timings,
-        warnings=(*matrix.warnings, *found.warnings, *notes),
-        node_of_row=numbering.node_of_row,
-        direction_of_row=numbering.direction_of_row,
-        numbering=numbering.kind,
+        warnings=(*matrix.warnings, *found.notes, *notes),
         choice=choice,
-        evidence=found.evidence,
     )
 
 
-def _verdict(error: float, found: Truss) -> tuple[str, str]:
-    if any(found.freedoms):
+def _verdict(error: float, found: Placed) -> tuple[str, str]:
+    if found.null_dimension > found.points.shape[1] + 1:
         return "uncertified", "the directions of the bars leave more free than translations and size"
     if not error <= CERTIFIED:
         return "uncertified", f"a block differs from that of a bar by {error:.1e} of the row's largest entry"
+    if found.unnoticed.any():
+        return "uncertified", "supports leave parts of bars only, and nothing contradicts other directions of these"
     worst = max(found.evidence, key=lambda one: one.residual / one.gap)
-    if worst.residual > _SURE * worst.gap:
+    if worst.residual > SURE * worst.gap:
         return "uncertified", (
             f"the directions of the bars contradict each other by {worst.residual:.1e}, and a field that is neither "
             f"translation nor enlargement does so only by {worst.gap:.1e}: positions are known to about "
@@ -101,32 +99,11 @@ def _verdict(error: float, found: Truss) -> tuple[str, str]:
     return "certified", "bars along these directions re-assemble to the matrix, and these determine the nodes"
 
 
-@dataclass(frozen=True, eq=False)
-class Truss:
-    """Positions of the nodes of a truss.
-
-    Attributes
-    ----------
-    points : (n, d) float64
-        Per piece the centroid at the origin, mean length of a bar 1; NaN where not determined.
-    component : (n,) int64
-        Piece of each node, -1 where not determined.
-    evidence : tuple of Evidence
-        One per piece.
-    freedoms : tuple of str
-        Of each piece, what beyond translation and enlargement remains free; mostly empty.
-    warnings : tuple of str
-    """
-
-    points: NDArray[np.float64]
-    component: NDArray[np.int64]
-    evidence: tuple[Evidence, ...]
-    freedoms: tuple[str, ...]
-    warnings: tuple[str, ...]
-
-
-def place_joints(bars: Bars, n: int) -> Truss:
+def place_joints(bars: Bars, n: int) -> Placed:
     """Find positions for which all bars have their directions.
+
+    Whole blocks are those of bars or not, but a block of which only one row or column is left is that of a bar for any
+    numbers: bars that only such blocks tell of count where others would contradict their directions.
 
     Raises
     ------
@@ -134,38 +111,33 @@ def place_joints(bars: Bars, n: int) -> Truss:
         If no piece is determined: its bars may turn against each other.
     """
     d = bars.directions.shape[1]
-    ends, directions = bars.ends[bars.known], bars.directions[bars.known]
-    points, component = np.full((n, d), np.nan), np.full(n, -1)
-    evidence: list[Evidence] = []
-    freedoms, warnings = [], []
-    failure: GeometryError | None = None
-    for piece in pieces(_across(ends, directions, n), d, ends):
-        body, order = piece.nodes, len(piece.nodes)
+    ends, directions, whole = bars.ends[bars.known], bars.directions[bars.known], bars.whole[bars.known]
+
+    def solve(piece: Piece) -> Positions:
+        order = len(piece.nodes)
         links = sp.csr_array((np.ones(len(piece.edges)), piece.edges.T), shape=(order, order))
         links = sp.csr_array(links + links.T)
-        try:
-            fields, values = null_fields(piece.operator, d)
-            one = shape(fields, values, links, np.zeros(order, dtype=bool))
-        except GeometryError as error:
-            failure = failure or error
-            warnings.append(f"the piece with node {body[0]}: {error}")
-            continue
-        points[body] = in_gauge(one.points, links)
-        component[body[~one.loose]] = len(evidence)
+        _, probes, fields, values = least_squares(piece.operator, np.zeros(len(piece.rows)), d)
+        one = shape(fields, values, np.zeros(order, dtype=bool))
+        which = piece.rows.reshape(-1, d)[:, 0] // d
+        seen = _across_one(directions[which]) @ probes[:, 1:].reshape(-1, d, probes.shape[1] - 1)
+        blind = ~whole[which] & (np.linalg.svd(seen, compute_uv=False)[:, d - 2] < NOTICED)
         gap = values[values > EXACT]
-        evidence.append(
-            Evidence(one.dimension, float(values[d]), float(gap[0]) if len(gap) else float("inf"), len(piece.edges))
-        )
-        freedoms.append(one.freedom)
-    if not evidence:
-        raise failure or GeometryError("no two nodes are joined by a bar whose direction shows")
-    return Truss(points, component, tuple(evidence), tuple(freedoms), tuple(warnings))
+        evidence = Evidence(one.dimension, float(values[d]), float(gap[0]) if len(gap) else float("inf"), len(which))
+        return Positions(in_gauge(one.points, links), evidence, np.repeat(blind, d))
+
+    return placed(_across(ends, directions, n), d, ends, solve)
+
+
+def _across_one(directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, d, d) I - e e^T of each bar."""
+    return np.asarray(np.eye(directions.shape[1]) - directions[:, :, None] * directions[:, None, :])
 
 
 def _across(ends: NDArray[np.int64], directions: NDArray[np.float64], n: int) -> sp.csr_array:
     """(m d, n d) what a field moves the ends of each bar against each other across its direction."""
     m, d = directions.shape
-    across = np.eye(d) - directions[:, :, None] * directions[:, None, :]
+    across = _across_one(directions)
     blocks = np.stack([across, -across], axis=1).reshape(2 * m, d, d)
     return sp.bsr_array((blocks, ends.ravel(), np.arange(0, 2 * m + 1, 2)), shape=(m * d, n * d)).tocsr()
 

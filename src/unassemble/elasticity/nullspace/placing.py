@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...errors import GeometryError
 from ..nodal import NodalMatrix, determined, linked
 from ..results import Evidence
+from ..springs import drawn_together
 from .atlas import NullFields, null_fields
 from .shape import EXACT, Shape, in_gauge, shape
 from .slender import affordable, unbent
@@ -19,7 +20,7 @@ from .solution import Solution
 # Gaps of thin pieces that as a whole cost no more than in charts, and lose no digits where these meet. The square of a
 # smaller one is too near to the shift with which normal matrices are factorised.
 _BENDING = 1e-5, 1e-3
-_SLENDER = {2: 1e-4, 3: 1e-5}  # gap below which a step on the whole piece is worth its cost, far more in space
+_SLENDER = 1e-4  # gap below which a step on the whole piece is worth its cost
 _SETTLED = 1e-8  # residual over gap: what coordinates may be wrong by
 # Nodes of a body whose best fit, where none is exact, one factorisation finds. Charts are no help there: each fits in
 # its own way, and where two of them meet the joined field has a kink that costs far more than the misfit itself.
@@ -31,8 +32,6 @@ def placed(
     valid: NDArray[np.bool_],
     patch: int | None,
     terms: NDArray[np.float64] | None = None,
-    *,
-    common: int | None = None,
 ) -> Solution:
     """Positions piece by piece.
 
@@ -44,8 +43,6 @@ def placed(
         Most nodes per chart.
     terms : (d, d, d, t) float64, optional
         Unknown boundary terms; see :func:`.identities.identities`.
-    common : int, optional
-        Fields that all nodes of a piece share; see :func:`.shape.shape`.
 
     Raises
     ------
@@ -70,10 +67,10 @@ def placed(
                 )
         told = np.asarray(valid.reshape(nodal.n, -1).any(axis=1))
         try:
-            one = _shape(found, graph, told, common)
+            one = shape(found.fields, found.values, told[found.nodes])
             if found.charts > 1 and _thin(found, one, graph):
                 found = null_fields(nodal, valid, body, patch=len(body), terms=terms)
-                one = _shape(found, graph, told, common)
+                one = shape(found.fields, found.values, told[found.nodes])
         except GeometryError as error:
             failure = failure or error
             warnings.append(f"piece {piece} with node {body[0]}: {error}")
@@ -83,7 +80,7 @@ def placed(
         points[found.nodes] = one.points
         points[body] = in_gauge(points[body], graph[body][:, body])
         evidence.append(_evidence(found, one))
-        if one.exact and not one.freedom and evidence[-1].gap < _SLENDER[nodal.dim] and affordable(points[body]):
+        if one.exact and not one.freedom and evidence[-1].gap < _SLENDER and affordable(points[body]):
             whole = np.full_like(points, np.nan)
             whole[body] = points[body]
             better, residual = unbent(nodal, valid, whole, evidence[-1].gap, terms)
@@ -93,14 +90,11 @@ def placed(
                 evidence[-1] = replace(evidence[-1], residual=residual, settled=settled)
         freedoms.append(one.freedom)
         exact.append(one.exact)
+    points[drawn_together(nodal, valid, points)] = np.nan
     if not exact:
         raise failure or GeometryError("no row annihilates constants: no node has a valid equation")
     component = np.where(determined(points), component, -1)
     return Solution(valid, component, points, tuple(evidence), tuple(freedoms), all(exact), tuple(warnings))
-
-
-def _shape(found: NullFields, graph: sp.csr_array, told: NDArray[np.bool_], common: int | None) -> Shape:
-    return shape(found.fields, found.values, graph[found.nodes][:, found.nodes], told[found.nodes], common)
 
 
 def _thin(found: NullFields, one: Shape, graph: sp.csr_array) -> bool:

@@ -54,10 +54,7 @@ def with_planes(
     whole = surrounded(nodal, valid) if whole is None else whole  # or more is missing than a roller takes
     graph = nodal.graph
     count = graph @ gone.astype(float)
-    near = count > 0
-    if nodal.blurred is not None:  # what such rows miss is not in the plane alone
-        near &= ~nodal.blurred[:, None]
-    held = (near & whole[:, None])[:, None, :] & present[:, :, None] & (nodal.size > 0)[:, None, None]
+    held = ((count > 0) & whole[:, None])[:, None, :] & present[:, :, None] & (nodal.size > 0)[:, None, None]
     held &= ~(nodal.penalised[:, None, :] & np.eye(d, dtype=bool))  # beside a penalty the sum does not show
     if not held.any():
         return None

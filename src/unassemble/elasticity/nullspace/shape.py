@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
@@ -32,7 +31,7 @@ class Shape:
         Nodes that can move while the others stay.
     dimension : int
         Of the null space, translations counted, loose nodes left out; that of the translations where no field is exact.
-    freedom : {"", "axes", "affine", "hourglass"}
+    freedom : {"", "axes", "affine"}
         What remains beyond translation and scale.
     exact : bool
         Whether the field is a null field, not only the best one.
@@ -51,9 +50,7 @@ class Shape:
 def shape(
     fields: NDArray[np.float64],
     values: NDArray[np.float64],
-    graph: sp.csr_array,
     told: NDArray[np.bool_],
-    common: int | None = None,
 ) -> Shape:
     """Find the coordinates among the least singular fields.
 
@@ -63,12 +60,8 @@ def shape(
         Orthonormal.
     values : (k,) float64
         Increasing singular values.
-    graph : (n, n) sparse
-        Which nodes are coupled.
     told : (n,) bool
         Nodes with a valid row of their own; supports do not leave these loose.
-    common : int, optional
-        Fields that the nodes share which are not loose: d + 1, translations and scale, where not given.
 
     Raises
     ------
@@ -78,7 +71,7 @@ def shape(
     n, d, k = fields.shape
     if k <= d:
         raise GeometryError(f"{n} nodes with valid rows are too few to tell their positions")
-    common = d + 1 if common is None else common
+    common = d + 1  # translations and scale
     exact = values[d] <= EXACT
     count = int((values <= EXACT).sum()) if exact else d + 1
     null, loose = fields[..., :count], np.zeros(n, dtype=bool)
@@ -95,7 +88,7 @@ def shape(
     moving = _without_translations(kept)
     dimension = d + moving.shape[2] if exact else d
     points = np.full((n, d), np.nan)
-    points[~loose], freedom = _choose(moving, graph[~loose][:, ~loose], exact=bool(exact))
+    points[~loose], freedom = _choose(moving, exact=bool(exact))
     return Shape(points, loose, dimension, freedom, bool(exact), count)
 
 
@@ -136,7 +129,7 @@ def _without_translations(fields: NDArray) -> NDArray:
     return u[:, : k - d][:, s[: k - d] > 1e-6].reshape(n, d, -1)
 
 
-def _choose(moving: NDArray, graph: sp.csr_array, *, exact: bool) -> tuple[NDArray, str]:
+def _choose(moving: NDArray, *, exact: bool) -> tuple[NDArray, str]:
     """The coordinates, or a representative and the name of what remains free."""
     _, d, k = moving.shape
     if k == 1 and exact and _flat(moving[..., 0]):
@@ -151,11 +144,9 @@ def _choose(moving: NDArray, graph: sp.csr_array, *, exact: bool) -> tuple[NDArr
         return np.stack([u[:, 0] for u, _, _ in single], axis=1) / np.sqrt(d), "axes"
     if k == d * d and ranks == [d] * d:
         return single[0][0][:, :d] / np.sqrt(d), "affine"
-    if _of_one_direction(moving):
-        return _smoothest(moving, graph), "hourglass"
     raise GeometryError(
         f"the valid rows leave a null space of dimension {d + k} where {d + 1} is expected: too many unknowns are "
-        "eliminated for the matrix to determine the nodes"
+        "eliminated, or reduced integration leaves hourglass modes"
     )
 
 
@@ -165,27 +156,6 @@ def _flat(points: NDArray) -> bool:
     ordered = np.sort(points, axis=0)
     spread = (ordered[most - 1 :] - ordered[: len(points) - most + 1]).min(axis=0)
     return bool((spread <= _LOOSE * np.abs(points).max()).any()) and most > 2 ** points.shape[1]
-
-
-def _of_one_direction(moving: NDArray) -> bool:
-    """Whether in each direction some of the fields move nodes in that direction only.
-
-    A scalar field h that every block of the matrix maps to zero gives such fields, one in each direction: where no
-    quadrature point sees its gradient, it is an hourglass mode.
-    """
-    _, d, k = moving.shape
-    for a in range(d):
-        others = np.delete(moving, a, axis=1).reshape(-1, k)
-        if svd(others, full_matrices=False)[1][-1] > _LOOSE:
-            return False
-    return True
-
-
-def _smoothest(moving: NDArray, graph: sp.csr_array) -> NDArray:
-    """Of the fields of norm one that whose differences along edges are least: hourglass modes alternate."""
-    pairs = sp.triu(graph, 1).tocoo()
-    steps = (moving[pairs.row] - moving[pairs.col]).reshape(-1, moving.shape[2])
-    return moving @ scipy.linalg.eigh(steps.T @ steps)[1][:, 0]
 
 
 def in_gauge(points: NDArray, graph: sp.csr_array) -> NDArray[np.float64]:

@@ -1,9 +1,8 @@
-"""Slender bodies: one more step for coordinates, whose error grows with the condition, not with its square.
+"""Slender bodies: one more step for coordinates, whose residual is that of the whole body.
 
 A body n times as long as thick has fields that satisfy the identities up to 1 / n^2: it bends. What charts leave in
 these is taken off by one least-squares problem for the whole body. Its residual is summed from differences along edges,
-so that rounding is relative to these and not to the length of the body. Normal equations do, if steps with them shrink;
-where the square of the condition is too large for that, partial pivoting.
+so that rounding is relative to these and not to the length of the body; normal equations do, as long as steps shrink.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...errors import SolverError
-from ...linalg.augmented import AugmentedSystem
 from ...linalg.normal import NormalEquations
 from ..nodal import NodalMatrix, determined, linked
 from .identities import Identities, boundary_basis, identities
@@ -22,7 +20,7 @@ from .identities import Identities, boundary_basis, identities
 _STEPS = 8
 _SHRINKING = 0.2  # a step over the one before; those of normal equations go like the square of the condition
 _STILL = 1e-11  # a step relative to the coordinates that rounding leaves: that of a residual, over the gap
-_WORK = 3e6  # nodes times the square of those across, up to which partial pivoting costs a few seconds
+_WORK = 3e6  # nodes times the square of those across, up to which one factorisation costs a few seconds
 _ROUNDING = 1e-15  # of an entry
 # How much softer, at most, a piece is whose first node is held, and not its centroid, is the root of its number of
 # nodes. Random numbers and all fields but the softest add less than this factor; a field that is free adds 1e6.
@@ -70,25 +68,18 @@ def unbent(
     free[0] = False
     free.flat[far] = False
     columns = sp.csr_array(equations[:, np.flatnonzero(free.ravel())])
-    found, settled = None, False
-    for kind in (NormalEquations, AugmentedSystem):
-        try:
-            system = kind(columns)
-        except SolverError:
-            continue
-        try:
-            if gap * _softness(system, equations.shape[0]) > _SOFTER * np.sqrt(len(x)):
-                return points, float("inf")
-            found, settled = _stepped(system, equations, x, free)
-        except SolverError:
-            continue
-        finally:
-            system.release()
-        if settled:
-            break
-    if found is None:
+    try:
+        system = NormalEquations(columns)
+    except SolverError:
         return points, float("inf")
-    x = found
+    try:
+        if gap * _softness(system, equations.shape[0]) > _SOFTER * np.sqrt(len(x)):
+            return points, float("inf")
+        x = _stepped(system, equations, x, free)
+    except SolverError:
+        return points, float("inf")
+    finally:
+        system.release()
     better = points.copy()
     better[local.columns] = x
     residual = np.linalg.norm(_residual(equations, x)) + _ROUNDING * np.sqrt(equations.shape[0])
@@ -96,23 +87,21 @@ def unbent(
 
 
 def _stepped(
-    system: NormalEquations | AugmentedSystem, equations: sp.csr_array, x: NDArray[np.float64], free: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], bool]:
-    """Coordinates (n, d) after steps as long as they shrink, and whether no more than rounding was left then."""
+    system: NormalEquations, equations: sp.csr_array, x: NDArray[np.float64], free: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Coordinates (n, d) after steps as long as they shrink, down to rounding."""
     x, before = x.copy(), np.inf
     for _ in range(_STEPS):
         step = system.solve(_residual(equations, x))
         x[free] -= step
         size = float(np.linalg.norm(step))
-        if size <= _STILL * np.linalg.norm(x):
-            return x, True
-        if not size <= _SHRINKING * before:
+        if size <= _STILL * np.linalg.norm(x) or not size <= _SHRINKING * before:
             break
         before = size
-    return x, False
+    return x
 
 
-def _softness(system: NormalEquations | AugmentedSystem, equations: int) -> float:
+def _softness(system: NormalEquations, equations: int) -> float:
     """About one over the least singular value: the norm of what solves for signs at random."""
     signs = np.random.default_rng(0).choice([-1.0, 1.0], equations)
     return float(np.linalg.norm(system.solve(signs)))

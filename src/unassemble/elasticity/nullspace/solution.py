@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..corner_nodes import Corner
 from ..results import Evidence
 
 
@@ -38,9 +37,7 @@ class Solution:
         lambda / mu of the pieces whose axes the identities leave free and elements told; see :mod:`.straight`.
     hanging : (n,) bool, optional
         Nodes that hang on equations that rest on an assumption, of planes or of one Poisson's ratio, which no other
-        equation controls; see :mod:`.control`. So do nodes next to corners whose rows may be several nodes'.
-    corners : tuple of Corner
-        Nodes that are not in the matrix, but whose place planes tell.
+        equation controls; see :mod:`.control`.
     cautious : Solution, optional
         The solution to fall back on where no elements show nodes that rows in doubt determine.
     """
@@ -57,7 +54,6 @@ class Solution:
     planes: bool = False
     straight: tuple[float, ...] = ()
     hanging: NDArray[np.bool_] | None = None
-    corners: tuple[Corner, ...] = ()
     cautious: Solution | None = None
 
     @property

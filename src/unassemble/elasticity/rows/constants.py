@@ -24,11 +24,6 @@ def row_sizes(matrix: sp.csr_array) -> NDArray[np.float64]:
     return np.asarray(np.bincount(entry.row, off, matrix.shape[0]), dtype=np.float64)
 
 
-def least_sums(size: NDArray[np.float64], rounding: float | NDArray[np.float64] = ROUNDING) -> NDArray[np.float64]:
-    """(N,) sums that are not zero in rows of given sizes: infinite where a row has no size."""
-    return np.asarray(rounding * np.where(size > 0, size, np.inf))
-
-
 def with_penalty(matrix: sp.csr_array, size: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(N,) rows of given sizes with a penalty on the diagonal."""
     return np.asarray(np.abs(matrix.diagonal()) > PENALTY * size)
@@ -78,12 +73,6 @@ def annihilated_share(
     return float((zero & own[:, None]).mean())
 
 
-def whole_share(matrix: sp.csr_array, identity: NDArray) -> float:
-    """Share of rows, among those that couple, that add up to zero over all directions together."""
-    zero = adding_up(matrix, row_sizes(matrix))
-    return float(zero[~identity].mean()) if not identity.all() else 0.0
-
-
 def proven_directions(
     matrix: sp.csr_array, direction: NDArray[np.int64], group: NDArray[np.int64], d: int
 ) -> NDArray[np.bool_]:
@@ -104,7 +93,7 @@ def proven_directions(
     """
     own = np.eye(d, dtype=bool)[direction]
     size = row_sizes(matrix)
-    least = least_sums(size)
+    least = ROUNDING * np.where(size > 0, size, np.inf)
     excused = own & with_penalty(matrix, size)[:, None]
     failing = np.zeros((int(group.max()) + 1, d))
     np.add.at(failing, group, (np.abs(matrix @ own.astype(float)) > least[:, None]) & ~excused)

@@ -9,14 +9,17 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 
-def same_pattern(matrix: sp.csr_array, identity: NDArray) -> NDArray[np.int64]:
-    """(N,) group of each row, numbered by first row: rows whose stored entries stand in the same columns."""
-    order = matrix.shape[0]
-    key = np.random.default_rng(0).integers(1, 2**62, order, dtype=np.uint64)
+def same_pattern(matrix: sp.csr_array, identity: NDArray[np.bool_] | None = None) -> NDArray[np.int64]:
+    """(N,) group of each row, numbered by first row: rows whose stored entries stand in the same columns.
+
+    Rows of the `identity`, (N,), are groups by themselves.
+    """
+    key = np.random.default_rng(0).integers(1, 2**62, matrix.shape[1], dtype=np.uint64)
     pattern = sp.csr_array((np.ones(matrix.nnz, np.uint64), matrix.indices, matrix.indptr), shape=matrix.shape)
     code = pattern @ key  # sums wrap around, which does no harm
-    code[identity] = key[identity]
-    return by_first_row(np.unique(code, return_inverse=True)[1])
+    if identity is not None:
+        code[identity] = key[identity]
+    return by_first_row(code)
 
 
 def by_first_row(label: NDArray) -> NDArray[np.int64]:
@@ -27,26 +30,28 @@ def by_first_row(label: NDArray) -> NDArray[np.int64]:
     return rank[inverse]
 
 
+def joined(first: NDArray[np.int64], second: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+    """(n,) labels of rows that pairs link, by way of others or not."""
+    link = sp.csr_array((np.ones(len(first), np.int8), (first, second)), shape=(n, n))
+    return np.asarray(sp.csgraph.connected_components(link, directed=False)[1], dtype=np.int64)
+
+
+def by_direction(label: NDArray[np.int64], direction: NDArray[np.int64], d: int) -> NDArray[np.int64]:
+    """(n, d) how many rows each label has of each direction."""
+    count = np.zeros((int(label.max(initial=-1)) + 1, d), dtype=np.int64)
+    np.add.at(count, (label, direction), 1)
+    return count
+
+
 def without_doubles(
     label: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[np.int64], d: int
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """(N,) labels as nodes, and which rows would make one with two rows of a direction: these keep their `node`."""
-    key = label * d + direction
-    torn = np.bincount(label, np.bincount(key)[key] > 1)[label] > 0
+    torn = np.asarray((by_direction(label, direction, d) > 1).any(axis=1))[label]
     return by_first_row(np.where(torn, len(label) + node, label)), torn
 
 
-def possible_nodes(group: NDArray[np.int64], d: int) -> list[NDArray[np.int64]]:
-    """Labels of rows to start a search from: rows of the same pattern as nodes, each row of larger groups by itself.
-
-    Several nodes of the same neighbours make such a group; nothing about the pattern tells their rows apart.
-    """
-    single = np.arange(len(group))
-    whole = by_first_row(np.where(np.bincount(group)[group] > d, len(group) + single, group))
-    return [whole, single] if whole.max() < len(group) - 1 else [single]
-
-
-def coupled_in_common(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> float:
+def coupled_in_common(matrix: sp.csr_array, node: NDArray[np.int64]) -> float:
     """How far the rows of one node couple to the same nodes: 1 if all do, about 1 / d if their nodes are made up."""
     n = node.max() + 1
     onto = sp.csr_array((np.ones(len(node), np.int32), (np.arange(len(node)), node)), shape=(len(node), n))
@@ -56,7 +61,7 @@ def coupled_in_common(matrix: sp.csr_array, node: NDArray, direction: NDArray) -
     return rows.nnz / float(np.diff(union.indptr) @ np.bincount(node))
 
 
-def made_up(matrix: sp.csr_array, node: NDArray, direction: NDArray, d: int) -> NDArray[np.bool_]:
+def made_up(matrix: sp.csr_array, node: NDArray[np.int64], direction: NDArray[np.int64], d: int) -> NDArray[np.bool_]:
     """(n,) nodes two rows of which couple to no other node in common: they cannot be one node's."""
     n = int(node.max()) + 1
     entry = matrix.tocoo()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .constants import annihilated_share, uncoupled_rows
 from .grouping import coupled_in_common
-from .orders import ORDERS
+from .orders import ORDERS, Reading
 from .traces import unaccounted
 
 _LIKELY = 0.6  # quality of nodes apart from the share of sums that vanish; made-up ones have half or less
@@ -46,11 +46,6 @@ class Numbering:
         nor order decides.
     unnamed : (N,) bool, optional
         Rows whose direction nothing proves.
-    group : (N,) int64, optional
-        Rows that couple to the same unknowns, among which open rows have their fellows.
-    likely : bool
-        Whether rows of one pattern were joined for being likest each other: only elements prove that they are one
-        node's.
     """
 
     block_size: int
@@ -63,8 +58,6 @@ class Numbering:
     odd: int = 0
     open_row: NDArray[np.bool_] | None = None
     unnamed: NDArray[np.bool_] | None = None
-    group: NDArray[np.int64] | None = None
-    likely: bool = False
 
     @property
     def incomplete(self) -> bool:
@@ -75,6 +68,16 @@ class Numbering:
     def has_whole_node(self) -> bool:
         """Whether some node has a row for every direction."""
         return int(np.bincount(self.node_of_row).max()) == self.block_size
+
+    @property
+    def inferred(self) -> bool:
+        """Whether it was inferred which rows belong to one node: some are missing, or couple to different unknowns."""
+        return self.kind != "given" and (self.incomplete or self.common < 1)
+
+    @property
+    def likely(self) -> bool:
+        """Whether rows of different patterns were joined where some are missing: only elements show that this is so."""
+        return self.kind != "given" and self.incomplete and self.common < 1
 
     @property
     def n_nodes(self) -> int:
@@ -112,18 +115,11 @@ class Numbering:
         return self.sound and shows and not self.odd
 
 
-def measured(
-    matrix: sp.csr_array,
-    node: NDArray[np.int64],
-    direction: NDArray[np.int64],
-    d: int,
-    kind: str = "pattern",
-    open_row: NDArray[np.bool_] | None = None,
-    unnamed: NDArray[np.bool_] | None = None,
-) -> Numbering:
+def measured(matrix: sp.csr_array, reading: Reading, d: int, kind: str) -> Numbering:
     """A numbering that was searched for, and what speaks for it."""
+    node, direction = reading.node, reading.direction
     identity = uncoupled_rows(matrix)
     share = annihilated_share(matrix, identity, direction, d, searched=True)
-    common = coupled_in_common(matrix, node, direction)
-    odd = int(unaccounted(matrix, ~identity, node, direction, d).any(axis=1).sum())
-    return Numbering(d, node, direction, identity, kind, share, common, odd, open_row, unnamed)
+    common = coupled_in_common(matrix, node)
+    odd = int(unaccounted(matrix, node, direction, d, ~identity).any(axis=1).sum())
+    return Numbering(d, node, direction, identity, kind, share, common, odd, reading.open_row, reading.unnamed)

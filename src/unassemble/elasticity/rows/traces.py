@@ -7,11 +7,14 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .constants import ROUNDING, row_sizes, with_penalty
-from .orders import Reading
 
 
 def unaccounted(
-    matrix: sp.csr_array, live: NDArray[np.bool_], node: NDArray[np.int64], direction: NDArray[np.int64], d: int
+    matrix: sp.csr_array,
+    node: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    d: int,
+    live: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.bool_]:
     """(n, d) directions that nodes lack although all rows coupled to them annihilate constants of that direction.
 
@@ -20,12 +23,13 @@ def unaccounted(
     Parameters
     ----------
     matrix : (N, N) sparse
-    live : (N,) bool
-        Rows that count; those of the identity do not.
     node, direction : (N,) int64
     d : int
+    live : (N,) bool, optional
+        Rows that count, all where not given; those of the identity do not.
     """
     order, n = len(node), int(node.max()) + 1
+    live = np.ones(order, dtype=bool) if live is None else live
     labels = np.zeros((order, d))
     labels[np.flatnonzero(live), direction[live]] = 1
     size = np.asarray(abs(matrix).sum(axis=1)).ravel()
@@ -36,16 +40,3 @@ def unaccounted(
     missed = onto @ (pattern.astype(np.int32) @ missing.astype(np.int32))
     present = (onto @ labels) > 0
     return np.asarray(~present & (missed == 0) & present.any(axis=1)[:, None])
-
-
-def shows_all(matrix: sp.csr_array, reading: Reading, d: int, live: NDArray[np.bool_] | None = None) -> bool:
-    """Whether all nodes that lack a direction without a trace are among those that the reading leaves open.
-
-    If not, equal patterns do not show every node, as where entries that vanished are not stored. Rows that are not
-    `live`, (N,), do not count.
-    """
-    rows = np.ones(len(reading.node), dtype=bool) if live is None else live
-    lost: NDArray[np.bool_] = np.asarray(unaccounted(matrix, rows, reading.node, reading.direction, d).any(axis=1))
-    if reading.open_row is not None:
-        lost[reading.node[reading.open_row]] = False
-    return not lost.any()

@@ -17,49 +17,29 @@ T^{cc} is a multiple of the identity plus one of rank one, whose direction is w_
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import product
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from ..elements.candidates import Block, candidates, coupled
-from ..elements.entries import Entries, Pairs, added, contributions
-from ..elements.model import FITS, Model
-from ..elements.reference import Rule, rules
-from ..elements.surface import contested
+from ...elements.candidates import Block, candidates
+from ...elements.reference import rules
+from ...elements.surface import contested
+from ...tolerances import CERTIFIED
+from ..materials.cells import coupled
+from ..materials.entries import Entries, Model, Pairs
 from ..nodal import NodalMatrix, determined
 
 _ROWS = 2000  # nodes whose rows are fitted; re-assembly looks at all of them
 _INDEPENDENT = 1e-6  # least singular value of the tables, relative to the largest, with which they tell T
 
 
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """The map from a picture to the body, up to its size and a point reflection, and the material.
+def frame(nodal: NodalMatrix, picture: NDArray[np.float64]) -> tuple[NDArray[np.float64], float] | None:
+    """The map M in x = M y for which one isotropic material explains the entries, and its lambda / mu.
 
-    Attributes
-    ----------
-    map : (d, d) float64
-        M in x = M y.
-    ratio : float
-        lambda / mu.
-    models : tuple of Model
-        The elements, at the points of the picture.
-    entries : Entries
-        Those that they explain.
-    """
-
-    map: NDArray[np.float64]
-    ratio: float
-    models: tuple[Model, ...]
-    entries: Entries
-
-
-def frame(nodal: NodalMatrix, picture: NDArray[np.float64]) -> Frame | None:
-    """Find the map for which one isotropic material explains the entries; None where no element does.
+    M is found up to the size of the body and a point reflection; None where no element explains the entries.
 
     Parameters
     ----------
@@ -68,37 +48,36 @@ def frame(nodal: NodalMatrix, picture: NDArray[np.float64]) -> Frame | None:
         Of one piece, about as large in all directions; NaN elsewhere.
     """
     graph, entries = coupled(nodal, picture), Entries.of(nodal, determined(picture))
-    for blocks in candidates(graph, picture, entries.complete) if len(entries.key) else ():
-        told = entries.explained_by([Pairs.of(one.cells, entries) for one in blocks], graph, FITS)
-        if told is None or not len(told.key):
+    for blocks in candidates(graph, picture) if len(entries.key) else ():
+        told = entries.explained_by([Pairs.of(one.cells, entries) for one in blocks], graph)
+        if told is None or not len(told.key) or len(blocks) > 1:
             continue
-        for chosen, tables, values in _tables(blocks, picture, told):
+        for tables, values in _tables(blocks[0], picture, told):
             tensors = _tensors(tables, values)
             found = None if tensors is None else _isotropic(tensors)
             if found is not None:
-                models = (Model(picture, one.cells, one.kind, rule) for one, rule in zip(blocks, chosen, strict=True))
-                return Frame(*found, tuple(models), told)
+                return found
     return None
 
 
 def _tables(
-    blocks: Sequence[Block], picture: NDArray[np.float64], entries: Entries
-) -> Iterator[tuple[tuple[Rule, ...], NDArray[np.float64], NDArray[np.float64]]]:
+    block: Block, picture: NDArray[np.float64], entries: Entries
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Tables G and entries of pairs of nodes, (e, d, d) each and relative to their row, for one rule after the other.
 
     Of the rows of some nodes; without the pairs of cells of which not all can be there.
     """
     some = entries.at(_sampled(entries))
-    blocks = [replace(one, cells=one.cells[Pairs.of(one.cells, some).seen]) for one in blocks]
+    block = replace(block, cells=block.cells[Pairs.of(block.cells, some).seen])
+    pairs = Pairs.of(block.cells, some)
+    doubtful = contested(block.kind.base, block.cells[:, : block.kind.corners])
     sure = np.ones(len(some.key), dtype=bool)
-    for one in blocks:
-        pairs = Pairs.of(one.cells, some)
-        doubtful = contested(one.kind.base, one.cells[:, : one.kind.corners])
-        sure[pairs.place[doubtful][pairs.there[doubtful]]] = False
+    sure[pairs.place[doubtful][pairs.there[doubtful]]] = False
     weight = 1 / some.size[sure, None, None]
-    for chosen in product(*(rules(one.kind) for one in blocks)):
-        parts = [_assembled(one, picture, rule, some) for one, rule in zip(blocks, chosen, strict=True)]
-        yield chosen, np.sum(parts, axis=0)[sure] * weight, some.value[sure] * weight
+    first = np.ones((len(block.cells), 1)) * [1.0, 0.0]  # lambda = 1, mu = 0
+    for rule in rules(block.kind):
+        tables = Model(picture, block.cells, block.kind, rule).assembled(pairs, some, first)
+        yield tables[sure] * weight, some.value[sure] * weight
 
 
 def _sampled(entries: Entries) -> NDArray[np.int64]:
@@ -111,15 +90,6 @@ def _sampled(entries: Entries) -> NDArray[np.int64]:
     return np.flatnonzero(chosen[i] | chosen[j])
 
 
-def _assembled(block: Block, points: NDArray, rule: Rule, entries: Entries) -> NDArray[np.float64]:
-    d, pairs = block.kind.dim, Pairs.of(block.cells, entries)
-    total = np.zeros(len(entries.key) * d * d)
-    for batch, (first, _) in contributions(points, block.cells, block.kind, rule, pairs.flip):
-        there = pairs.there[batch]
-        added(total, pairs.place[batch][there], first[there])
-    return total.reshape(-1, d, d)
-
-
 def _tensors(tables: NDArray, values: NDArray) -> NDArray[np.float64] | None:
     """(d, d, d, d) symmetric T^{cb} by c, b, a, e; None where none fit, or the tables do not tell them."""
     d = tables.shape[1]
@@ -127,7 +97,7 @@ def _tensors(tables: NDArray, values: NDArray) -> NDArray[np.float64] | None:
     if len(design) < d * d:
         return None
     solution, _, rank, size = scipy.linalg.lstsq(design, right, cond=_INDEPENDENT)
-    if rank < d * (d + 1) // 2 or size[0] == 0 or np.abs(design @ solution - right).max() > FITS:
+    if rank < d * (d + 1) // 2 or size[0] == 0 or np.abs(design @ solution - right).max() > CERTIFIED:
         return None
     t = solution.T.reshape(d, d, d, d)
     return np.asarray((t + t.swapaxes(2, 3)) / 2)
@@ -155,6 +125,6 @@ def _isotropic(tensors: NDArray[np.float64]) -> tuple[NDArray[np.float64], float
     u = scipy.linalg.polar(u)[0]
     model = kappa / 2 * (np.einsum("ca,be->cbae", u, u) + np.einsum("ba,ce->cbae", u, u))
     model += mu * np.einsum("cb,ae->cbae", np.eye(d), np.eye(d))
-    if not (mu > 0 and np.abs(r - model).max() <= FITS * kappa):
+    if not (mu > 0 and np.abs(r - model).max() <= CERTIFIED * kappa):
         return None
     return u @ inverse, float(kappa / mu - 1)

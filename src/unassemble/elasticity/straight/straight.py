@@ -2,30 +2,31 @@
 
 Where a homogeneous body is held all around, no boundary term is left that would fix the axes: the identities have more
 solutions than translations and scale. With the boundary terms known to vanish, inside, they are scalar equations, the
-same for each coordinate, among whose solutions are the affine functions. These make up an affine picture of the piece
-(:mod:`.pictures`), of which :mod:`.frame` finds the axes.
+same for each coordinate, whose solutions are the affine functions. Any d of these are an affine picture of the piece,
+of which :mod:`.frame` finds the axes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
+from ...linalg import svd
 from ..nodal import NodalMatrix, determined
 from ..nullspace.atlas import null_fields
 from ..nullspace.identities import no_terms
 from ..nullspace.placing import pieces_of
-from ..nullspace.shape import EXACT, in_gauge
+from ..nullspace.shape import EXACT, in_gauge, set_aside
 from ..nullspace.solution import Solution
 from ..results import Evidence
 from .frame import frame
-from .pictures import picture
-from .rigid import interchangeable, rigid
 
-Rows = tuple[NodalMatrix, NDArray[np.bool_]]  # which of them are valid, (n, d, d) or (n, d, d, d)
+_NONE = 1e-6  # singular value of functions that are none, beside others of norm one
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +48,9 @@ class Straight:
 
 
 def straightened(
-    nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.bool_], completed: Rows | None, patch: int | None
+    nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.bool_], patch: int | None
 ) -> Solution | None:
     """The solution with as many of its bent pieces straight as elements explain; unchanged where there are none.
-
-    All identities place more nodes than those of rows inside alone, which have fewer solutions. So these are for
-    pieces of which the first show no picture.
 
     Parameters
     ----------
@@ -61,23 +59,11 @@ def straightened(
         None where the identities determine nothing.
     valid : (n, d, d) bool
         By the strict rule.
-    completed : (NodalMatrix, (n, d, d, d) bool), optional
-        What rows next to rollers say too; see :mod:`.planes`.
     patch : int, optional
         Most nodes per chart.
     """
-    bent = _bent(nodal, found)
-    inside = valid & (valid.all(axis=(1, 2)) & bent)[:, None, None]
-    if not inside.any():
-        return found
-    straight: list[Straight] = []
-    if found is not None:
-        rows, used = completed if completed is not None and found.planes else (nodal, found.valid)
-        used = used & bent.reshape(-1, *(1,) * (used.ndim - 1))
-        straight += _straight(nodal, inside, (rows, used), None, patch)
-        for one in straight:
-            inside = inside & (found.component != one.piece_in(found))[:, None, None]
-    straight += _straight(nodal, inside, (nodal, inside), no_terms(nodal.dim), patch)
+    inside = valid & (valid.all(axis=(1, 2)) & _bent(nodal, found))[:, None, None]
+    straight = list(_straight(nodal, inside, patch)) if inside.any() else []
     return in_place(found, valid, straight) if straight else found
 
 
@@ -88,33 +74,58 @@ def _bent(nodal: NodalMatrix, found: Solution | None) -> NDArray[np.bool_]:
     return np.isin(found.component, [piece for piece, freedom in enumerate(found.freedoms) if freedom])
 
 
-def _straight(
-    nodal: NodalMatrix,
-    inside: NDArray[np.bool_],
-    rows: Rows,
-    terms: NDArray[np.float64] | None,
-    patch: int | None,
-) -> Iterator[Straight]:
-    """Pieces that these rows hold together, and of which elements tell the axes."""
-    component, n_pieces = pieces_of(*rows)
+def _straight(nodal: NodalMatrix, inside: NDArray[np.bool_], patch: int | None) -> Iterator[Straight]:
+    """Pieces that rows inside, (n, d, d) bool, hold together, and of which elements tell the axes."""
+    component, n_pieces = pieces_of(nodal, inside)
     graph = nodal.graph
     for piece in range(n_pieces):
-        null = null_fields(*rows, np.flatnonzero(component == piece), patch=patch, terms=terms)
+        body = np.flatnonzero(component == piece)
+        null = null_fields(nodal, inside, body, patch=patch, terms=no_terms(nodal.dim))
         exact = null.values <= EXACT
         if not len(exact) or exact[-1] or exact.sum() <= nodal.dim:
             continue
-        shown = picture(nodal, inside, null.nodes, null.fields[..., exact])
-        one = None if shown is None else frame(nodal, shown.points)
-        if shown is None or one is None:
+        shown = _picture(null.fields[..., exact])
+        if shown is None:
             continue
-        body = determined(shown.points)
-        points = np.full_like(shown.points, np.nan)
-        points[body] = in_gauge(shown.points[body] @ one.map.T, graph[body][:, body])
-        models = tuple(replace(model, points=points) for model in one.models)
-        told = not shown.told_by_cells or not interchangeable(nodal, inside, body)
-        if told and (not shown.told_by_cells or rigid(models, one.entries, one.ratio, shown.functions)):
-            residual, gap = map(float, null.values[[nodal.dim, exact.sum()]])
-            yield Straight(points, one.ratio, Evidence(shown.fields, residual, gap, null.rows))
+        points = np.full((nodal.n, nodal.dim), np.nan)
+        points[null.nodes[shown.held]] = shown.points
+        told = frame(nodal, points)
+        if told is None:
+            continue
+        matrix, ratio = told
+        here = determined(points)
+        points[here] = in_gauge(points[here] @ matrix.T, graph[here][:, here])
+        residual, gap = map(float, null.values[[nodal.dim, exact.sum()]])
+        yield Straight(points, ratio, Evidence(shown.fields, residual, gap, null.rows))
+
+
+class _Picture(NamedTuple):
+    """Which nodes are held, (N,), an affine picture of these, (N', d), and how many of the fields they share."""
+
+    held: NDArray[np.bool_]
+    points: NDArray[np.float64]
+    fields: int
+
+
+def _picture(null: NDArray[np.float64]) -> _Picture | None:
+    """An affine picture among fields (N, d, k) without boundary terms; None where there is more than that."""
+    d, functions = null.shape[1], _functions(null)
+    held = np.ones(len(null), dtype=bool)
+    if functions.shape[1] > d:  # those of nodes that can move by themselves are among them
+        constant = np.full(len(null), len(null) ** -0.5)
+        held = ~set_aside(np.column_stack([constant, functions])[:, None], d + 1)[1]
+        functions = _functions(null[held])
+    if functions.shape[1] != d:
+        return None
+    fields = int((scipy.linalg.svdvals(null[held].reshape(-1, null.shape[2])) > _NONE).sum())
+    return _Picture(held, functions, fields)
+
+
+def _functions(null: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, m) orthonormal basis of all components of the fields, constants aside."""
+    flat = (null - null.mean(axis=0)).reshape(len(null), -1)
+    u, s, _ = svd(flat, full_matrices=False)
+    return np.asarray(u[:, s > _NONE * max(s.max(initial=0), _NONE)])
 
 
 def in_place(found: Solution | None, valid: NDArray[np.bool_], straight: list[Straight]) -> Solution:

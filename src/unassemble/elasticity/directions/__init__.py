@@ -1,1 +1,0 @@
-"""Which direction each row belongs to, from sums and from solving for translations."""

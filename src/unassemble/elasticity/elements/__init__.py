@@ -1,1 +1,0 @@
-"""Elements and their material: which there are, and whether they add up to the matrix."""

@@ -1,0 +1,1 @@
+"""The material of elements: which candidates for cells, with which Lame coefficients, add up to the matrix."""

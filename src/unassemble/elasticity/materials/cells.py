@@ -1,0 +1,181 @@
+"""Elements, recognised by re-assembly.
+
+Candidates for cells are cliques of the graph. With the positions known, the matrix is linear in the Lame coefficients
+of each; the residual of the fit is the certificate. Material may differ from cell to cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ...elements.candidates import Block, candidates
+from ...elements.cliques import Graph
+from ...elements.surface import tiles
+from ...tolerances import CERTIFIED
+from ..nodal import NodalMatrix, determined, surrounded, valid_pairs
+from .entries import Entries, Pairs
+from .fits import Fit, fits
+
+_EMPTY = 1e-7  # of the largest coefficient; candidates below carry no material
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Elements of a mesh.
+
+    Attributes
+    ----------
+    blocks : mapping of str to (m, k) int64
+        By kind, meshio's names: nodes in meshio's order, positively oriented. Empty where no element was recognised.
+    lame : (n_cells, 2) float64
+        lambda and mu of each cell, up to one common factor (the unknown size of the body), in the order of the blocks;
+        empty where they are not known.
+    backward_error : float
+        Largest difference between an entry and the re-assembled one, relative to the largest off-diagonal entry of
+        its row; NaN where the cells were read off the graph only.
+    shown : (n, d) bool, optional
+        Unknowns of nodes whose row has an entry that re-assembles and is not zero.
+    """
+
+    blocks: Mapping[str, NDArray[np.int64]]
+    lame: NDArray[np.float64]
+    backward_error: float
+    shown: NDArray[np.bool_] | None = None
+
+    @property
+    def kind(self) -> str:
+        """The kind of all cells; several are joined by a plus sign."""
+        return "+".join(self.blocks)
+
+    @property
+    def cells(self) -> NDArray[np.int64]:
+        """(m, k) the cells, where they are of one kind."""
+        (cells,) = self.blocks.values()
+        return cells
+
+    @property
+    def first_nodes(self) -> NDArray[np.int64]:
+        """(n_cells,) a node of each cell, in the order of `lame`."""
+        return np.concatenate([cells[:, 0] for cells in self.blocks.values()])
+
+    @property
+    def recognised(self) -> bool:
+        """Whether there are cells."""
+        return bool(self.blocks)
+
+    @property
+    def certified(self) -> bool:
+        """Whether the cells re-assemble to the given matrix."""
+        return self.recognised and bool(np.isfinite(self.backward_error))
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return sum(map(len, self.blocks.values()))
+
+    def among(self, nodes: NDArray[np.bool_]) -> Cells:
+        """The cells all of whose nodes are among some, (n,) bool."""
+        kept = [nodes[cells].all(axis=1) for cells in self.blocks.values()]
+        if all(some.all() for some in kept):
+            return self
+        parts = zip(self.blocks.items(), kept, strict=True)
+        blocks = {kind: cells[some] for (kind, cells), some in parts if some.any()}
+        lame = self.lame[np.concatenate(kept)] if len(self.lame) else self.lame
+        return replace(self, blocks=blocks, lame=lame)
+
+
+def no_cells() -> Cells:
+    """Nothing recognised."""
+    return Cells({}, np.empty((0, 2)), float("nan"))
+
+
+def coupled(nodal: NodalMatrix, points: NDArray[np.float64]) -> Graph:
+    """Pairs of determined nodes with an entry that is not zero, or that lack some, which may not have been zero."""
+    known, lacking = determined(points), np.asarray((nodal.row_of < 0).any(axis=1))
+    i, j = nodal.node, nodal.indices
+    live = np.abs(nodal.data).max(axis=(1, 2)) > 1e-13 * np.minimum(nodal.size[i], nodal.size[j])  # symmetric
+    live |= lacking[i] | lacking[j]
+    live &= known[i] & known[j]
+    return Graph(sp.csr_array((np.ones(live.sum()), (i[live], j[live])), shape=(nodal.n,) * 2))
+
+
+def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: float | None = None) -> Cells:
+    """Find cells that re-assemble to the matrix: of one kind, or triangles beside quadrilaterals.
+
+    With lambda / mu known to be one number, `ratio`, linear simplices of one material are tried first, which is quick.
+    Where no material fits, boxes and quadratic cells that lie side by side and of which each entry belongs to one at
+    least are returned all the same, without certificate.
+
+    Entries between two nodes that both miss a neighbour are left out, since cells that lost a node to a support
+    contribute to them. Cells all of whose entries are left out cannot be seen and are not reported. First neighbours
+    that lack some of their directions only, as on rollers, and those of nodes with a penalty count as being there,
+    which fewer rows can tell.
+    """
+    graph, known = coupled(nodal, points), determined(points)
+    likely = Entries.of(nodal, known, surrounded(nodal, valid_pairs(nodal, inferred=True)))
+    found = no_cells()
+    # The power of two next to the largest entry: squares of what is measured in it neither overflow nor vanish.
+    unit = float(2.0 ** np.frexp(nodal.size.max(initial=0.0))[1])
+    for entries in [likely, Entries.of(nodal, known)] if (likely.complete != likely.sure).any() else [likely]:
+        other = _recognised(points, graph, entries.over(unit), ratio)
+        if other.certified:
+            return replace(other, lame=other.lame * unit)
+        found = found if found.recognised else other
+    return found
+
+
+def _recognised(points: NDArray[np.float64], graph: Graph, entries: Entries, ratio: float | None) -> Cells:
+    """Cells that explain most entries.
+
+    Cells that hide next to supports are excused, and those of another kind must not pass for such.
+    """
+    best, most = no_cells(), 0
+    for blocks in candidates(graph, points) if len(entries.key) else ():
+        told = entries.explained_by([Pairs.of(one.cells, entries) for one in blocks], graph)
+        if told is None or len(told.key) <= most:
+            continue
+        seen = [replace(one, cells=one.cells[Pairs.of(one.cells, told).seen]) for one in blocks]
+        if not all(len(one.cells) for one in seen):
+            continue
+        found = next((cells for fit in fits(points, seen, told, ratio) if (cells := _accepted(fit))), None)
+        if found is not None:
+            best, most = replace(found, shown=told.shown()), len(told.key)
+        elif not best.recognised:
+            best = _by_graph(seen)
+        if most == len(entries.key):
+            break
+    return best
+
+
+def _by_graph(blocks: Sequence[Block]) -> Cells:
+    """Cells without certificate, if they lie side by side; cliques of linear simplices are no evidence."""
+    if any(one.kind.linear_simplex for one in blocks) or not tiles(_linear(blocks)):
+        return no_cells()
+    return Cells({one.kind.name: one.cells for one in blocks}, np.empty((0, 2)), float("nan"))
+
+
+def _linear(blocks: Sequence[Block]) -> dict[str, NDArray[np.int64]]:
+    """The linear cells on the same corners."""
+    return {one.kind.base: one.cells[:, : one.kind.corners] for one in blocks}
+
+
+def _accepted(fit: Fit) -> Cells | None:
+    """Cells that carry material, if they fit, have shear moduli of one sign and do not overlap; made-up ones do.
+
+    A quadratic triangle, for one, is a combination of small linear ones and a large one with a negative modulus.
+    """
+    lame = fit.lame
+    if not fit.misfit <= CERTIFIED or not lame.any():
+        return None
+    carries = np.abs(lame).max(axis=1) > _EMPTY * np.abs(lame).max()
+    parts = np.split(carries, np.cumsum([len(one.cells) for one in fit.blocks])[:-1])
+    blocks = [replace(one, cells=one.cells[part]) for one, part in zip(fit.blocks, parts, strict=True) if part.any()]
+    mu = lame[carries, 1]
+    if not ((mu > 0).all() or (mu < 0).all()) or not tiles(_linear(blocks)):
+        return None
+    return Cells({one.kind.name: one.cells for one in blocks}, lame[carries], fit.misfit)

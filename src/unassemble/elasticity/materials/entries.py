@@ -1,0 +1,231 @@
+"""Entries between nodes, and what cells add to them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ...elements.cliques import Graph
+from ...elements.kinds import Kind
+from ...elements.matrices import elasticity
+from ...elements.reference import Rule
+from ...tolerances import CERTIFIED
+from ..nodal import NodalMatrix, valid_pairs
+
+_AT_ONCE = 8_000_000  # numbers in the blocks and gradients of one batch of cells
+
+
+@dataclass(frozen=True, eq=False)
+class Entries:
+    """Blocks above the diagonal that complete cells alone explain.
+
+    Entries between two nodes that both miss a neighbour are left out, since cells that lost a node to a support
+    contribute to them. A neighbour that lacks some directions only is none that they miss.
+
+    Attributes
+    ----------
+    n : int
+        Nodes.
+    key : (e,) int64
+        Pairs i < j as i n + j, increasing.
+    value : (e, d, d) float64
+        Zero where not told.
+    told : (e, d, d) bool
+        Places of unknowns that the matrix has.
+    size : (e,) float64
+        Largest entry of the two nodes' rows, the smaller of the two.
+    complete : (n,) bool
+        Nodes that lost no neighbour, and of which none is unknown.
+    sure : (n,) bool
+        Those of which every row shows it.
+    """
+
+    n: int
+    key: NDArray[np.int64]
+    value: NDArray[np.float64]
+    told: NDArray[np.bool_]
+    size: NDArray[np.float64]
+    complete: NDArray[np.bool_]
+    sure: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, nodal: NodalMatrix, known: NDArray[np.bool_], likely: NDArray[np.bool_] | None = None) -> Entries:
+        """Those of a matrix between nodes whose places are known; cells that have others are as good as lost.
+
+        Parameters
+        ----------
+        nodal : NodalMatrix
+        known : (n,) bool
+        likely : (n,) bool, optional
+            Nodes that count as complete though not every row shows it.
+        """
+        alone = np.bincount(nodal.node, ~known[nodal.indices], minlength=nodal.n) == 0
+        sure = np.asarray(valid_pairs(nodal).all(axis=(1, 2)) & alone)
+        complete = sure if likely is None else sure | likely & alone
+        i, j = nodal.node.astype(np.int64), nodal.indices.astype(np.int64)
+        off = np.abs(nodal.data).max(axis=(1, 2))
+        off[i == j] = 0
+        largest = np.maximum.reduceat(off, nodal.indptr[:-1])
+        use = (i < j) & (complete[i] | complete[j]) & known[i] & known[j]
+        i, j = i[use], j[use]
+        present = nodal.row_of >= 0
+        told = present[i][:, :, None] & present[j][:, None, :]
+        size = np.minimum(largest[i], largest[j])
+        return cls(nodal.n, i * nodal.n + j, nodal.data[use], told, np.where(size > 0, size, 1.0), complete, sure)
+
+    @property
+    def largest(self) -> float:
+        """Largest of the values relative to their row."""
+        return float(np.abs(self.value / self.size[:, None, None]).max(initial=0))
+
+    def at(self, place: NDArray[np.int64]) -> Entries:
+        """Some of them."""
+        return replace(self, key=self.key[place], value=self.value[place], told=self.told[place], size=self.size[place])
+
+    def over(self, unit: float) -> Entries:
+        """The same in another unit."""
+        return replace(self, value=self.value / unit, size=self.size / unit)
+
+    def shown(self) -> NDArray[np.bool_]:
+        """(n, d) unknowns whose rows have one of these entries that is not zero."""
+        seen = np.zeros((self.n, self.value.shape[1]), dtype=bool)
+        i, j = np.divmod(self.key, self.n)
+        entry = np.abs(self.value) > CERTIFIED * self.size[:, None, None]
+        np.logical_or.at(seen, i, entry.any(axis=2))
+        np.logical_or.at(seen, j, entry.any(axis=1))
+        return seen
+
+    def explained_by(self, pairs: Sequence[Pairs], graph: Graph) -> Entries | None:
+        """Entries that cells of all kinds explain; None if some belong to no cell, and not since a cell lost a node.
+
+        A node may have lost a neighbour without a trace, where their entry was zero: the middle of a straight side of a
+        quadratic triangle, and the corner facing it; or two nodes on rollers. Its entries with others of that cell
+        tell, and what both ends of such an entry couple to are the nodes of the cell.
+        """
+        outside = np.abs(self.value).max(axis=(1, 2)) > CERTIFIED * self.size
+        for own in pairs:
+            outside[own.place[own.there]] = False
+        i, j = np.divmod(self.key, self.n)
+        if (outside & self.sure[i] & self.sure[j]).any():
+            return None
+        complete = self.complete.copy()
+        complete[i[outside]] = complete[j[outside]] = False
+        closed = graph.closed()
+        complete[closed[i[outside]].multiply(closed[j[outside]]).nonzero()[1]] = False
+        return replace(self.at(np.flatnonzero(complete[i] | complete[j])), complete=complete)
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """The pairs of nodes of cells among the entries, (m, k (k - 1) / 2) each.
+
+    Attributes
+    ----------
+    place : int64
+        Of the entry; any where there is none.
+    there : bool
+        Whether there is one.
+    flip : bool
+        Whether the entry is that of the pair the other way round.
+    """
+
+    place: NDArray[np.int64]
+    there: NDArray[np.bool_]
+    flip: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, cells: NDArray[np.int64], entries: Entries) -> Pairs:
+        """Those of cells (m, k)."""
+        a, b = np.triu_indices(cells.shape[1], 1)
+        i, j = cells[:, a], cells[:, b]
+        key = np.minimum(i, j) * entries.n + np.maximum(i, j)
+        place = np.minimum(np.searchsorted(entries.key, key), len(entries.key) - 1)
+        return cls(place, entries.key[place] == key, i > j)
+
+    def at(self, cells: NDArray[np.int64] | slice) -> Pairs:
+        """Those of some of the cells."""
+        return Pairs(self.place[cells], self.there[cells], self.flip[cells])
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """(m,) cells that contribute to one of the entries at least."""
+        return np.asarray(self.there.any(axis=1))
+
+
+def claims(pairs: Sequence[Pairs], entries: Entries) -> NDArray[np.int64]:
+    """(e,) how many cells contribute to each entry."""
+    place = np.concatenate([one.place[one.there] for one in pairs])
+    return np.bincount(place, minlength=len(entries.key))
+
+
+def added(total: NDArray[np.float64], place: NDArray[np.int64], blocks: NDArray[np.float64]) -> None:
+    """Add blocks (p, d, d) at places of the flat blocks `total`, in place."""
+    dd = blocks.shape[1] * blocks.shape[2]
+    where = place[:, None] * dd + np.arange(dd)
+    total += np.bincount(where.ravel(), blocks.ravel(), len(total))
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """How the matrix depends on the material: cells (m, k) of a kind on points (n, d), integrated by a rule."""
+
+    points: NDArray[np.float64]
+    cells: NDArray[np.int64]
+    kind: Kind
+    rule: Rule
+
+    @property
+    def coefficients(self) -> int:
+        """Nonzero numbers of the matrix that takes all coefficients to the entries."""
+        return len(self.cells) * self.kind.nodes * (self.kind.nodes - 1) * self.kind.dim**2
+
+    def contributions(
+        self, pairs: Pairs, entries: Entries, some: NDArray | slice = slice(None)
+    ) -> Iterator[tuple[slice, NDArray[np.float64]]]:
+        """What unit Lame coefficients of some cells add to the entries of their pairs; zero where unknowns lack.
+
+        Yields
+        ------
+        batch : slice
+            Of these cells.
+        unit : (2, b, pairs, d, d) float64
+            For (lambda, mu) = (1, 0) and (0, 1).
+        """
+        own, cells = pairs.at(some), self.cells[some]
+        k, d, partial = self.kind.nodes, self.kind.dim, not entries.told.all()
+        a, b = np.triu_indices(k, 1)
+        step = max(_AT_ONCE // (k * d * (3 * k * d + 2 * len(self.rule[1]))), 1)
+        for start in range(0, len(cells), step):
+            batch = slice(start, start + step)
+            unit = np.stack([one[:, a, b] for one in elasticity(self.points, cells[batch], self.kind, self.rule)])
+            turned = own.flip[batch]
+            unit[:, turned] = unit[:, turned].swapaxes(-1, -2)
+            yield batch, unit * entries.told[own.place[batch]] if partial else unit
+
+    def assembled(self, pairs: Pairs, entries: Entries, lame: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(e, d, d) entries of cells with coefficients (m, 2)."""
+        total = np.zeros(entries.value.size)
+        for batch, unit in self.contributions(pairs, entries):
+            there = pairs.there[batch]
+            part = np.einsum("ms,smpcb->mpcb", lame[batch], unit)
+            added(total, pairs.place[batch][there], part[there])
+        return total.reshape(entries.value.shape)
+
+    def operator(self, pairs: Pairs, entries: Entries, ratio: float | None = None) -> sp.csr_array:
+        """(e d d, 2 m) what coefficients add to the entries, relative to their size; (e d d, m) with lambda / mu."""
+        dd, unknowns = self.kind.dim**2, 2 if ratio is None else 1
+        rows, columns, values = [np.empty(0, np.int64)], [np.empty(0, np.int64)], [np.empty(0)]
+        for batch, unit in self.contributions(pairs, entries):
+            there = pairs.there[batch]
+            place = pairs.place[batch][there]
+            cell = np.arange(len(self.cells))[batch][np.nonzero(there)[0]]
+            for number, part in enumerate(unit if ratio is None else [ratio * unit[0] + unit[1]]):
+                rows.append((place[:, None] * dd + np.arange(dd)).ravel())
+                columns.append(np.repeat(unknowns * cell + number, dd))
+                values.append((part[there] / entries.size[place][:, None, None]).ravel())
+        shape = (entries.value.size, unknowns * len(self.cells))
+        return sp.csr_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)

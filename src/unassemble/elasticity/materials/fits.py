@@ -1,0 +1,232 @@
+"""Lame coefficients of candidates for cells whose nodes are known: the matrix is linear in them.
+
+Boxes and quadratic cells have entries of their own, between nodes on opposite sides, which tell their coefficients.
+What is left once these cells are taken away belongs to linear simplices: of one material, or by sparse least squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ...elements.candidates import Block
+from ...elements.reference import Rule, rules
+from ...errors import SolverError
+from ...linalg import threads
+from ...linalg.factorisation import factorisation
+from ...linalg.upper import UpperTriangle
+from ...tolerances import CERTIFIED
+from .entries import Entries, Model, Pairs, added, claims
+
+_ROUNDS = 6  # cells next to supports may wait for their neighbours
+_INDEPENDENT = 1e-10  # least eigenvalue of the scaled normal equations of a cell whose coefficients show
+_SAMPLE = 60  # cells on which quadrature rules are tried
+_FEW = 0.3  # of the candidates: how many may be no cells
+_LARGEST = 50_000_000  # numbers in a least-squares problem
+_DIRECT = 20_000  # coefficients: a factorisation costs half of the iterations here, and fills memory beyond
+_SHIFT = 1e-11  # of normal equations: rounding of their entries is 1e-16
+_STEPS = 20
+_STILL = 1e-15  # relative change of coefficients at which steps end
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Lame coefficients and how well they fit.
+
+    Attributes
+    ----------
+    blocks : tuple of Block
+    lame : (m, 2) float64
+        lambda and mu of the cells of all blocks, one after the other; zero for candidates that carry no material.
+    misfit : float
+        Largest difference between an entry and the re-assembled one, relative to its row.
+    """
+
+    blocks: tuple[Block, ...]
+    lame: NDArray[np.float64]
+    misfit: float
+
+
+def fits(points: NDArray[np.float64], blocks: Sequence[Block], entries: Entries, ratio: float | None) -> Iterator[Fit]:
+    """Lame coefficients of the candidates, in the ways that suit their kinds, the simplest first.
+
+    Parameters
+    ----------
+    points : (n, d) float64
+    blocks : sequence of Block
+        Linear simplices, cells with entries of their own, or the one beside the other.
+    entries : Entries
+        Those that these cells explain.
+    ratio : float, optional
+        lambda / mu, where it is one number.
+    """
+    simple = [Model(points, one.cells, one.kind, next(rules(one.kind))) for one in blocks if one.kind.linear_simplex]
+    beside = [Pairs.of(one.cells, entries) for one in simple]
+    rich = [one for one in blocks if not one.kind.linear_simplex]
+    lame = [np.empty((0, 2))]
+    for one in rich:
+        rule = _likely_rule(points, one, entries, beside)
+        if rule is None:
+            return
+        found, entries = cell_by_cell(Model(points, one.cells, one.kind, rule), entries, beside)
+        if np.isnan(found).any():
+            return
+        lame.append(found)
+    if not simple:
+        yield Fit(tuple(rich), np.vstack(lame), entries.largest)
+    for model in simple:
+        if ratio is not None:
+            mu, rest = one_material(model, entries, ratio)
+            yield Fit(tuple(blocks), np.vstack([mu[:, None] * [ratio, 1], *lame]), rest.largest)
+        if model.coefficients <= _LARGEST:
+            coefficients, rest = _least_squares(model, entries)
+            yield Fit(tuple(blocks), np.vstack([coefficients, *lame]), rest.largest)
+
+
+def _likely_rule(points: NDArray, block: Block, entries: Entries, beside: Sequence[Pairs]) -> Rule | None:
+    """The quadrature rule that fits a few cells best by the entries that are theirs alone, None if none does."""
+    pairs = Pairs.of(block.cells, entries)
+    alone = claims((pairs, *beside), entries) == 1
+    own = pairs.there & alone[pairs.place]
+    rich = np.flatnonzero(own.sum(axis=1) >= np.median(own.sum(axis=1)))
+    some = rich[:: max(len(rich) // _SAMPLE, 1)]
+    few = entries.at(np.unique(pairs.place[some][own[some]]))
+    best, chosen = CERTIFIED, None
+    for rule in rules(block.kind) if len(few.key) else ():
+        found, rest = cell_by_cell(Model(points, block.cells[some], block.kind, rule), few)
+        if np.isfinite(found).all() and rest.largest < 0.1 * best:  # where geometry is affine they all fit
+            best, chosen = rest.largest, rule
+    return chosen
+
+
+def cell_by_cell(model: Model, entries: Entries, beside: Sequence[Pairs] = ()) -> tuple[NDArray[np.float64], Entries]:
+    """(m, 2) coefficients of cells from the entries that no other contributes to, and what they leave of all entries.
+
+    Two nodes on opposite sides of a cell share that cell only, so that their entries tell its coefficients. A cell next
+    to a support may lack such entries until its neighbours' contributions are taken away. Cells that stay open have
+    NaN, and those `beside` claim entries too.
+    """
+    pairs = Pairs.of(model.cells, entries)
+    rest = entries.value.reshape(-1).copy()
+    lame = np.zeros((len(model.cells), 2))
+    todo = np.flatnonzero(pairs.seen)
+    lame[todo] = np.nan
+    count = claims((pairs, *beside), entries)
+    for _ in range(_ROUNDS):
+        alone, before = count == 1, len(todo)
+        for batch, unit in model.contributions(pairs, entries, todo):
+            some = todo[batch]
+            place, there = pairs.place[some], pairs.there[some]
+            target = rest.reshape(entries.value.shape)[place]
+            found = _of_own_entries(unit, target, there & alone[place], entries.size[place])
+            told = np.isfinite(found[:, 0])
+            lame[some[told]] = found[told]
+            place, there = place[told], there[told]
+            sums = np.einsum("sm,smpcb->mpcb", found[told].T, unit[:, told])
+            added(rest, place[there], -sums[there])
+            count -= np.bincount(place[there], minlength=len(count))
+        todo = todo[np.isnan(lame[todo, 0])]
+        if not 0 < len(todo) < before:
+            break
+    return lame, replace(entries, value=rest.reshape(entries.value.shape))
+
+
+def _of_own_entries(unit: NDArray, target: NDArray, own: NDArray[np.bool_], size: NDArray) -> NDArray[np.float64]:
+    """(m, 2) coefficients of each cell for which its own pairs fit best; NaN where they tell too little."""
+    s, m = unit.shape[:2]
+    weight = (own / size)[..., None, None]
+    columns = (unit * weight).transpose(1, 0, 2, 3, 4).reshape(m, s, -1)
+    normal = columns @ columns.transpose(0, 2, 1)
+    right = columns @ (target * weight).reshape(m, -1, 1)
+    length = np.sqrt(np.maximum(np.diagonal(normal, axis1=1, axis2=2), 1e-300))
+    normal = normal / (length[:, :, None] * length[:, None, :])
+    enough = np.linalg.eigvalsh(normal)[:, 0] > _INDEPENDENT
+    found = np.full((m, s), np.nan)
+    scaled = np.linalg.solve(normal[enough], (right[..., 0] / length)[enough][..., None])[..., 0]
+    found[enough] = scaled / length[enough]
+    return found
+
+
+def one_material(model: Model, entries: Entries, ratio: float) -> tuple[NDArray[np.float64], Entries]:
+    """(m,) shear moduli of cells with (ratio mu, mu), the same mu or zero, and what they leave of the entries.
+
+    Candidates that are no cells have to be few. They overfill all entries that they contribute to; among candidates of
+    which that is true, least squares tell which are cells.
+    """
+    pairs = Pairs.of(model.cells, entries)
+    full = model.assembled(pairs, entries, np.ones((len(model.cells), 1)) * [ratio, 1])
+    mu = _usual_factor(full, entries.value)
+    rest = replace(entries, value=entries.value - mu * full)
+    poor = np.abs(rest.value).max(axis=(1, 2)) > CERTIFIED * entries.size
+    suspects = np.flatnonzero((poor[pairs.place] | ~pairs.there).all(axis=1))
+    moduli = np.full(len(model.cells), mu)
+    if mu == 0 or not 0 < len(suspects) < _FEW * len(model.cells):
+        return moduli, rest
+    doubted = replace(model, cells=model.cells[suspects])
+    lame = np.full((len(suspects), 1), mu) * [ratio, 1]
+    without = replace(rest, value=rest.value + doubted.assembled(pairs.at(suspects), entries, lame))
+    told, _ = _least_squares(doubted, without, ratio)
+    no_cell = told[:, 1] < 0.5 * mu if mu > 0 else told[:, 1] > 0.5 * mu
+    moduli[suspects[no_cell]] = 0
+    again = doubted.assembled(pairs.at(suspects), entries, lame * ~no_cell[:, None])
+    return moduli, replace(rest, value=without.value - again)
+
+
+def _usual_factor(blocks: NDArray, values: NDArray) -> float:
+    """Between the entries and those assembled, whatever a few candidates too many add."""
+    square = (blocks * blocks).sum(axis=(1, 2))
+    weighty = square > 1e-12 * square.max(initial=0)
+    if not weighty.any():
+        return 0.0
+    return float(np.median((blocks * values).sum(axis=(1, 2))[weighty] / square[weighty]))
+
+
+def _least_squares(model: Model, entries: Entries, ratio: float | None = None) -> tuple[NDArray[np.float64], Entries]:
+    """(m, 2) coefficients that fit entries best, zero where none shows, and what they leave of the entries.
+
+    Neighbours share most of their entries, and candidates that carry no material get zeros.
+    """
+    design = model.operator(Pairs.of(model.cells, entries), entries, ratio)
+    target = (entries.value / entries.size[:, None, None]).ravel()
+    weight = np.sqrt(np.asarray(design.power(2).sum(axis=0)).ravel())
+    seen = weight > 0
+    scaled = sp.csr_array(design[:, np.flatnonzero(seen)] @ sp.diags_array(1 / weight[seen]))
+    coefficients = np.zeros(design.shape[1])
+    with threads(1):  # many short vectors are not worth waking threads for
+        found = _refined(scaled, target) if scaled.shape[1] <= _DIRECT else None
+        if found is None:
+            found = sp.linalg.lsmr(scaled, target, atol=1e-15, btol=1e-15, conlim=0, maxiter=600)[0]
+    coefficients[seen] = found / weight[seen]
+    left = (target - design @ coefficients).reshape(entries.value.shape) * entries.size[:, None, None]
+    lame = coefficients.reshape(-1, 2) if ratio is None else coefficients[:, None] * [ratio, 1]
+    return lame, replace(entries, value=left)
+
+
+def _refined(design: sp.csr_array, target: NDArray) -> NDArray[np.float64] | None:
+    """The least coefficients that fit best, by normal equations whose errors are taken off again and again.
+
+    Columns have length one. Each step divides what is left of a combination of squared singular value s by 1 + s /
+    `_SHIFT`; combinations that fit nothing stay zero. None where they have no factors.
+    """
+    if not (design.shape[1] and np.isfinite(design.data).all() and np.isfinite(target).all()):
+        return None
+    transposed = sp.csr_array(design.T)
+    normal = UpperTriangle.of(sp.csr_array(transposed @ design + _SHIFT * sp.eye_array(design.shape[1])))
+    solver = factorisation(normal, definite=True)
+    try:
+        solver.factorise(normal)
+    except SolverError:
+        solver.release()
+        return None
+    found = np.zeros(design.shape[1])
+    for _ in range(_STEPS):
+        step = solver.solve(transposed @ (target - design @ found))
+        found += step
+        if np.abs(step).max(initial=0) <= _STILL * np.abs(found).max(initial=0):
+            break
+    solver.release()
+    return found

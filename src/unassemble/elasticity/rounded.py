@@ -1,0 +1,114 @@
+"""Matrices written with few digits: their rows annihilate translations up to rounding only, and are set right.
+
+What belongs to translations is known beforehand: away from supports the entries of a row and a direction add up to
+zero. Where they do up to the rounding of each, the sum is taken off the largest of them. Then a
+row that a support touched stands out as clearly as in a matrix of full precision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..matrix.digits import Digits
+from .rows.constants import ROUNDING
+from .rows.orders import ORDERS, regular
+from .rows.searching import directions_in_order, live_part
+
+_LAYOUTS = {3: (3, 2, 1), 2: (2,), 6: (3,)}  # unknowns of a node, and how many of these may be displacements
+_SPREADS = 20  # times the rounding of the entries: what an identity, or a sum of forces, may be off by
+_FULL = 1e-10  # rounding below which nothing needs to be set right
+_EXACT = 1e-14  # sums this small, beside the largest entry, are those of entries in full precision
+_LEAST = 0.05  # of the rows that have to annihilate all translations
+
+
+@dataclass(frozen=True)
+class Rounding:
+    """What the entries of a matrix were rounded to.
+
+    Attributes
+    ----------
+    name : str
+        Digits, decimals or single precision; see :class:`~unassemble.matrix.digits.Digits`.
+    level : float
+        How far entries may be off, relative to their size, as half of the rows have it.
+    """
+
+    name: str
+    level: float
+
+    @property
+    def spread(self) -> float:
+        """What an identity, or a sum of forces, may be off by, relative to what makes it up."""
+        return _SPREADS * self.level
+
+
+def with_exact_sums(matrix: sp.csr_array) -> tuple[sp.csr_array, Rounding | None]:
+    """Take the rounding out of rows that annihilate translations, if unknowns stand in one of the usual orders.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+
+    Returns
+    -------
+    matrix : (N, N) sparse
+        The given one where there is nothing to do.
+    rounding : Rounding, optional
+        None where nothing was done.
+    """
+    digits = Digits.of(matrix.data)
+    if digits is None:
+        return matrix, None
+    error = sp.csr_array((digits.unit / 2, matrix.indices, matrix.indptr), shape=matrix.shape)
+    size = abs(matrix)
+    total, of_row = (np.asarray(part.sum(axis=1)).ravel() for part in (size, error))
+    off = np.maximum(of_row / np.where(total > 0, total, np.inf), ROUNDING)
+    rounding = Rounding(digits.name, float(np.median(off)))
+    if rounding.level <= _FULL:
+        return matrix, None
+    best, most = None, _LEAST
+    for direction, b in _readings(matrix, off):
+        labels = (direction[:, None] == np.arange(b)).astype(float)
+        sums, sizes = matrix @ labels, size @ labels
+        zero = (np.abs(sums) <= error @ labels + _EXACT * total[:, None]) & (sizes > _EXACT * total[:, None])
+        share = max(float(zero[:, :moves].all(axis=1).mean()) for moves in _LAYOUTS[b])
+        if share > most:
+            best, most = (direction, np.where(zero, sums, 0.0)), share
+    if best is None or np.abs(best[1]).max() <= _EXACT * size.max():  # dyadic numbers are exact, few digits or not
+        return matrix, None
+    return _without(matrix, *best), rounding
+
+
+def _readings(matrix: sp.csr_array, off: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.int64], int]]:
+    """Directions of rows in one of the usual orders, and how many; with gaps where supports took some rows.
+
+    `off` (N,) is what rows may add up to that make up zero, relative to their size.
+    """
+    order = matrix.shape[0]
+    for b in _LAYOUTS:
+        for kind in ORDERS:
+            if order % b == 0:
+                yield regular(order, b, kind)[1], b
+    live, inner = live_part(matrix)
+    for d in (3, 2):
+        for found in directions_in_order(inner, d, off[live]):
+            direction = np.full(order, -1)
+            direction[live] = found
+            yield direction, d
+
+
+def _without(matrix: sp.csr_array, direction: NDArray[np.int64], excess: NDArray[np.float64]) -> sp.csr_array:
+    """The matrix after sums (N, b) of rows and directions were taken off the largest entry of each."""
+    entry = matrix.tocoo(copy=True)
+    b = excess.shape[1]
+    key = entry.row * (b + 1) + direction[entry.col]
+    order = np.lexsort((np.abs(entry.data), key))
+    last = order[np.append(np.diff(key[order]) > 0, True)]
+    last = last[direction[entry.col[last]] >= 0]
+    entry.data[last] -= excess[entry.row[last], direction[entry.col[last]]]
+    return sp.csr_array(entry)

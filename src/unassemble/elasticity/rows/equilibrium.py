@@ -1,0 +1,164 @@
+"""Directions of rows, spread from the rows of one node, or of many, by solving for translations.
+
+A translation is in equilibrium: with the unknowns of a few nodes held at 1 in one direction and at 0 in the others, all
+rows coupled to them take the same values if they are whole. So directions are read off d solutions of a sparse system
+around what is known already, the clearest first, and what is known grows. Which rows are whole is known beforehand,
+since all their entries add up to zero, whatever their directions; so it is known too when all is right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import permutations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ...linalg import solved
+from .constants import ROUNDING, adding_up, row_sizes, with_penalty
+
+_SHIFT = 1e-3  # of the diagonal: keeps bodies that are held in one node only from turning
+_GROWTH = 0.4  # share of rows to add at a time
+_CLEAR = 0.8  # how far apart the values of a row's two best directions are where there is no doubt
+_SEEDS = (0.5, 0.4, 0.6, 0.3, 0.7, 0.15, 0.85)  # nodes to start from, as parts of the way through a body
+_ROUNDS = 6
+_SETTLED = 0.98  # share of the whole rows whose sums vanish in all directions: single ones may add up by chance
+
+
+def spread_directions(
+    matrix: sp.csr_array, group: NDArray[np.int64], d: int, known: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """(N,) directions of all rows, with which most of the whole rows annihilate translations.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+        Symmetric, every row coupled to another one.
+    group : (N,) int64
+        Rows that couple to the same unknowns; those of d whole rows are nodes.
+    d : int
+    known : (N,) int64
+        Directions to start from, -1 where they are not known.
+    """
+    direction = np.zeros(len(group), np.int64)
+    inner = matrix.copy()
+    inner.eliminate_zeros()
+    label = sp.csgraph.connected_components(inner, directed=False)[1]
+    for piece in range(int(label.max(initial=-1)) + 1):
+        part = np.flatnonzero(label == piece)
+        body = _Body(sp.csr_array(inner[part][:, part]), np.unique(group[part], return_inverse=True)[1], d)
+        direction[part] = body.directions(known[part])
+    return direction
+
+
+class _Body:
+    """One piece: its matrix with the signs of a stiffness, penalties replaced by what makes their rows whole."""
+
+    def __init__(self, matrix: sp.csr_array, group: NDArray[np.int64], d: int) -> None:
+        n, own = matrix.shape[0], matrix.diagonal()
+        size = row_sizes(matrix)
+        penalised = with_penalty(matrix, size)
+        off = sp.csr_array(matrix * (np.sign(own.sum()) or 1.0))
+        off.setdiag(0)
+        off.eliminate_zeros()
+        inferred = -np.asarray(off.sum(axis=1)).ravel()
+        own = np.where(penalised, np.maximum(inferred, 1e-3 * size), np.abs(own))
+        self._size, self._d = np.where(size > 0, size, np.inf), d
+        self._whole = sp.csr_array(off + sp.diags_array(own))
+        self._shifted = sp.csr_array(off + sp.diags_array((1 + _SHIFT) * own))
+        self._pattern = sp.csr_array((np.ones(off.nnz, np.int32), off.indices, off.indptr), shape=off.shape)
+        adds_up = adding_up(self._whole, self._size)
+        self.telling: NDArray[np.bool_] = np.asarray(adds_up & ~penalised)
+        order = np.argsort(group, kind="stable")
+        nodes = order[np.bincount(group)[group[order]] == d].reshape(-1, d)
+        self._nodes = nodes[adds_up[nodes].all(axis=1)]
+        alone = np.ones(n, dtype=bool)
+        alone[self._nodes] = False
+        self._members = [np.flatnonzero(alone)[:, None], self._nodes]
+        self._names = [np.arange(d)[:, None], np.array(list(permutations(range(d))))]
+
+    def directions(self, given: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(n,) directions with which most rows annihilate translations, and of several those of least sums."""
+        best, most, least = np.zeros(len(self._size), np.int64), -1, np.inf
+        hope = int(self.telling.sum())
+        for start in self._starts(given):
+            known, before = start, -1
+            for _ in range(_ROUNDS):
+                direction = self._extended(known)
+                good = self._good(direction)
+                count = int(good.sum())
+                total = self._total(direction)
+                if (count, -total) > (most, -least):
+                    best, most, least = direction, count, total
+                if count <= before or count == hope or not count:
+                    break
+                before, known = count, np.where(self._vouched(good), direction, -1)
+            if most >= _SETTLED * hope:
+                break
+        return best
+
+    def _starts(self, given: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+        """Directions to start from: those given, or else those of one node each, in the middle of the piece first."""
+        if (given >= 0).any():
+            yield given
+        if (given >= 0).any() or not len(self._nodes):
+            return
+        breadth_first = sp.csgraph.breadth_first_order
+        order = breadth_first(self._pattern, 0, directed=False, return_predecessors=False)
+        order = breadth_first(self._pattern, order[-1], directed=False, return_predecessors=False)
+        rank = np.empty(len(order), np.int64)
+        rank[order] = np.arange(len(order))
+        nodes = self._nodes[np.argsort(rank[self._nodes[:, 0]])]
+        for part in _SEEDS:
+            known = np.full(len(given), -1)
+            known[nodes[int(part * (len(nodes) - 1))]] = np.arange(self._d)
+            yield known
+
+    def _extended(self, known: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Fill in directions of -1, those coupled to what is known first."""
+        direction = known.copy()
+        while (direction < 0).any():
+            near = (direction < 0) & (self._pattern @ (direction >= 0).astype(np.int32) > 0)
+            if not near.any():  # nothing is coupled to what is left
+                return direction
+            best, margin = self._guessed(np.flatnonzero(near), direction)
+            count = int(np.clip(_GROWTH * (direction >= 0).sum(), min(self._d, near.sum()), near.sum()))
+            least = min(np.partition(margin[near], -count)[-count], _CLEAR)
+            direction = np.where(near & (margin >= least), best, direction)
+        return direction
+
+    def _guessed(
+        self, rows: NDArray[np.int64], direction: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Likeliest directions of all rows, and by how much they beat the next, if the others are as they are."""
+        held = np.flatnonzero(direction >= 0)
+        field = np.zeros((len(direction), self._d))
+        field[held, direction[held]] = 1
+        around = self._shifted[rows]
+        field[rows] = solved(sp.csr_array(around[:, rows]), -(around[:, held] @ field[held]))
+        best, margin = direction.copy(), np.full(len(direction), -np.inf)
+        for members, names in zip(self._members, self._names, strict=True):
+            fit = field[members[:, None, :], names[None]].mean(axis=2)
+            best[members] = names[np.argmax(fit, axis=1)]
+            two = np.partition(fit, -2, axis=1)[:, -2:]
+            margin[members] = (two[:, 1] - two[:, 0])[:, None]
+        return best, margin
+
+    def _total(self, direction: NDArray[np.int64]) -> float:
+        """Absolute sums over each direction, in all rows, of their sizes."""
+        return float((np.abs(self._whole @ np.eye(self._d)[direction]) / self._size[:, None]).sum())
+
+    def _good(self, direction: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(n,) rows whose entries add up to zero in each direction."""
+        sums = self._whole @ np.eye(self._d)[direction]
+        return np.asarray(self.telling & (np.abs(sums) <= ROUNDING * self._size[:, None]).all(axis=1))
+
+    def _vouched(self, good: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(n,) rows of the largest domain tied together by good ones, which vouch for what they couple to."""
+        n = len(good)
+        entry = sp.coo_array(self._whole)
+        told = good[entry.row] & (np.abs(entry.data) > ROUNDING * self._size[entry.row])
+        link = sp.csr_array((np.ones(told.sum(), np.int8), (entry.row[told] + n, entry.col[told])), shape=(2 * n,) * 2)
+        label = sp.csgraph.connected_components(link, directed=False)[1][:n]
+        return np.asarray(label == np.argmax(np.bincount(label)))

@@ -1,0 +1,211 @@
+"""Nodes and directions where rows are missing, or stand in no order: directions by sums, nodes by patterns.
+
+The order of the rows is where the search starts. Direction by direction it tells directions; node by node it tells
+those of whole nodes, from which all others spread; at random they spread from any node. With directions known, rows
+that couple to the same unknowns are one node's, as far as the order allows. Where entries that vanished are not stored
+patterns do not show nodes, and are made up for first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ...budget import Budget
+from .constants import ROUNDING, adding_up, proven_directions, row_sizes, uncoupled_rows, with_penalty
+from .equilibrium import spread_directions
+from .filling import filled, filled_by_direction
+from .grouping import by_direction, by_first_row, same_pattern
+from .least_sums import with_least_sums
+from .likeness import pattern_of
+from .numbering import Numbering, measured
+from .orders import Reading, directions_by_component, nodes_by_component, nodes_in_runs
+from .traces import unaccounted
+
+_LARGE = 20_000  # rows beyond which entries that vanished are not put back, which would take minutes
+_WORK = 2e10  # for directions: half a minute or so
+_IN_TURN = 0.1  # by which neighbouring rows have more in common than rows far apart, if they stand node by node
+_ANNIHILATED = 0.9  # share of whole rows that annihilate translations when directions are right
+_EVEN = 0.6  # share of rows, far from supports, in patterns with as many rows in each direction
+
+
+def searched(matrix: sp.csr_array, sizes: tuple[int, ...], *, as_stored: bool = False) -> list[Numbering]:
+    """Numberings that were found, up to the first that leaves no doubt.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+        Symmetric.
+    sizes : tuple of int
+        Block sizes to try.
+    as_stored : bool
+        Whether to believe only what entries as they are stored show, in one of the usual orders.
+    """
+    live, inner = live_part(matrix)
+    found: list[Numbering] = []
+    for kind, d, reading in _readings(inner, sizes, as_stored):
+        found.append(measured(matrix, _of_all_rows(reading, live, matrix.shape[0]), d, kind))
+        if found[-1].settled and found[-1] is max(found, key=lambda one: one.quality):
+            break
+    return found
+
+
+def same_cuts(matrix: sp.csr_array, regular: Numbering) -> bool:
+    """Whether rows show the same cuts between directions as the order without gaps has, so that it is the only one."""
+    live, inner = live_part(matrix)
+    direction = directions_by_component(inner, regular.block_size)
+    return direction is not None and np.array_equal(direction, regular.direction_of_row[live])
+
+
+def directions_in_order(
+    inner: sp.csr_array, d: int, rounding: float | NDArray[np.float64]
+) -> Iterator[NDArray[np.int64]]:
+    """(N,) the likeliest directions of rows that stand in one of the usual orders, with gaps, their sums rounded."""
+    direction = directions_by_component(inner, d, rounding)
+    if direction is not None:
+        yield direction
+    group = same_pattern(inner)
+    if _shows_runs(group, d) and inner.diagonal().all():
+        direction = spread_directions(inner, group, d, _of_runs(group, d))
+        yield with_least_sums(inner, group, direction, d, Budget(_WORK))
+
+
+def live_part(matrix: sp.csr_array) -> tuple[NDArray[np.int64], sp.csr_array]:
+    """(k,) rows that couple to others, and the matrix of these."""
+    live = np.flatnonzero(~uncoupled_rows(matrix))
+    inner = sp.csr_array(matrix[live][:, live])
+    inner.sort_indices()
+    return live, inner
+
+
+def _runs(group: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(N,) runs of neighbouring rows of one group."""
+    return np.concatenate([[0], np.cumsum(np.diff(group) != 0)])
+
+
+def _shows_runs(group: NDArray[np.int64], d: int) -> bool:
+    """Whether most rows stand in runs of d rows of one group, as those of nodes do."""
+    run = _runs(group)
+    return bool(2 * np.count_nonzero(np.bincount(run)[run] == d) > len(run))
+
+
+def _of_runs(group: NDArray[np.int64], d: int) -> NDArray[np.int64]:
+    """(N,) directions of rows in runs of d rows of one group, -1 for all others."""
+    run = _runs(group)
+    return np.where(np.bincount(run)[run] == d, np.arange(len(run)) - np.searchsorted(run, run), -1)
+
+
+def _readings(inner: sp.csr_array, sizes: tuple[int, ...], as_stored: bool) -> Iterator[tuple[str, int, Reading]]:
+    """Order, number of directions, and nodes; with entries as they are stored, then with those that vanished."""
+    if inner.shape[0] < 2 * min(sizes) or not inner.diagonal().all():  # an elastic body resists every displacement
+        return
+    for d in sizes:
+        direction = directions_by_component(inner, d)
+        if direction is not None:
+            yield "by component", d, _by_component(inner, direction, d)
+    kind = "interleaved" if _in_turn(inner) else "pattern"
+    if as_stored and kind == "pattern":
+        return
+    large = inner.shape[0] > _LARGE
+    for put_back in (False,) if as_stored or large else (False, True):
+        whole = filled(inner) if put_back else inner
+        group = same_pattern(whole)
+        for d in sizes:
+            if kind == "interleaved" and not (put_back or (large and not as_stored) or _shows_runs(group, d)):
+                continue
+            reading = _by_equilibrium(inner, whole, d, kind)
+            if reading is not None:
+                yield kind, d, reading
+
+
+def _in_turn(matrix: sp.csr_array) -> bool:
+    """Whether neighbouring rows couple to the same unknowns, far more than rows that stand far from each other."""
+    pattern, count, half = pattern_of(matrix), np.diff(matrix.indptr), matrix.shape[0] // 2
+    shares = []
+    for step in (1, half):
+        common = pattern[:-step].multiply(pattern[step:]).sum(axis=1)
+        shares.append(float(np.mean(common / (count[:-step] + count[step:] - common))))
+    return shares[0] > shares[1] + _IN_TURN
+
+
+def _by_component(inner: sp.csr_array, direction: NDArray[np.int64], d: int) -> Reading:
+    """Nodes of one pattern; where zeros are not stored, of the patterns with which no node lacks anything."""
+    node, open_row = nodes_by_component(same_pattern(inner), direction, d)
+    lost = _came_apart(inner, node, direction, d)
+    if not (lost & ~open_row).any():
+        return Reading(node, direction, open_row)
+    for k in range(2 if inner.shape[0] <= _LARGE else 1):
+        group = same_pattern(filled_by_direction(filled(inner) if k else inner, direction, d))
+        node, open_row = nodes_by_component(group, direction, d)
+        lost = _came_apart(inner, node, direction, d)
+        if not (lost.any() or open_row.any()):
+            break
+    if lost.any():  # each belongs to another: these go together one by one between nodes that are known
+        node, open_row = nodes_by_component(np.where(lost, len(group), group), direction, d)
+    return Reading(node, direction, open_row if open_row.any() else None)
+
+
+def _came_apart(
+    matrix: sp.csr_array, node: NDArray[np.int64], direction: NDArray[np.int64], d: int
+) -> NDArray[np.bool_]:
+    """(N,) rows of nodes that lack a direction without a trace."""
+    return np.asarray(unaccounted(matrix, node, direction, d).any(axis=1))[node]
+
+
+def _by_equilibrium(inner: sp.csr_array, whole: sp.csr_array, d: int, kind: str) -> Reading | None:
+    """Directions spread from whole nodes, and nodes; None where translations are not annihilated."""
+    group = same_pattern(whole)
+    known = _of_runs(group, d) if kind == "interleaved" else np.full(len(group), -1)
+    direction = spread_directions(whole, group, d, known)
+    direction = with_least_sums(whole, group, direction, d, Budget(_WORK))
+    if kind == "pattern" and _annihilated(whole, direction, d) <= _ANNIHILATED:
+        return None
+    if whole is not inner:
+        whole = filled_by_direction(whole, direction, d)
+        group = same_pattern(whole)
+    if kind == "interleaved":
+        node, open_row = nodes_in_runs(inner, group, direction, d), None
+    else:
+        node, open_row = _of_patterns(group, direction, d)
+        if _even(inner, group, direction, d) <= _EVEN:
+            return None
+    return Reading(node, direction, open_row, ~proven_directions(whole, direction, group, d))
+
+
+def _annihilated(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> float:
+    """Share of the rows that add up to zero over all directions together which do so over each."""
+    size = row_sizes(matrix)
+    whole = adding_up(matrix, size) & ~with_penalty(matrix, size)
+    sums = np.abs(matrix @ np.eye(d)[direction])
+    return float((sums <= ROUNDING * size[:, None]).all(axis=1)[whole].mean()) if whole.any() else 0.0
+
+
+def _even(matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], d: int) -> float:
+    """Share of rows whose pattern has as many rows in each direction, where all of them add up to zero.
+
+    Two directions of three taken for one annihilate translations as well.
+    """
+    size = row_sizes(matrix)
+    adds_up = adding_up(matrix, size) | with_penalty(matrix, size)
+    count = by_direction(group, direction, d)
+    whole = (np.bincount(group, ~adds_up) == 0)[group]
+    return float((count == count[:, :1]).all(axis=1)[group[whole]].mean()) if whole.any() else 0.0
+
+
+def _of_patterns(
+    group: NDArray[np.int64], direction: NDArray[np.int64], d: int
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Nodes of rows of one pattern, and rows that are left by themselves since their pattern has several of some."""
+    several = np.asarray((by_direction(group, direction, d) > 1).any(axis=1))[group]
+    return by_first_row(np.where(several, len(group) + np.arange(len(group)), group)), several
+
+
+def _of_all_rows(reading: Reading, live: NDArray[np.int64], order: int) -> Reading:
+    """The reading of all rows from that of live ones; each row of the identity is a node by itself."""
+    node, direction = np.arange(order) + len(live), np.zeros(order, np.int64)
+    node[live], direction[live] = reading.node, reading.direction
+    masks = [None if mask is None else np.isin(np.arange(order), live[mask]) for mask in reading[2:]]
+    return Reading(by_first_row(node), direction, *masks)

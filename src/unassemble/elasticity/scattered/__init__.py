@@ -1,1 +1,0 @@
-"""Nodes of rows that stand in no order."""

@@ -1,0 +1,135 @@
+"""Candidates for cells: sets of nodes of which each couples to each."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+_AT_ONCE = 10_000_000  # products in one go
+_STRAIGHT = 1e-6  # of a side's length: how far from its middle a node may be
+
+
+class Graph:
+    """Neighbours of nodes, with fast answers to "are these two coupled?".
+
+    Parameters
+    ----------
+    pattern : (n, n) sparse
+        Symmetric; the diagonal does not matter.
+    """
+
+    def __init__(self, pattern: sp.csr_array):
+        coo = pattern.tocoo()
+        off = coo.row != coo.col
+        order = np.lexsort((coo.col[off], coo.row[off]))
+        self.n = pattern.shape[0]
+        self.row = coo.row[off][order].astype(np.int64)
+        self.col = coo.col[off][order].astype(np.int64)
+        self.start = np.searchsorted(self.row, np.arange(self.n + 1))
+        self._key = self.row * self.n + self.col
+
+    def coupled(self, i: NDArray, j: NDArray) -> NDArray[np.bool_]:
+        """(k,) whether i and j are neighbours."""
+        if not len(self._key):
+            return np.zeros(np.shape(i), dtype=bool)
+        key = i * self.n + j
+        place = np.minimum(np.searchsorted(self._key, key), len(self._key) - 1)
+        return self._key[place] == key
+
+    def spread(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
+        """All pairs of an entry of `nodes`, by its place, and a neighbour of it."""
+        count = self.start[nodes + 1] - self.start[nodes]
+        place = np.repeat(np.arange(len(nodes)), count)
+        offset = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        return place, self.col[self.start[nodes[place]] + offset]
+
+    def only(self, pairs: NDArray[np.bool_]) -> Graph:
+        """The graph of some of the pairs `row`, `col`, both ways."""
+        entries = (np.ones(int(pairs.sum()), np.int8), (self.row[pairs], self.col[pairs]))
+        return Graph(sp.csr_array(entries, shape=(self.n, self.n)))
+
+    def closed(self) -> sp.csr_array:
+        """Pattern of ones, with the diagonal."""
+        own = np.arange(self.n)
+        row, col = np.concatenate([self.row, own]), np.concatenate([self.col, own])
+        return sp.csr_array((np.ones(len(row), np.int32), (row, col)), shape=(self.n, self.n))
+
+    def cliques(self, sets: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(m,) whether all nodes of each of the sets (m, k) are coupled to each other."""
+        good = np.ones(len(sets), dtype=bool)
+        for a in range(sets.shape[1]):
+            for b in range(a + 1, sets.shape[1]):
+                good[good] = self.coupled(sets[good, a], sets[good, b])
+        return good
+
+
+def simplices(graph: Graph, d: int) -> NDArray[np.int64]:
+    """(m, d + 1) all cliques of d + 1 nodes, each with its nodes increasing."""
+    cliques = np.arange(graph.n)[:, None]
+    for _ in range(d):
+        place, new = graph.spread(cliques[:, -1])
+        later = new > cliques[place, -1]
+        place, new = place[later], new[later]
+        for k in range(cliques.shape[1] - 1):
+            both = graph.coupled(cliques[place, k], new)
+            place, new = place[both], new[both]
+        cliques = np.column_stack([cliques[place], new])
+    return cliques
+
+
+def shared_cliques(graph: Graph, k: int) -> NDArray[np.int64]:
+    """(m, k) cliques of k nodes that are all that two of them have in common; nodes increasing.
+
+    A node couples to the nodes of the cells around it. So nodes on opposite sides of a cell, like opposite corners of
+    a box or the middles of opposite edges of a quadratic tetrahedron, share the nodes of that cell and no others; a
+    node inside a cell has no others itself.
+    """
+    closed = graph.closed()
+    degree = np.diff(closed.indptr)
+    work = np.cumsum(closed @ degree.astype(np.int64))
+    found = np.empty((0, k), np.int64)
+    if not graph.n or degree.max() < k:
+        return found
+    for rows in np.split(np.arange(graph.n), np.searchsorted(work, np.arange(_AT_ONCE, work[-1], _AT_ONCE))):
+        if not len(rows):
+            continue
+        block = closed[rows]
+        common = sp.triu(sp.csr_array((block @ closed).multiply(block)), rows[0], format="coo")
+        pairs = common.data == k
+        i, j = rows[common.row[pairs]], common.col[pairs]
+        if len(i):
+            sets = sp.csr_array(closed[i].multiply(closed[j]))
+            sets.sort_indices()
+            found = np.unique(np.vstack([found, sets.indices.reshape(-1, k).astype(np.int64)]), axis=0)
+    return found[graph.cliques(found)]
+
+
+def straight_simplices(graph: Graph, points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(m, 6 or 10) corners and middles of simplices whose sides have a node in the middle; nodes increasing.
+
+    For quadratic triangles of one material: there the entries between a corner and the middle of the side facing
+    it vanish, so that the six nodes are no clique; but all middles are coupled.
+    """
+    d = points.shape[1]
+    known = np.flatnonzero(np.isfinite(points).all(axis=1))
+    first = (graph.row < graph.col) & np.isin(graph.row, known) & np.isin(graph.col, known)
+    i, j = graph.row[first], graph.col[first]
+    length = np.linalg.norm(points[i] - points[j], axis=1)
+    away, nearest = cKDTree(points[known]).query((points[i] + points[j]) / 2)
+    middle = known[nearest]
+    side = (away < _STRAIGHT * length) & graph.coupled(i, middle) & graph.coupled(j, middle)
+    i, j, middle = i[side], j[side], middle[side]
+    corners = simplices(Graph(_symmetric(i, j, graph.n)), d)
+    key = i * graph.n + j  # increasing, as the graph's rows are
+    a, b = np.triu_indices(d + 1, 1)
+    middles = middle[np.searchsorted(key, corners[:, a] * graph.n + corners[:, b])]
+    whole = graph.cliques(middles)
+    return np.sort(np.column_stack([corners[whole], middles[whole]]), axis=1)
+
+
+def _symmetric(i: NDArray, j: NDArray, n: int) -> sp.csr_array:
+    """Pattern of pairs both ways."""
+    pair = np.concatenate([i, j]), np.concatenate([j, i])
+    return sp.csr_array((np.ones(2 * len(i)), pair), shape=(n, n))

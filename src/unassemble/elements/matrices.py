@@ -1,0 +1,92 @@
+"""Element matrices: Laplacian, mass and isotropic elasticity, from one set of shape functions and any quadrature.
+
+An isoparametric cell maps the reference element by x(t) = sum_k x_k phi_k(t). With J = dx/dt, gradients in space are
+J^-T times those in the reference element, and |det J| is the volume that goes with a weight.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .kinds import Kind
+from .reference import Rule, shape_functions, shape_gradients
+
+_FLAT = 1e-14  # determinant relative to the size of a Jacobian that is singular up to rounding
+
+
+def mapped_gradients(
+    points: NDArray[np.float64], cells: NDArray[np.int64], kind: Kind, rule: Rule
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(m, q, k, d) gradients of the shape functions in space, and (m, q) weights times |det J|.
+
+    Parameters
+    ----------
+    points : (n, d) float64
+    cells : (m, k) int64
+        In meshio's order. In cells that are flat gradients are those of the reference element, and the weights zero.
+    kind : Kind
+    rule : (q, d) and (q,) float64
+        Quadrature in the reference element; see :func:`.reference.rules`.
+    """
+    at, weights = rule
+    local = shape_gradients(kind, at)
+    jacobian = np.einsum("mke,qkr->mqer", points[cells], local, optimize=True)
+    size = np.abs(np.linalg.det(jacobian))
+    jacobian[size <= _FLAT * np.linalg.norm(jacobian, axis=(2, 3)) ** kind.dim] = np.eye(kind.dim)
+    return np.einsum("qkr,mqre->mqke", local, np.linalg.inv(jacobian), optimize=True), size * weights
+
+
+def gradient_products(
+    points: NDArray[np.float64], cells: NDArray[np.int64], kind: Kind, rule: Rule
+) -> NDArray[np.float64]:
+    """(m, k, k, d, d) integrals of d_c phi_i d_b phi_j, by i, j, c, b; parameters as in :func:`mapped_gradients`."""
+    m, k, d = len(cells), kind.nodes, kind.dim
+    g, volume = mapped_gradients(points, cells, kind, rule)
+    g = g.reshape(m, len(volume.T), k * d)
+    outer = (g * volume[..., None]).transpose(0, 2, 1) @ g  # one product of matrices per cell: fast
+    return outer.reshape(m, k, d, k, d).transpose(0, 1, 3, 2, 4)
+
+
+def laplacian(points: NDArray[np.float64], cells: NDArray[np.int64], kind: Kind, rule: Rule) -> NDArray[np.float64]:
+    """(m, k, k) integrals of grad phi_i . grad phi_j."""
+    return np.trace(gradient_products(points, cells, kind, rule), axis1=3, axis2=4)
+
+
+def mass(points: NDArray[np.float64], cells: NDArray[np.int64], kind: Kind, rule: Rule) -> NDArray[np.float64]:
+    """(m, k, k) integrals of phi_i phi_j."""
+    phi = shape_functions(kind, rule[0])
+    volume = mapped_gradients(points, cells, kind, rule)[1]
+    return np.einsum("mq,qi,qj->mij", volume, phi, phi, optimize=True)
+
+
+def elasticity(
+    points: NDArray[np.float64], cells: NDArray[np.int64], kind: Kind, rule: Rule
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(m, k, k, d, d) blocks of isotropic elasticity for (lambda, mu) = (1, 0) and (0, 1), by i, j, c, b.
+
+    The strain energy lambda tr(e)^2 / 2 + mu e : e gives int lambda d_c phi_i d_b phi_j + mu d_b phi_i d_c phi_j +
+    delta_cb mu grad phi_i . grad phi_j.
+    """
+    first = gradient_products(points, cells, kind, rule)
+    trace = np.trace(first, axis1=3, axis2=4)
+    return first, first.transpose(0, 1, 2, 4, 3) + trace[..., None, None] * np.eye(kind.dim)
+
+
+def assembled(blocks: NDArray[np.float64], cells: NDArray[np.int64], n: int) -> sp.csr_array:
+    """The matrix of n nodes that element matrices add up to.
+
+    Parameters
+    ----------
+    blocks : (m, k, k) or (m, k, k, d, d) float64
+        Scalar; or blocks of d unknowns per node, which the matrix then has node by node.
+    cells : (m, k) int64
+    n : int
+    """
+    d = blocks.shape[-1] if blocks.ndim == 5 else 1
+    unknowns = (cells[:, :, None] * d + np.arange(d)).reshape(len(cells), -1)
+    size = unknowns.shape[1]
+    flat = (blocks.transpose(0, 1, 3, 2, 4) if blocks.ndim == 5 else blocks).reshape(len(cells), size, size)
+    row, column = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
+    return sp.csr_array((flat.ravel(), (row.ravel(), column.ravel())), shape=(n * d, n * d))

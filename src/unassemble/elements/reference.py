@@ -1,0 +1,128 @@
+"""Reference elements: shape functions and quadrature rules."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kinds import Kind
+
+Rule = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+@cache
+def reference_nodes(kind: Kind) -> NDArray[np.float64]:
+    """(k, d) nodes of the unit simplex or the unit box, in meshio's order."""
+    if kind.simplex:
+        corners = np.vstack([np.zeros(kind.dim), np.eye(kind.dim)])
+    else:
+        ring = [(0, 0), (1, 0), (1, 1), (0, 1)]
+        corners = np.array(ring if kind.dim == 2 else [(*r, z) for z in (0, 1) for r in ring], dtype=float)
+    return np.vstack([corners, *(corners[list(some)].mean(axis=0) for some in kind.between)])
+
+
+@cache
+def _exponents(kind: Kind) -> NDArray[np.int64]:
+    """(k, d) monomials that span the shape functions.
+
+    Simplices have all up to a total degree, boxes all up to a degree in each direction; serendipity boxes, which lack
+    nodes inside, those in which at most one direction is squared.
+    """
+    degree = 2 if kind.quadratic else 1
+    every = np.array(list(product(range(degree + 1), repeat=kind.dim)))
+    if kind.simplex:
+        return every[every.sum(axis=1) <= degree]
+    return every if len(every) == kind.nodes else every[(every == 2).sum(axis=1) <= 1]
+
+
+@cache
+def _coefficients(kind: Kind) -> NDArray[np.float64]:
+    """(k, k) shape functions in columns, by monomials: one in their own node and zero in the others."""
+    return np.linalg.inv((reference_nodes(kind)[:, None, :] ** _exponents(kind)).prod(axis=2))
+
+
+def shape_functions(kind: Kind, at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(q, k) values of the shape functions at points (q, d) of the reference element."""
+    return np.asarray((at[:, None, :] ** _exponents(kind)).prod(axis=2) @ _coefficients(kind))
+
+
+def shape_gradients(kind: Kind, at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(q, k, d) gradients of the shape functions at points (q, d) of the reference element."""
+    power = _exponents(kind)
+    slopes = np.empty((len(at), len(power), kind.dim))
+    for a in range(kind.dim):
+        lower = power - np.eye(kind.dim, dtype=np.int64)[a]
+        slopes[:, :, a] = power[:, a] * (at[:, None, :] ** np.maximum(lower, 0)).prod(axis=2)
+    return np.einsum("qea,ek->qka", slopes, _coefficients(kind))
+
+
+def rules(kind: Kind) -> Iterator[Rule]:
+    """Quadrature rules in use, points (q, d) and weights (q,), likely ones first.
+
+    Which one integrated an element shows where its geometry is not affine.
+    """
+    if not kind.simplex:
+        yield from (_gauss(kind.dim, order) for order in ((3, 2, 4, 5, 6, 7) if kind.quadratic else (2, 3, 4, 1)))
+    elif not kind.quadratic:
+        yield np.full((1, kind.dim), 1 / (kind.dim + 1)), np.array([(1, 1, 1 / 2, 1 / 6)[kind.dim]])
+    else:
+        yield from _triangle_rules() if kind.dim == 2 else _tetrahedron_rules()
+
+
+def _gauss(d: int, order: int) -> Rule:
+    """Gauss's rule in each direction of the unit box."""
+    node, weight = np.polynomial.legendre.leggauss(order)
+    points = np.array(list(product((node + 1) / 2, repeat=d)))
+    return points, np.array(list(product(weight / 2, repeat=d))).prod(axis=1)
+
+
+def _symmetric(*orbits: tuple[float, tuple[float, ...]]) -> Rule:
+    """A rule from weights, which add up to 1 over all points, and barycentric coordinates up to their order."""
+    points = [(w, x) for w, orbit in orbits for x in sorted(set(permutations(orbit)))]
+    d = len(points[0][1]) - 1
+    volume = (1, 1, 1 / 2, 1 / 6)[d]
+    return np.array([x[1:] for _, x in points]), volume * np.array([w for w, _ in points])
+
+
+def _triangle_rules() -> Iterator[Rule]:
+    """Of degrees 4, 2, 2, 5 and 3 (Strang and Fix 1973, Dunavant 1985)."""
+    root = np.sqrt(10)
+    orbits = []
+    for sign in (1, -1):
+        a = (8 - root + sign * np.sqrt(38 - 44 * np.sqrt(0.4))) / 18
+        w = (620 + sign * np.sqrt(213125 - 53320 * root)) / 3720
+        orbits.append((float(w), (float(a), float(a), float(1 - 2 * a))))
+    yield _symmetric(*orbits)
+    yield _symmetric((1 / 3, (1 / 6, 1 / 6, 2 / 3)))
+    yield _symmetric((1 / 3, (0.5, 0.5, 0.0)))
+    root = np.sqrt(15)
+    orbits = [(9 / 40, (1 / 3, 1 / 3, 1 / 3))]
+    for sign in (1, -1):
+        a = (6 + sign * root) / 21
+        orbits.append((float((155 + sign * root) / 1200), (float(a), float(a), float(1 - 2 * a))))
+    yield _symmetric(*orbits)
+    yield _symmetric((-9 / 16, (1 / 3, 1 / 3, 1 / 3)), (25 / 48, (0.2, 0.2, 0.6)))
+
+
+def _tetrahedron_rules() -> Iterator[Rule]:
+    """Of degrees 4, 2, 3 and 5 (Keast 1986)."""
+    centre = (0.25, 0.25, 0.25, 0.25)
+    a = (1 + np.sqrt(5 / 14)) / 4
+    yield _symmetric(
+        (-148 / 1875, centre),
+        (343 / 7500, (1 / 14, 1 / 14, 1 / 14, 11 / 14)),
+        (56 / 375, (a, a, 0.5 - a, 0.5 - a)),
+    )
+    a = (5 - np.sqrt(5)) / 20
+    yield _symmetric((1 / 4, (a, a, a, 1 - 3 * a)))
+    yield _symmetric((-4 / 5, centre), (9 / 20, (1 / 6, 1 / 6, 1 / 6, 1 / 2)))
+    yield _symmetric(
+        (6544 / 36015, centre),
+        (81 / 2240, (1 / 3, 1 / 3, 1 / 3, 0.0)),
+        (161051 / 2304960, (1 / 11, 1 / 11, 1 / 11, 8 / 11)),
+        (338 / 5145, (0.0665501535736643, 0.0665501535736643, 0.4334498464263357, 0.4334498464263357)),
+    )

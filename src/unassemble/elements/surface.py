@@ -1,0 +1,142 @@
+"""The outside of a mesh: facets that belong to one cell only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..topology.boundary import loops
+from .kinds import KINDS, Kind
+
+Blocks = Mapping[str, NDArray[np.int64]]  # cells by kind
+
+# Facets of a positively oriented cell in meshio's order, each seen counter-clockwise from outside.
+_FACETS: dict[str, list[tuple[int, ...]]] = {
+    "triangle": [(0, 1), (1, 2), (2, 0)],
+    "quad": [(0, 1), (1, 2), (2, 3), (3, 0)],
+    "tetra": [(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)],
+    "hexahedron": [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
+}
+
+
+def _ring(kind: Kind, corners: Sequence[int]) -> list[int]:
+    """Corners in a ring, and between them the nodes on the sides."""
+    middle = {frozenset(some): kind.corners + k for k, some in enumerate(kind.between)}
+    sides = zip(corners, (*corners[1:], corners[0]), strict=True)
+    return [node for a, b in sides for node in ([a, middle[frozenset((a, b))]] if kind.quadratic else [a])]
+
+
+@cache
+def _outlines(name: str) -> NDArray[np.int64]:
+    """(f, r) facets of a kind of cell: in the plane pairs of neighbours on its rim, in space rings."""
+    kind = KINDS[name]
+    if kind.dim == 3:
+        return np.array([_ring(kind, facet) for facet in _FACETS[kind.base]])
+    rim = _ring(kind, list(range(kind.corners)))
+    return np.column_stack([rim, np.roll(rim, -1)])
+
+
+def planar_outlines(name: str, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m, r) nodes around each planar cell (m, k), counter-clockwise."""
+    return cells[:, _outlines(name)[:, 0]]
+
+
+def outer_facets(blocks: Blocks) -> list[NDArray[np.int64]]:
+    """Facets that no other cell shares, (f, r) for each number r of nodes, seen counter-clockwise from outside.
+
+    Sides of quadratic cells in the plane are two facets each; in space facets have the nodes in the middle of their
+    sides between their corners. A facet of four corners on which triangles of other cells lie is none of the outside,
+    and neither are these.
+
+    Parameters
+    ----------
+    blocks : mapping of str to (m, k) int64
+        Cells by kind, meshio's names.
+    """
+    facets = _facets(blocks)
+    for size, some in facets.items():
+        _, which, count = np.unique(np.sort(some, axis=1), axis=0, return_inverse=True, return_counts=True)
+        facets[size] = some[count[which.ravel()] == 1]
+    if {3, 4} <= facets.keys():
+        halves = np.sort(facets[4][:, [[0, 1, 2], [1, 2, 3], [2, 3, 0], [3, 0, 1]]], axis=2)
+        covered = _rows_among(halves.reshape(-1, 3), np.sort(facets[3], axis=1)).reshape(-1, 4).any(axis=1)
+        inner = _rows_among(np.sort(facets[3], axis=1), halves[covered].reshape(-1, 3))
+        facets = {3: facets[3][~inner], 4: facets[4][~covered]}
+    return list(facets.values())
+
+
+def _facets(blocks: Blocks) -> dict[int, NDArray[np.int64]]:
+    """All facets of all cells, (f, r) by their number r of nodes."""
+    found: dict[int, list[NDArray[np.int64]]] = {}
+    for name, cells in blocks.items():
+        corners = _outlines(name)
+        found.setdefault(corners.shape[1], []).append(cells[:, corners].reshape(-1, corners.shape[1]))
+    return {size: np.concatenate(some) for size, some in found.items()}
+
+
+def outer_nodes(blocks: Blocks) -> NDArray[np.int64]:
+    """Nodes on the outside, those inside facets included."""
+    nodes = [np.unique(facets) for facets in outer_facets(blocks)]
+    for name, cells in blocks.items():
+        kind = KINDS[name]
+        for k, some in enumerate(kind.between):
+            if kind.dim == 3 and len(some) == 4:  # in the middle of a facet of a hexahedron
+                facets = np.sort(cells[:, list(some)], axis=1)
+                (outside,) = outer_facets({kind.base: cells[:, : kind.corners]})
+                nodes.append(cells[_rows_among(facets, np.sort(outside, axis=1)), kind.corners + k])
+    return np.unique(np.concatenate(nodes))
+
+
+def _rows_among(rows: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(m,) whether each row is one of the others."""
+    _, label = np.unique(np.vstack([rows, others]), axis=0, return_inverse=True)
+    return np.isin(label.ravel()[: len(rows)], label.ravel()[len(rows) :])
+
+
+def tiles(blocks: Blocks) -> bool:
+    """Whether positively oriented linear cells lie side by side: any facet bounds one from each side at most.
+
+    Cells made up to explain entries overlap: several small triangles in a quadratic one, for example.
+    """
+    return not any(_bounding_twice(facets).any() for facets in _facets(blocks).values())
+
+
+def contested(base: str, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(m,) positively oriented linear cells one of whose facets bounds another cell from the same side."""
+    (facets,) = _facets({base: cells}).values()
+    return np.asarray(_bounding_twice(facets).reshape(len(cells), len(_outlines(base))).any(axis=1))
+
+
+def _bounding_twice(facets: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(f,) facets that occur more than once, seen from the same side."""
+    if facets.shape[1] > 2:  # start with the least node: the order of the others then tells the side, as an edge's does
+        start = facets.argmin(axis=1)[:, None]
+        facets = np.take_along_axis(facets, (start + np.arange(facets.shape[1])) % facets.shape[1], axis=1)
+    order = np.lexsort(facets.T)
+    same = (facets[order[1:]] == facets[order[:-1]]).all(axis=1)
+    double = np.zeros(len(facets), dtype=bool)
+    double[order[1:][same]] = double[order[:-1][same]] = True
+    return double
+
+
+def boundary_loops(blocks: Blocks) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Directed boundary edges of planar cells loop by loop, and where each loop begins.
+
+    Where loops touch in a vertex they are taken apart, or joined, as the order of the cells has it.
+
+    Returns
+    -------
+    boundary : (b, 2) int64
+    offsets : (loops + 1,) int64
+    """
+    (edges,) = outer_facets(blocks)
+    if not len(edges):
+        return edges.reshape(0, 2), np.zeros(1, np.int64)
+    successor = np.empty(len(edges), np.int64)
+    # As many edges leave a vertex as enter it.
+    successor[np.argsort(edges[:, 1], kind="stable")] = np.argsort(edges[:, 0], kind="stable")
+    loop, order = loops(successor)
+    return edges[order], np.append(np.flatnonzero(np.diff(loop[order], prepend=-1)), len(order)).astype(np.int64)

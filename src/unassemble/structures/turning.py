@@ -1,0 +1,99 @@
+"""Positions of the nodes of frames, shells and plates, from the equations that deserve most trust."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..elasticity.nullspace.shape import EXACT, set_aside
+from ..elasticity.results import Evidence
+from ..errors import GeometryError
+from ..tolerances import CERTIFIED
+from .equations import Equations, equations
+from .layouts import Layout
+from .nodes import Nodes
+from .pieces import Piece
+from .placed import Placed, Positions, placed
+from .positions import least_squares
+from .redundancy import unnoticed
+
+_NOTHING = 1e-9  # of what rotations of nodes contribute: displacements between coupled nodes that are rounding
+
+
+def turning_positions(nodes: Nodes) -> tuple[Placed, NDArray[np.bool_]]:
+    """Positions from all rows; where these contradict or do not check each other, from those that no spring spoils.
+
+    Returns
+    -------
+    Placed
+    (n, b, rotations) bool
+        Rows and rotations that these rest on, whose forces have to vanish.
+
+    Raises
+    ------
+    GeometryError
+        If no node is determined.
+    """
+    attempts: list[tuple[Placed, NDArray[np.bool_]]] = []
+    failure: GeometryError | None = None
+    layout, valid = nodes.layout, nodes.whole()
+    edges = np.column_stack(sp.triu(nodes.moving, 1).nonzero())
+    for springs in (False, True):
+        given, counted = equations(nodes, valid, springs=springs), valid.copy()
+        if springs:
+            counted[:, len(layout.displacements) :] = False
+        try:
+            found = placed(given.operator, layout.dim, edges, partial(_positions, given, layout))
+        except GeometryError as error:
+            failure = failure or error
+            continue
+        left = given[~found.used & (given.row >= 0)]
+        counted.reshape(-1, counted.shape[2])[left.row, left.rotation] = False
+        attempts.append((found, counted))
+        if not any(_doubts(found)[:3]) and found.used.all():
+            break
+    if not attempts and failure:
+        raise failure
+    return min(attempts, key=lambda one: _doubts(one[0]))
+
+
+def _doubts(found: Placed) -> tuple[bool, bool, bool, int, float]:
+    """What speaks against positions, the gravest first."""
+    free, lost = found.null_dimension > found.points.shape[1], int(np.count_nonzero(found.component < 0))
+    return found.residual > CERTIFIED, free, bool(found.unnoticed.any()), lost, found.residual
+
+
+def _positions(given: Equations, layout: Layout, piece: Piece) -> Positions:
+    """Coordinates of one piece.
+
+    Raises
+    ------
+    GeometryError
+        If there are fewer equations than unknowns leave room for, or far more is free than translations.
+    """
+    d, b, n, m = layout.dim, layout.block_size, len(piece.nodes), len(piece.rows)
+    if n < 2 or m < (n - 1) * d:
+        raise GeometryError(f"{m} equations are too few for {n} nodes: too much lies next to supports")
+    part = given[piece.rows]
+    x, residuals, fields, values = least_squares(piece.operator, part.right, d)
+    x = x.reshape(n, d)
+    span = np.linalg.norm(x[piece.edges[:, 0]] - x[piece.edges[:, 1]], axis=1).max(initial=0)
+    if span <= _NOTHING * part.lever.max(initial=0):
+        raise GeometryError("rotations and displacements do not depend on each other: the nodes would lie in one point")
+    null, gap = fields[..., values <= EXACT], values[values > EXACT]
+    loose = np.zeros(n, dtype=bool)
+    if null.shape[2] > d:
+        null, loose = set_aside(null, d)
+    place = np.searchsorted(piece.nodes, part.row // b)
+    own = (part.row >= 0) & (
+        piece.nodes[np.minimum(place, n - 1)] == part.row // b
+    )  # a row may not depend on its own node
+    local = replace(part, operator=piece.operator, row=np.where(own, place * b + part.row % b, -1))
+    blind = unnoticed(local, residuals[:, 1:], layout, x, piece.edges)
+    residual = float(np.abs(residuals[:, 0]).max()) / span
+    evidence = Evidence(null.shape[2], residual, float(gap[0]) if len(gap) else float("inf"), m)
+    return Positions(np.where(loose[:, None], np.nan, x - x[~loose].mean(axis=0)), evidence, blind)
