@@ -6,11 +6,12 @@ import scipy.sparse as sp
 
 from meshes import largest_error, random_mesh, specimen
 from unassemble import recover
-from unassemble.cells import in_doubt, wrong_entries
+from unassemble.cells import in_doubt
 from unassemble.matrix import check_matrix
 from unassemble.planar.conformal import conformal_map
 from unassemble.planar.piece import PieceMesh
 from unassemble.planar.robust import robust_fit
+from unassemble.scalar.wrong_entries import wrong_entries
 from unassemble.topology import recognise, surfaces
 from vanishing import forgotten, holes, squares, triangular_holes
 

@@ -7,7 +7,6 @@ from .completion import completed, guessed
 from .doubt import Attempt, Outcome, in_doubt
 from .eliminated import incomplete_rows
 from .unique.alternatives import Alternative, alternatives
-from .wrong_entries import settled, wrong_entries
 
 __all__ = [
     "Alternative",
@@ -18,6 +17,4 @@ __all__ = [
     "guessed",
     "in_doubt",
     "incomplete_rows",
-    "settled",
-    "wrong_entries",
 ]

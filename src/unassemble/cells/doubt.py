@@ -12,8 +12,6 @@ from scipy.sparse import csgraph
 from ..errors import RecoveryError, SolverError
 from ..matrix import OperatorMatrix
 from ..planar.cautious import cautious_polish, count_flipped
-from ..planar.cotangent import left_by_all
-from ..planar.deviations import factor_deviations
 from ..planar.piece import PieceMesh
 from ..planar.polish import PolishOptions, polish
 from ..topology import Numbering, Piece, Topology, components
@@ -25,9 +23,6 @@ _WIDE = 200  # rows of a matrix on which the misfit of a wrong cell stays near i
 SURE = 1e-3
 """Misfit, even if spread evenly, that no wrong cell is known to leave."""
 
-_SIGMAS = 5.0  # errors of c by which pieces may differ: the last word on that is not spoken here
-_CHANCE = np.log(1e-6)  # that factors agree by coincidence
-_NORMAL_MEDIAN = 1.4826  # standard deviation of normal errors, over the median of their moduli
 _SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 
 Outcome = PieceMesh | RecoveryError
@@ -54,7 +49,8 @@ def in_doubt(
     """
     doubtful = unexplained(matrix, topology)
     solved = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
-    doubtful |= _discordant(matrix, solved, scale, noise or 0.0)
+    if not noise:
+        doubtful |= _discordant(matrix, solved, scale)
     solved = [(piece, mesh) for piece, mesh in solved if not doubtful[piece.vertices[0]]]
     rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
     misfit = misfits_of(matrix, solved)[rest]
@@ -68,68 +64,28 @@ def in_doubt(
     return doubtful | _components_of(matrix, rest[wrong])
 
 
-def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None, noise: float) -> NDArray[np.bool_]:
-    """(n,) rows of components whose pieces fit, but loose ones with another factor c than is known or others have.
+def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None) -> NDArray[np.bool_]:
+    """(n,) rows of components whose pieces all fit, but loose ones with another factor c than is known or others have.
 
     With a hole filled such a piece still fits, with another c. That of pieces with more entries than unknowns is right,
     if any is: where these differ from each other, or from the known one, other cells are no help.
     """
     having = [(piece, mesh) for piece, mesh in solved if isinstance(mesh, PieceMesh)]
-    none = np.zeros(matrix.n, dtype=bool)
     if not having:
-        return none
-    pieces, meshes = zip(*having, strict=True)
+        return np.zeros(matrix.n, dtype=bool)
     label = components_of(matrix)
-    count = int(label.max()) + 1
-    own = label[[piece.vertices[0] for piece in pieces]]
-    loose = np.array([piece.redundancy <= 0 for piece in pieces])
-    c = np.array([mesh.scale for mesh in meshes])
-    order = np.lexsort((np.array([piece.n_vertices for piece in pieces]), ~loose))
-    telling = np.full(count, -1)  # the piece that tells c: the largest of those with entries to spare, if there is one
+    own = label[[piece.vertices[0] for piece, _ in having]]
+    loose = np.array([piece.redundancy <= 0 for piece, _ in having])
+    c = np.array([mesh.scale for _, mesh in having])
+    order = np.lexsort((np.array([piece.n_vertices for piece, _ in having]), ~loose))
+    telling = np.full(int(label.max()) + 1, -1)  # the piece that tells c: the largest of those with entries to spare
     telling[own[order]] = order
-    right = np.full(len(c), scale) if scale else c[telling[own]]
-    apart = np.abs(c / right - 1) > SAME_SCALE
-    if not apart.any():
-        return none
-    deviation = factor_deviations(pieces, [mesh.z for mesh in meshes], [None] * len(pieces)) / np.abs(c)
-    told = np.zeros(len(c)) if scale else deviation[telling[own]]
-    sigma = np.full(count, noise) if noise else _noise(matrix, pieces, meshes, own, count, c, deviation)
-    apart &= np.abs(c / right - 1) > _SIGMAS * sigma[own] * np.hypot(deviation, told)
-    wrong, hopeless = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    apart = np.abs(c / (scale or c[telling[own]]) - 1) > SAME_SCALE
+    wrong, hopeless = np.zeros((2, len(telling)), dtype=bool)
     wrong[own[apart]] = True
     hopeless[own[apart & ~loose]] = True
+    hopeless[label[matrix.edges[misfits_of(matrix, solved) > FITS, 0]]] = True
     return np.asarray((wrong & ~hopeless)[label])
-
-
-def _noise(
-    matrix: OperatorMatrix,
-    pieces: Sequence[Piece],
-    meshes: Sequence[PieceMesh],
-    own: NDArray,
-    count: int,
-    c: NDArray,
-    deviation: NDArray,
-) -> NDArray[np.float64]:
-    """(count,) standard deviation of the entries' errors in each component, from what their pieces leave unexplained.
-
-    Where no piece has entries to spare it is the one for which half of them have the same c, if they are so many that
-    this is no coincidence, and 0 otherwise.
-    """
-    sizes = [len(piece.edge_rows) for piece in pieces]
-    left = left_by_all(pieces, -matrix.entries, [mesh.z for mesh in meshes], c)
-    with np.errstate(all="ignore"):  # not finite at flat triangles
-        squares = np.bincount(np.repeat(own, sizes), left**2, count)
-    spare = np.bincount(own, [piece.redundancy for piece in pieces], count)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        sigma = np.where(spare > 0, np.sqrt(squares / spare), 0.0)
-    for component in np.flatnonzero((spare <= 0) & (np.bincount(own, minlength=count) > 2)):
-        inside = own == component
-        if (c[inside] * c[inside][0] > 0).all():
-            size = np.log(np.abs(c[inside]))
-            away = np.abs(size - np.median(size))
-            if (inside.sum() / 2 - 1) * np.log(max(float(np.median(away)), np.finfo(float).tiny)) < _CHANCE:
-                sigma[component] = _NORMAL_MEDIAN * np.median(away / deviation[inside])
-    return np.asarray(sigma)
 
 
 def _like_noise(misfit: NDArray, n: int) -> bool:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cells import settled
 from ..certify import Certificate
 from ..errors import SolverError
 from ..matrix import OperatorMatrix
@@ -18,6 +17,7 @@ from ..planar.robust import differences_without
 from ..planar.suspects import find_suspects
 from ..topology import Topology
 from .noise import Noise
+from .wrong_entries import settled
 
 _SUSPECT_LIMIT = 200_000
 """Most vertices of a piece that is searched for wrong entries: that takes a factorisation of its own."""

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cells import Outcome, completed, in_doubt, wrong_entries
+from ..cells import Outcome, completed, in_doubt
 from ..errors import GeometryError, RecoveryError, SolverError
 from ..linalg import Factorisation, UpperTriangle, blas_threads, factorisation
 from ..matrix import OperatorMatrix
@@ -20,6 +20,7 @@ from ..planar.triangles import lone_triangles
 from ..topology import Piece, Polygons, Topology
 from .factors import Factors, fitted_together
 from .noise import Noise, with_vanished
+from .wrong_entries import wrong_entries
 
 Clock = Callable[[str], AbstractContextManager[None]]
 

@@ -57,7 +57,7 @@ class Candidates(CellSet):
         relative = weights / (scale or likeliest_scale(blocks, weights))
         angles = np.repeat(facing_angles(relative), 2)
         sums = face_sums(blocks, angles)
-        outer = outer_faces(blocks, sums, relative)
+        outer = outer_faces(blocks, sums)
         faces = np.flatnonzero(blocks.simple)
         empty = (blocks.size > _SHORT) | outer | ~blocks.simple
         corners = Corners.of(blocks.joined(empty), empty[blocks.face])

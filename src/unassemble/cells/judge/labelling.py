@@ -16,17 +16,15 @@ from ...planar.hinges import CLOSED, gap
 from ...planar.piece import PieceMesh
 from ...planar.triangles import lone_triangles
 from ...topology import Piece, Topology
-from ...topology.keys import contains, pair_keys, with_sides
+from ...topology.keys import pair_keys, with_sides
 from ...topology.pieces import planar_pieces
 from ..candidates.cell_set import CellSet
 from .maps import best_map
+from .triangulation import triangulation
 from .within_errors import GAP, beyond, factor_tolerances, polished
 
 FITS = 1e-6
 """Largest misfit, relative to the row, of a conformal solve with the right cells; the polish does the rest."""
-
-NEARLY = 1e-5
-"""Misfit up to which entries of few digits may keep a labelling from fitting."""
 
 _RIGHT_ANGLES = 4
 
@@ -124,19 +122,6 @@ class Labelling(Generic[C]):
         """Whether every entry is reproduced."""
         return bool(len(self.pieces) and (self.misfit <= FITS).all())
 
-    def nearly_fits(self, agree: float) -> bool:
-        """Whether it might fit, were it not for errors of the entries; those of noise are up to `agree`."""
-        return bool(len(self.pieces) and self.misfit.max() <= max(NEARLY, agree))
-
-    @property
-    def fits_but_for_few(self) -> bool:
-        """Whether every entry is reproduced that has not been set aside as wrong."""
-        rest = np.ones(len(self.edges), dtype=bool)
-        for piece, mesh in zip(self.pieces, self.meshes, strict=True):
-            if mesh is not None and mesh.aside is not None:
-                rest[piece.edge_rows[mesh.aside]] = False
-        return bool(len(self.pieces) and not rest.all() and (self.misfit[rest] <= FITS).all())
-
     @property
     def has_wrong_entries(self) -> bool:
         """Whether entries have been set aside as wrong; those that are left may have small errors."""
@@ -157,14 +142,6 @@ class Labelling(Generic[C]):
         """The c that is known, or that of the largest piece; 1 where nothing is solved."""
         solved = [(piece.n_vertices, mesh.scale) for piece, mesh in zip(self.pieces, self.meshes, strict=True) if mesh]
         return self.candidates.scale or max(solved, default=(0, 1.0))[1]
-
-    @property
-    def like_noise(self) -> bool:
-        """Whether the misfit is that of errors in the entries, see :func:`even`.
-
-        If they are known and do not explain it, they are larger than is said, or it is that of wrong cells.
-        """
-        return bool(len(self.pieces)) and self.size < 1e-3 and even(self.misfit)
 
 
 def _crowded(candidates: CellSet, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -249,52 +226,6 @@ def even(misfit: NDArray) -> bool:
         return False
     size = float(np.sqrt(np.mean(misfit**2)))
     return size < 0.03 and float(misfit.max()) < 8 * size and float(np.median(misfit)) > 0.3 * size
-
-
-def triangulation(candidates: CellSet, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(m, 3) triangles of the chosen cells, longer ones in fans.
-
-    The apex of a fan moves on where a diagonal would be an edge already, of the graph or of another cell.
-    """
-    n, shift = candidates.n_vertices, np.zeros(candidates.count, dtype=np.int64)
-    given = candidates.edges[:, 0] * n + candidates.edges[:, 1]
-    for _ in range(int(candidates.size.max())):
-        triangles, cell, diagonal = _fans(candidates, labels, shift)
-        key = _keys(n, triangles)[:, 1]  # each diagonal belongs to the triangle before it
-        key, owner = key[diagonal], cell[diagonal]
-        value, place, count = np.unique(key, return_inverse=True, return_counts=True)
-        clash = contains(given, value) | (count > 1)
-        if not clash.any():
-            break
-        moved = owner[clash[place]]
-        # Of two cells that want the same diagonal one keeps it.
-        keeps = np.unique(key[clash[place]], return_index=True)[1]
-        moved = np.setdiff1d(moved, moved[keeps][count[clash] > 1])
-        shift[moved] += 1
-    return triangles
-
-
-def _fans(candidates: CellSet, labels: NDArray, shift: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Triangles, the cell of each, and whether its last side is a diagonal."""
-    cells = np.flatnonzero(labels)
-    size = candidates.size[cells]
-    cell = np.repeat(cells, size - 2)
-    step = np.arange(len(cell)) - np.repeat(np.cumsum(size - 2) - (size - 2), size - 2) + 1
-    start, length = candidates.cells.offsets[cell], candidates.size[cell]
-    corner = (shift[cell][:, None] + np.column_stack([np.zeros_like(step), step, step + 1])) % length[:, None]
-    return candidates.cells.vertices[start[:, None] + corner], cell, step < length - 2
-
-
-def fans_of(candidates: CellSet, labels: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """(m, 3) triangles of cells, each in a fan about its first vertex, and (m,) the cell of each."""
-    triangles, cell, _ = _fans(candidates, labels, np.zeros(candidates.count, dtype=np.int64))
-    return triangles, cell
-
-
-def _keys(n: int, triangles: NDArray) -> NDArray[np.int64]:
-    """(m, 3) keys i n + j, i < j, of the edges facing the corners."""
-    ends = triangles[:, [[1, 2], [2, 0], [0, 1]]]
-    return pair_keys(n, ends[..., 0], ends[..., 1])
 
 
 def _key_of(piece: Piece) -> bytes:

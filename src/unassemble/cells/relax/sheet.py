@@ -20,8 +20,8 @@ from ...planar.normal import distant_pair
 from ...planar.pencil import ConformalPencil
 from ...topology.keys import with_sides
 from ..candidates.candidates import Candidates
-from ..judge.labelling import fans_of
 from ..judge.maps import best_of, mean_misfit
+from ..judge.triangulation import fans_of
 
 LONGEST = 40
 """Edges of a face that may be a cell."""

@@ -10,15 +10,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cells.agreement import SAME_SCALE
+from ..cells.doubt import SURE, Attempt, Outcome, misfits_of, unexplained, with_pieces
+from ..cells.judge.labelling import FITS, even
 from ..matrix import OperatorMatrix
 from ..planar.cautious import count_flipped
 from ..planar.cotangent import edge_weights
 from ..planar.piece import PieceMesh
 from ..planar.robust import RobustFit, robust_fit
 from ..topology import Numbering, Piece, Topology
-from .agreement import SAME_SCALE
-from .doubt import SURE, Attempt, Outcome, misfits_of, unexplained, with_pieces
-from .judge.labelling import FITS, even
 
 _MOST_VERTICES = 200_000
 _CHANCE = np.log(1e-6)  # that the entries which fit do so by coincidence
