@@ -11,7 +11,7 @@ from scipy.sparse import csgraph
 
 from ..errors import RecoveryError, SolverError
 from ..matrix import OperatorMatrix
-from ..planar.cautious import cautious_polish, count_flipped
+from ..planar.cautious import cautious_polish
 from ..planar.piece import PieceMesh
 from ..planar.polish import PolishOptions, polish
 from ..topology import Numbering, Piece, Topology, components
@@ -94,23 +94,19 @@ def _like_noise(misfit: NDArray, n: int) -> bool:
 
 
 def _shortly_polished(matrix: OperatorMatrix, solved: Solved, scale: float | None, *, small_steps: bool) -> Solved:
-    """By a few large steps; where these lead to flat triangles by as many `small_steps` as it takes, if at all."""
+    """By a few steps; by small ones where noise may lead large ones to flat triangles."""
     polished: Solved = []
     for piece, mesh in solved:
+        outcome: Outcome = mesh
         if isinstance(mesh, PieceMesh):
-            weights, failure = -matrix.entries[piece.edge_rows], None
+            weights = -matrix.entries[piece.edge_rows]
             try:
-                found = polish(piece, weights, mesh.z, scale=scale, options=_SHORT)
+                step = cautious_polish(piece, weights, mesh.z, scale=scale) if small_steps else None
+                found = step or polish(piece, weights, mesh.z, scale=scale, options=_SHORT)
+                outcome = PieceMesh(found.z, found.scale)
             except SolverError as error:
-                failure = error
-            try:
-                if small_steps and (failure or count_flipped(piece, found.z)):
-                    found, failure = cautious_polish(piece, weights, mesh.z, scale=scale), None
-            except SolverError as error:
-                failure = error
-            polished.append((piece, failure or PieceMesh(found.z, found.scale)))
-        else:
-            polished.append((piece, mesh))
+                outcome = error
+        polished.append((piece, outcome))
     return polished
 
 

@@ -20,14 +20,13 @@ from ..planar.cotangent import edge_weights
 from ..planar.inside import fit_inside
 from ..planar.piece import PieceMesh
 from ..planar.polish import PolishedMesh, PolishOptions, polish
-from ..planar.robust import ASIDE, RobustFit, robust_fit
+from ..planar.robust import ASIDE
 from ..topology import Piece
 from ..words import count_of
 from .judge.labelling import FITS, Labelling
 from .search.search import first_labelling
 
 _SUM = 1e-10  # sum of a row, relative to its entries, that is rounding
-_FEW = 0.1  # wrong entries, for each on the boundary
 _SHORT = PolishOptions(max_steps=20, max_factorisations=3)
 _NOTE = (
     "entries between rows that do not add up to zero, as next to unknowns that were eliminated, still contain cells "
@@ -142,17 +141,9 @@ def _without(piece: Piece, weights: NDArray, aside: NDArray[np.int64], scale: fl
         return None
     # Of entries set aside by choice there are fewer than of those that the mesh is held against.
     more = len(inner.aside) - len(aside)
-    if piece.redundancy - len(inner.aside) <= more or _may_be_whole(piece, weights, aside, inner, scale):
+    if piece.redundancy - len(inner.aside) <= more:
         return None
     return PieceMesh(inner.z, inner.scale, (_NOTE, *_more(more)), aside=inner.aside)
-
-
-def _may_be_whole(
-    piece: Piece, weights: NDArray, unknown: NDArray[np.int64], near: RobustFit, scale: float | None
-) -> bool:
-    """Whether all entries but a few fit, those on the boundary too, as they cannot where cells beyond them are gone."""
-    found = robust_fit(piece, weights, near.z, lambda misfit: bool(misfit.max(initial=0.0) <= FITS), scale=scale)
-    return found is not None and len(found.aside) <= _FEW * len(unknown)
 
 
 def _fit(piece: Piece, weights: NDArray, found: PolishedMesh) -> NDArray[np.bool_]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Generic, TypeVar
@@ -19,7 +18,7 @@ from ...topology import Piece, Topology
 from ...topology.keys import pair_keys, with_sides
 from ...topology.pieces import planar_pieces
 from ..candidates.cell_set import CellSet
-from .maps import best_map
+from .maps import map_of
 from .triangulation import triangulation
 from .within_errors import GAP, beyond, factor_tolerances, polished
 
@@ -86,7 +85,7 @@ class Labelling(Generic[C]):
             if piece not in meshes:
                 name = _key_of(piece)
                 if name not in known:
-                    known[name] = best_map(piece, weights[piece.edge_rows])
+                    known[name] = map_of(piece, weights[piece.edge_rows])
                 meshes[piece] = known[name]
         return bare.placed(tuple(meshes[piece] for piece in bare.pieces))
 
@@ -166,15 +165,6 @@ def misfits(n: int, edges: NDArray, weights: NDArray, solved: list[tuple[Piece, 
         left = np.abs(scale * fitted - weights[rows]) / smaller
     misfit[rows] = np.where(left < 1, left, 1.0)
     return misfit
-
-
-def sound_pieces(solved: Iterable[tuple[Piece, PieceMesh | None]], misfit: NDArray) -> list[tuple[Piece, PieceMesh]]:
-    """Pieces that fit by themselves and have entries to spare, so that it is no chance."""
-    return [
-        (piece, mesh)
-        for piece, mesh in solved
-        if mesh is not None and piece.redundancy > 0 and (misfit[piece.edge_rows] <= FITS).all()
-    ]
 
 
 def _add_discord(

@@ -47,8 +47,8 @@ class Path:
     last: float = 1e-3
     factor: float = 0.75
     slack: float = 0.03
-    mapped_above: float = 0.01
-    outlier: float = np.inf
+    mapped_above: float = 1e-3
+    outlier: float = 0.3
 
 
 def relaxed(sheet: Sheet, free: NDArray[np.bool_], path: Path) -> NDArray[np.bool_] | None:

@@ -20,7 +20,6 @@ from ...planar.normal import distant_pair
 from ...planar.pencil import ConformalPencil
 from ...topology.keys import with_sides
 from ..candidates.candidates import Candidates
-from ..judge.maps import best_of, mean_misfit
 from ..judge.triangulation import fans_of
 
 LONGEST = 40
@@ -163,24 +162,6 @@ class Sheet:
                 break
             shift = c * (1 - min(max(4 * spread, 1e-6), 0.3))
         return Placed(z, c if self.free_scale else 1.0)
-
-    def best_mapped(self, strength: NDArray) -> Placed:
-        """The map that fits best of the first few, see :mod:`unassemble.cells.judge.maps`.
-
-        Raises
-        ------
-        RecoveryError
-            If there is none.
-        """
-        first = self.mapped(strength)
-        unit = first.c
-        mean = mean_misfit(self.edges, self.weights / unit)
-
-        def misfit(z: NDArray, c: float) -> float:
-            return mean(c * self.fitted_weights(z, strength))
-
-        z, c = best_of(self.pencil(strength, unit), first.z, misfit)
-        return Placed(z, c * unit)
 
     def linearised(self, placed: Placed, strength: NDArray) -> tuple[sp.csr_array, sp.csr_array, NDArray]:
         """Derivatives of the weights over their spread.

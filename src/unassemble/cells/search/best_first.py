@@ -23,33 +23,10 @@ from ..judge.labelling import Labelling
 from ..relax.sheet import Sheet
 from .leaps import leap
 from .moves import turned
+from .options import DEFAULT, SearchOptions
 from .updates import Updates
 
 _log = logging.getLogger(__name__)
-
-_BATCH = 8
-"""Small changes of a labelling that are tried at a time."""
-
-_IN_VAIN = 40
-"""Changes in all without an improvement."""
-
-_TRIED = 0.25
-"""A labelling with a batch tried is put off behind those with so much more misfit."""
-
-_BETTER = 0.9
-"""Misfit, relative to the least before, that is an improvement worth its price."""
-
-_RANKING = 10
-"""Solves that ranking the changes of a labelling costs."""
-
-_PATIENCE = 15
-"""Labellings whose changes are ranked for as much misfit as there is, if it goes on falling as it has."""
-
-_LEAPS = 8
-"""Changes of many labels at once, one after the other."""
-
-_MANY = 20
-"""Pieces that cost as much as another solve."""
 
 _Waiting = tuple[float, int, Labelling, Iterator[NDArray[np.bool_]] | None]
 
@@ -64,7 +41,7 @@ class Judge:
     def __call__(self, candidates: Candidates, labels: NDArray[np.bool_]) -> Labelling[Candidates]:
         """A labelling, its cost taken."""
         labelling = Labelling.of(candidates, labels, self._known)
-        self.spend(labelling, 1 + len(labelling.pieces) // _MANY)
+        self.spend(labelling, 1 + len(labelling.pieces) // 20)
         return labelling
 
     def spend(self, labelling: Labelling, solves: float) -> None:
@@ -82,11 +59,11 @@ def better(one: Labelling | None, other: Labelling) -> Labelling:
     return other if one is None or other.size < one.size else one
 
 
-def leapt(start: Labelling[Candidates], judge: Judge) -> Labelling[Candidates]:
+def leapt(start: Labelling[Candidates], judge: Judge, options: SearchOptions = DEFAULT) -> Labelling[Candidates]:
     """The best of what all clear changes at once lead to, uphill too: with many wrong cells the misfit is no guide."""
     best = labelling = start
     sheet, seen = Sheet(start.candidates, start.scale), {start.labels.tobytes()}
-    for _ in range(_LEAPS):
+    for _ in range(options.leaps):
         labels = leap(sheet, labelling.labels)
         if labelling.fits or judge.spent or labels.tobytes() in seen:
             break
@@ -104,10 +81,13 @@ class BestFirst:
     start : Labelling
     free : (cells,) bool, optional
         Labels that may change; all of them by default.
+    options : SearchOptions
     """
 
-    def __init__(self, start: Labelling[Candidates], free: NDArray[np.bool_] | None = None):
-        self.best = start
+    def __init__(
+        self, start: Labelling[Candidates], free: NDArray[np.bool_] | None = None, options: SearchOptions = DEFAULT
+    ):
+        self.best, self._options = start, options
         self._candidates, self._scale = start.candidates, start.scale
         self._n_faces = int(start.candidates.sides[:, 0].max(initial=-1)) + 1
         self._free = np.ones(start.candidates.count, dtype=bool) if free is None else free
@@ -119,11 +99,11 @@ class BestFirst:
 
     @cached_property
     def _updates(self) -> Updates:
-        return Updates(Sheet(self._candidates, self._scale), self._free)
+        return Updates(Sheet(self._candidates, self._scale), self._free, self._options)
 
     def run(self, judge: Judge) -> Labelling[Candidates]:
         """Go on until a labelling fits, or the budget is spent, or the search is in vain; the best so far."""
-        while self._waiting and not (self.best.fits or judge.spent) and self._in_vain < _IN_VAIN:
+        while self._waiting and not (self.best.fits or judge.spent) and self._in_vain < self._options.in_vain:
             value, number, labelling, changed = heapq.heappop(self._waiting)
             if changed is None:
                 if self._hopeless:
@@ -132,13 +112,13 @@ class BestFirst:
                 self._ranked += 1
                 changed = self._changed(labelling)
             asked = 0
-            for labels in islice(changed, _BATCH):
+            for labels in islice(changed, self._options.batch):
                 asked += 1
-                if judge.spent or self._tried(labels, labelling, judge) < _BETTER * value:
+                if judge.spent or self._tried(labels, labelling, judge) < self._options.better * value:
                     break
             else:
-                judge.spend(labelling, _RANKING)  # what leads on is not counted
-                value += _TRIED * labelling.mean_misfit
+                judge.spend(labelling, self._options.ranking)  # what leads on is not counted
+                value += self._options.tried * labelling.mean_misfit
             if asked:
                 heapq.heappush(self._waiting, (value, number, labelling, changed))
         _log.debug("best-first: misfit %.1e, %d labellings ranked", self.best.size, self._ranked)
@@ -147,12 +127,14 @@ class BestFirst:
     @property
     def _hopeless(self) -> bool:
         """Whether the misfit, about proportional to the number of wrong labels, will not be gone falling as it has."""
-        return self._ranked >= 8 and self._ranked * self._least > _PATIENCE * (self._first - self._least)
+        return self._ranked >= self._options.at_least and (
+            self._ranked * self._least > self._options.patience * (self._first - self._least)
+        )
 
     def _changed(self, labelling: Labelling[Candidates]) -> Iterator[NDArray[np.bool_]]:
         """Small changes of the labels; where the first few are in vain, also all clear ones at once."""
         for k, move in enumerate(self._updates.ranked(labelling)):
-            if k == _BATCH and self._n_faces == self._candidates.count:
+            if k == self._options.batch and self._n_faces == self._candidates.count:
                 yield leap(self._updates.sheet, labelling.labels)
             yield self._whole(turned(labelling.labels, move))
 

@@ -30,7 +30,7 @@ def leap(sheet: Sheet, labels: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(cells,) labels with all clear changes made; as they are where there is no map."""
     strength = labels.astype(np.float64)
     try:
-        placed = sheet.best_mapped(strength)
+        placed = sheet.mapped(strength)
         by_position, by_label, by_scale = sheet.linearised(placed, strength)
         free = unpinned(placed.z)
         columns = sp.hstack([by_position[:, free], sp.csr_array(by_scale[:, None]), by_label]).tocsr()

@@ -45,7 +45,7 @@ class ChangedMaps:
 
     def __init__(self, sheet: Sheet, labels: NDArray[np.bool_], near: float):
         strength = labels.astype(np.float64)
-        placed = sheet.best_mapped(strength)
+        placed = sheet.mapped(strength)
         pencil = sheet.pencil(strength)
         self._cells = sheet.candidates.cells
         self._shift = (1 - near) * placed.c

@@ -17,28 +17,16 @@ from ..judge.labelling import Labelling
 from ..propagate.peeling import ContradictionError, lone_scales, peeled
 from ..relax.holes import with_holes
 from .best_first import BestFirst, Judge, better, leapt
-
-MOST_VERTICES = 20_000
-"""Up to which labels are relaxed and searched for."""
-
-_WORK, _LEAST, _MOST = 1.2e5, 12, 500
-"""Vertices times solves that a graph is worth, and the least and the largest number of solves."""
-
-_FIRST = 0.7
-"""Part of what is left for the likeliest start; half for each of the others."""
-
-_SOLVES = 300
-"""For the last wrong labels after a relaxation."""
-
-_CLOSE, _WIDE = 0.15, 300
-"""Misfit of a labelling that few cells are missing in, and solves for these."""
-
-_FEW = 60
-"""Vertices below which relaxations have nothing to go on."""
+from .options import DEFAULT, SearchOptions
 
 
 def label_cells(
-    n: int, edges: NDArray, weights: NDArray, scale: float | None = None, errors: NDArray | None = None
+    n: int,
+    edges: NDArray,
+    weights: NDArray,
+    scale: float | None = None,
+    errors: NDArray | None = None,
+    options: SearchOptions = DEFAULT,
 ) -> Labelling[Candidates] | None:
     """The labelling of a connected planar graph that fits its weights, or else the one that fits best.
 
@@ -53,13 +41,14 @@ def label_cells(
         c, where it is known.
     errors : (e,) float64, optional
         Standard deviations of the errors of the weights, where they are known.
+    options : SearchOptions
 
     Returns
     -------
     Labelling or None
         None if no labelling makes a planar surface.
     """
-    judge = Judge(Budget(float(np.clip(_WORK, _LEAST * n, _MOST * n))))
+    judge = Judge(Budget(float(np.clip(options.work, options.least_solves * n, options.solves * n))))
     starts: list[Labelling[Candidates]] = []
     for number, candidates in enumerate(embedded(n, edges, weights, scale, errors)):
         for labels in likely_labels(candidates):
@@ -67,23 +56,23 @@ def label_cells(
             if start.fits:
                 return start
             starts += [start] if start.pieces else []
-        if not number and _FEW <= n <= MOST_VERTICES:
-            relaxed = _with_holes(candidates)
+        if not number and options.least_relaxed <= n <= options.most_vertices:
+            relaxed = _with_holes(candidates, options)
             if relaxed is not None and relaxed.fits:
                 return relaxed
             starts += [relaxed] if relaxed is not None and relaxed.pieces else []
     best: Labelling[Candidates] | None = None
     for number, start in enumerate(sorted(starts, key=lambda one: one.mean_misfit)):
         best = better(best, start)
-        if n <= MOST_VERTICES and not judge.spent:
-            judge.budget, whole = judge.budget.share(_FIRST if number == 0 else 0.5), judge.budget
+        if n <= options.most_vertices and not judge.spent:
+            judge.budget, whole = judge.budget.share(options.first if number == 0 else 0.5), judge.budget
             start = leapt(start, judge)
             best = better(best, start if start.fits else BestFirst(start).run(judge))
             judge.budget = whole
         if best.fits:
             break
-    if best is not None and not best.fits and best.size < _CLOSE and n <= MOST_VERTICES:
-        best = better(best, BestFirst(_widened(best)).run(Judge(Budget(float(_WIDE * n)))))
+    if best is not None and not best.fits and best.size < options.close and n <= options.most_vertices:
+        best = better(best, BestFirst(_widened(best)).run(Judge(Budget(float(options.widened_solves * n)))))
     return best
 
 
@@ -95,22 +84,28 @@ def _widened(labelling: Labelling[Candidates]) -> Labelling[Candidates]:
     return Labelling.of(candidates, labels)
 
 
-def _with_holes(candidates: Candidates) -> Labelling[Candidates] | None:
+def _with_holes(candidates: Candidates, options: SearchOptions) -> Labelling[Candidates] | None:
     """Triangles that fit best, where every edge lies on one; with the c that lone triangles tell, if they do."""
     sides, weights = candidates.triangle_sides, candidates.weights
+    state = np.zeros(len(sides), dtype=np.int8)
+    best: Labelling[Candidates] | None = None
     for c in lone_scales(sides, weights) if candidates.scale is None else [candidates.scale]:
         with suppress(ContradictionError):
-            state = peeled(sides, 2 * weights / c)
-            relaxed = with_holes(Candidates.of(candidates.embedding, weights, c), state, _last_labels)
-            if relaxed is None or relaxed.fits or candidates.scale is not None:
-                return relaxed
+            known = Candidates.of(candidates.embedding, weights, c)
+            best = _relaxed(known, peeled(sides, 2 * weights / c), options)
             break
-    return with_holes(candidates, np.zeros(len(sides), dtype=np.int8), _last_labels)
+    if candidates.scale is None and (best is None or not best.fits):
+        best = _relaxed(candidates, state, options) or best
+    return best
 
 
-def _last_labels(labelling: Labelling[Candidates], free: NDArray[np.bool_]) -> Labelling[Candidates]:
-    judge = Judge(Budget(float(_SOLVES * labelling.candidates.n_vertices)))
-    return BestFirst(labelling, free).run(judge)
+def _relaxed(candidates: Candidates, state: NDArray[np.int8], options: SearchOptions) -> Labelling[Candidates] | None:
+    found = with_holes(candidates, state)
+    if found is None:
+        return None
+    labels, free = found
+    judge = Judge(Budget(float(options.relaxed_solves * candidates.n_vertices)))
+    return BestFirst(judge(candidates, labels), free, options).run(judge)
 
 
 def embedded(

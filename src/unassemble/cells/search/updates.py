@@ -14,19 +14,9 @@ from ..judge.labelling import Labelling
 from ..relax.sheet import STEEPEST, Sheet
 from .low_rank import ChangedMaps
 from .moves import Move, Neighbours, turned
+from .options import DEFAULT, SearchOptions
 
-_WORK = 3e5  # vertices times moves that are tried at a time, as much as some tens of solves take
-_MOST_MOVES = 1500
-_WORK_BESIDE = 2e6  # the same around a labelling that fits
 _BATCH = 5e4  # triangles times moves that are computed together
-_NEAR = 1e-3  # of the shift to the c at hand: so much nearer than to other maps, that one step tells
-_LEADERS = 60  # moves that are tried together with what they touch
-_AT_FIRST = 8  # moves that are given before those of three labels are told
-_NEAREST = 1e-6  # the same where the c is that of the mesh: maps that fit are told to about so much over their gap
-_FAINT = 1e-4  # mean misfit that they may leave then; some that do not fit leave 1e-5, and are to be solved for
-_FEW_EDGES = 24
-_STEEP = 5.0  # weights over row sizes beyond which they are those of flat triangles
-_GROSS = 0.5  # misfit above which an entry has no say in c
 
 
 class Updates:
@@ -37,10 +27,11 @@ class Updates:
     sheet : Sheet
     free : (cells,) bool, optional
         Labels that may change; all of them by default.
+    options : SearchOptions
     """
 
-    def __init__(self, sheet: Sheet, free: NDArray[np.bool_] | None = None):
-        self.sheet = sheet
+    def __init__(self, sheet: Sheet, free: NDArray[np.bool_] | None = None, options: SearchOptions = DEFAULT):
+        self.sheet, self._options = sheet, options
         self._free = sheet.chosen if free is None else sheet.chosen & free
         self._near = Neighbours(sheet)
         n, m = sheet.n_vertices, len(sheet.triangles)
@@ -53,7 +44,7 @@ class Updates:
         """The same for labels that make the same surface, whichever cells they put together or divide."""
         return bytes(np.rint(self.sheet.around(labels.astype(np.float64))).astype(np.int8).tobytes())
 
-    def ranked(self, labelling: Labelling, *, leaders: int = _LEADERS, levels: int = 3) -> Iterator[Move]:
+    def ranked(self, labelling: Labelling, *, levels: int = 3) -> Iterator[Move]:
         """Moves that leave least, the best first; what is in the way of a new cell goes.
 
         Single labels and pairs, then also threes: these are told after a few of the others only.
@@ -62,28 +53,26 @@ class Updates:
         ----------
         labelling : Labelling
             In this drawing; with pieces.
-        leaders : int
-            Moves, the best, that are tried with what they touch.
         levels : int
             Labels in one move, at most.
         """
         labels = labelling.labels
         try:
-            maps = ChangedMaps(self.sheet, labels, _NEAR)
+            maps = ChangedMaps(self.sheet, labels, self._options.near)
         except RecoveryError:
             return
-        most = int(np.clip(_WORK / self.sheet.n_vertices, 1, _MOST_MOVES))
+        most = int(np.clip(self._options.moves_work / self.sheet.n_vertices, 1, self._options.moves))
         now = labels.tolist()
         moves = list(dict.fromkeys(self._near.with_rivals(now, (k,)) for k in self._suspects(labelling)[:most]))
         left = self._left(maps, labels, moves)
         alone, given = self._alone(moves, left), set[Move]()
         for level in range(2, levels + 1):
-            first = np.argsort(left, kind="stable")[:leaders].tolist()
+            first = np.argsort(left, kind="stable")[: self._options.leaders].tolist()
             more = self._joined(labels, {moves[k]: float(left[k]) for k in first}, alone, set(moves))[:most]
             left = np.append(left, self._left(maps, labels, more))
             moves += more
             order = [k for k in np.argsort(left, kind="stable").tolist() if np.isfinite(left[k])]
-            for move in (moves[k] for k in order[: len(order) if level == levels else _AT_FIRST]):
+            for move in (moves[k] for k in order[: len(order) if level == levels else self._options.soon]):
                 if move not in given:
                     given.add(move)
                     yield move
@@ -97,20 +86,20 @@ class Updates:
         that touches it, of the `usual` ones; and these `more` moves.
         """
         labels = labelling.labels
-        maps = ChangedMaps(self.sheet, labels, _NEAREST)
+        maps = ChangedMaps(self.sheet, labels, self._options.nearest)
         now = labels.tolist()
         first = np.flatnonzero(self._free & supposed).tolist()
         moves = list(dict.fromkeys([*more, *(self._near.with_rivals(now, (k,)) for k in first)]))
         if not moves:
             return
-        most = int(_WORK_BESIDE / self.sheet.n_vertices) + 1
+        most = int(self._options.beside_work / self.sheet.n_vertices) + 1
         left = self._left(maps, labels, moves)
         leaders = dict(zip(moves, left.tolist(), strict=True))
         pairs = self._joined(labels, leaders, self._alone(moves, left), set(moves), usual)[:most]
-        moves, left = moves + pairs, np.append(left, self._left(maps, labels, pairs, _FAINT))
+        moves, left = moves + pairs, np.append(left, self._left(maps, labels, pairs, self._options.faint))
         seen = {self.outline(labels)}
         for k in np.argsort(left, kind="stable").tolist():
-            if not left[k] <= _FAINT:
+            if not left[k] <= self._options.faint:
                 return
             if (outline := self.outline(turned(labels, moves[k]))) not in seen:
                 seen.add(outline)
@@ -174,7 +163,7 @@ class Updates:
         left = np.full(count, np.inf)
         hopeful = np.all(np.isfinite(z), axis=0)
         if most < np.inf:  # few edges tell of nearly all that they leave more
-            edges = np.arange(0, len(self._weights), -(-len(self._weights) // _FEW_EDGES))
+            edges = np.arange(0, len(self._weights), -(-len(self._weights) // 24))  # as many are enough
             few = np.any(np.isin(sheet.row, edges), axis=1)
             w = self._fitted(z[:, hopeful], after[:, hopeful], few)[edges]
             hopeful[hopeful] = _misfits(w, self._weights[edges]).sum(axis=0) <= most * len(self._weights)
@@ -200,10 +189,10 @@ class Updates:
         """(k,) c for each column of weights over their row sizes, from those that it brings near the given ones."""
         if not self.sheet.free_scale:
             return np.ones(w.shape[1])
-        used = np.clip(w, -_STEEP, _STEEP)
+        used = np.clip(w, -5.0, 5.0)  # more belongs to flat triangles
         for _ in range(3):
             c = (self._weights @ used) / np.maximum((used * used).sum(axis=0), np.finfo(float).tiny)
-            used = np.where(np.abs(c * w - self._weights[:, None]) < _GROSS, w, 0.0)
+            used = np.where(np.abs(c * w - self._weights[:, None]) < 0.5, w, 0.0)
         return np.asarray(c)
 
 
