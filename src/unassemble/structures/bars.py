@@ -8,10 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.nodal import NodalMatrix, nodal_matrix
-from ..elasticity.rows.constants import uncoupled_rows
-from ..elasticity.rows.numbering import Numbering
-from ..elasticity.rows.orders import ORDERS, regular
+from ..nodes.constants import uncoupled_rows
+from ..nodes.nodal import NodalMatrix, nodal_matrix
+from ..nodes.numbering import Numbering
+from ..nodes.orders import ORDERS, regular
 
 _RANK_ONE = 1e-9  # how much of a bar's block may be left, relative to the bar
 _SAMPLE = 64  # blocks to look at before all are

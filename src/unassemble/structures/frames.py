@@ -10,10 +10,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..clock import Clock
-from ..elasticity.anchoring import checked_anchors, digits_lost, near_enough
-from ..elasticity.rounded import Rounding, with_exact_sums
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
+from ..nodes.anchoring import checked_anchors, digits_lost, near_enough
+from ..nodes.rounded import Rounding, with_exact_sums
 from ..recovery import Structure
 from ..tolerances import CERTIFIED
 from ..words import count_of

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elasticity.nodal import determined
+from ..nodes.nodal import determined
 
 
 @dataclass(frozen=True)

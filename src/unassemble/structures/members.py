@@ -6,8 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.nodal import determined
 from ..elements.cliques import Graph, shared_cliques, simplices
+from ..nodes.nodal import determined
 from ..topology.keys import contains, pair_keys
 from .nodes import Nodes
 

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.rows.constants import PENALTY
+from ..nodes.constants import PENALTY
 from .layouts import Layout
 
 _ROUNDING = 1e-9  # a row that annihilates a translation does so to rounding; supports leave 1e-3 and more

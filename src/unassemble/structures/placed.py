@@ -10,9 +10,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.nodal import determined
-from ..elasticity.rows.numbering import Numbering
 from ..errors import GeometryError
+from ..nodes.nodal import determined
+from ..nodes.numbering import Numbering
 from ..recovery import Evidence
 from ..tolerances import CERTIFIED
 from .pieces import Piece, pieces

@@ -13,9 +13,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.rows.grouping import by_first_row
-from ..elasticity.rows.orders import ORDERS, regular
 from ..errors import InputError
+from ..nodes.grouping import by_first_row
+from ..nodes.orders import ORDERS, regular
 from .gaps import with_gaps
 from .layouts import LAYOUTS, SPACE, Layout
 

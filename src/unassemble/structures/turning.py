@@ -9,9 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.nullspace.shape import EXACT, set_aside
-from ..elasticity.results import Evidence
 from ..errors import GeometryError
+from ..nodes.shape import EXACT, set_aside
+from ..recovery import Evidence
 from ..tolerances import CERTIFIED
 from .equations import Equations, equations
 from .layouts import Layout

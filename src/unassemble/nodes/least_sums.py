@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...budget import Budget
+from ..budget import Budget
 from .constants import proven_directions, row_sizes, without_penalties
 from .equilibrium import spread_directions
 
