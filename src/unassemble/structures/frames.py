@@ -18,9 +18,8 @@ from ..recovery import Structure
 from ..tolerances import CERTIFIED
 from ..words import count_of
 from .certificate import forces
-from .members import members_and_cells
+from .members import members_and_cells, mispaired
 from .nodes import Nodes, nodes_of
-from .pairing import mispaired
 from .placed import SURE, Placed, covered
 from .recognise import StructuralNumbering
 from .turning import turning_positions
