@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from os import PathLike, fspath
 from pathlib import Path, PurePath
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.io
@@ -13,6 +14,9 @@ from .errors import FormatError, InputError, OutputError
 from .files import check_target, whole_file
 from .recovery import Body, Recovery
 from .words import count_of
+
+if TYPE_CHECKING:
+    from .structures import Layout
 
 
 def modes_of(recovery: Recovery) -> NDArray[np.float64]:
@@ -26,14 +30,14 @@ def modes_of(recovery: Recovery) -> NDArray[np.float64]:
     InputError
         If the matrix is scalar.
     """
-    from .structures.layouts import layout_named, turning_modes
+    from .structures.layouts import layout_named
 
     node, direction = recovery.node_of_row, recovery.direction_of_row
     if node is None or direction is None:
         raise InputError("a scalar matrix has no rigid-body modes: its near-null space is that of the constants")
     layout = layout_named(recovery.operator)
     if layout is not None:
-        return turning_modes(layout, recovery.points, node, direction)
+        return _turning_modes(layout, recovery.points, node, direction)
     if isinstance(recovery, Body) or recovery.operator == "truss":
         return rigid_body_modes(recovery.points, node, direction)
     return (direction[:, None] == np.arange(direction.max() + 1)).astype(np.float64)
@@ -72,6 +76,32 @@ def rigid_body_modes(
     for k, (a, b) in enumerate(planes, start=d):
         modes[:, k] = np.where(direction_of_row == b, x[:, a], 0) - np.where(direction_of_row == a, x[:, b], 0)
     return modes
+
+
+def _turning_modes(
+    layout: Layout, points: NDArray[np.float64], node_of_row: NDArray[np.int64], direction_of_row: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Near-null space of a structure whose nodes have rotations: translations, then rotations about the centroid.
+
+    Parameters
+    ----------
+    layout : Layout
+    points : (n, d) float64
+        NaN rows get what they have without moving: translations, and rotations of the node itself.
+    node_of_row, direction_of_row : (N,) int64
+        A direction of -1 is not known, and gets zeros.
+
+    Returns
+    -------
+    (N, 6) or (N, 3) float64
+        Rotations are divided by the radius of gyration, so that none swamps another.
+    """
+    known = np.asarray(np.isfinite(points).all(axis=1))
+    x = points - points[known].mean(axis=0)
+    radius = float(np.sqrt((x[known] ** 2).sum(axis=1).mean())) or 1.0
+    motions = layout.rigid_motions(np.where(known[:, None], x, 0.0))
+    motions[:, :, len(layout.displacements) :] /= radius
+    return np.asarray(motions[node_of_row, direction_of_row] * (direction_of_row >= 0)[:, None])
 
 
 def save_modes(path: str | PathLike[str], modes: NDArray[np.float64]) -> None:

@@ -24,8 +24,7 @@ from ..recovery import Evidence, Structure
 from ..tolerances import CERTIFIED
 from ..words import count_of
 from .bars import Bars
-from .pieces import Piece
-from .placed import SURE, Placed, Positions, covered, placed
+from .placed import SURE, Piece, Placed, Positions, covered, placed
 from .positions import least_squares
 from .redundancy import NOTICED
 
