@@ -9,17 +9,14 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...errors import GeometryError
-from ..nodal import NodalMatrix, determined, linked
-from ..results import Evidence
+from ...nodes.nodal import NodalMatrix, determined, linked
+from ...nodes.shape import EXACT, Shape, in_gauge, shape
+from ...recovery import Evidence
 from ..springs import drawn_together
 from .atlas import NullFields, null_fields
-from .shape import EXACT, Shape, in_gauge, shape
 from .slender import affordable, unbent
 from .solution import Solution
 
-# Gaps of thin pieces that as a whole cost no more than in charts, and lose no digits where these meet. The square of a
-# smaller one is too near to the shift with which normal matrices are factorised.
-_BENDING = 1e-5, 1e-3
 _SLENDER = 1e-4  # gap below which a step on the whole piece is worth its cost
 _SETTLED = 1e-8  # residual over gap: what coordinates may be wrong by
 # Nodes of a body whose best fit, where none is exact, one factorisation finds. Charts are no help there: each fits in
@@ -68,9 +65,6 @@ def placed(
         told = np.asarray(valid.reshape(nodal.n, -1).any(axis=1))
         try:
             one = shape(found.fields, found.values, told[found.nodes])
-            if found.charts > 1 and _thin(found, one, graph):
-                found = null_fields(nodal, valid, body, patch=len(body), terms=terms)
-                one = shape(found.fields, found.values, told[found.nodes])
         except GeometryError as error:
             failure = failure or error
             warnings.append(f"piece {piece} with node {body[0]}: {error}")
@@ -95,15 +89,6 @@ def placed(
         raise failure or GeometryError("no row annihilates constants: no node has a valid equation")
     component = np.where(determined(points), component, -1)
     return Solution(valid, component, points, tuple(evidence), tuple(freedoms), all(exact), tuple(warnings))
-
-
-def _thin(found: NullFields, one: Shape, graph: sp.csr_array) -> bool:
-    """Whether one factorisation of the whole piece is cheap, and gains digits."""
-    least, most = _BENDING
-    if not (one.exact and least < _evidence(found, one).gap < most):
-        return False
-    points = in_gauge(one.points, graph[found.nodes][:, found.nodes])
-    return affordable(points[determined(points)])
 
 
 def _settled(found: NullFields) -> bool:

@@ -17,9 +17,7 @@ from numpy.typing import NDArray
 from .grouping import by_first_row, joined, same_pattern
 from .likeness import likest_pairs, pattern_of, reach
 
-_STEPS = 4  # of the graph; rows of all directions have more to tell apart
-_STEPS_BY_DIRECTION = 3
-_ROUNDS = 8
+_STEPS = 3  # of the graph
 
 
 def filled(matrix: sp.csr_array) -> sp.csr_array:
@@ -30,15 +28,14 @@ def filled(matrix: sp.csr_array) -> sp.csr_array:
     matrix : (N, N) sparse
         Symmetric.
     """
-    for _ in range(_ROUNDS):
+    while True:
         pattern = pattern_of(matrix)
         near = sp.coo_array(sp.triu(pattern @ pattern, 1))
         pairs = likest_pairs(reach(matrix, _STEPS), near.row, near.col)
         more = _shared(matrix, joined(*pairs, matrix.shape[0]))
         if more.nnz == matrix.nnz:
-            break
+            return matrix
         matrix = more
-    return matrix
 
 
 def filled_by_direction(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> sp.csr_array:
@@ -60,8 +57,8 @@ def filled_by_direction(matrix: sp.csr_array, direction: NDArray[np.int64], d: i
     for own in rows:
         label[own] = own[same_pattern(sp.csr_array(matrix[own][:, own]))]
     matrix = _shared(matrix, label)
-    for _ in range(_ROUNDS):
-        pattern, reached = pattern_of(matrix), reach(matrix, _STEPS_BY_DIRECTION)
+    while True:
+        pattern, reached = pattern_of(matrix), reach(matrix, _STEPS)
         first, second = [np.arange(n)], [n + label]
         for c, b in combinations([own for own in rows if len(own)], 2):
             cross = pattern[c][:, b]
@@ -72,9 +69,8 @@ def filled_by_direction(matrix: sp.csr_array, direction: NDArray[np.int64], d: i
         linked = joined(np.concatenate(first), np.concatenate(second), 2 * n)[:n]
         more = _shared(matrix, by_first_row(linked))
         if more.nnz == matrix.nnz:
-            break
+            return matrix
         matrix = more
-    return matrix
 
 
 def _shared(matrix: sp.csr_array, label: NDArray[np.int64]) -> sp.csr_array:
