@@ -1,0 +1,170 @@
+"""Small hostile inputs: no traceback, no answer that takes long, and never a wrong certificate.
+
+Run ``python benchmarks/hostile.py --minutes 60``, or ``--count 1000``; ``--seed 1`` makes others, ``--jobs 2`` runs as
+many side by side, ``--kinds tree mesh`` chooses. Input k of a seed is always the same one, and ``--seed 0 --first k
+--count 1`` makes it again. Exit status 1 after a wrong certificate or a crash; each of them is printed with its k, and
+so is every answer that takes more than ten seconds of processor time.
+
+What a certificate says is held against the mesh where one is known, each edge-connected piece up to similarity, and
+the operator is assembled again by scikit-fem. Where the matrix is given back by another mesh than its own, the answer
+counts as ambiguous, unless its uniqueness is said to be proved, which is wrong then.
+"""
+
+from __future__ import annotations
+
+import argparse
+import faulthandler
+import tempfile
+import time
+import traceback
+import warnings
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from itertools import count, islice, repeat
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+import skfem
+from click.testing import CliRunner
+from hostile_inputs import KINDS, Given, Piece, pieces_of
+from numpy.typing import NDArray
+from skfem.models import laplace
+
+from unassemble import InputError, RecoveryError, recover
+from unassemble.cli import main as command_line
+from unassemble.matrix import read_matrix
+
+SECONDS = 10.0  # of processor time that any answer may take
+HANGS = 60.0  # seconds after which a traceback is printed, and the answer waited for all the same
+MISFIT, DISTANCE = 1e-8, 1e-6  # of entries, relative to their rows; of points, relative to the diameter of a piece
+OUTCOMES = ("right", "ambiguous", "uncertified", "refused", "SLOW", "WRONG", "CRASH")
+
+
+def positions_agree(found, pieces: list[Piece]) -> bool:
+    """Whether the determined points of every piece are right, up to similarity, in every component found."""
+    node = np.arange(found.n_points) if found.node_of_row is None else found.node_of_row
+    for rows, points in pieces:
+        known = rows[found.node_status[node[rows]] == 0]
+        place = dict(zip(rows.tolist(), points, strict=True))
+        for label in np.unique(found.component[node[known]]):
+            own = known[found.component[node[known]] == label]
+            x, y = found.points[node[own]], np.array([place[row] for row in own.tolist()])
+            if x.shape[1] != y.shape[1] or misplaced(x - x.mean(axis=0), y - y.mean(axis=0)) > DISTANCE:
+                return False
+    return True
+
+
+def misplaced(x: NDArray, y: NDArray) -> float:
+    """Largest distance after the best rotation, reflection and scaling of centred points, relative to their extent."""
+    u, s, v = np.linalg.svd(x.T @ y)
+    fit = x @ (u @ v) * (s.sum() / max((x * x).sum(), 1e-300))
+    return float(np.linalg.norm(fit - y, axis=1).max() / max(np.linalg.norm(np.ptp(y, axis=0)), 1e-300))
+
+
+def gives_back(found, matrix: Any) -> bool:
+    """Whether P1 elements on the triangles, one factor in each piece, give the entries of determined rows."""
+    triangles = found.divided()[0]
+    if len(triangles) == 0 or not np.isfinite(found.points[triangles]).all():
+        return False
+    given = sp.csr_array(matrix, dtype=np.float64)
+    off = given / max(np.abs(given).max(), 1e-300) * 1.0
+    off = sp.csr_array(off - sp.diags_array(off.diagonal()))
+    label, total = pieces_of(triangles), sp.csr_array(off.shape)
+    for k in range(label.max() + 1):
+        corners = skfem.MeshTri(found.points.T.copy(), triangles[label == k].T.copy())
+        part = sp.csr_array(laplace.assemble(skfem.Basis(corners, skfem.ElementTriP1())))
+        part = sp.csr_array(part - sp.diags_array(part.diagonal()))
+        total = total + part * (part.multiply(off).sum() / part.multiply(part).sum())
+    largest = np.maximum(np.abs(off).max(axis=1).toarray().ravel(), 1e-300)
+    difference = sp.coo_array(off - total)
+    row, column = difference.coords
+    return bool((np.abs(difference.data) <= MISFIT * np.minimum(largest[row], largest[column])).all())
+
+
+def judged(given: Given) -> str:
+    """What comes of one input."""
+    if given.name:
+        return judged_file(given)
+    try:
+        found = recover(given.matrix)
+    except (RecoveryError, InputError):
+        return "refused"
+    found.report()
+    if found.status != "certified":
+        return "ambiguous" if found.status == "ambiguous" else "uncertified"
+    right = given.pieces is not None and positions_agree(found, given.pieces)
+    if not hasattr(found, "divided"):  # bodies and structures
+        return "right" if right else "WRONG"
+    matrix = sp.csr_array(given.matrix)
+    if not gives_back(found, matrix):
+        return "WRONG"
+    if right or given.pieces is None:
+        return "right"
+    return "ambiguous" if found.uniqueness == "searched" else "WRONG"
+
+
+def judged_file(given: Given) -> str:
+    """What comes of a file: its matrix as any other, and the same exit status from the command line."""
+    with tempfile.TemporaryDirectory() as folder:
+        path, out = Path(folder) / given.name, Path(folder) / "out.npz"
+        path.write_bytes(given.matrix)
+        try:
+            outcome = judged(Given(read_matrix(path)))
+        except (RecoveryError, InputError):
+            outcome = "refused"
+        ran = CliRunner().invoke(command_line, ["recover", str(path), "-o", str(out), "--quiet"])
+        expected = {"right": (0,), "refused": (2, 4)}.get(outcome, (0, 3))
+        if ran.exit_code not in expected or "Traceback" in ran.output or out.exists() != (ran.exit_code in (0, 3)):
+            raise RuntimeError(f"{outcome}, and exit status {ran.exit_code}: {ran.output}") from ran.exception
+        return outcome
+
+
+def tried(seed: int, k: int, kinds: tuple[str, ...] = tuple(KINDS)) -> tuple[int, str, str, float, str]:
+    """Input k of a seed: its number, kind, outcome, seconds of processor time, and what there is to say."""
+    rng = np.random.default_rng([seed, k])
+    kind = str(rng.choice(kinds))
+    given, said, start = KINDS[kind](rng), "", time.process_time()
+    faulthandler.dump_traceback_later(HANGS, exit=False)  # only says where it hangs
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            outcome = judged(given)
+    except Exception:
+        outcome, said = "CRASH", traceback.format_exc()
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+    seconds = time.process_time() - start
+    slow = seconds > SECONDS and outcome not in ("WRONG", "CRASH")
+    return k, kind, "SLOW" if slow else outcome, seconds, said
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Throw small hostile inputs at unassemble.")
+    parser.add_argument("--minutes", type=float, default=float("inf"))
+    parser.add_argument("--count", type=int, help="how many inputs; 1000 where no minutes are given")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--first", type=int, default=0, help="number of the first input")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
+    chosen = parser.parse_args()
+    number = chosen.count if chosen.count or chosen.minutes < float("inf") else 1000
+    end = time.monotonic() + 60 * chosen.minutes
+    inputs = islice(count(chosen.first), number)
+    table: Counter[tuple[str, str]] = Counter()
+    with ProcessPoolExecutor(chosen.jobs) as pool:
+        while time.monotonic() < end and (some := list(islice(inputs, 4 * chosen.jobs))):
+            kinds = tuple(chosen.kinds)
+            for k, kind, outcome, seconds, said in pool.map(tried, repeat(chosen.seed), some, repeat(kinds)):
+                table[kind, outcome] += 1
+                if outcome in ("SLOW", "WRONG", "CRASH"):
+                    print(f"{outcome}: {kind}, --seed {chosen.seed} --first {k}, {seconds:.1f} s\n{said}", flush=True)
+    print("".join(f"{word:>12}" for word in ("", *OUTCOMES)))
+    for kind in chosen.kinds:
+        print(f"{kind:>12}" + "".join(f"{table[kind, outcome]:12}" for outcome in OUTCOMES))
+    return int(any(table[kind, outcome] for kind in chosen.kinds for outcome in ("WRONG", "CRASH")))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
