@@ -12,7 +12,6 @@ from unassemble.matrix import check_matrix
 from unassemble.planar import piece as pieces
 from unassemble.planar.cautious import cautious_polish, count_flipped
 from unassemble.planar.conformal import conformal_map
-from unassemble.planar.patches import from_patches
 from unassemble.planar.polish import polish
 from unassemble.topology import recognise
 
@@ -155,11 +154,7 @@ def test_start_far_off_is_polished_to_the_same_mesh_as_the_truth():
     assert recover(noisy(known.matrix, sigma), noise=sigma).certified
 
 
-def test_polish_that_does_not_get_there_says_so(monkeypatch):
-    def nowhere(*_):
-        raise SolverError("no patches")
-
-    monkeypatch.setattr("unassemble.planar.piece.from_patches", nowhere)
+def test_polish_that_does_not_get_there_says_so():
     known, sigma = channel(200, 5), 2e-2
     matrix = noisy(known.matrix, sigma, seed=4)
     found = recover(matrix, noise=sigma)
@@ -173,34 +168,6 @@ def test_misfit_that_is_no_fault_of_the_polish_is_not_told_from_one():
     found = recover(noisy(known.matrix, 1e-3), noise=5e-4)
     assert found.status == "uncertified"
     assert "cannot be told" in found.reason
-
-
-def test_patches_serve_where_the_null_vector_has_no_digits():
-    """It shrinks along the channel by more digits than numbers have."""
-    known, sigma = channel(200, 5), 2e-2
-    matrix = noisy(known.matrix, sigma, seed=4)
-    found = recover(matrix, noise=sigma)
-    assert found.certified, found.reason
-    checked = check_matrix(matrix, noise=sigma)
-    piece = recognise(checked.n, checked.edges).pieces[0]
-    entries = -checked.entries[piece.edge_rows]
-    truth = cautious_polish(piece, entries, known.points[piece.vertices] @ [1, 1j])
-    assert found.chi_square["statistic"] == pytest.approx((truth.residual / sigma) ** 2, rel=1e-3)
-
-
-def test_patches_of_a_ring_close():
-    """Turns and factors between patches are potentials: nothing adds up around the hole."""
-    points, triangles = random_mesh(500, seed=3)
-    radius = np.linalg.norm(points - points.mean(axis=0), axis=1)
-    kept = (radius > 0.3 * radius.max())[triangles].all(axis=1)
-    used, triangles = np.unique(triangles[kept], return_inverse=True)
-    known, sigma = specimen(points[used], triangles.reshape(-1, 3), c=-3.0), 1e-2
-    checked = check_matrix(noisy(known.matrix, sigma), noise=sigma)
-    piece = max(recognise(checked.n, checked.edges).pieces, key=lambda one: one.n_vertices)
-    z = from_patches(piece, -checked.entries[piece.edge_rows])
-    assert count_flipped(piece, z) == 0
-    true = known.points[piece.vertices]
-    assert np.abs(best_fit(np.column_stack([z.real, z.imag]), true)).max() < 0.2 * diameter(true)
 
 
 def test_large_steps_that_fail_are_replaced_by_small_ones(monkeypatch):

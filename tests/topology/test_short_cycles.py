@@ -4,16 +4,12 @@ import networkx
 import numpy as np
 import pytest
 
-from unassemble.topology.short_cycles import chordless_five_cycles, chordless_four_cycles
+from unassemble.topology.short_cycles import chordless_four_cycles
 
 GRAPHS = {
     "grid": networkx.convert_node_labels_to_integers(networkx.grid_2d_graph(4, 5)),
-    "dodecahedron": networkx.dodecahedral_graph(),
-    "Petersen": networkx.petersen_graph(),
     "wheel": networkx.wheel_graph(6),
-    "random": networkx.gnm_random_graph(25, 50, seed=1),
     "sparse": networkx.gnm_random_graph(40, 55, seed=2),
-    "empty": networkx.empty_graph(4),
 }
 
 
@@ -23,15 +19,6 @@ def cycles_of(cycles):
 
 
 @pytest.mark.parametrize("name", GRAPHS)
-def test_five_cycles(name):
-    graph = GRAPHS[name]
-    edges = np.array(sorted(tuple(sorted(edge)) for edge in graph.edges), dtype=np.int64).reshape(-1, 2)
-    expected = [c for c in networkx.chordless_cycles(graph, length_bound=5) if len(c) == 5]
-    found = chordless_five_cycles(len(graph), edges, np.ones(len(edges), bool))
-    assert cycles_of(found.tolist()) == cycles_of(expected)
-
-
-@pytest.mark.parametrize("name", ["grid", "wheel", "sparse"])
 def test_four_cycles(name):
     """Where few share two opposite vertices all are found."""
     graph = GRAPHS[name]
@@ -42,7 +29,7 @@ def test_four_cycles(name):
 
 
 def test_only_usable_edges():
-    graph = networkx.cycle_graph(5)
+    graph = networkx.cycle_graph(4)
     edges = np.array(sorted(tuple(sorted(edge)) for edge in graph.edges))
-    assert len(chordless_five_cycles(5, edges, np.ones(5, bool))) == 1
-    assert len(chordless_five_cycles(5, edges, np.arange(5) > 0)) == 0
+    assert len(chordless_four_cycles(4, edges, np.ones(4, bool))) == 1
+    assert len(chordless_four_cycles(4, edges, np.arange(4) > 0)) == 0

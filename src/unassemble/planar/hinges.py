@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from itertools import combinations
 
 import numpy as np
@@ -12,14 +11,11 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from ..linalg import least_norm
 from ..topology import Topology
-from .images import growing_images
 
 CLOSED = 1e-6  # distance at shared vertices, relative to the largest piece, below which rings count as closed
-_MOST_GROWN = 200  # pieces; above, those images are taken in which all have the orientation that they were drawn in
 _MOST_IMAGES = 100  # pieces; above, none is turned over by itself
 _FEW, _SOME = 9, 24  # pieces of which several, or two, are turned over at once
 _MOST_TOGETHER = 4
-_TRIED = 4  # choices of images
 _DENSE = 100  # pieces; above, sparse linear algebra is faster
 
 
@@ -95,15 +91,16 @@ def _matching_images(
 ) -> list[NDArray]:
     """Mirror images of pieces in rings that let these close.
 
-    Where they are not found piece by piece, one after the other is turned over as long as that lowers the gap, then two
-    at once are tried, and of few pieces more.
+    Those of one embedding; else one piece after the other is turned over as long as that lowers the gap, then two at
+    once are tried, and of few pieces more.
     """
     if rings(topology) <= 0:
         return positions
     best = _joined(topology, positions, held)[1]
-    for images in (_as_drawn, _grown):
-        if best > closed:
-            positions, best = _closed_by(images(topology, positions, closed), topology, positions, held, best, closed)
+    if best > closed:
+        drawn = _as_drawn(topology, positions, held)
+        left = _joined(topology, drawn, held)[1]
+        positions, best = (drawn, left) if left <= closed else (positions, best)
     if len(positions) > _MOST_IMAGES:
         return positions
     free = np.flatnonzero(~held).tolist()
@@ -122,39 +119,13 @@ def _matching_images(
     return positions
 
 
-def _closed_by(
-    images: Iterable[NDArray[np.bool_]],
-    topology: Topology,
-    positions: list[NDArray],
-    held: NDArray[np.bool_],
-    gap: float,
-    closed: float,
-) -> tuple[list[NDArray], float]:
-    """Positions with the first of some images that close all rings, and what gap they leave; else those given."""
-    for turned in images:
-        # Held pieces stay: what is turned over is the other pieces of their group.
-        group = groups(topology)
-        away = np.isin(group, group[held & turned]) ^ turned
-        trial = [np.conj(z) if over else z for z, over in zip(positions, away, strict=True)]
-        left = _joined(topology, trial, held)[1]
-        if left <= closed:
-            return trial, left
-    return positions, gap
-
-
-def _as_drawn(topology: Topology, positions: list[NDArray], _: float) -> Iterator[NDArray[np.bool_]]:
-    """Pieces that lie with their triangles the other way round: those of one drawing are all alike."""
+def _as_drawn(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> list[NDArray]:
+    """Triangles of all pieces the same way round, as those of one embedding are; held pieces stay as they are."""
     corners = (z[piece.triangles].T for piece, z in zip(topology.pieces, positions, strict=True))
-    yield np.array([float((np.conj(b - a) * (c - a)).imag.sum()) < 0 for a, b, c in corners])
-
-
-def _grown(topology: Topology, positions: list[NDArray], closed: float) -> Iterator[NDArray[np.bool_]]:
-    """Images that close all rings, piece by piece."""
-    if len(positions) > _MOST_GROWN:
-        return
-    shared = [np.flatnonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces]
-    vertices = [piece.vertices[s] for piece, s in zip(topology.pieces, shared, strict=True)]
-    yield from growing_images(vertices, [z[s] for z, s in zip(positions, shared, strict=True)], closed)[:_TRIED]
+    turned = np.array([float((np.conj(b - a) * (c - a)).imag.sum()) < 0 for a, b, c in corners])
+    group = groups(topology)
+    away = np.isin(group, group[held & turned]) ^ turned
+    return [np.conj(z) if over else z for z, over in zip(positions, away, strict=True)]
 
 
 def rings(topology: Topology) -> int:

@@ -15,7 +15,6 @@ from .cautious import cautious_polish, count_flipped
 from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
 from .hinged import Hinged
-from .patches import from_patches
 from .pivoted import PivotedEquations, affordable
 from .polish import PolishedMesh, polish
 from .robust import ASIDE
@@ -30,8 +29,6 @@ _FAR = 0.05
 _OUTLIER = 10.0  # standard deviations that no entry is off by
 _LOST = 1e-14
 """Edges of that length, relative to the extent, have hardly a digit left."""
-_PATCHES_LIMIT = 50_000
-"""Most vertices of a piece for which patches are tried: they take some 5 ms a vertex."""
 _CAUTIOUS_LIMIT = 200_000
 """Most vertices for which a polish that fails is tried again with a factorisation in every step."""
 
@@ -80,23 +77,16 @@ def positions(
 def brought_near(piece: Piece, weights: NDArray, mesh: PieceMesh, *, scale: float | None) -> PieceMesh:
     """A start for the polish in place of one that noise has bent too far; the same mesh where there is none.
 
-    That is a first polish from there or, where this leads nowhere, from patches: up to `_PATCHES_LIMIT` vertices.
+    That is a first polish from there, which does not know yet how errors are spread.
     """
     if _fits_roughly(piece, weights, mesh.z, mesh.scale):
         return mesh
     try:
         found = _polished(piece, weights, mesh.z, scale, None, None)
-        if found.converged and _fits_roughly(piece, weights, found.z, found.scale):
-            return replace(mesh, z=found.z, scale=found.scale)
-    except SolverError:
-        pass
-    if piece.n_vertices > _PATCHES_LIMIT:
-        return mesh
-    try:
-        found = cautious_polish(piece, weights, from_patches(piece, weights), scale=scale)
     except SolverError:
         return mesh
-    return replace(mesh, z=found.z, scale=found.scale) if _fits_roughly(piece, weights, found.z, found.scale) else mesh
+    near = found.converged and _fits_roughly(piece, weights, found.z, found.scale)
+    return replace(mesh, z=found.z, scale=found.scale) if near else mesh
 
 
 def _fits_roughly(piece: Piece, weights: NDArray, z: NDArray, scale: float) -> bool:

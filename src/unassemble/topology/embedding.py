@@ -8,14 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import planarity
-from .adjacency import adjacency, neighbours
 from .cycles import three_cycles
-from .faces import FaceComplex, around, from_cycles, from_rotation, joined
-from .keys import contains, distinct, pair_keys, with_sides
+from .faces import FaceComplex, around, from_cycles, from_rotation
+from .keys import distinct
 from .separating import not_faces
-from .short_cycles import chordless_five_cycles, chordless_four_cycles
-
-_FEW = 1000  # vertices of a graph in which 5-cycles are looked for: large ones cost too much to be drawn once more
+from .short_cycles import chordless_four_cycles
 
 
 def short_faces(n: int, edges: NDArray) -> list[NDArray[np.int64]]:
@@ -45,7 +42,7 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
 
     Where the graph is not tri-connected it has many. A mesh has nearly all of its short cycles as faces: first the
     surface that they make by themselves, then an embedding in which all of them are faces, or all but those on edges
-    with more than two 3-cycles, then one in which 5-cycles are faces as well, last any.
+    with more than two 3-cycles, last any.
 
     Parameters
     ----------
@@ -76,25 +73,9 @@ def _drawings(n: int, edges: NDArray, cycles: list[NDArray]) -> Iterator[FaceCom
         drawing = drawing_with_faces(n, edges, [triangles[~crowded(n, edges, triangles).any(axis=1)], quads])
     if drawing is not None:
         yield drawing
-    fives = _five_cycles(n, edges, cycles) if n <= _FEW else None
-    drawing = drawing_with_faces(n, edges, [*cycles, fives]) if fives is not None and len(fives) else None
-    if drawing is not None:
-        yield drawing
     rotation = planarity.rotation_system(n, edges)
     if rotation is not None:
         yield from_rotation(n, edges, *rotation)
-
-
-def _five_cycles(n: int, edges: NDArray, cycles: list[NDArray]) -> NDArray[np.int64]:
-    """Chordless 5-cycles that may all be faces beside given cycles."""
-    count = np.zeros(len(edges), dtype=np.int64)
-    for some in cycles:
-        count += np.bincount((around(n, edges, some) >> 1).ravel(), minlength=len(edges))
-    fives = chordless_five_cycles(n, edges, count < 2)
-    if not len(fives):
-        return fives
-    sides = around(n, edges, fives) >> 1
-    return fives[((count + np.bincount(sides.ravel(), minlength=len(edges)))[sides] <= 2).all(axis=1)]
 
 
 def drawing_with_faces(n: int, edges: NDArray, cycles: list[NDArray]) -> FaceComplex | None:
@@ -107,42 +88,6 @@ def crowded(n: int, edges: NDArray, triangles: NDArray) -> NDArray[np.bool_]:
     """(m, 3) whether the sides of 3-cycles, each from a vertex to the next, lie on more than two of them."""
     sides = around(n, edges, triangles) >> 1
     return np.asarray((np.bincount(sides.ravel(), minlength=len(edges)) > 2)[sides])
-
-
-def drawing_with_corners(n: int, edges: NDArray, corners: NDArray) -> FaceComplex | None:
-    """A drawing in which the edges a-h and h-b of some corners follow each other about h.
-
-    A corner that one more vertex closes to a 4-cycle makes that a face; one that none does is closed by an edge a-b,
-    which is taken away again; others are drawn as they come. None if there is no such drawing, or all corners belong
-    to 4-cycles, which are faces without that.
-
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
-    corners : (k, 3) int64
-        a, h, b.
-    """
-    a, h, b = corners.T
-    place, fourth = neighbours(adjacency(n, edges), a)
-    closing = (fourth != h[place]) & joined(n, edges, fourth, b[place])
-    place, fourth = place[closing], fourth[closing]
-    count = np.bincount(place, minlength=len(corners))
-    open_ones = corners[(count == 0) & ~joined(n, edges, a, b)]
-    one = count[place] == 1
-    quads = np.column_stack([corners[place[one]], fourth[one]])
-    _, once = np.unique(np.sort(quads, axis=1), axis=0, return_index=True)
-    whole, _, _ = with_sides(n, edges, open_ones)
-    cycles = [cycle for cycle in (open_ones, quads[once]) if len(cycle)]
-    if len(whole) > 3 * n - 6 or not len(open_ones):
-        return None
-    rotation = _with_faces(n, whole, cycles)
-    if rotation is None:
-        return None
-    tail, head = rotation
-    kept = contains(edges[:, 0] * n + edges[:, 1], pair_keys(n, tail, head))
-    return from_rotation(n, edges, tail[kept], head[kept])
 
 
 def fingerprint(drawing: FaceComplex) -> bytes:

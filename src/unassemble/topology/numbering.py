@@ -35,13 +35,6 @@ class Numbering:
         """A numbering of this numbering, in one."""
         return Numbering(self.vertices[inner.vertices], self.edge_rows[inner.edge_rows], inner.edges)
 
-    def shuffled(self, rng: np.random.Generator) -> Numbering:
-        """The same graph with its vertices in random order."""
-        order = rng.permutation(len(self.vertices))
-        edges = np.sort(np.argsort(order)[self.edges], axis=1)
-        rows = np.lexsort(edges.T[::-1])
-        return self.then(Numbering(order, rows, edges[rows]))
-
 
 def local_numbering(n: int, edges: NDArray) -> Numbering:
     """Number vertices in breadth-first order.

@@ -3,23 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from .boundary import boundary_corners, following, loops
-from .keys import Grouped, distinct, with_sides
+from .keys import Grouped, distinct
 from .orientation import Gluing, glue, orient, reglue
 from .surface import Piece
-
-
-def edge_connected(n: int, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(m,) label of the edge-connected piece of each triangle, however many share an edge."""
-    edges, _, opposite = with_sides(n, np.empty((0, 2), np.int64), triangles)
-    m = len(triangles)
-    place = (np.repeat(np.arange(m), 3), m + opposite.ravel())
-    graph = sp.coo_array((np.ones(3 * m, np.int8), place), shape=(m + len(edges),) * 2)
-    return np.asarray(csgraph.connected_components(graph, directed=False)[1][:m], dtype=np.int64)
 
 
 def planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> tuple[Piece, ...] | None:

@@ -1,4 +1,4 @@
-"""Chordless 4-cycles and 5-cycles of a sparse graph, by array code."""
+"""Chordless 4-cycles of a sparse graph, by array code."""
 
 from __future__ import annotations
 
@@ -55,37 +55,3 @@ def chordless_four_cycles(n: int, edges: NDArray, usable: NDArray[np.bool_]) -> 
     cycles = np.concatenate(found)
     a, b, c, d = cycles.T
     return cycles[~(joined(n, edges, a, c) | joined(n, edges, b, d))]
-
-
-def chordless_five_cycles(n: int, edges: NDArray, usable: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Cycles a-b-c-d-e of usable edges, no two of whose vertices another edge joins.
-
-    Each is found once, from its vertex a of highest number. The work grows with the fourth power of the degrees.
-
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
-    usable : (e,) bool
-
-    Returns
-    -------
-    (m, 5) int64
-        Vertices in running order.
-    """
-    pairs = edges[usable]
-    if not len(pairs):
-        return np.empty((0, 5), np.int64)
-    graph = adjacency(n, pairs)
-    paths = np.column_stack([pairs[:, 1], pairs[:, 0]])  # from the higher vertex
-    for length in (2, 3, 4):
-        place, following = neighbours(graph, paths[:, -1])
-        paths = np.column_stack([paths[place], following])
-        kept = following < paths[:, 0]
-        # Not joined to those before it, but for the one just before and, in the end, the first.
-        for vertex in paths[:, int(length == 4) : length - 1].T:
-            kept &= (vertex != following) & ~joined(n, edges, vertex, following)
-        paths = paths[kept]
-    closed = joined(n, pairs, paths[:, 0], paths[:, 4]) & (paths[:, 1] < paths[:, 4])
-    return paths[closed]
