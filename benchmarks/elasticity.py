@@ -81,11 +81,13 @@ def measure_pyamg(path: Path, near_null: str) -> dict:
     rhs = np.random.default_rng(0).standard_normal(matrix.shape[0])
     given: dict = {}
     if near_null in ("true", "recovered"):
-        from unassemble.elasticity import recover_elasticity, rigid_body_modes
+        from unassemble.elasticity import recover_elasticity
+        from unassemble.modes import rigid_body_modes
 
         row = np.arange(matrix.shape[0])
         if near_null == "recovered":
-            given = {"B": recover_elasticity(matrix, cells=False).rigid_body_modes()}
+            found = recover_elasticity(matrix, cells=False)
+            given = {"B": rigid_body_modes(found.points, found.node_of_row, found.direction_of_row)}
         else:
             given = {"B": rigid_body_modes(points, row // 3, row % 3)}
     before, start = peak(), perf_counter()

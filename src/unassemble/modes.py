@@ -1,12 +1,22 @@
-"""The near-null space of a recovered matrix, whichever room it comes from."""
+"""The near-null space of a recovered matrix, whichever room it comes from, and files of it for other solvers."""
 
 from __future__ import annotations
 
+from os import PathLike, fspath
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING
+
 import numpy as np
+import scipy.io
 from numpy.typing import NDArray
 
-from .errors import InputError
+from .errors import FormatError, InputError, OutputError
+from .files import check_target, whole_file
 from .recovery import Body, Recovery
+from .words import count_of
+
+if TYPE_CHECKING:
+    from .structures import Layout
 
 
 def modes_of(recovery: Recovery) -> NDArray[np.float64]:
@@ -20,15 +30,133 @@ def modes_of(recovery: Recovery) -> NDArray[np.float64]:
     InputError
         If the matrix is scalar.
     """
-    from .elasticity.modes import rigid_body_modes
-    from .structures.layouts import layout_named, turning_modes
+    from .structures.layouts import layout_named
 
     node, direction = recovery.node_of_row, recovery.direction_of_row
     if node is None or direction is None:
         raise InputError("a scalar matrix has no rigid-body modes: its near-null space is that of the constants")
     layout = layout_named(recovery.operator)
     if layout is not None:
-        return turning_modes(layout, recovery.points, node, direction)
+        return _turning_modes(layout, recovery.points, node, direction)
     if isinstance(recovery, Body) or recovery.operator == "truss":
         return rigid_body_modes(recovery.points, node, direction)
     return (direction[:, None] == np.arange(direction.max() + 1)).astype(np.float64)
+
+
+def rigid_body_modes(
+    points: NDArray[np.float64],
+    node_of_row: NDArray[np.int64],
+    direction_of_row: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """Near-null space of an elasticity matrix, in the layout that PyAMG expects.
+
+    Parameters
+    ----------
+    points : (n, d) float64
+        NaN rows get translations only.
+    node_of_row, direction_of_row : (N,) int64
+        A direction of -1 is not known, and gets zeros.
+
+    Returns
+    -------
+    (N, 3) or (N, 6) float64
+        Translations, then rotations, row by row of the matrix. Rotations are about the centroid, each column of norm
+        sqrt(N / d) or so, so that none swamps another.
+    """
+    d = points.shape[1]
+    known = np.asarray(np.isfinite(points).all(axis=1))
+    x = points - points[known].mean(axis=0) if known.any() else np.zeros_like(points)
+    x = np.where(known[:, None], x, 0.0)
+    radius = np.sqrt((x**2).sum(axis=1).mean())
+    x = (x / radius if radius > 0 else x)[node_of_row]
+    row = np.arange(len(node_of_row))
+    planes = [(0, 1)] if d == 2 else [(0, 1), (2, 0), (1, 2)]
+    modes = np.zeros((len(row), d + len(planes)))
+    modes[row, direction_of_row] = direction_of_row >= 0
+    for k, (a, b) in enumerate(planes, start=d):
+        modes[:, k] = np.where(direction_of_row == b, x[:, a], 0) - np.where(direction_of_row == a, x[:, b], 0)
+    return modes
+
+
+def _turning_modes(
+    layout: Layout, points: NDArray[np.float64], node_of_row: NDArray[np.int64], direction_of_row: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Near-null space of a structure whose nodes have rotations: translations, then rotations about the centroid.
+
+    Parameters
+    ----------
+    layout : Layout
+    points : (n, d) float64
+        NaN rows get what they have without moving: translations, and rotations of the node itself.
+    node_of_row, direction_of_row : (N,) int64
+        A direction of -1 is not known, and gets zeros.
+
+    Returns
+    -------
+    (N, 6) or (N, 3) float64
+        Rotations are divided by the radius of gyration, so that none swamps another.
+    """
+    known = np.asarray(np.isfinite(points).all(axis=1))
+    x = points - points[known].mean(axis=0)
+    radius = float(np.sqrt((x[known] ** 2).sum(axis=1).mean())) or 1.0
+    motions = layout.rigid_motions(np.where(known[:, None], x, 0.0))
+    motions[:, :, len(layout.displacements) :] /= radius
+    return np.asarray(motions[node_of_row, direction_of_row] * (direction_of_row >= 0)[:, None])
+
+
+def save_modes(path: str | PathLike[str], modes: NDArray[np.float64]) -> None:
+    """Write a near-null space as numpy's ``.npy``, or as a dense Matrix Market ``.mtx`` (AMGCL's ``-N``).
+
+    Raises
+    ------
+    OutputError
+        If the name ends otherwise, or the file cannot be written.
+    """
+    suffix = check_modes(path)
+    with whole_file(path, suffix) as draft:
+        if suffix == ".npy":
+            np.save(draft, modes)
+        else:
+            _write_dense(draft, modes)
+
+
+def check_modes(path: str | PathLike[str]) -> str:
+    """Find out, before long work, whether modes can be written; returns the extension."""
+    suffix = PurePath(path).suffix.lower()
+    if suffix not in (".npy", ".mtx"):
+        raise OutputError(f"rigid-body modes are a .npy or .mtx file, not {fspath(path)!r}")
+    check_target(path)
+    return suffix
+
+
+def save_petsc_vec(path: str | PathLike[str], points: NDArray[np.float64]) -> None:
+    """Write coordinates as a Vec in PETSc's binary format, node by node, for ``PCSetCoordinates``.
+
+    Big-endian: class identifier 1211214 and length as 32-bit integers, then the values as doubles.
+    """
+    values = _determined(points).ravel()
+    header = np.array([1211214, len(values)], dtype=">i4")
+    with whole_file(path, ".petsc") as draft:
+        draft.write_bytes(header.tobytes() + values.astype(">f8").tobytes())
+
+
+def save_amgcl_coordinates(path: str | PathLike[str], points: NDArray[np.float64]) -> None:
+    """Write coordinates as a dense Matrix Market array of n rows and d columns, for AMGCL's ``-C``."""
+    values = _determined(points)
+    with whole_file(path, ".mtx") as draft:
+        _write_dense(draft, values)
+
+
+def _write_dense(path: Path, values: NDArray[np.float64]) -> None:
+    with path.open("wb") as file:  # a name would be completed, a file is not
+        scipy.io.mmwrite(file, values, precision=17, symmetry="general")
+
+
+def _determined(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    loose = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(loose):
+        raise FormatError(
+            f"{count_of(len(loose), 'node has', 'nodes have')} no coordinates (node {loose[0]} for one), and this "
+            "format has no way to say so: write the .npz, or the modes, in which such nodes have translations only"
+        )
+    return points

@@ -14,8 +14,8 @@ from .matrix.digits import Digits
 from .tolerances import ROUNDED
 
 if TYPE_CHECKING:
-    from .elasticity import Numbering
-    from .elasticity.rounded import Rounding
+    from .nodes import Numbering
+    from .nodes.rounded import Rounding
     from .structures import StructuralNumbering
 
 
@@ -55,8 +55,8 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
     RecoveryError
         If no numbering makes rows annihilate translations.
     """
-    from .elasticity.rows.orders import ORDERS
-    from .elasticity.unknowns import find_numbering, given_numbering, regular_numbering
+    from .nodes.orders import ORDERS
+    from .nodes.unknowns import find_numbering, given_numbering, regular_numbering
     from .structures import find_structure, given_structure, truss_numbering
     from .structures.layouts import SPACE
 
@@ -98,7 +98,7 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
     crowded = matrix.n >= 3 and len(matrix.edges) > 3 * matrix.n - 6
     if not crowded and not _twins_interleaved(matrix):
         return None
-    from .elasticity.unknowns import numbering_at_sight
+    from .nodes.unknowns import numbering_at_sight
     from .structures import find_structure
 
     whole, exact = _exact(matrix)
@@ -115,7 +115,7 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
 
 def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     """Read a matrix as vector-valued after it turned out not to be a planar mesh; None where little speaks for it."""
-    from .elasticity.unknowns import find_numbering
+    from .nodes.unknowns import find_numbering
     from .structures import find_structure
 
     if not matrix.diagonal.all():  # every unknown of an elastic body has a stiffness
@@ -135,7 +135,7 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
 
 def about_translations(matrix: OperatorMatrix) -> str:
     """Why a matrix that is no planar mesh is no stiffness matrix either though its rows form nodes; empty if not so."""
-    from .elasticity.unknowns import MORE_THAN_STIFFNESS, nodes_of_pattern
+    from .nodes.unknowns import MORE_THAN_STIFFNESS, nodes_of_pattern
 
     nodes, rounded = nodes_of_pattern(matrix.csr()), Digits.of(matrix.csr().data)
     if nodes is None:
@@ -149,7 +149,7 @@ def about_translations(matrix: OperatorMatrix) -> str:
 
 def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, tuple[sp.csr_array, Rounding] | None]:
     """The matrix to look at, and of entries with few digits what a reading keeps of it."""
-    from .elasticity.rounded import with_exact_sums
+    from .nodes.rounded import with_exact_sums
 
     whole, rounding = with_exact_sums(matrix.csr())
     return whole, (whole, rounding) if rounding else None

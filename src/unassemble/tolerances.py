@@ -14,6 +14,9 @@ ROUNDED = 1e-12
 SUMMED = 1e-10
 """Relative error of sums of entries, and of entries that were summed in two orders, as both triangles are."""
 
+CANCELLED = 1e-9
+"""Relative size of what is left of terms that cancel, up to which it is rounding; supports leave 1e-3 and more."""
+
 SIGMAS = 10.0
 """Standard deviations that no difference of independent noise exceeds, in a matrix of any size."""
 

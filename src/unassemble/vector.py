@@ -7,16 +7,15 @@ from dataclasses import replace
 from typing import Any
 
 from .clock import Clock
-from .elasticity.nodal import nodal_matrix, uncoupled
-from .elasticity.recover import parts_of
 from .elasticity.serving import Request, serve_body
 from .matrix import OperatorMatrix
+from .nodes.nodal import nodal_matrix, uncoupled
 from .operators import VectorReading
 from .recovery import Recovery
 from .structures import StructuralNumbering, serve_structure
 from .structures.bars import bars_of
 from .structures.trusses import serve_truss
-from .vector_laplacian import Scalar, recover_directions
+from .vector_laplacian import Scalar, parts_of, recover_directions
 
 
 def recover_vector(

@@ -3,21 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .elasticity.anchoring import checked_anchors
-from .elasticity.results import ScalarParts
 from .errors import RecoveryError
 from .matrix import OperatorMatrix, check_matrix
+from .nodes.anchoring import checked_anchors
+from .nodes.nodal import NodalMatrix
+from .nodes.numbering import Numbering
 from .recovery import PlanarMesh
 from .tolerances import ROUNDED
 
 Scalar = Callable[[OperatorMatrix, Sequence[Any]], PlanarMesh]
+
+
+@dataclass(frozen=True, eq=False)
+class ScalarParts:
+    """A vector-valued matrix whose directions do not know of each other.
+
+    Attributes
+    ----------
+    matrices : tuple of (n_k, n_k) sparse
+        One scalar matrix per direction, over the nodes that have that direction.
+    nodes : tuple of (n_k,) int64
+        Node of each row of these matrices.
+    numbering : Numbering
+    """
+
+    matrices: tuple[sp.csr_array, ...]
+    nodes: tuple[NDArray[np.int64], ...]
+    numbering: Numbering
+
+
+def parts_of(matrix: sp.csr_array, nodal: NodalMatrix, numbering: Numbering) -> ScalarParts:
+    """The scalar matrices of uncoupled directions."""
+    nodes = tuple(np.flatnonzero(nodal.row_of[:, a] >= 0) for a in range(nodal.dim))
+    rows = [nodal.row_of[here, a] for a, here in enumerate(nodes)]
+    return ScalarParts(tuple(sp.csr_array(matrix[r][:, r]) for r in rows), nodes, numbering)
 
 
 def recover_directions(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from unassemble.elasticity.nullspace.shape import SOFT, shape
+from unassemble.nodes.shape import SOFT, shape
 
 N, LOOSE = 200, 6
 

@@ -10,8 +10,8 @@ from assembled import box, heterogeneous, permuted_nodes, stiffness
 from supported import assert_certified, given, judged
 
 from unassemble.elasticity import recover_elasticity
-from unassemble.elasticity.rows.grouping import by_first_row
-from unassemble.elasticity.unknowns import find_numbering, given_numbering
+from unassemble.nodes.grouping import by_first_row
+from unassemble.nodes.unknowns import find_numbering, given_numbering
 
 
 def quadratic(kind: str, support: str, order: str, seed: int, perturb: float = 0.2):

@@ -5,9 +5,9 @@ import pytest
 from assembled import box, eliminated, error, on_plane, stiffness
 
 from unassemble.elasticity import recover_elasticity
-from unassemble.elasticity.nodal import nodal_matrix, valid_pairs
 from unassemble.elasticity.nullspace.slender import unbent
-from unassemble.elasticity.unknowns import given_numbering
+from unassemble.nodes.nodal import nodal_matrix, valid_pairs
+from unassemble.nodes.unknowns import given_numbering
 
 
 def beam(kind, length):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from unassemble.elasticity.nullspace.solution import Solution
-from unassemble.elasticity.results import Evidence
 from unassemble.elasticity.straight.straight import Straight, in_place
+from unassemble.recovery import Evidence
 
 
 @pytest.mark.parametrize("loose", [0, 3])

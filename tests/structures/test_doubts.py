@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from built import assembled, error, frame, grid, model_on, plane_frame, truss
 
 from unassemble import RecoveryError, recover
-from unassemble.structures.pieces import pieces
+from unassemble.structures.placed import pieces
 
 
 def rows_of(given, kept):

@@ -28,8 +28,8 @@ def modes(
     One row per row of MATRIX, in its order; translations, then rotations: 3 columns in the plane, 6 in space.
     """
     options["numbering"] = spelled_numbering(options["numbering"])
-    from ..elasticity.modes import check_modes, save_amgcl_coordinates, save_modes, save_petsc_vec
     from ..files import check_target
+    from ..modes import check_modes, save_amgcl_coordinates, save_modes, save_petsc_vec
     from ..progress import StageDisplay
     from ..report import check_report, write_report
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from ..clock import Clock
+from ..nodes.nodal import NodalMatrix, determined
+from ..nodes.numbering import Numbering
+from ..nodes.rounded import Rounding
 from .doubts import guessed_directions, unborne, unconfirmed
 from .materials.cells import no_cells, recognise_cells
-from .nodal import NodalMatrix, determined
 from .nullspace.certificate import largest_residual
 from .nullspace.material import lame_ratio, poisson_ratio
 from .nullspace.solution import Solution
 from .remarks import about_assumptions, about_cells, about_directions, about_nodes
 from .results import ElasticityRecovery
-from .rounded import Rounding
-from .rows.numbering import Numbering
 from .verdict import NOTHING_SHOWN, RESTS_ON_PLANES, of_few_digits, verdict
 
 _SAME = 1e-6  # difference up to which Poisson's ratios of pieces are one

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..nodes.nodal import NodalMatrix, determined
+from ..nodes.numbering import Numbering
 from .materials.cells import Cells
-from .nodal import NodalMatrix, determined
 from .nullspace.solution import Solution
-from .rows.numbering import Numbering
 
 
 def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from .nodal import NodalMatrix, determined, valid_pairs
+from ..nodes.nodal import NodalMatrix, determined, valid_pairs
 from .nullspace.control import uncontrolled
 from .nullspace.identities import boundary_terms
 from .nullspace.material import lame_ratio

@@ -2,38 +2,22 @@
 
 from __future__ import annotations
 
-import numpy as np
 import scipy.sparse as sp
 
 from ..clock import Clock
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..matrix import check_matrix
+from ..nodes.nodal import NodalMatrix, nodal_matrix, uncoupled
+from ..nodes.numbering import Numbering
+from ..nodes.rounded import Rounding, with_exact_sums
+from ..nodes.unknowns import find_numbering
 from .description import described
 from .doubts import with_doubts
-from .nodal import NodalMatrix, nodal_matrix, uncoupled
 from .positions import solve
-from .results import ElasticityRecovery, ScalarParts
-from .rounded import Rounding, with_exact_sums
-from .rows.numbering import Numbering
+from .results import ElasticityRecovery
 from .springs import without_springs
-from .unknowns import find_numbering
 from .verdict import about_made_up_nodes, about_open_rows, about_rows
-
-
-def scalar_parts(matrix: sp.csr_array, *, block_size: int | None = None) -> ScalarParts | None:
-    """Take a vector Laplacian apart; None for matrices that couple directions or have no nodes of several unknowns."""
-    matrix = sp.csr_array(matrix)
-    numbering = find_numbering(matrix, block_size)
-    nodal = nodal_matrix(matrix, numbering)
-    return parts_of(matrix, nodal, numbering) if uncoupled(nodal) else None
-
-
-def parts_of(matrix: sp.csr_array, nodal: NodalMatrix, numbering: Numbering) -> ScalarParts:
-    """The scalar matrices of uncoupled directions."""
-    nodes = tuple(np.flatnonzero(nodal.row_of[:, a] >= 0) for a in range(nodal.dim))
-    rows = [nodal.row_of[here, a] for a, here in enumerate(nodes)]
-    return ScalarParts(tuple(sp.csr_array(matrix[r][:, r]) for r in rows), nodes, numbering)
 
 
 def recover_elasticity(

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..nodes.nodal import NodalMatrix
 from ..words import count_of
 from .materials.cells import Cells
-from .nodal import NodalMatrix
 from .nullspace.solution import Solution
 
 

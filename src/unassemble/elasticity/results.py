@@ -6,13 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..recovery import Evidence as Evidence
+from ..recovery import Evidence
 from .materials.cells import Cells
-from .modes import rigid_body_modes
-from .rows.numbering import Numbering
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,25 +63,3 @@ class ElasticityRecovery:
     def certified(self) -> bool:
         """Whether the coordinates satisfy the matrix to rounding, and nothing else does."""
         return self.status == "certified"
-
-    def rigid_body_modes(self) -> NDArray[np.float64]:
-        """(N, 3) or (N, 6) near-null space in PyAMG's layout; see :func:`.modes.rigid_body_modes`."""
-        return rigid_body_modes(self.points, self.node_of_row, self.direction_of_row)
-
-
-@dataclass(frozen=True, eq=False)
-class ScalarParts:
-    """A vector-valued matrix whose directions do not know of each other.
-
-    Attributes
-    ----------
-    matrices : tuple of (n_k, n_k) sparse
-        One scalar matrix per direction, over the nodes that have that direction.
-    nodes : tuple of (n_k,) int64
-        Node of each row of these matrices.
-    numbering : Numbering
-    """
-
-    matrices: tuple[sp.csr_array, ...]
-    nodes: tuple[NDArray[np.int64], ...]
-    numbering: Numbering

@@ -13,14 +13,14 @@ from ..clock import Clock
 from ..elements.kinds import KINDS
 from ..elements.surface import boundary_loops
 from ..matrix import OperatorMatrix
+from ..nodes.anchoring import anchored, checked_anchors, digits_lost, near_enough
+from ..nodes.nodal import NodalMatrix
+from ..nodes.numbering import Numbering
+from ..nodes.rounded import Rounding
 from ..recovery import Body
-from .anchoring import anchored, checked_anchors, digits_lost, near_enough
 from .materials.cells import Cells
-from .nodal import NodalMatrix
 from .recover import place_nodes
 from .results import ElasticityRecovery
-from .rounded import Rounding
-from .rows.numbering import Numbering
 
 _THIN = 1e-14  # of the largest variance of the coordinates: rounding
 

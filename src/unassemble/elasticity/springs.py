@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .nodal import NodalMatrix, determined, valid_pairs
+from ..nodes.nodal import NodalMatrix, determined, valid_pairs
 
 _APART = 1e-7  # of the mean edge length, up to which two nodes lie in one place
 

@@ -6,14 +6,14 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..nodes.nodal import NodalMatrix, without_trace
+from ..nodes.numbering import Numbering
+from ..nodes.rounded import Rounding
+from ..nodes.shape import SOFT
 from ..tolerances import CERTIFIED
 from ..words import count_of
 from .materials.cells import Cells
-from .nodal import NodalMatrix, without_trace
-from .nullspace.shape import SOFT
 from .nullspace.solution import Solution
-from .rounded import Rounding
-from .rows.numbering import Numbering
 
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
 _GIVE = "; give the numbering if it is known"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..tolerances import CANCELLED
 from .cliques import Graph
 from .kinds import KINDS, Kind
 from .reference import reference_nodes, shape_gradients
 
-_INSIDE = 1e-9  # barycentric coordinates above count as positive
 _AT_ONCE = 2_000_000  # pairs of a corner and a neighbour
 
 
@@ -39,7 +39,7 @@ def unpierced(cells: NDArray[np.int64], points: NDArray[np.float64], graph: Grap
             place, neighbour = graph.spread(some[:, a])
             direction = points[neighbour] - corner[place]
             within = np.einsum("pa,pab->pb", direction, np.linalg.inv(spanned)[place])
-            enters = (within > -_INSIDE).all(axis=1) & ((within > _INSIDE).sum(axis=1) > 1)
+            enters = (within > -CANCELLED).all(axis=1) & ((within > CANCELLED).sum(axis=1) > 1)
             whole[start + place[enters]] = False
     return whole
 

@@ -39,7 +39,7 @@ def matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
 
 def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]:
     """Of a vector-valued matrix."""
-    from ..elasticity.nodal import nodal_matrix, uncoupled
+    from ..nodes.nodal import nodal_matrix, uncoupled
     from ..structures import StructuralNumbering
     from ..structures.bars import bars_of
 

@@ -8,12 +8,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.nodal import NodalMatrix, nodal_matrix
-from ..elasticity.rows.constants import uncoupled_rows
-from ..elasticity.rows.numbering import Numbering
-from ..elasticity.rows.orders import ORDERS, regular
+from ..nodes.constants import uncoupled_rows
+from ..nodes.nodal import NodalMatrix, nodal_matrix
+from ..nodes.numbering import Numbering
+from ..nodes.orders import ORDERS, regular
+from ..tolerances import CANCELLED
 
-_RANK_ONE = 1e-9  # how much of a bar's block may be left, relative to the bar
 _SAMPLE = 64  # blocks to look at before all are
 
 
@@ -51,11 +51,11 @@ def bars_of(nodal: NodalMatrix) -> Bars | None:
     if not len(blocks):
         return None
     some = np.linalg.svd(blocks[:_SAMPLE], compute_uv=False)
-    if (some[:, 1] > _RANK_ONE * some[:, 0]).any():  # mostly a solid: not worth looking at all of it
+    if (some[:, 1] > CANCELLED * some[:, 0]).any():  # mostly a solid: not worth looking at all of it
         return None
     i, j = nodal.node[upper].astype(np.int64), nodal.indices[upper].astype(np.int64)
     left, size, right = np.linalg.svd(blocks)
-    if (size[:, 1] > _RANK_ONE * size[:, 0]).any():
+    if (size[:, 1] > CANCELLED * size[:, 0]).any():
         return None
     whole = nodal.row_of.min(axis=1) >= 0
     # Rows belong to i, columns to j: whichever has all its unknowns shows all of the direction.
@@ -63,11 +63,11 @@ def bars_of(nodal: NodalMatrix) -> Bars | None:
     known = whole[i] | whole[j]
     both = whole[i] & whole[j]
     aligned = (left[both, :, 0] * right[both, 0]).sum(axis=1)
-    if not both.any() or np.abs(np.abs(aligned) - 1).max() > _RANK_ONE:
+    if not both.any() or np.abs(np.abs(aligned) - 1).max() > CANCELLED:
         return None
     spread = np.linalg.eigvalsh(directions[known].T @ directions[known] / known.sum())
     pulls = np.trace(blocks[both], axis1=1, axis2=2) > 0
-    if spread[0] < _RANK_ONE or 0 < pulls.sum() < len(pulls):  # bars all in line or in a plane; of stiffness below zero
+    if spread[0] < CANCELLED or 0 < pulls.sum() < len(pulls):  # bars all in line or in a plane; of stiffness below zero
         return None
     return Bars(np.column_stack([i, j]), directions, known, both)
 

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.nodal import determined
+from ..nodes.nodal import determined
 from .layouts import Layout
 
 

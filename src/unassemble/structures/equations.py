@@ -17,9 +17,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..tolerances import CANCELLED
 from .nodes import Nodes
-
-_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +91,7 @@ def _relative(given: Equations) -> Equations:
     What comes in has the size of what the coefficients are differences of.
     """
     size = np.asarray(abs(given.operator).sum(axis=1)).ravel()
-    tells = np.flatnonzero(size > _ROUNDING * given.size)
+    tells = np.flatnonzero(size > CANCELLED * given.size)
     some, size = given[tells], size[tells]
     operator = sp.csr_array(sp.diags_array(1 / size) @ some.operator)
     return replace(some, operator=operator, right=some.right / size, size=size, lever=some.lever / size)

@@ -7,20 +7,18 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from ..clock import Clock
-from ..elasticity.anchoring import checked_anchors, digits_lost, near_enough
-from ..elasticity.rounded import Rounding, with_exact_sums
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
+from ..nodes.anchoring import anchored, checked_anchors, digits_lost, near_enough
+from ..nodes.rounded import Rounding, with_exact_sums
 from ..recovery import Structure
 from ..tolerances import CERTIFIED
 from ..words import count_of
 from .certificate import forces
-from .members import members_and_cells
+from .members import members_and_cells, mispaired
 from .nodes import Nodes, nodes_of
-from .pairing import mispaired
 from .placed import SURE, Placed, covered
 from .recognise import StructuralNumbering
 from .turning import turning_positions
@@ -95,8 +93,8 @@ def serve_structure(
     if (found.component < 0).any():
         notes.append(f"{(found.component < 0).sum()} of {count_of(nodes.n, 'node')} cannot be determined: at supports, "
                      "or tied to these only")  # fmt: skip
-    points, more = _moved(found, known)
-    lost = digits_lost(points, found.points, found.component, np.ones(len(found.evidence))) / _edge_length(nodes, found)
+    points, factor, more = anchored(found.points, found.component, len(found.evidence), known, sized=True)
+    lost = digits_lost(points, found.points, found.component, factor) / _edge_length(nodes, found)
     status, reason = near_enough(status, reason, lost)
     return Structure(
         **fields,
@@ -118,23 +116,6 @@ def _edge_length(nodes: Nodes, found: Placed) -> float:
     i, j = sp.triu(nodes.graph, 1).nonzero()
     length = np.linalg.norm(found.points[i] - found.points[j], axis=1)
     return float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
-
-
-def _moved(found: Placed, anchors: tuple[NDArray, NDArray]) -> tuple[NDArray[np.float64], list[str]]:
-    """Pieces moved to their anchors, and how far these are missed."""
-    nodes, places = anchors
-    points, piece, notes = found.points.copy(), found.component, []
-    lost = nodes[piece[nodes] < 0]
-    if len(lost):
-        notes.append(f"the anchored nodes {', '.join(map(str, lost))} are not determined and were not used")
-    for one in np.unique(piece[nodes][piece[nodes] >= 0]):
-        here, wanted = nodes[piece[nodes] == one], places[piece[nodes] == one]
-        points[piece == one] += (wanted - points[here]).mean(axis=0)
-        misfit = float(np.linalg.norm(points[here] - wanted, axis=1).max())
-        if len(here) > 1 and misfit > SURE * np.linalg.norm(wanted - wanted.mean(axis=0), axis=1).max():
-            notes.append(f"the anchors do not fit the structure, whose size and axes the matrix knows: one is missed "
-                         f"by {misfit:.3g}")  # fmt: skip
-    return points, notes
 
 
 def _verdict(error: float, found: Placed, rounding: Rounding | None) -> tuple[str, str]:

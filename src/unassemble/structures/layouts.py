@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elasticity.nodal import determined
-
 
 @dataclass(frozen=True)
 class Layout:
@@ -81,29 +79,3 @@ LAYOUTS = (SPACE, PLANE, PLATE)
 def layout_named(name: str) -> Layout | None:
     """The layout of an operator's name; None for other operators."""
     return next((layout for layout in LAYOUTS if layout.name == name), None)
-
-
-def turning_modes(
-    layout: Layout, points: NDArray[np.float64], node_of_row: NDArray[np.int64], direction_of_row: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Near-null space of a structure whose nodes have rotations: translations, then rotations about the centroid.
-
-    Parameters
-    ----------
-    layout : Layout
-    points : (n, d) float64
-        NaN rows get what they have without moving: translations, and rotations of the node itself.
-    node_of_row, direction_of_row : (N,) int64
-        A direction of -1 is not known, and gets zeros.
-
-    Returns
-    -------
-    (N, 6) or (N, 3) float64
-        Rotations are divided by the radius of gyration, so that none swamps another.
-    """
-    known = determined(points)
-    x = points - points[known].mean(axis=0)
-    radius = float(np.sqrt((x[known] ** 2).sum(axis=1).mean())) or 1.0
-    motions = layout.rigid_motions(np.where(known[:, None], x, 0.0))
-    motions[:, :, len(layout.displacements) :] /= radius
-    return np.asarray(motions[node_of_row, direction_of_row] * (direction_of_row >= 0)[:, None])

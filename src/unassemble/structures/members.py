@@ -1,4 +1,8 @@
-"""Members and shell cells, read off coupled nodes whose positions are known."""
+"""Members between two nodes: what a structure consists of, and whether they show that its rows were joined rightly.
+
+What a straight member between two nodes transmits balances by itself, whatever its section; what a pair of corners of a
+shell element transmits does not. So each pair of coupled nodes tells what it is.
+"""
 
 from __future__ import annotations
 
@@ -6,23 +10,17 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.nodal import determined
-from ..elements.cliques import Graph, shared_cliques, simplices
-from ..topology.keys import contains, pair_keys
+from ..elements.shells import graph_of, shell_cells
+from ..nodes.nodal import determined
+from ..tolerances import CANCELLED
+from .layouts import PLANE
 from .nodes import Nodes
-
-_ALONE = 1e-9  # relative misfit of a pair of nodes that balances by itself
-_FLAT = 0.3  # of its width: how thick a quadrilateral may be
-
-_SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))
 
 
 def members_and_cells(nodes: Nodes, points: NDArray[np.float64]) -> dict[str, NDArray[np.int64]]:
     """Straight members between two nodes, and triangles and quadrilaterals between more.
 
-    A member of constant section turns with a rigid rotation of its two nodes all by itself, which a pair of corners of
-    a shell element does not: so each pair tells what it is. Cells are cliques of the others; a pair of which none is
-    part of a cell is a member too.
+    Cells are cliques of pairs that are no members; a pair of which none is part of a cell is a member too.
 
     Parameters
     ----------
@@ -36,78 +34,66 @@ def members_and_cells(nodes: Nodes, points: NDArray[np.float64]) -> dict[str, ND
         ``lines`` (m, 2), ``triangles`` (m, 3) and ``quads`` (m, 4): corners in order around the cell; in the plane
         counter-clockwise.
     """
-    i, j = sp.triu(nodes.graph, 1).nonzero()
-    known = determined(points)
-    real = known[i] & known[j]
-    i, j = i[real].astype(np.int64), j[real].astype(np.int64)
-    alone = _balanced(nodes, points, i, j)
-    n = nodes.n
-    graph = Graph(_pattern(n, i[~alone], j[~alone]))
-    quads = _around(points, shared_cliques(graph, 4))
-    sides = [np.sort(quads[:, side], axis=1) for side in _SIDES]
-    inside = [*sides, np.sort(quads[:, [0, 2]], axis=1), np.sort(quads[:, [1, 3]], axis=1)]
-    taken = np.unique(_keys(n, inside))
-    triangles = simplices(graph, 2)
-    pairs = [triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]]
-    within = np.all([contains(taken, pair_keys(n, *pair.T)) for pair in pairs], axis=0)
-    triangles = triangles[~within]
-    covered = np.unique(np.concatenate([taken, _keys(n, [pair[~within] for pair in pairs])]))
-    lone = alone | ~contains(covered, pair_keys(n, i, j))
-    lines = np.column_stack([i[lone], j[lone]])
-    return {"lines": lines, "triangles": _counter_clockwise(points, triangles), "quads": quads}
+    pairs = np.column_stack(sp.triu(nodes.graph, 1).nonzero()).astype(np.int64)
+    pairs = pairs[determined(points)[pairs].all(axis=1)]
+    alone = np.logical_and(*_balanced(nodes, points, *pairs.T))
+    triangles, quads = shell_cells(graph_of(nodes.n, pairs[~alone]), points)
+    alone |= ~graph_of(nodes.n, triangles, quads).coupled(*pairs.T)
+    return {"lines": pairs[alone], "triangles": triangles, "quads": quads}
 
 
-def _balanced(nodes: Nodes, points: NDArray, i: NDArray, j: NDArray) -> NDArray[np.bool_]:
-    """(e,) pairs whose blocks alone annihilate rotations about one of the nodes.
+def mispaired(nodes: Nodes, points: NDArray[np.float64]) -> tuple[int, int] | None:
+    """Two nodes that are not coupled as elements couple them, if there are any.
 
-    Of a member of constant section, both ends' rotations act alike on the forces, so that the block of the pair tells
-    that of the node with itself: A_ij (w x (x_j - x_i)) + 2 A_ij w = 0 in the rows of forces.
+    The equations for coordinates add up the columns of each direction, and so hardly tell which row of one direction
+    and which of another are one node's. The couplings do: elements join whole nodes, so that two nodes meet in several
+    directions or in none. In space each coordinate acts on two directions, which contradict each other where their rows
+    are not one node's; the coordinates of a plate act on one direction. Those of a plane frame have a direction each,
+    so that all depends on the pairing: its nodes have to be joined by members, and no two of them to have the same
+    neighbours.
+
+    Parameters
+    ----------
+    nodes : Nodes
+    points : (n, dim) float64
+        NaN where not determined.
     """
-    layout = nodes.layout
-    b, moves = layout.block_size, len(layout.displacements)
-    blocks = nodes.matrix.tobsr((b, b))
-    blocks.sort_indices()
-    row = np.repeat(np.arange(nodes.n), np.diff(blocks.indptr))
-    key = pair_keys(nodes.n, row, blocks.indices.astype(np.int64))
-    upper = row <= blocks.indices
-    place = np.flatnonzero(upper)[np.searchsorted(key[upper], pair_keys(nodes.n, i, j))]
-    block = blocks.data[place][:, :moves]
-    motion = layout.rigid_motions(points[j] - points[i])[:, :, moves:]
-    motion[:, moves:] *= 2
-    force = block @ motion
-    size = np.abs(block) @ np.abs(motion)
-    # Every force counts by the largest: those that are rounding say nothing of themselves.
-    return np.asarray(np.abs(force).max(axis=(1, 2), initial=0) <= _ALONE * size.max(axis=(1, 2), initial=0))
+    n, b = nodes.n, nodes.layout.block_size
+    coo, diagonal = nodes.matrix.tocoo(), np.abs(nodes.matrix.diagonal())
+    real = np.abs(coo.data) > CANCELLED * np.sqrt(diagonal[coo.row] * diagonal[coo.col])
+    (i, one), (j, other) = np.divmod(coo.row[real], b), np.divmod(coo.col[real], b)
+    near, meeting = _counts(i, j, n), _counts(i[one == other], j[one == other], n)
+    first, second = sp.triu(near, 1).nonzero()
+    shared = (nodes.present[first] & nodes.present[second]).sum(axis=1)
+    strange = np.asarray(meeting[first, second]).ravel() < np.minimum(shared, 2)
+    if nodes.layout == PLANE:
+        pattern = (near > 0).astype(np.int32)
+        degree, common = np.diff(near.indptr), np.asarray((pattern @ pattern)[first, second]).ravel()
+        twins = (common == degree[first]) & (common == degree[second])
+        balanced, whole = _balanced(nodes, points, first, second)
+        strange |= twins | (whole & ~balanced)
+    k = int(np.argmax(strange)) if strange.any() else None
+    return None if k is None else (int(first[k]), int(second[k]))
 
 
-def _pattern(n: int, i: NDArray, j: NDArray) -> sp.csr_array:
-    pair = np.concatenate([i, j]), np.concatenate([j, i])
-    return sp.csr_array((np.ones(2 * len(i), np.int8), pair), shape=(n, n))
+def _counts(i: NDArray, j: NDArray, n: int) -> sp.csr_array:
+    return sp.csr_array((np.ones(len(i), np.int32), (i, j)), shape=(n, n))
 
 
-def _keys(n: int, pairs: list[NDArray]) -> NDArray[np.int64]:
-    every = np.concatenate(pairs)
-    return pair_keys(n, every[:, 0], every[:, 1])
+def _balanced(nodes: Nodes, points: NDArray, i: NDArray, j: NDArray) -> tuple[NDArray, NDArray]:
+    """Pairs whose block is a member's, whatever its section; and those that are known as a whole.
 
-
-def _around(points: NDArray, cliques: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Those of four nodes that lie around a flat quadrilateral, in order."""
-    if not len(cliques):
-        return cliques
-    x = points[cliques] - points[cliques].mean(axis=1, keepdims=True)
-    _, size, axes = np.linalg.svd(x, full_matrices=False)
-    flat = size[:, 1] > 0
-    if points.shape[1] == 3:
-        flat &= size[:, 2] <= _FLAT * size[:, 1]
-    across = x @ axes[:, :2].transpose(0, 2, 1)
-    order = np.argsort(np.arctan2(across[..., 1], across[..., 0]), axis=1)
-    return _counter_clockwise(points, np.take_along_axis(cliques, order, axis=1)[flat])
-
-
-def _counter_clockwise(points: NDArray, cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Cells in the plane turned to run counter-clockwise; those in space as they are."""
-    if points.shape[1] == 3 or not len(cells):
-        return cells
-    first, second = points[cells[:, 1]] - points[cells[:, 0]], points[cells[:, -1]] - points[cells[:, 0]]
-    clockwise = first[:, 0] * second[:, 1] < first[:, 1] * second[:, 0]
-    return np.where(clockwise[:, None], cells[:, ::-1], cells)
+    Forces at both ends balance for every motion of one of them: with T the motion of node i that goes with one of node
+    j, T^T A_ij is minus the member's own block of node j, and symmetric.
+    """
+    b = nodes.layout.block_size
+    every, place = np.arange(b), b * np.column_stack([i, j])
+    rows, columns = place[:, 0, None, None] + every[:, None], place[:, 1, None, None] + every
+    block = np.asarray(nodes.matrix[np.broadcast_to(rows, (len(i), b, b)).ravel(),
+                                    np.broadcast_to(columns, (len(i), b, b)).ravel()]).reshape(-1, b, b)  # fmt: skip
+    turn = nodes.layout.rigid_motions(points[i] - points[j]).transpose(0, 2, 1)
+    left = turn @ block
+    off = np.abs(left - left.transpose(0, 2, 1)).max(axis=(1, 2), initial=0)
+    whole = (nodes.present[i] & nodes.present[j]).all(axis=1) & determined(points)[i] & determined(points)[j]
+    size = (np.abs(turn) @ np.abs(block)).max(axis=(1, 2), initial=0)
+    return off <= 10 * CANCELLED * size, whole

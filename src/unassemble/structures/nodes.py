@@ -9,10 +9,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.rows.constants import PENALTY
+from ..nodes.constants import PENALTY
+from ..tolerances import CANCELLED
 from .layouts import Layout
 
-_ROUNDING = 1e-9  # a row that annihilates a translation does so to rounding; supports leave 1e-3 and more
 _NOTHING = 1e-14  # of sqrt(A_ii A_jj), which bounds an entry of a definite matrix: rounding
 
 
@@ -81,7 +81,7 @@ class Nodes:
         columns = [self.direction(k) for k in range(b)]
         sums = np.column_stack([part.sum(axis=1) for part in columns])
         size = np.column_stack([abs(part).sum(axis=1) for part in columns])
-        zero = (np.abs(sums) <= _ROUNDING * size).reshape(self.n, b, b)
+        zero = (np.abs(sums) <= CANCELLED * size).reshape(self.n, b, b)
         lacking = self.graph @ (~self.present).astype(np.int32) > 0
         sound: NDArray[np.bool_] = self.present & ~self._penalised()
         still = np.asarray(zero[:, :moves, :moves].all(axis=(1, 2)) & sound[:, :moves].all(axis=1))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,15 +10,35 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.nodal import determined
-from ..elasticity.rows.numbering import Numbering
 from ..errors import GeometryError
+from ..nodes.nodal import determined
+from ..nodes.numbering import Numbering
 from ..recovery import Evidence
 from ..tolerances import CERTIFIED
-from .pieces import Piece, pieces
 from .recognise import StructuralNumbering
 
 SURE = 1e-6  # of the diameter: how far off the points of a certified structure may be
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Equations that share no node with others.
+
+    Attributes
+    ----------
+    nodes : (k,) int64
+        Increasing.
+    rows : (m,) int64
+        Of the equations of all pieces.
+    operator : (m, k d) sparse
+    edges : (e, 2) int64
+        Coupled nodes, by their place in `nodes`.
+    """
+
+    nodes: NDArray[np.int64]
+    rows: NDArray[np.int64]
+    operator: sp.csr_array
+    edges: NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,3 +168,49 @@ def _placed(
     if not found:
         raise failure or GeometryError("no node has an equation that supports leave whole")
     return Placed(points, component, tuple(one.evidence for one in found), used, unnoticed, tuple(notes))
+
+
+def pieces(
+    operator: sp.csr_array, d: int, edges: NDArray[np.int64], rows: NDArray[np.int64] | None = None
+) -> Iterator[Piece]:
+    """Connected pieces, in the order of their first nodes; nodes in no equation are in none.
+
+    The work is that of one pass over the equations, however many pieces there are.
+
+    Parameters
+    ----------
+    operator : (m, n d) sparse
+    d : int
+        Coordinates of a node.
+    edges : (e, 2) int64
+        Coupled nodes; those of different pieces are left out.
+    rows : (k,) int64, optional
+        The equations to use; all by default.
+    """
+    rows = np.arange(operator.shape[0]) if rows is None else rows
+    operator = sp.csr_array(operator[rows])
+    m, n = operator.shape[0], operator.shape[1] // d
+    node = operator.indices // d
+    row = np.repeat(np.arange(m), np.diff(operator.indptr))
+    incidence = sp.csr_array((np.ones(len(node), np.int8), (row, m + node)), shape=(m + n, m + n))
+    count, label = sp.csgraph.connected_components(incidence, directed=False)
+    of_row, of_node = label[:m], label[m:]
+    bodies, equations = _groups(of_node, count), _groups(of_row, count)
+    inside = edges[of_node[edges[:, 0]] == of_node[edges[:, 1]]]
+    links = _groups(of_node[inside[:, 0]], count)
+    place = np.empty(n, np.int64)
+    for body in bodies:
+        place[body] = np.arange(len(body))
+    used = [k for k in range(count) if len(bodies[k]) and len(equations[k])]
+    for k in sorted(used, key=lambda k: bodies[k][0]):
+        part = sp.csr_array(operator[equations[k]])
+        columns = place[part.indices // d] * d + part.indices % d
+        shape = (len(equations[k]), len(bodies[k]) * d)
+        local = sp.csr_array((part.data, columns, part.indptr), shape=shape)
+        yield Piece(bodies[k], rows[equations[k]], local, place[inside[links[k]]])
+
+
+def _groups(label: NDArray, count: int) -> list[NDArray[np.int64]]:
+    """Indices of each label, increasing."""
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(label, minlength=count))[:-1])

@@ -7,9 +7,9 @@ import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.nullspace.shape import EXACT
 from ..errors import GeometryError
 from ..linalg import Factorisation, UpperTriangle, nearly_singular
+from ..nodes.shape import EXACT
 
 _SHIFTS = (1e-15, 1e-13, 1e-11)  # of the typical diagonal of the normal matrix: the least at which no pivot vanishes
 _STEPS = 3

@@ -13,13 +13,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.rows.grouping import by_first_row
-from ..elasticity.rows.orders import ORDERS, regular
 from ..errors import InputError
-from .gaps import with_gaps
+from ..nodes.grouping import by_first_row, same_pattern
+from ..nodes.orders import ORDERS, regular
+from ..tolerances import CANCELLED
 from .layouts import LAYOUTS, SPACE, Layout
 
-_ROUNDING = 1e-9
 _SAMPLE = 2000  # rows to ask
 # On regular meshes some of a solid's rows annihilate whatever is asked; read as what it is it has more of them.
 _SOLIDS = (Layout("solid", 3, (0, 1, 2), ()), Layout("solid", 2, (0, 1), ()))
@@ -80,7 +79,7 @@ def find_structure(
     }
     best = _best(matrix, usual, block_size)
     if best is None and kind != "by component":
-        best = _best(matrix, {(b, "interleaved"): with_gaps(matrix, b) for b in (3, 6)}, block_size)
+        best = _best(matrix, {(b, "interleaved"): _with_gaps(matrix, b) for b in (3, 6)}, block_size)
     return best if best is not None and best.layout.rotations else None
 
 
@@ -142,7 +141,7 @@ def _share(matrix: sp.csr_array, layout: Layout, direction: NDArray) -> float:
     some = sp.csr_array(matrix[rows])
     labels = (direction[:, None] == np.arange(layout.block_size)).astype(float)
     size = abs(some) @ labels
-    zero = np.abs(some @ labels) <= _ROUNDING * size
+    zero = np.abs(some @ labels) <= CANCELLED * size
     coupled = size > 0
     moves = len(layout.displacements)
     turning = direction[rows] >= moves
@@ -154,3 +153,32 @@ def _share(matrix: sp.csr_array, layout: Layout, direction: NDArray) -> float:
     kinds = [kind & tells for kind in (turning, ~turning) if kind.any()]
     share = float(min(good[kind].mean() if kind.any() else 0.0 for kind in kinds))
     return 0.0 if layout.rotations and own[turning].mean() > (_MOST + layout.twisting) * share else share
+
+
+def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+    """Nodes of rows that stand node by node, where some nodes lack unknowns; None if the pattern shows no nodes.
+
+    The rows of a node couple to the same columns, zeros being stored, as assembly leaves them.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+    b : int
+        Unknowns of a whole node.
+
+    Returns
+    -------
+    node : (N,) int64
+    direction : (N,) int64
+        -1 for rows of nodes that lack unknowns: which ones, the pattern does not tell.
+    """
+    order = matrix.shape[0]
+    first = np.flatnonzero(np.append(True, np.diff(same_pattern(matrix)) != 0))
+    length = np.diff(np.append(first, order))
+    if (length % b)[length > b].any() or 2 * length[length % b == 0].sum() < order:
+        return None
+    # Neighbours in the numbering may couple to the same columns all by chance: such a run is several nodes.
+    within = np.arange(order) - np.repeat(first, length)
+    whole = np.repeat(length % b == 0, length)
+    node = np.cumsum((within == 0) | (whole & (within % b == 0))) - 1
+    return node, np.where(whole, within % b, -1)

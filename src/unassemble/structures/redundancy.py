@@ -13,10 +13,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..tolerances import CANCELLED
 from .equations import Equations
 from .layouts import Layout
 
-_ROUNDING = 1e-9  # of the largest force of equal springs: what cancels between neighbours on both sides
 NOTICED = 1e-4  # how much of a disturbance has to be left in the residuals
 
 
@@ -77,7 +77,7 @@ def _small(seen: NDArray) -> NDArray[np.bool_]:
 
 def _blind_together(blind: NDArray, place: NDArray, forces: NDArray, weighted: NDArray) -> None:
     """Mark equations as unnoticed, if one disturbance of them all is."""
-    there = (place >= 0) & (np.abs(forces) > _ROUNDING * np.abs(forces).max(initial=0.0))
+    there = (place >= 0) & (np.abs(forces) > CANCELLED * np.abs(forces).max(initial=0.0))
     pull = weighted[place[there]] * forces[there][:, None]
     if _small(pull.sum(axis=0) / (np.linalg.norm(pull) or 1.0)):
         blind[place[there]] = True

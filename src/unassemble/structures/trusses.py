@@ -15,17 +15,16 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..clock import Clock
-from ..elasticity.anchoring import anchored, checked_anchors, digits_lost, near_enough
-from ..elasticity.nodal import NodalMatrix, determined
-from ..elasticity.nullspace.shape import EXACT, in_gauge, shape
-from ..elasticity.rows.numbering import Numbering
 from ..matrix import OperatorMatrix
+from ..nodes.anchoring import anchored, checked_anchors, digits_lost, near_enough
+from ..nodes.nodal import NodalMatrix, determined
+from ..nodes.numbering import Numbering
+from ..nodes.shape import EXACT, in_gauge, shape
 from ..recovery import Evidence, Structure
 from ..tolerances import CERTIFIED
 from ..words import count_of
 from .bars import Bars
-from .pieces import Piece
-from .placed import SURE, Placed, Positions, covered, placed
+from .placed import SURE, Piece, Placed, Positions, covered, placed
 from .positions import least_squares
 from .redundancy import NOTICED
 

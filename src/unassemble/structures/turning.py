@@ -9,19 +9,16 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elasticity.nullspace.shape import EXACT, set_aside
-from ..elasticity.results import Evidence
 from ..errors import GeometryError
-from ..tolerances import CERTIFIED
+from ..nodes.shape import EXACT, set_aside
+from ..recovery import Evidence
+from ..tolerances import CANCELLED, CERTIFIED
 from .equations import Equations, equations
 from .layouts import Layout
 from .nodes import Nodes
-from .pieces import Piece
-from .placed import Placed, Positions, placed
+from .placed import Piece, Placed, Positions, placed
 from .positions import least_squares
 from .redundancy import unnoticed
-
-_NOTHING = 1e-9  # of what rotations of nodes contribute: displacements between coupled nodes that are rounding
 
 
 def turning_positions(nodes: Nodes) -> tuple[Placed, NDArray[np.bool_]]:
@@ -82,7 +79,7 @@ def _positions(given: Equations, layout: Layout, piece: Piece) -> Positions:
     x, residuals, fields, values = least_squares(piece.operator, part.right, d)
     x = x.reshape(n, d)
     span = np.linalg.norm(x[piece.edges[:, 0]] - x[piece.edges[:, 1]], axis=1).max(initial=0)
-    if span <= _NOTHING * part.lever.max(initial=0):
+    if span <= CANCELLED * part.lever.max(initial=0):
         raise GeometryError("rotations and displacements do not depend on each other: the nodes would lie in one point")
     null, gap = fields[..., values <= EXACT], values[values > EXACT]
     loose = np.zeros(n, dtype=bool)

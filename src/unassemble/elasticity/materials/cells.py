@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from ...elements.candidates import Block, candidates
 from ...elements.cliques import Graph
 from ...elements.surface import tiles
+from ...nodes.nodal import NodalMatrix, determined, surrounded, valid_pairs
 from ...tolerances import CERTIFIED
-from ..nodal import NodalMatrix, determined, surrounded, valid_pairs
 from .entries import Entries, Pairs
 from .fits import Fit, fits
 

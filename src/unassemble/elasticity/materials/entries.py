@@ -13,8 +13,8 @@ from ...elements.cliques import Graph
 from ...elements.kinds import Kind
 from ...elements.matrices import elasticity
 from ...elements.reference import Rule
+from ...nodes.nodal import NodalMatrix, valid_pairs
 from ...tolerances import CERTIFIED
-from ..nodal import NodalMatrix, valid_pairs
 
 _AT_ONCE = 8_000_000  # numbers in the blocks and gradients of one batch of cells
 

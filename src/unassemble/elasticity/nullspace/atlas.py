@@ -22,7 +22,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...linalg import svd
-from ..nodal import NodalMatrix
+from ...nodes.nodal import NodalMatrix
 from .charts import Chart, chart, patches
 from .identities import identities
 

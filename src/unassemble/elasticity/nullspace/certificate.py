@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..nodal import NodalMatrix, determined
+from ...nodes.nodal import NodalMatrix, determined
 
 
 def largest_residual(

@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...linalg import Factorisation, UpperTriangle, nearly_singular, svd
-from ..nodal import NodalMatrix
+from ...nodes.nodal import NodalMatrix
 from .identities import Identities, identities
 
 SHIFTS = (1e-12, 3e-11, 1e-9)  # above the rounding of the normal matrix, below every eigenvalue that is not zero

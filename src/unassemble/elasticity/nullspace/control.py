@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...linalg import UpperTriangle, nearly_singular
-from ..nodal import NodalMatrix, determined
+from ...nodes.nodal import NodalMatrix, determined
 from .charts import SHIFTS
 from .identities import Identities, identities
 

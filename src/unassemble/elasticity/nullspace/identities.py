@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..nodal import NodalMatrix
+from ...nodes.nodal import NodalMatrix
 
 
 def boundary_terms(d: int, ratio: float | None = None) -> NDArray[np.float64]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..nodal import NodalMatrix, determined
+from ...nodes.nodal import NodalMatrix, determined
 from .identities import identities
 
 _CONSTANT = 1e-6  # spread of lambda / mu, relative to 1 + lambda / mu, up to which it counts as one number

@@ -9,11 +9,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...errors import GeometryError
-from ..nodal import NodalMatrix, determined, linked
-from ..results import Evidence
+from ...nodes.nodal import NodalMatrix, determined, linked
+from ...nodes.shape import EXACT, Shape, in_gauge, shape
+from ...recovery import Evidence
 from ..springs import drawn_together
 from .atlas import NullFields, null_fields
-from .shape import EXACT, Shape, in_gauge, shape
 from .slender import affordable, unbent
 from .solution import Solution
 

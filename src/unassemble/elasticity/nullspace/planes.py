@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..nodal import NodalMatrix, eliminated, surrounded
+from ...nodes.nodal import NodalMatrix, eliminated, surrounded
 
 
 def with_planes(

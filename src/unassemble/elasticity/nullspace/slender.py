@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...errors import SolverError
 from ...linalg.normal import NormalEquations
-from ..nodal import NodalMatrix, determined, linked
+from ...nodes.nodal import NodalMatrix, determined, linked
 from .identities import Identities, boundary_basis, identities
 
 _STEPS = 8

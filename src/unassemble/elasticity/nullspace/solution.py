@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..results import Evidence
+from ...recovery import Evidence
 
 
 @dataclass(frozen=True, eq=False)

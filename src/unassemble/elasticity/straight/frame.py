@@ -27,10 +27,10 @@ from numpy.typing import NDArray
 from ...elements.candidates import Block, candidates
 from ...elements.reference import rules
 from ...elements.surface import contested
+from ...nodes.nodal import NodalMatrix, determined
 from ...tolerances import CERTIFIED
 from ..materials.cells import coupled
 from ..materials.entries import Entries, Model, Pairs
-from ..nodal import NodalMatrix, determined
 
 _ROWS = 2000  # nodes whose rows are fitted; re-assembly looks at all of them
 _INDEPENDENT = 1e-6  # least singular value of the tables, relative to the largest, with which they tell T

@@ -17,13 +17,13 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from ...linalg import svd
-from ..nodal import NodalMatrix, determined
+from ...nodes.nodal import NodalMatrix, determined
+from ...nodes.shape import EXACT, in_gauge, set_aside
+from ...recovery import Evidence
 from ..nullspace.atlas import null_fields
 from ..nullspace.identities import no_terms
 from ..nullspace.placing import pieces_of
-from ..nullspace.shape import EXACT, in_gauge, set_aside
 from ..nullspace.solution import Solution
-from ..results import Evidence
 from .frame import frame
 
 _NONE = 1e-6  # singular value of functions that are none, beside others of norm one

@@ -8,8 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .rows.constants import PENALTY, ROUNDING
-from .rows.numbering import Numbering
+from .constants import PENALTY, ROUNDING
+from .numbering import Numbering
 
 
 @dataclass(frozen=True, eq=False)

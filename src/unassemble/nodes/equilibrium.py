@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...linalg import solved
+from ..linalg import solved
 from .constants import ROUNDING, adding_up, row_sizes, with_penalty
 
 _SHIFT = 1e-3  # of the diagonal: keeps bodies that are held in one node only from turning

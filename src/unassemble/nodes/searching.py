@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...budget import Budget
+from ..budget import Budget
 from .constants import ROUNDING, adding_up, proven_directions, row_sizes, uncoupled_rows, with_penalty
 from .equilibrium import spread_directions
 from .filling import filled, filled_by_direction

@@ -15,11 +15,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...budget import Budget
+from ..budget import Budget
+from ..tolerances import CANCELLED
 from .constants import proven_directions, row_sizes, without_penalties
 from .equilibrium import spread_directions
 
-_SMALLER = 1e-9  # share by which sums are smaller, and not by rounding
 _STEPS = 1000  # of the primal-dual method: a third of them names the same rows, three times as many no more
 _ROUNDS = 4  # after which directions hardly change
 
@@ -55,7 +55,7 @@ def with_least_sums(
         other = spread_directions(matrix, group, d, np.where(unnamed, -1, direction))
         trials = [_named(scaled, one, unnamed, d, budget) for one in (direction, other)]
         best = min([other, *trials], key=total)
-        if total(best) >= (1 - _SMALLER) * total(direction):
+        if total(best) >= (1 - CANCELLED) * total(direction):
             break
         direction = best
     return direction

@@ -15,9 +15,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..matrix.digits import Digits
-from .rows.constants import ROUNDING
-from .rows.orders import ORDERS, regular
-from .rows.searching import directions_in_order, live_part
+from .constants import ROUNDING
+from .orders import ORDERS, regular
+from .searching import directions_in_order, live_part
 
 _LAYOUTS = {3: (3, 2, 1), 2: (2,), 6: (3,)}  # unknowns of a node, and how many of these may be displacements
 _SPREADS = 20  # times the rounding of the entries: what an identity, or a sum of forces, may be off by

@@ -44,9 +44,9 @@ def checked_anchors(anchors: Sequence[Any] | None, node_of_row: NDArray[np.int64
 
 
 def anchored(
-    points: NDArray[np.float64], component: NDArray[np.int64], n_pieces: int, anchors: Anchors
+    points: NDArray[np.float64], component: NDArray[np.int64], n_pieces: int, anchors: Anchors, *, sized: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
-    """Move pieces to their anchors; the axes are the matrix's own and stay.
+    """Move pieces to their anchors; the axes are the matrix's own and stay, and so does the size if pieces are `sized`.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def anchored(
     notes : list of str
     """
     nodes, places = anchors
-    points, factor, notes = points.copy(), np.full(n_pieces, np.nan), []
+    points, factor, notes = points.copy(), np.full(n_pieces, 1.0 if sized else np.nan), []
     lost = nodes[component[nodes] < 0]
     if len(lost):
         notes.append(f"the anchored nodes {', '.join(map(str, lost))} are not determined and were not used")
@@ -68,7 +68,7 @@ def anchored(
         body = component == piece
         found, wanted = points[nodes[here]], places[here]
         x, y = found - found.mean(axis=0), wanted - wanted.mean(axis=0)
-        if here.sum() > 1:
+        if here.sum() > 1 and not sized:
             size = float((x * y).sum() / (x * x).sum())
             if size == 0:
                 raise InputError("the anchors lie in one point, or across the line between their nodes")

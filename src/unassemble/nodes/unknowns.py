@@ -16,11 +16,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError, RecoveryError
-from .rows.constants import annihilated_share, uncoupled_rows
-from .rows.grouping import by_first_row, coupled_in_common, made_up, same_pattern
-from .rows.numbering import Numbering
-from .rows.orders import ORDERS, regular
-from .rows.searching import same_cuts, searched
+from .constants import annihilated_share, uncoupled_rows
+from .grouping import by_first_row, coupled_in_common, made_up, same_pattern
+from .numbering import Numbering
+from .orders import ORDERS, regular
+from .searching import same_cuts, searched
 
 _ORDERLY = 0.8  # rows of made-up nodes couple to common nodes less than this
 

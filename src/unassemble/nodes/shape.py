@@ -8,8 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...errors import GeometryError
-from ...linalg import svd
+from ..errors import GeometryError
+from ..linalg import svd
 
 EXACT = 1e-9  # singular values below this are zero; matrices are rounded to 1e-16, gaps are 1e-4 and more
 SOFT = 2e-7  # singular values at which entries rounded to 1e-15 still give coordinates to 1e-8

@@ -1,1 +1,0 @@
-"""Rows and what they couple to: what every search for nodes and directions starts from."""
