@@ -5,8 +5,7 @@
 
 The meshes are those of tests/families.py, assembled by scikit-fem, vanishing entries dropped, rows in random order, or
 in several. An answer counts as right if every edge-connected piece of the mesh comes back to 1e-9 of its diameter, and
-with the same cells; certified answers that are not right are listed as WRONG. Ambiguous ones name cells that others can
-take the place of; doubted ones only cells that others might, which were not tried.
+with the same cells; certified answers that are not right are listed as WRONG.
 """
 
 from __future__ import annotations
@@ -79,8 +78,7 @@ def outcome(known: Specimen, scale: float | None) -> str:
     except RecoveryError:
         return "refused"
     if not found.certified:
-        tested = [other.tested for other in found.alternatives]
-        return "ambiguous" if any(tested) else "doubted" if tested else "uncertified"
+        return found.status
     wrong = [rows for rows in pieces(known.triangles) if error(found.points[rows], known.points[rows]) > 1e-9]
     polygons = np.split(found.polygons_data, found.polygons_offsets[1:-1]) if found.n_polygons else []
     if wrong or cells(found.triangles, polygons, known.matrix) != cells(known.triangles, [], known.matrix):
