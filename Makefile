@@ -9,13 +9,16 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11 python3.14; 
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input
 
 INSTALLED := $(VENV)/.installed
+SIDE_BY_SIDE = $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist worksteal
+
 DOCS_INSTALLED := $(VENV)/.installed-docs
 
-.PHONY: help demo test lint bench docs clean
+.PHONY: help demo test test-all lint bench docs clean
 
 help:
 	@echo 'make demo   recover two matrices and draw the meshes (into demo-output/)'
 	@echo 'make test   run the tests, also with the fallback solver'
+	@echo 'make test-all  the same, and the long families'
 	@echo 'make lint   check style, types, and which rooms use which'
 	@echo 'make bench  run the benchmarks'
 	@echo 'make docs   build the documentation (into docs/_build/html/)'
@@ -46,10 +49,13 @@ demo: $(INSTALLED)
 
 # The short first pass repeats what depends on the sparse solver with the one that every machine has. The tests run side
 # by side on all cores, each process with one thread: threads of several processes would wait for each other.
-test: export OMP_NUM_THREADS := 1
+test test-all: export OMP_NUM_THREADS := 1
 test: $(INSTALLED)
-	UNASSEMBLE_SOLVER=superlu $(BIN)/python -m pytest -q -m fallback
-	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile
+	UNASSEMBLE_SOLVER=superlu $(BIN)/python -m pytest -q -m 'fallback and not slow'
+	$(SIDE_BY_SIDE) -m 'not slow'
+
+test-all: test
+	$(SIDE_BY_SIDE) -m slow
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .

@@ -21,9 +21,9 @@ TESTS = Path(__file__).resolve().parents[1] / "tests"
 sys.path[:0] = [str(TESTS), str(TESTS / "structures"), str(TESTS / "elasticity")]
 import assembled
 import built
+
 from families import FAMILIES, HOPELESS
 from meshes import delaunay, random_mesh, specimen
-
 
 Piece = tuple[NDArray, NDArray]  # rows, and where they are
 
