@@ -81,4 +81,4 @@ def test_elements_confirm_rows_that_order_leaves_open():
     """Nodes of the same neighbours, which order and planes join rightly; those joined otherwise no element shows."""
     body = permuted_nodes(stiffness("hex-q2", box("hex-q2", (4, 4, 4), perturb=0.2), **MATERIALS["one"]), seed=1)
     case = given(body, "symmetry", "boundary first by component", "stored")
-    assert_certified(case, 1e-11, 0.04)
+    assert_certified(case, 1e-11, 0.05)

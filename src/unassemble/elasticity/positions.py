@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ..errors import GeometryError
 from ..nodes.nodal import NodalMatrix, determined, valid_pairs
-from .nullspace.control import uncontrolled
 from .nullspace.identities import boundary_terms
 from .nullspace.material import lame_ratio
 from .nullspace.placing import placed
@@ -112,32 +111,21 @@ def _with_planes(
         return found
     if not other.exact:
         return found
-    return _better(found, other, completed, full, full & ~valid[..., None])
+    return _better(found, other)
 
 
-def _better(
-    found: Solution | None,
-    other: Solution,
-    rows: NodalMatrix,
-    valid: NDArray[np.bool_],
-    assumed: NDArray[np.bool_],
-    terms: NDArray[np.float64] | None = None,
-) -> Solution:
+def _better(found: Solution | None, other: Solution) -> Solution:
     """The solution that rests on assumed equations, and which of its points hang on them; `found` if that has more.
 
-    In the plane all of them hang that are not determined without. There a row next to a roller has as many equations as
-    it has coordinates, or hardly more, and in meshes that repeat those that control each other are controlled by none.
+    All of them hang that are not determined without: elements have to show them.
     """
     if found is not None and other.rank <= found.rank:
         return found
     if not other.unique:
         return other
-    if rows.dim == 2:
-        hanging = determined(other.points)
-        if found is not None and found.unique:
-            hanging &= ~determined(found.firm_points)
-    else:
-        hanging = uncontrolled(rows, valid, assumed, other.points, terms)
+    hanging = determined(other.points)
+    if found is not None and found.unique:
+        hanging &= ~determined(found.firm_points)
     other = replace(other, hanging=hanging if hanging.any() else None)
     return found if found is not None and other.rank <= found.rank else other
 
@@ -163,7 +151,4 @@ def _with_ratio(
         other = replace(placed(rows, valid, patch, terms), planes=found.planes, valid=found.valid, ratio=ratio)
     except GeometryError:
         return found
-    new = determined(other.points) & ~determined(found.firm_points)
-    assumed = ~found.valid | (nodal.graph @ new.astype(float) > 0)[:, None, None]
-    valid = valid if valid.ndim == 4 else np.repeat(valid[..., None], nodal.dim, axis=3)
-    return _better(found, other, rows, valid, valid & assumed[..., None], terms)
+    return _better(found, other)

@@ -8,10 +8,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .constants import annihilated_share, uncoupled_rows
+from .constants import annihilated_share, unaccounted, uncoupled_rows
 from .grouping import coupled_in_common
 from .orders import ORDERS, Reading
-from .traces import unaccounted
 
 _LIKELY = 0.6  # quality of nodes apart from the share of sums that vanish; made-up ones have half or less
 WHOLE = 0.5  # share of sums that vanish in most rows, supports apart

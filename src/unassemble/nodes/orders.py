@@ -14,9 +14,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .constants import ROUNDING
+from .constants import ROUNDING, unaccounted
 from .grouping import by_direction, joined, without_doubles
-from .traces import unaccounted
 
 ORDERS = ("interleaved", "by component")
 _VOTES = 0.5  # share of the rows that add up to zero that has to vote for a cut: nearly all do, or a few by chance

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..budget import Budget
-from .constants import ROUNDING, adding_up, proven_directions, row_sizes, uncoupled_rows, with_penalty
+from .constants import ROUNDING, adding_up, proven_directions, row_sizes, unaccounted, uncoupled_rows, with_penalty
 from .equilibrium import spread_directions
 from .filling import filled, filled_by_direction
 from .grouping import by_direction, by_first_row, same_pattern
@@ -23,7 +23,6 @@ from .least_sums import with_least_sums
 from .likeness import pattern_of
 from .numbering import Numbering, measured
 from .orders import Reading, directions_by_component, nodes_by_component, nodes_in_runs
-from .traces import unaccounted
 
 _LARGE = 20_000  # rows beyond which entries that vanished are not put back, which would take minutes
 _WORK = 2e10  # for directions: half a minute or so

@@ -19,12 +19,7 @@ from numpy.typing import NDArray
 from ...nodes.nodal import NodalMatrix, eliminated, surrounded
 
 
-def with_planes(
-    nodal: NodalMatrix,
-    valid: NDArray[np.bool_],
-    gone: NDArray[np.bool_] | None = None,
-    whole: NDArray[np.bool_] | None = None,
-) -> tuple[NodalMatrix, NDArray[np.bool_]] | None:
+def with_planes(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NodalMatrix, NDArray[np.bool_]] | None:
     """Complete the rows next to rollers; None where there are none.
 
     Parameters
@@ -32,10 +27,6 @@ def with_planes(
     nodal : NodalMatrix
     valid : (n, d, d) bool
         By the strict rule.
-    gone : (n, d) bool, optional
-        Nodes that surely lack the direction: those that do and are not doubtful, where not given.
-    whole : (n,) bool, optional
-        Nodes whose neighbours are all there, in some direction at least; see :func:`.nodal.surrounded`.
 
     Returns
     -------
@@ -47,11 +38,10 @@ def with_planes(
     """
     d = nodal.dim
     present = nodal.row_of >= 0
-    if gone is None:
-        gone = eliminated(nodal)
-        if nodal.doubtful is not None:  # the missing row may be another node's
-            gone = gone & ~nodal.doubtful[:, None]
-    whole = surrounded(nodal, valid) if whole is None else whole  # or more is missing than a roller takes
+    gone = eliminated(nodal)
+    if nodal.doubtful is not None:  # the missing row may be another node's
+        gone = gone & ~nodal.doubtful[:, None]
+    whole = surrounded(nodal, valid)  # or more is missing than a roller takes
     graph = nodal.graph
     count = graph @ gone.astype(float)
     held = ((count > 0) & whole[:, None])[:, None, :] & present[:, :, None] & (nodal.size > 0)[:, None, None]

@@ -36,8 +36,7 @@ class Solution:
     straight : tuple of float
         lambda / mu of the pieces whose axes the identities leave free and elements told; see :mod:`.straight`.
     hanging : (n,) bool, optional
-        Nodes that hang on equations that rest on an assumption, of planes or of one Poisson's ratio, which no other
-        equation controls; see :mod:`.control`.
+        Nodes that only equations determine that rest on an assumption, of planes or of one Poisson's ratio.
     cautious : Solution, optional
         The solution to fall back on where no elements show nodes that rows in doubt determine.
     """
