@@ -100,7 +100,7 @@ def judged(given: Given) -> str:
     matrix = sp.csr_array(given.matrix)
     if not gives_back(found, matrix):
         return "WRONG"
-    if right or given.pieces is None:
+    if right or given.pieces is None or not given.intact:
         return "right"
     return "ambiguous" if found.uniqueness == "searched" else "WRONG"
 
