@@ -19,11 +19,11 @@ from skfem.models import laplace, mass
 
 TESTS = Path(__file__).resolve().parents[1] / "tests"
 sys.path[:0] = [str(TESTS), str(TESTS / "structures"), str(TESTS / "elasticity")]
-import assembled
-import built
+import assembled  # noqa: E402
+import built  # noqa: E402
 
-from families import FAMILIES, HOPELESS
-from meshes import delaunay, random_mesh, specimen
+from families import FAMILIES, HOPELESS  # noqa: E402
+from meshes import delaunay, random_mesh, specimen  # noqa: E402
 
 Piece = tuple[NDArray, NDArray]  # rows, and where they are
 
@@ -88,7 +88,7 @@ def glued(rng) -> Given:
 
 
 def damaged(rng) -> Given:
-    """A mesh, structure or body, with entries exchanged, changed, of other sign, stored as zeros or moved; less rows."""
+    """Any of these with entries exchanged, changed, of other sign, stored as zeros or moved; fewer rows."""
     whole = [mesh, mesh, mesh, glued, scalar, body, structure][rng.integers(7)](rng)
     matrix = sp.coo_array(sp.triu(whole.matrix, 1))
     row, column, value = (np.array(part) for part in (*matrix.coords, matrix.data))

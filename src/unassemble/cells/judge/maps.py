@@ -119,7 +119,8 @@ def mean_misfit(edges: NDArray, given: NDArray) -> Callable[[NDArray], float]:
     smaller = row_sizes(int(edges.max()) + 1, edges, np.abs(given))[edges].min(axis=1)
 
     def mean(fitted: NDArray) -> float:
-        misfit = np.abs(fitted - given) / smaller
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # entries next to far larger ones underflow
+            misfit = np.abs(fitted - given) / smaller
         return float(np.where(misfit < 1, misfit, 1.0).mean())
 
     return mean

@@ -45,6 +45,7 @@ class Updates:
         self._near = Neighbours(sheet)
         n, m = sheet.n_vertices, len(sheet.triangles)
         smaller = row_sizes(n, sheet.edges, np.abs(sheet.weights))[sheet.edges].min(axis=1)
+        smaller = np.maximum(smaller, np.finfo(float).tiny)  # entries next to far larger ones underflow
         self._weights = sheet.weights / smaller
         half = 0.5 / smaller[sheet.row.T.ravel()]
         self._of_edge = sp.csc_array((half, (sheet.row.T.ravel(), np.arange(3 * m))), shape=(len(sheet.edges), 3 * m))
