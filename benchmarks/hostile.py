@@ -20,6 +20,7 @@ import traceback
 import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from itertools import count, islice, repeat
 from pathlib import Path
 from typing import Any
@@ -113,7 +114,7 @@ def judged_file(given: Given) -> str:
         path, out = Path(folder) / given.name, Path(folder) / "out.npz"
         path.write_bytes(given.matrix)
         try:
-            outcome = judged(Given(read_matrix(path)))
+            outcome = judged(replace(given, matrix=read_matrix(path), name=""))
         except (RecoveryError, InputError):
             outcome = "refused"
         ran = CliRunner().invoke(command_line, ["recover", str(path), "-o", str(out), "--quiet"])

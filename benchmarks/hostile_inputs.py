@@ -225,7 +225,8 @@ def strange(rng) -> Given:
 
 def file(rng) -> Given:
     """A damaged file of a small matrix."""
-    matrix = [mesh, symmetric, scalar, body][rng.integers(4)](rng).matrix
+    whole = [mesh, symmetric, scalar, body][rng.integers(4)](rng)
+    matrix = whole.matrix
     stream, name = io.BytesIO(), str(rng.choice(["a.mtx", "a.npz", "a.mat"]))
     if name == "a.mtx":
         scipy.io.mmwrite(stream, matrix, symmetry=str(rng.choice(["general", "symmetric"])))
@@ -249,7 +250,7 @@ def file(rng) -> Given:
             content = content[: at + 1]
         else:
             content[at:at] = content[at : at + 40]
-    return Given(bytes(content), name=name)
+    return Given(bytes(content), whole.pieces, intact=False, name=name)
 
 
 KINDS = {
