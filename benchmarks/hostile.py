@@ -20,6 +20,7 @@ import traceback
 import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from itertools import count, islice, repeat
 from pathlib import Path
 from typing import Any
@@ -69,12 +70,14 @@ def gives_back(found, matrix: Any) -> bool:
     if len(triangles) == 0 or not np.isfinite(found.points[triangles]).all():
         return False
     given = sp.csr_array(matrix, dtype=np.float64)
-    off = given / max(np.abs(given).max(), 1e-300) * 1.0
+    off = given / max(np.abs(given).max(), 1e-300)
     off = sp.csr_array(off - sp.diags_array(off.diagonal()))
     label, total = pieces_of(triangles), sp.csr_array(off.shape)
     for k in range(label.max() + 1):
-        corners = skfem.MeshTri(found.points.T.copy(), triangles[label == k].T.copy())
-        part = sp.csr_array(laplace.assemble(skfem.Basis(corners, skfem.ElementTriP1())))
+        rows, corners = np.unique(triangles[label == k], return_inverse=True)
+        piece = skfem.MeshTri(found.points[rows].T.copy(), corners.reshape(-1, 3).T.copy())
+        part = sp.coo_array(laplace.assemble(skfem.Basis(piece, skfem.ElementTriP1())))
+        part = sp.coo_array((part.data, (rows[part.row], rows[part.col])), shape=off.shape).tocsr()
         part = sp.csr_array(part - sp.diags_array(part.diagonal()))
         total = total + part * (part.multiply(off).sum() / part.multiply(part).sum())
     largest = np.maximum(np.abs(off).max(axis=1).toarray().ravel(), 1e-300)
@@ -100,7 +103,7 @@ def judged(given: Given) -> str:
     matrix = sp.csr_array(given.matrix)
     if not gives_back(found, matrix):
         return "WRONG"
-    if right or given.pieces is None:
+    if right or given.pieces is None or not given.intact:
         return "right"
     return "ambiguous" if found.uniqueness == "searched" else "WRONG"
 
@@ -111,7 +114,7 @@ def judged_file(given: Given) -> str:
         path, out = Path(folder) / given.name, Path(folder) / "out.npz"
         path.write_bytes(given.matrix)
         try:
-            outcome = judged(Given(read_matrix(path)))
+            outcome = judged(replace(given, matrix=read_matrix(path), name=""))
         except (RecoveryError, InputError):
             outcome = "refused"
         ran = CliRunner().invoke(command_line, ["recover", str(path), "-o", str(out), "--quiet"])

@@ -19,21 +19,22 @@ from skfem.models import laplace, mass
 
 TESTS = Path(__file__).resolve().parents[1] / "tests"
 sys.path[:0] = [str(TESTS), str(TESTS / "structures"), str(TESTS / "elasticity")]
-import assembled
-import built
+import assembled  # noqa: E402
+import built  # noqa: E402
 
-from families import FAMILIES, HOPELESS
-from meshes import delaunay, random_mesh, specimen
+from families import FAMILIES, HOPELESS  # noqa: E402
+from meshes import delaunay, random_mesh, specimen  # noqa: E402
 
 Piece = tuple[NDArray, NDArray]  # rows, and where they are
 
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """A matrix, or the bytes of a file, and the pieces of its mesh; None where it has none that is known."""
+    """A matrix, or the bytes of a file; the pieces of its mesh, None where that is not known; whether it is whole."""
 
     matrix: Any
     pieces: list[Piece] | None = None
+    intact: bool = True
     name: str = ""
 
 
@@ -87,11 +88,11 @@ def glued(rng) -> Given:
 
 
 def damaged(rng) -> Given:
-    """A mesh, structure or body, with entries exchanged, changed, of other sign, stored as zeros or moved; less rows."""
+    """Any of these with entries exchanged, changed, of other sign, stored as zeros or moved; fewer rows."""
     whole = [mesh, mesh, mesh, glued, scalar, body, structure][rng.integers(7)](rng)
     matrix = sp.coo_array(sp.triu(whole.matrix, 1))
     row, column, value = (np.array(part) for part in (*matrix.coords, matrix.data))
-    n, pieces = matrix.shape[0], None
+    n, pieces = matrix.shape[0], whole.pieces
     for _ in range(int(rng.integers(1, 4)) if len(value) and n > 3 else 0):
         i, j = rng.integers(len(value), size=2)
         what = rng.integers(7)
@@ -119,8 +120,10 @@ def damaged(rng) -> Given:
     result = sp.coo_array((np.concatenate([part.data for part in parts]), (rows, columns)), shape=(n, n)).tocsr()
     if rng.random() < 0.2:
         kept = np.sort(rng.permutation(n)[: max(n - int(rng.integers(1, 4)), 1)])
-        result = result[kept][:, kept]
-    return Given(result, pieces)
+        result, place = result[kept][:, kept], np.full(n, -1)
+        place[kept] = np.arange(len(kept))
+        pieces = pieces and [(place[rows][place[rows] >= 0], at[place[rows] >= 0]) for rows, at in pieces]
+    return Given(result, pieces, intact=False)
 
 
 def scalar(rng) -> Given:
@@ -222,7 +225,8 @@ def strange(rng) -> Given:
 
 def file(rng) -> Given:
     """A damaged file of a small matrix."""
-    matrix = [mesh, symmetric, scalar, body][rng.integers(4)](rng).matrix
+    whole = [mesh, symmetric, scalar, body][rng.integers(4)](rng)
+    matrix = whole.matrix
     stream, name = io.BytesIO(), str(rng.choice(["a.mtx", "a.npz", "a.mat"]))
     if name == "a.mtx":
         scipy.io.mmwrite(stream, matrix, symmetry=str(rng.choice(["general", "symmetric"])))
@@ -246,7 +250,7 @@ def file(rng) -> Given:
             content = content[: at + 1]
         else:
             content[at:at] = content[at : at + 40]
-    return Given(bytes(content), name=name)
+    return Given(bytes(content), whole.pieces, intact=False, name=name)
 
 
 KINDS = {

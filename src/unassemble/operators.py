@@ -118,7 +118,8 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     from .nodes.unknowns import find_numbering
     from .structures import find_structure
 
-    if not matrix.diagonal.all():  # every unknown of an elastic body has a stiffness
+    # Every unknown of an elastic body has a stiffness, and no body has entries of one size: graphs have.
+    if not matrix.diagonal.all() or np.ptp(np.abs(matrix.entries)) <= ROUNDED * np.abs(matrix.entries).max(initial=0.0):
         return None
     whole, exact = _exact(matrix)
     structure = find_structure(whole)

@@ -80,7 +80,8 @@ def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None) -> 
     order = np.lexsort((np.array([piece.n_vertices for piece, _ in having]), ~loose))
     telling = np.full(int(label.max()) + 1, -1)  # the piece that tells c: the largest of those with entries to spare
     telling[own[order]] = order
-    apart = np.abs(c / (scale or c[telling[own]]) - 1) > SAME_SCALE
+    with np.errstate(all="ignore"):
+        apart = ~(np.abs(c / (scale or c[telling[own]]) - 1) <= SAME_SCALE)
     wrong, hopeless = np.zeros((2, len(telling)), dtype=bool)
     wrong[own[apart]] = True
     hopeless[own[apart & ~loose]] = True

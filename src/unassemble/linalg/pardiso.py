@@ -13,6 +13,7 @@ import os
 import re
 import sys
 import threading
+from dataclasses import replace
 from enum import IntEnum
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
@@ -118,9 +119,19 @@ class PardisoFactorisation:
 
     def factorise(self, matrix: UpperTriangle) -> None:
         """Factorise a matrix with the analysed pattern."""
-        size = float(np.abs(matrix.data).max(initial=0.0))
+        sizes = np.abs(matrix.data)
+        size = float(sizes.max(initial=0.0))
         if not size <= 1e30:  # such entries have been seen to spoil memory
             raise SolverError(f"a matrix to be factorised has entries that are not finite, or as large as {size:.1e}")
+        # Next to such entries and rows of zeros pivots overflow, and a segmentation fault follows.
+        tiny = (sizes > 0) & (sizes < max(np.finfo(float).eps ** 2 * size, 1e-100))
+        if tiny.any():
+            matrix = replace(matrix, data=np.where(tiny, 0, matrix.data))
+            seen = np.zeros(matrix.n, dtype=bool)
+            filled = (matrix.data != 0).reshape(len(matrix.data), -1).any(axis=1)
+            seen[matrix.indices[filled]] = seen[np.repeat(np.arange(matrix.n), np.diff(matrix.indptr))[filled]] = True
+            if not seen.all():
+                raise SolverError(f"row {int(np.argmin(seen))} of a matrix to be factorised vanishes beside the others")
         self._matrix = matrix
         self._call(_Phase.FACTORISE)
 

@@ -56,7 +56,7 @@ class SearchOptions:
     close: float = 0.15
     widened_solves: float = 300
     least_relaxed: int = 60
-    relaxed_solves: int = 300
+    relaxed_solves: int = 200
     leaps: int = 8
     batch: int = 8
     in_vain: int = 40
@@ -64,7 +64,7 @@ class SearchOptions:
     better: float = 0.9
     ranking: int = 10
     patience: int = 15
-    at_least: int = 8
+    at_least: int = 5
     moves: float = 1500
     moves_work: float = 3e5
     beside_work: float = 2e6

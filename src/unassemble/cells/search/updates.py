@@ -36,6 +36,7 @@ class Updates:
         self._near = Neighbours(sheet)
         n, m = sheet.n_vertices, len(sheet.triangles)
         smaller = row_sizes(n, sheet.edges, np.abs(sheet.weights))[sheet.edges].min(axis=1)
+        smaller = np.maximum(smaller, np.finfo(float).tiny)  # entries next to far larger ones underflow
         self._weights = sheet.weights / smaller
         half = 0.5 / smaller[sheet.row.T.ravel()]
         self._of_edge = sp.csc_array((half, (sheet.row.T.ravel(), np.arange(3 * m))), shape=(len(sheet.edges), 3 * m))
@@ -192,7 +193,8 @@ class Updates:
         used = np.clip(w, -5.0, 5.0)  # more belongs to flat triangles
         for _ in range(3):
             c = (self._weights @ used) / np.maximum((used * used).sum(axis=0), np.finfo(float).tiny)
-            used = np.where(np.abs(c * w - self._weights[:, None]) < 0.5, w, 0.0)
+            with np.errstate(all="ignore"):  # a change that leaves nothing has no scale
+                used = np.where(np.abs(c * w - self._weights[:, None]) < 0.5, w, 0.0)
         return np.asarray(c)
 
 
