@@ -1,7 +1,6 @@
 """Sparse linear algebra behind one small interface."""
 
 from .ahead import AnalysisAhead
-from .augmented import AugmentedSystem
 from .definite import nearly_singular, solved
 from .factorisation import Factorisation, backend, factorisation
 from .least_norm import least_norm
@@ -12,7 +11,6 @@ from .upper import UpperTriangle, upper_from_edges
 
 __all__ = [
     "AnalysisAhead",
-    "AugmentedSystem",
     "Factorisation",
     "UpperTriangle",
     "backend",

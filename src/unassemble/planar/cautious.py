@@ -8,7 +8,6 @@ steps are cut short before that.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..topology import Piece
 from .normal import NormalEquations, WeightJacobian, distant_pair
-from .polish import Equations, GaussNewton, PolishedMesh, Problem, downhill
+from .polish import GaussNewton, PolishedMesh, Problem, downhill
 
 _log = logging.getLogger(__name__)
 
@@ -29,6 +28,8 @@ class CautiousOptions:
     ----------
     max_steps : int
         Each with a factorisation.
+    most_vertices : int
+        Of a piece for which so many factorisations are worth their time; callers ask.
     least_area : float
         What a step must leave of the area of every triangle, relative.
     settled : float
@@ -36,6 +37,7 @@ class CautiousOptions:
     """
 
     max_steps: int = 40
+    most_vertices: int = 200_000
     least_area: float = 0.1
     settled: float = 1e-3
 
@@ -48,10 +50,9 @@ def cautious_polish(
     scale: float | None = None,
     spread: NDArray | None = None,
     pins: NDArray | None = None,
-    equations: Callable[[WeightJacobian, NDArray], Equations] = NormalEquations,
     options: CautiousOptions | None = None,
 ) -> PolishedMesh:
-    """Maximum-likelihood mesh from a distant start, or with equations that serve one Jacobian.
+    """Maximum-likelihood mesh from a distant start, with a factorisation for each step.
 
     Parameters
     ----------
@@ -62,8 +63,6 @@ def cautious_polish(
     spread : (e,) float64, optional
     pins : (k,) int, optional
         As for the polish.
-    equations : callable
-        Makes the linearised problem from its Jacobian and two vertices to be held.
     options : CautiousOptions, optional
     """
     options = options or CautiousOptions()
@@ -74,11 +73,11 @@ def cautious_polish(
     problem = Problem(piece, weights, spread, scale)
     fit, steps, length, converged = problem.at(z), 0, np.inf, False
     history: list[tuple[float, float]] = []
-    held: Equations | None = None
+    held: NormalEquations | None = None
     while steps < options.max_steps and not converged:
         jacobian = WeightJacobian(piece, fit.z, spread)
         if held is None:
-            held = equations(jacobian, pins)
+            held = NormalEquations(jacobian, pins)
         else:
             held.renew(jacobian)
         move = GaussNewton(jacobian, held, fit.weights if scale is None else None)(jacobian, fit.misfit)

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ..errors import GeometryError
 from ..linalg import Factorisation, UpperTriangle, factorisation
+from ..tolerances import SUMMED
 from ..topology import Piece
 from .krylov import ShiftedSearch
 from .pencil import ConformalPencil
@@ -33,11 +34,8 @@ _STEEPEST = 1e12  # weight in units of the scale, beyond that of any triangle in
 
 _log = logging.getLogger(__name__)
 
-_AGREE = 1e-10  # relative difference of values of c by triangles that are one
 _MOST = 0.7  # if that share of the triangles agree, that is c
 _MANY, _SHARE = 100, 0.2  # or that many, if they are such a share: mirrored neighbours among others
-_SCATTERS = 3.0  # from the estimate of c to the first shift, in units of the scatter of what triangles say
-_NEAREST = 0.03
 
 _FARTHEST = 1e-6
 """Least ratio of a scale to its estimate, or of the estimate to it."""
@@ -54,7 +52,9 @@ class ConformalOptions:
     max_factorisations : int
         Factorisations before giving up.
     first_shift : float
-        Relative to the estimate of c; any value well inside (0, 1) will do. Nearer to 1 where triangles say so.
+        Relative to the estimate of c; any value well inside (0, 1) will do.
+    scatters, nearest : float
+        Where triangles agree it is nearer: at least so many times their scatter, and so much, below the estimate.
     margin : float
         Distance of the last shift below c, relative. Nearer, M would be singular to working accuracy.
     """
@@ -62,6 +62,8 @@ class ConformalOptions:
     krylov_steps: int = 8
     max_factorisations: int = 8
     first_shift: float = 0.7
+    scatters: float = 3.0
+    nearest: float = 0.03
     margin: float = 1e-11
 
 
@@ -144,7 +146,7 @@ def _common(values: NDArray[np.float64]) -> float | None:
     On meshes of a few triangles over and over some values are frequent that are wrong.
     """
     values = np.sort(values)
-    alike = np.searchsorted(values, values * (1 + _AGREE), side="right") - np.arange(len(values))
+    alike = np.searchsorted(values, values * (1 + SUMMED), side="right") - np.arange(len(values))
     first = int(np.argmax(alike))
     count = int(alike[first])
     alike[first : first + count] = 0
@@ -221,7 +223,7 @@ def conformal_map(
     else:
         spread = None
     if spread is None:
-        first = max(1 - max(_SCATTERS * estimate.scatter, _NEAREST), options.first_shift)
+        first = max(1 - max(options.scatters * estimate.scatter, options.nearest), options.first_shift)
         z, c, spread = search.at(first, _smooth_start(piece))
         if c < first > options.first_shift:  # not all triangles are wrong in the same sense, but many may be
             z, c, spread = search.at(options.first_shift, _smooth_start(piece))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,46 +14,57 @@ from .cotangent import edge_weights
 from .normal import NormalEquations, WeightJacobian, distant_pair
 from .side_by_side import SideBySide
 
-_EXACT = 3000
-_SAMPLES = 400
-_BLOCK = 64
+
+@dataclass(frozen=True)
+class SamplingOptions:
+    """How responses to the errors of entries are added up.
+
+    Attributes
+    ----------
+    exact_up_to : int
+        Edges whose responses are computed one by one; above, random sign patterns stand in for them.
+    samples : int
+        Of these patterns: the relative standard error of a standard deviation is 1 / sqrt(2 samples).
+    block : int
+        Right-hand sides that are solved for together.
+    """
+
+    exact_up_to: int = 3000
+    samples: int = 400
+    block: int = 64
 
 
 def coordinate_covariances(
     piece: Piece,
     z: NDArray,
     *,
-    sigma: float,
-    free_scale: bool,
-    beside: float = 0.0,
+    beside: float | None,
     stretch: NDArray | None = None,
     spread: NDArray | None = None,
     pins: NDArray | None = None,
+    options: SamplingOptions | None = None,
 ) -> NDArray[np.float64]:
-    """Covariance of each vertex for independent noise of standard deviation sigma in the weights.
+    """Covariance of each vertex for independent noise of standard deviation 1 in the weights w = -A_ij / c.
 
     The estimate z responds to noise r by y = (J'J)^+ J' r, in the gauge in which a change has no component along
     translations, rotation and scaling. Responses to every single entry add up to the covariance exactly;
-    above 3000 edges 400 random sign patterns stand in for them, which leaves a relative standard error of
-    3.5% in a standard deviation.
+    above `options.exact_up_to` edges random sign patterns stand in for them.
 
     Parameters
     ----------
     piece : Piece
     z : (n,) complex128
         The Laplacian's frame.
-    sigma : float
-        In units of the weights, that is divided by the modulus of c.
-    free_scale : bool
-        Whether c was fitted as well.
-    beside : float
-        What other pieces, fitted with the same c, say of it: the inverse of the variance of log c for sigma = 1.
+    beside : float or None
+        What other pieces, fitted with the same c, say of it: the inverse of the variance of log c for such noise. None
+        where c was not fitted.
     stretch : (2, 2) float64, optional
         Linear map from that frame to the one in which covariances are wanted.
     spread : (e,) float64, optional
-        Standard deviations of the weights relative to `sigma`, for which z is the least-squares estimate.
+        Standard deviations of the weights relative to that, for which z is the least-squares estimate.
     pins : (k,) int, optional
         Vertices that are held, where two do not fix all similarities.
+    options : SamplingOptions, optional
 
     Returns
     -------
@@ -63,20 +75,20 @@ def coordinate_covariances(
     weights = edge_weights(piece, z) / jacobian.spread
     slope = jacobian.transpose(weights)
     response = equations.solve(slope)
-    complement = float(weights @ weights) - float(np.vdot(slope, response).real) + beside
+    complement = float(weights @ weights) - float(np.vdot(slope, response).real) + (beside or 0.0)
     gauge = _gauge(z)
     root = np.eye(2) if stretch is None else stretch
     total = np.zeros((len(z), 2, 2))
-    for noise in _noise_blocks(len(weights)):
+    for noise in _noise_blocks(len(weights), options or SamplingOptions()):
         y = equations.solve(np.column_stack([jacobian.transpose(column) for column in noise.T]))
-        if free_scale and complement > 0:
+        if beside is not None and complement > 0:
             along = (weights @ noise - np.real(slope.conj() @ y)) / complement
             y = y - response[:, None] * along
         total += _spread(y, gauge, root)
-    if free_scale and complement > 0:
+    if beside is not None and complement > 0:
         total += _spread(response[:, None] * np.sqrt(beside) / complement, gauge, root)
     equations.release()
-    return sigma**2 * total
+    return total
 
 
 def _spread(moves: NDArray, gauge: NDArray, root: NDArray) -> NDArray[np.float64]:
@@ -140,16 +152,16 @@ def _gauge(z: NDArray) -> NDArray:
     return np.linalg.qr(np.column_stack(columns))[0]
 
 
-def _noise_blocks(n_edges: int) -> Iterator[NDArray[np.float64]]:
+def _noise_blocks(n_edges: int, options: SamplingOptions) -> Iterator[NDArray[np.float64]]:
     """Columns r with sum r r' = I, exactly or in the mean."""
-    if n_edges <= _EXACT:
-        for start in range(0, n_edges, _BLOCK):
-            width = min(_BLOCK, n_edges - start)
+    if n_edges <= options.exact_up_to:
+        for start in range(0, n_edges, options.block):
+            width = min(options.block, n_edges - start)
             block = np.zeros((n_edges, width))
             block[start + np.arange(width), np.arange(width)] = 1
             yield block
         return
     rng = np.random.default_rng(0)
-    for start in range(0, _SAMPLES, _BLOCK):
-        width = min(_BLOCK, _SAMPLES - start)
-        yield rng.choice([-1.0, 1.0], size=(n_edges, width)) / np.sqrt(_SAMPLES)
+    for start in range(0, options.samples, options.block):
+        width = min(options.block, options.samples - start)
+        yield rng.choice([-1.0, 1.0], size=(n_edges, width)) / np.sqrt(options.samples)

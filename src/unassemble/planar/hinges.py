@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import combinations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
@@ -13,10 +11,7 @@ from ..linalg import least_norm
 from ..topology import Topology
 
 CLOSED = 1e-6  # distance at shared vertices, relative to the largest piece, below which rings count as closed
-_MOST_IMAGES = 100  # pieces; above, none is turned over by itself
-_FEW, _SOME = 9, 24  # pieces of which several, or two, are turned over at once
-_MOST_TOGETHER = 4
-_DENSE = 100  # pieces; above, sparse linear algebra is faster
+_DENSE = 100  # pieces; above, sparse linear algebra is faster, and none is turned over by itself
 
 
 def join(
@@ -62,7 +57,7 @@ def free_images(topology: Topology, joined: list[NDArray]) -> NDArray[np.int64]:
     joined : list of (n_p,) complex128
         Positions by :func:`join`.
     """
-    if rings(topology) <= 0 or len(joined) > _MOST_IMAGES:
+    if rings(topology) <= 0 or len(joined) > _DENSE:
         return np.empty(0, dtype=np.int64)
     held = _held(groups(topology), np.zeros(len(joined), dtype=np.int64))
     shared = [np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces]
@@ -91,8 +86,7 @@ def _matching_images(
 ) -> list[NDArray]:
     """Mirror images of pieces in rings that let these close.
 
-    Those of one embedding; else one piece after the other is turned over as long as that lowers the gap, then two at
-    once are tried, and of few pieces more.
+    Those of one embedding; else one piece after the other is turned over as long as that lowers the gap.
     """
     if rings(topology) <= 0:
         return positions
@@ -101,21 +95,17 @@ def _matching_images(
         drawn = _as_drawn(topology, positions, held)
         left = _joined(topology, drawn, held)[1]
         positions, best = (drawn, left) if left <= closed else (positions, best)
-    if len(positions) > _MOST_IMAGES:
+    if len(positions) > _DENSE:
         return positions
-    free = np.flatnonzero(~held).tolist()
-    most = _MOST_TOGETHER if len(free) <= _FEW else 2 if len(free) <= _SOME else 1
-    together = 1
-    while best > closed and together <= most:
+    while best > closed:
         trials = []
-        for pieces in combinations(free, together):
-            turned = [np.conj(z) if p in pieces else z for p, z in enumerate(positions)]
+        for piece in np.flatnonzero(~held).tolist():
+            turned = [np.conj(z) if p == piece else z for p, z in enumerate(positions)]
             trials.append((_joined(topology, turned, held)[1], turned))
         lowest, turned = min(trials, key=lambda trial: trial[0], default=(np.inf, positions))
-        if lowest < 0.999 * best:
-            best, positions, together = lowest, turned, 1
-        else:
-            together += 1
+        if not lowest < 0.999 * best:
+            break
+        best, positions = lowest, turned
     return positions
 
 

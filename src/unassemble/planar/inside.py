@@ -13,6 +13,7 @@ the boundary that stand out are set aside, in rounds, until all others fit.
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +27,35 @@ from .robust import ASIDE, RobustFit
 
 _log = logging.getLogger(__name__)
 
-_GUESSES = 1.0, 0.75  # parts of the entries that are unknown
 _SHORT = CautiousOptions(max_steps=10)
-_ROUNDS = 24
-_GAIN = 0.5  # part of the misfit to which a round must lower it for no more entries to be set aside
-_FITS = 1e-9  # of a typical entry: a misfit that is none
-_FITS_AGAIN = 1e-7  # and one of an entry that had been set aside, which may have held nothing since
-_OUT = 10.0, 0.2  # times the median misfit, and the largest one: what stands out
+
+
+@dataclass(frozen=True)
+class InsideOptions:
+    """Settings of the rounds.
+
+    Attributes
+    ----------
+    guesses : tuple of float
+        Parts of the entries that are unknown, to begin with.
+    rounds : int
+    gain : float
+        Part of the misfit to which a round must lower it for no more entries to be set aside.
+    fits, fits_again : float
+        Misfit that is none, in typical entries; of one that was set aside, which may have held nothing since.
+    out : (float, float)
+        What stands out, in median misfits and in largest ones.
+    """
+
+    guesses: tuple[float, ...] = (1.0, 0.75)
+    rounds: int = 24
+    gain: float = 0.5
+    fits: float = 1e-9
+    fits_again: float = 1e-7
+    out: tuple[float, float] = (10.0, 0.2)
+
+
+_OPTIONS = InsideOptions()
 
 
 def fit_inside(
@@ -57,7 +80,7 @@ def fit_inside(
     # What is done does not depend on the size of c then, but for rounding.
     unit = float(np.exp2(np.round(np.log2(np.median(np.abs(weights))))))
     weights, scale = weights / unit, None if scale is None else scale / unit
-    for guess in _GUESSES:
+    for guess in _OPTIONS.guesses:
         guessed = weights.copy()
         guessed[unknown] *= guess
         try:
@@ -82,7 +105,7 @@ def _in_rounds(
     aside = np.zeros(len(weights), dtype=bool)
     aside[unknown] = True
     before = np.inf
-    for _ in range(_ROUNDS):
+    for _ in range(_OPTIONS.rounds):
         spread = np.where(aside, ASIDE, 1.0)
         found = cautious_polish(piece, weights, z, scale=scale, spread=spread, options=_SHORT)
         z, c = found.z, found.scale
@@ -91,11 +114,13 @@ def _in_rounds(
         rest = misfit[~aside]
         left = float(np.linalg.norm(rest))
         _log.debug("%d entries set aside: misfit %.1e", np.count_nonzero(aside), left)
-        if (rest <= _FITS * np.median(np.abs(fitted))).all():
+        if (rest <= _OPTIONS.fits * np.median(np.abs(fitted))).all():
             return RobustFit(z, c, np.flatnonzero(aside))
         ended = found.converged or found.steps < _SHORT.max_steps
-        if ended or left > _GAIN * before:
-            aside |= near & (misfit > max(_OUT[0] * float(np.median(rest)), _OUT[1] * float(rest.max())))
+        if ended or left > _OPTIONS.gain * before:
+            aside |= near & (
+                misfit > max(_OPTIONS.out[0] * float(np.median(rest)), _OPTIONS.out[1] * float(rest.max()))
+            )
         before = left
         weights = np.where(aside, c * fitted, weights)  # held where it is, and no further
     return None
@@ -104,7 +129,7 @@ def _in_rounds(
 def _still_aside(piece: Piece, weights: NDArray, unknown: NDArray[np.int64], found: RobustFit) -> NDArray[np.int64]:
     """Those set aside that are unknown, or do not fit in the end."""
     fitted = edge_weights(piece, found.z)
-    off = np.abs(fitted - weights / found.scale) > _FITS_AGAIN * np.median(np.abs(fitted))
+    off = np.abs(fitted - weights / found.scale) > _OPTIONS.fits_again * np.median(np.abs(fitted))
     off[unknown] = True
     aside = np.zeros(len(weights), dtype=bool)
     aside[found.aside] = True

@@ -10,27 +10,20 @@ from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..linalg import Factorisation, UpperTriangle
+from ..tolerances import LARGEST_NOISE, ROUNDED, SIGMAS
 from ..topology import Piece
-from .cautious import cautious_polish, count_flipped
+from .cautious import CautiousOptions, cautious_polish, count_flipped
 from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
 from .hinged import Hinged
-from .pivoted import PivotedEquations, affordable
 from .polish import PolishedMesh, polish
 from .robust import ASIDE
 from .side_by_side import SideBySide
 
-_ROUNDING = 1e-12
-"""Errors of the weights that may be rounding."""
 EXACT = 1e-3
 """Standard deviation of entries without noise, relative to that of the others: next to none, and safe to divide by."""
-_FAR = 0.05
-"""Root mean square misfit, over c, that no rounding in the solution of a linear problem leaves, and no noise tested."""
-_OUTLIER = 10.0  # standard deviations that no entry is off by
 _LOST = 1e-14
 """Edges of that length, relative to the extent, have hardly a digit left."""
-_CAUTIOUS_LIMIT = 200_000
-"""Most vertices for which a polish that fails is tried again with a factorisation in every step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +86,9 @@ def _fits_roughly(piece: Piece, weights: NDArray, z: NDArray, scale: float) -> b
     """Whether no triangle is turned over, and no more is left than the largest noise that is tested leaves anywhere."""
     with np.errstate(all="ignore"):
         misfit = np.abs(weights / scale - edge_weights(piece, z))
-    return not count_flipped(piece, z) and bool(np.sqrt(np.mean(misfit**2)) < _FAR and misfit.max() < _OUTLIER * _FAR)
+    return not count_flipped(piece, z) and bool(
+        np.sqrt(np.mean(misfit**2)) < LARGEST_NOISE and misfit.max() < SIGMAS * LARGEST_NOISE
+    )
 
 
 def refined(
@@ -209,17 +204,14 @@ def _polished(
     try:
         found = polish(piece, weights, start, scale=scale, spread=spread, pins=pins)
     except SolverError:  # steps that led to flat triangles; small ones do not
-        if piece.n_vertices > _CAUTIOUS_LIMIT:
+        if piece.n_vertices > CautiousOptions().most_vertices:
             raise
         return cautious_polish(piece, weights, start, scale=scale, spread=spread, pins=pins)
     finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
     flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
     if found.converged and not flipped:
         return found
-    if not flipped and _near(piece, weights, found) and affordable(piece.edges, found.z):
-        pivoted = PivotedEquations
-        return cautious_polish(piece, weights, found.z, scale=scale, spread=spread, pins=pins, equations=pivoted)
-    if piece.n_vertices > _CAUTIOUS_LIMIT:
+    if piece.n_vertices > CautiousOptions().most_vertices:
         return found
     nearest = found.z if flipped <= count_flipped(piece, start) else start
     again = cautious_polish(piece, weights, nearest, scale=scale, spread=spread, pins=pins)
@@ -231,12 +223,6 @@ def _shortest(piece: Piece, z: NDArray) -> float:
     return float(np.abs(z[piece.edges[:, 0]] - z[piece.edges[:, 1]]).min() / np.abs(z - z.mean()).max())
 
 
-def _near(piece: Piece, weights: NDArray, found: PolishedMesh) -> bool:
-    """Whether the misfit is so small that rounding may be what is left to mend."""
-    misfit = weights / found.scale - edge_weights(piece, found.z)
-    return bool(np.sqrt(np.mean(misfit**2)) < _FAR)
-
-
 def _is_uniform_noise(piece: Piece, weights: NDArray, found: PolishedMesh, spread: NDArray) -> bool:
     """Whether the misfit is beyond rounding, and normal errors of one size are likelier than those of sizes `spread`.
 
@@ -244,6 +230,6 @@ def _is_uniform_noise(piece: Piece, weights: NDArray, found: PolishedMesh, sprea
     """
     misfit = weights / found.scale - edge_weights(piece, found.z)
     even, uneven = (float(np.linalg.norm(r)) / np.sqrt(len(r)) for r in (misfit, misfit / spread))
-    if not (np.isfinite(uneven) and uneven > _ROUNDING):
+    if not (np.isfinite(uneven) and uneven > ROUNDED):
         return False
     return bool(np.log(even) < np.log(uneven) + np.mean(np.log(spread)))

@@ -22,12 +22,27 @@ from ..topology import Piece
 from .cotangent import edge_weights
 from .normal import NormalEquations, WeightJacobian, distant_pair
 
-CANDIDATES = 48
-MOST = 8
-ENOUGH = 1e-6
-"""Share of the sum of squares at which nothing more is left to explain: derivatives are no longer accurate."""
-LEAST_RATIO = 30.0
-"""An entry is suspect if leaving it out saves this many times the mean square of what is left."""
+
+@dataclass(frozen=True)
+class SuspectOptions:
+    """Settings of the selection.
+
+    Attributes
+    ----------
+    candidates : int
+        Entries of the largest misfit, among which those that stand out are looked for.
+    most : int
+        Entries that are left out.
+    enough : float
+        Share of the sum of squares at which nothing is left to explain: derivatives are no longer accurate.
+    least_ratio : float
+        An entry is suspect if leaving it out saves this many times the mean square of what is left.
+    """
+
+    candidates: int = 48
+    most: int = 8
+    enough: float = 1e-6
+    least_ratio: float = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +65,9 @@ class Suspects:
     left: float
     size: float
     log_p: float
+
+
+_OPTIONS = SuspectOptions()
 
 
 def find_suspects(
@@ -76,7 +94,7 @@ def find_suspects(
     fitted = edge_weights(piece, z) / spread
     rest = _Complement(jacobian, equations, fitted if free_scale else None)
     misfit = rest(weights[:, None] / scale / spread[:, None] - fitted[:, None])[:, 0]
-    candidates = np.argsort(-np.abs(misfit), kind="stable")[:CANDIDATES]
+    candidates = np.argsort(-np.abs(misfit), kind="stable")[: _OPTIONS.candidates]
     columns = np.zeros((len(weights), len(candidates)))
     columns[candidates, np.arange(len(candidates))] = 1
     columns = rest(columns)
@@ -102,12 +120,12 @@ def _forward(misfit: NDArray, columns: NDArray, freedom: int) -> tuple[list[int]
     chosen: list[int] = []
     norms = np.sum(columns**2, axis=0)
     floor = 1e-6 * norms  # an entry that the others fix says nothing about itself
-    while left > ENOUGH * total and len(chosen) < min(MOST, freedom - 1):
+    while left > _OPTIONS.enough * total and len(chosen) < min(_OPTIONS.most, freedom - 1):
         with np.errstate(divide="ignore", invalid="ignore"):
             saved = np.where(norms > floor, (misfit @ columns) ** 2 / norms, 0.0)
         k = int(saved.argmax())
         remaining = max(left - float(saved[k]), 0.0)
-        if saved[k] <= LEAST_RATIO * remaining / (freedom - len(chosen) - 1):
+        if saved[k] <= _OPTIONS.least_ratio * remaining / (freedom - len(chosen) - 1):
             break
         chosen.append(k)
         left = remaining

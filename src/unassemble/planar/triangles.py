@@ -7,11 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..tolerances import ROUNDED
 from ..topology import Piece
 from .piece import PieceMesh
-
-_FLATTEST = 1e-12  # of the form, in units of the largest weight's square; below, rounding decides about c
-_SAME_SCALE = 1e-12
 
 
 def lone_triangles(
@@ -52,9 +50,11 @@ def lone_triangles(
         form = (relative * np.roll(relative, -1, axis=1)).sum(axis=1)
         factor = 2 * np.sqrt(form) * largest * np.sign(a + b)
         sums = np.stack([a + b, b + c, c + a])
-        usable = ((sums > 0).all(axis=0) | (sums < 0).all(axis=0)) & (form > _FLATTEST)
+        usable = ((sums > 0).all(axis=0) | (sums < 0).all(axis=0)) & (
+            form > ROUNDED
+        )  # below, in units of the largest weight, rounding decides about c
         if scale is not None:
-            usable &= np.abs(factor / scale - 1) < _SAME_SCALE
+            usable &= np.abs(factor / scale - 1) < ROUNDED
             factor = np.full_like(factor, scale)
         cotangents = 2 * facing / factor[:, None]
         height = 1 / (cotangents[:, 0] + cotangents[:, 1])

@@ -8,37 +8,24 @@ from numpy.typing import NDArray
 from ..planar.deviations import coordinate_covariances, factor_deviations
 from ..planar.piece import PieceMesh
 from ..topology import Topology
-from .factors import Factors, hinged
-from .placement import Placement
+from .evidence import pooled_noise
+from .factors import hinged
+from .solving import Solved, Task
 
 
-def coordinate_deviations(
-    topology: Topology,
-    placement: Placement,
-    placed: list[NDArray],
-    meshes: list[PieceMesh],
-    sigma: float,
-    factors: Factors,
-    *,
-    free: bool,
-) -> NDArray:
+def coordinate_deviations(solved: Solved, task: Task, placed: list[NDArray]) -> NDArray:
     """(n, 2) standard deviations in the final frame.
 
     Parameters
     ----------
-    topology : Topology
-    placement : Placement
+    solved : Solved
+    task : Task
     placed : list of (k,) complex128
         Positions of each piece in that frame.
-    meshes : list of PieceMesh
-    sigma : float
-        Standard deviation of typical entries.
-    factors : Factors
-        Which pieces were fitted with a single c, and which of them close rings.
-    free : bool
-        Whether c was fitted.
     """
-    tensor = placement.tensor
+    topology, meshes, factors, tensor = solved.topology, solved.meshes, solved.factors, task.placement.tensor
+    free = task.scale is None
+    sigma = solved.noise.sigma if solved.noise else pooled_noise(solved, solved.freedom(free_scale=free))
     stretch = tensor.root if tensor else None
     drawn = [tensor.to_laplacian(z) if tensor else z for z in placed]
     result = np.full((topology.n_vertices, 2), np.nan)
@@ -55,25 +42,24 @@ def coordinate_deviations(
             covariance = coordinate_covariances(
                 joined.piece,
                 z,
-                sigma=sigma / abs(meshes[inside[0]].scale),
-                free_scale=free,
+                beside=0.0 if free else None,
                 stretch=stretch,
                 spread=np.concatenate(spreads) if spreads else None,
                 pins=joined.pins,
             )
-            result[joined.piece.vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+            own = sigma / abs(meshes[inside[0]].scale)
+            result[joined.piece.vertices] = own * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     beside = _beside(topology, meshes, factors.fitted) if free and alone.any() else np.zeros(len(meshes))
     for p in np.flatnonzero(alone)[::-1].tolist():
         covariance = coordinate_covariances(
             topology.pieces[p],
             drawn[p],
-            sigma=sigma / abs(meshes[p].scale),
-            free_scale=free,
-            beside=beside[p],
+            beside=beside[p] if free else None,
             stretch=stretch,
             spread=meshes[p].spread,
         )
-        result[topology.pieces[p].vertices] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        own = sigma / abs(meshes[p].scale)
+        result[topology.pieces[p].vertices] = own * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     return result
 
 

@@ -10,18 +10,14 @@ from numpy.typing import NDArray
 
 from ..certify import Certificate
 from ..errors import SolverError
-from ..matrix import OperatorMatrix
+from ..planar.cautious import CautiousOptions
 from ..planar.cotangent import edge_weights, weight_roundings
-from ..planar.piece import PieceMesh
 from ..planar.robust import differences_without
 from ..planar.suspects import find_suspects
-from ..topology import Topology
-from .noise import Noise
+from ..tolerances import CHANCE
+from .solving import Solved
 from .wrong_entries import settled
 
-_SUSPECT_LIMIT = 200_000
-"""Most vertices of a piece that is searched for wrong entries: that takes a factorisation of its own."""
-_CERTAIN = np.log(1e-6)
 _ROUNDING = 1e-11
 """Misfits up to this, where errors are as large as rounding makes them, prove nothing."""
 _NEARLY_ALL = 0.01  # of the squared misfit
@@ -52,33 +48,24 @@ class Evidence:
 NONE = np.empty((0, 2), dtype=np.int64)
 
 
-def weigh(
-    topology: Topology,
-    matrix: OperatorMatrix,
-    meshes: list[PieceMesh],
-    certificate: Certificate,
-    freedom: int,
-    *,
-    free_scale: bool,
-    search: bool,
-    known_noise: Noise | None,
-) -> Evidence:
+def weigh(solved: Solved, certificate: Certificate, *, free_scale: bool, search: bool) -> Evidence:
     """Evidence on a finished mesh; wrong entries are looked for if `search`.
 
-    Unless there is `known_noise`, errors of the size that rounding has where there are slivers do not stand out.
+    Unless their noise is known, errors of the size that rounding has where there are slivers do not stand out.
     """
+    freedom = solved.freedom(free_scale=free_scale)
     noise = _norm(certificate.differences) / float(np.sqrt(freedom)) if freedom > 0 else None
     suspects, certain = NONE, False
     if search and freedom > 1:
-        suspects, certain = _suspects(topology, matrix, meshes, free_scale=free_scale, noise=known_noise)
+        suspects, certain = _suspects(solved, free_scale=free_scale)
     return Evidence(noise, suspects, certain)
 
 
-def pooled_noise(topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], freedom: int) -> float:
+def pooled_noise(solved: Solved, freedom: int) -> float:
     """Common factor of the standard deviations of the entries' errors, in the norms that the pieces were fitted in."""
     norms = []
-    for piece, mesh in zip(topology.pieces, meshes, strict=True):
-        misfit = matrix.entries[piece.edge_rows] + mesh.scale * edge_weights(piece, mesh.z)
+    for piece, mesh in zip(solved.topology.pieces, solved.meshes, strict=True):
+        misfit = solved.matrix.entries[piece.edge_rows] + mesh.scale * edge_weights(piece, mesh.z)
         norms.append(_norm(misfit if mesh.spread is None else misfit / mesh.spread))
     return _norm(np.array(norms)) / float(np.sqrt(max(freedom, 1)))
 
@@ -89,13 +76,12 @@ def _norm(values: NDArray) -> float:
     return largest * float(np.linalg.norm(values / largest)) if 0 < largest < np.inf else largest
 
 
-def _suspects(
-    topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], *, free_scale: bool, noise: Noise | None
-) -> tuple[NDArray[np.int64], bool]:
+def _suspects(solved: Solved, *, free_scale: bool) -> tuple[NDArray[np.int64], bool]:
     """Entries to blame: those without which all others fit, in all pieces; and whether few explain the misfit."""
+    matrix, topology, noise = solved.matrix, solved.topology, solved.noise
     pairs, certain, explained = [], False, True
     errors = None if noise is None else noise.sigma * noise.on(topology)
-    for piece, mesh in zip(topology.pieces, meshes, strict=True):
+    for piece, mesh in zip(topology.pieces, solved.meshes, strict=True):
         if mesh.aside is not None:  # and all others fit
             pairs.append(matrix.edges[piece.edge_rows[mesh.aside]])
             certain = True
@@ -103,11 +89,11 @@ def _suspects(
         weights = -matrix.entries[piece.edge_rows]
         before = np.nan_to_num(weights - mesh.scale * edge_weights(piece, mesh.z), nan=np.inf)
         found, own = None, None if errors is None else errors[piece.edge_rows]
-        if piece.n_vertices <= _SUSPECT_LIMIT:
+        if piece.n_vertices <= CautiousOptions().most_vertices:
             spread = weight_roundings(piece, mesh.z) if noise is None else mesh.spread
             with suppress(SolverError):  # flat triangles: nothing can be told apart there
                 found = find_suspects(piece, weights, mesh.z, mesh.scale, spread, free_scale=free_scale)
-        if found is None or found.log_p >= _CERTAIN:
+        if found is None or found.log_p >= np.log(CHANCE):
             explained = explained and _fitted(weights, before, own)
             continue
         certain = certain or (found.left < _NEARLY_ALL and found.size > _ROUNDING)

@@ -18,14 +18,12 @@ from ..planar.hinged import Hinged
 from ..planar.hinges import CLOSED, groups, join, rings
 from ..planar.piece import PieceMesh, refined_together
 from ..planar.polish import PolishOptions
-from ..tolerances import CONFIDENCE, LARGEST_NOISE
+from ..tolerances import CHANCE, CONFIDENCE, LARGEST_NOISE, ROUNDED
 from ..topology import Topology
 from .noise import Noise, with_vanished
 
-_EQUAL = 1e-12  # relative difference of factors that rounding leaves: each piece keeps its own
 _UNTOLD = 1e100  # standard deviation of log c where entries do not tell c
 _NOT_TOGETHER = "the polish of all pieces that share vertices did not converge, and each was fitted by itself"
-_CHANCE = 1e-6  # that factors which agree to within their errors do so by coincidence
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +111,7 @@ def fitted_together(
         Whether anything is fitted; it is only found out otherwise what errors explain.
     """
     factors = Factors.of(topology, meshes)
-    if not (len(topology.hinges) and (noise or factors.differences.max() > _EQUAL)):
+    if not (len(topology.hinges) and (noise or factors.differences.max() > ROUNDED)):
         return meshes, factors
     errors = with_vanished(topology) if noise is None else noise.on(topology)
     several = np.flatnonzero(np.bincount(factors.group)[factors.group] > 1)
@@ -249,8 +247,8 @@ def discord(topology: Topology, factors: Factors, backward_error: float, noise: 
     # No loose piece vouches for another one: what may be read otherwise agrees by itself, or closes rings.
     alone, in_ring = _readable_otherwise(topology), _shared(topology) > 1
     own = agree + np.where(in_ring, (chance - np.bincount(factors.first, agree, len(agree)))[factors.first], 0.0)
-    rough = (unproved & alone & (own > np.log(_CHANCE))).any()
-    if rough or (chance[factors.first[unproved]] > np.log(_CHANCE)).any():
+    rough = (unproved & alone & (own > np.log(CHANCE))).any()
+    if rough or (chance[factors.first[unproved]] > np.log(CHANCE)).any():
         return (
             f"{noise} explains that pieces which share vertices have different "
             f"factors c by themselves ({_named(topology, factors, difference)}), but they agree too roughly, or are "

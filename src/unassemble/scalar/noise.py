@@ -12,11 +12,9 @@ from ..matrix import OperatorMatrix
 from ..matrix.digits import Digits
 from ..matrix.operator import row_sizes
 from ..planar.piece import EXACT
-from ..tolerances import CONFIDENCE, LARGEST_NOISE
+from ..tolerances import CHANCE, CONFIDENCE, LARGEST_NOISE
 from ..topology import Topology
 from ..topology.keys import pair_keys
-
-_CHANCE = np.log(1e-6)  # that entries without a mesh are fitted to within their rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +123,7 @@ class NoiseTest:
         """Whether entries without a mesh may be fitted to within their rounding by chance; noise given is believed."""
         equations = self.freedom * self.noise.different
         chance = equations * np.log(self.noise.sigma * LARGEST_NOISE / self.limit)
-        return self.noise.digits is not None and chance > _CHANCE
+        return self.noise.digits is not None and chance > np.log(CHANCE)
 
     @property
     def likely(self) -> bool:

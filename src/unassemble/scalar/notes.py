@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from ..cells import incomplete_rows
 from ..matrix import OperatorMatrix
+from ..tolerances import ROUNDED
 from ..topology import Topology
 from ..words import count_of, words_of
-
-_EQUAL = 1e-12  # relative difference of entries that is rounding
 
 
 def topology_notes(topology: Topology) -> list[str]:
@@ -93,7 +92,7 @@ def origin_notes(matrix: OperatorMatrix, suspects: NDArray) -> list[str]:
     """
     rest = np.flatnonzero(incomplete_rows(matrix))
     size = np.abs(matrix.entries)
-    if not len(rest) and np.ptp(matrix.entries) <= _EQUAL * size.max():
+    if not len(rest) and np.ptp(matrix.entries) <= ROUNDED * size.max():
         return [
             "all entries are equal, as in the Laplacian of a graph without weights; on a mesh, entries on the boundary "
             "have one triangle each and others two"

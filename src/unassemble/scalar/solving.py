@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -14,12 +14,14 @@ from ..cells import Outcome, completed, in_doubt
 from ..errors import GeometryError, RecoveryError, SolverError
 from ..linalg import Factorisation, UpperTriangle, blas_threads, factorisation
 from ..matrix import OperatorMatrix
+from ..options import ScalarOptions
 from ..planar.cotangent import left_by_all
 from ..planar.piece import PieceMesh, brought_near, positions, refined
 from ..planar.triangles import lone_triangles
 from ..topology import Piece, Polygons, Topology
 from .factors import Factors, fitted_together
 from .noise import Noise, with_vanished
+from .placement import Placement
 from .wrong_entries import wrong_entries
 
 Clock = Callable[[str], AbstractContextManager[None]]
@@ -27,23 +29,39 @@ Clock = Callable[[str], AbstractContextManager[None]]
 _BEYOND = 2.0  # root mean square of a misfit, over errors of rounding, that are not all
 
 
-def solve(
-    topology: Topology,
-    matrix: OperatorMatrix,
-    clock: Clock,
-    *,
-    method: str,
-    scale: float | None,
-    refine: bool,
-    noise: Noise | None,
-    analyse: Callable[[UpperTriangle], Factorisation] = factorisation,
-) -> tuple[OperatorMatrix, Topology, list[PieceMesh], Factors, Noise | None]:
-    """Positions and scale of each piece, in no particular frame; `analyse` as for the conformal map.
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """What is asked of a scalar matrix, and known of it.
 
-    Entries have errors of the sizes `noise`, or those of assembly.
+    Attributes
+    ----------
+    options : ScalarOptions
+    placement : Placement
+    noise : Noise or None
+        Errors of the entries, where they are not those of assembly.
+    """
 
-    Returns
-    -------
+    options: ScalarOptions
+    placement: Placement
+    noise: Noise | None
+
+    @property
+    def stretch(self) -> float:
+        """sqrt(det K): c div(K grad) is a Laplacian of factor c sqrt(det K), in coordinates that K stretches."""
+        return self.placement.tensor.root_determinant if self.placement.tensor else 1.0
+
+    @property
+    def scale(self) -> float | None:
+        """The factor of that Laplacian, where c is known."""
+        return None if self.options.scale is None else self.options.scale * self.stretch
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Positions and scale of each piece, in no particular frame.
+
+    Attributes
+    ----------
     matrix : OperatorMatrix
         With entries that had vanished as zeros.
     topology : Topology
@@ -53,12 +71,40 @@ def solve(
         What each piece by itself says of c.
     noise : Noise or None
         Without that of rounding, if the misfit is far beyond it.
+    """
+
+    matrix: OperatorMatrix
+    topology: Topology
+    meshes: list[PieceMesh]
+    factors: Factors
+    noise: Noise | None
+
+    @property
+    def scales(self) -> NDArray[np.float64]:
+        """(pieces,) c of each, the factor of the Laplacian."""
+        return np.array([mesh.scale for mesh in self.meshes])
+
+    def freedom(self, *, free_scale: bool) -> int:
+        """Entries less unknowns: 2 v - 4 coordinates of each piece, as far as rings do not tie them, and each c."""
+        coordinates = sum(2 * piece.n_vertices - 4 for piece in self.topology.pieces) - int(self.factors.closings.sum())
+        return len(self.topology.edges) - coordinates - (self.factors.count if free_scale else 0)
+
+
+def solve(
+    topology: Topology,
+    matrix: OperatorMatrix,
+    clock: Clock,
+    task: Task,
+    analyse: Callable[[UpperTriangle], Factorisation] = factorisation,
+) -> Solved:
+    """Positions and scale of each piece; `analyse` as for the conformal map.
 
     Raises
     ------
     RecoveryError
         If no piece has positions.
     """
+    method, refine, scale, noise = task.options.method, task.options.refine, task.scale, task.noise
     lone = lone_triangles(topology.pieces, -matrix.entries, scale) if method == "conformal" else {}
 
     drowning = refine and noise is not None and not noise.digits  # rounding to a few digits does not
@@ -100,7 +146,7 @@ def solve(
             noise = None
             meshes = _polished(topology, matrix, starts, scale, noise) if refine else starts
         meshes, factors = fitted_together(topology, -matrix.entries, meshes, noise, scale, refine=refine)
-    return matrix, topology, meshes, factors, noise
+    return Solved(matrix, topology, meshes, factors, noise)
 
 
 def _is_rounding(topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], noise: Noise) -> bool:

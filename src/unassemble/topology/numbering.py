@@ -31,10 +31,6 @@ class Numbering:
     edge_rows: NDArray[np.int64]
     edges: NDArray[np.int64]
 
-    def then(self, inner: Numbering) -> Numbering:
-        """A numbering of this numbering, in one."""
-        return Numbering(self.vertices[inner.vertices], self.edge_rows[inner.edge_rows], inner.edges)
-
 
 def local_numbering(n: int, edges: NDArray) -> Numbering:
     """Number vertices in breadth-first order.

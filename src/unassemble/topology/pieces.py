@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,16 @@ from .boundary import boundary_corners, following, loops
 from .keys import Grouped, distinct
 from .orientation import Gluing, glue, orient, reglue
 from .surface import Piece
+
+
+@dataclass(frozen=True, eq=False)
+class _Surfaces:
+    """Oriented triangles with the edges that face their corners, how they are glued, and the piece of each."""
+
+    triangles: NDArray[np.int64]
+    opposite: NDArray[np.int64]
+    gluing: Gluing
+    piece: NDArray[np.int64]
 
 
 def planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> tuple[Piece, ...] | None:
@@ -37,19 +49,19 @@ def planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray)
     corners = boundary_corners(gluing)
     loop, order = loops(following(triangles, opposite, gluing, corners))
     at = _vertices_of_pieces(n, triangles, piece)
-    if not _spheres_with_holes(n, triangles, gluing, piece, at, corners, loop):
+    glued = _Surfaces(triangles, opposite, gluing, piece)
+    if not _spheres_with_holes(n, glued, at, corners, loop):
         return None
-    return _cut(n, edges, triangles, opposite, gluing, piece, at, corners[order], loop[order])
+    return _cut(n, edges, glued, at, corners[order], loop[order])
 
 
-def _spheres_with_holes(
-    n: int, triangles: NDArray, gluing: Gluing, piece: NDArray, at: NDArray, corners: NDArray, loop: NDArray
-) -> bool:
+def _spheres_with_holes(n: int, glued: _Surfaces, at: NDArray, corners: NDArray, loop: NDArray) -> bool:
     """Euler's formula for every piece, with a vertex counted once for each fan of triangles about it.
 
     A vertex with p boundary edges leaving it in a piece has p fans, one if p = 0. A second closed
     fan would be missed here, but counting it could only raise v - e + m, which is at most 2 - loops.
     """
+    triangles, gluing, piece = glued.triangles, glued.gluing, glued.piece
     n_pieces = int(piece.max()) + 1
     n_loops = np.zeros(n_pieces, dtype=np.int64)
     n_edges = np.bincount(piece[gluing.first[gluing.count > 0] // 3], minlength=n_pieces)
@@ -74,18 +86,9 @@ def _vertices_of_pieces(n: int, triangles: NDArray, piece: NDArray) -> NDArray[n
     return distinct(piece[:, None] * n + triangles)
 
 
-def _cut(
-    n: int,
-    edges: NDArray,
-    triangles: NDArray,
-    opposite: NDArray,
-    gluing: Gluing,
-    piece: NDArray,
-    at: NDArray,
-    corners: NDArray,
-    loop: NDArray,
-) -> tuple[Piece, ...]:
+def _cut(n: int, edges: NDArray, glued: _Surfaces, at: NDArray, corners: NDArray, loop: NDArray) -> tuple[Piece, ...]:
     """Number each piece by itself: everything is sorted by piece, and pieces are slices of that."""
+    triangles, opposite, gluing, piece = glued.triangles, glued.opposite, glued.gluing, glued.piece
     base = 3 * (corners // 3)
     flat = triangles.ravel()
     boundary = np.column_stack([flat[base + (corners + 1) % 3], flat[base + (corners + 2) % 3]])
