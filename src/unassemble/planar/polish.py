@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SolverError
 from ..topology import Piece
 from .cotangent import edge_weights
+from .iterative import IterativeNormalEquations
 from .normal import NormalEquations, WeightJacobian, distant_pair
 
 _log = logging.getLogger(__name__)
@@ -42,7 +43,7 @@ class PolishOptions:
         The iteration also ends when a step changes the fitted weights by less than this times the noise that the misfit
         shows: the mesh then moves by as small a part of its error bars.
     direct_limit : int
-        Most vertices of a piece that is polished: the factor of J'J has ten times the entries of the conformal one.
+        Up to this many vertices J'J is factorised; above, conjugate gradients take a tenth of the memory.
     """
 
     max_steps: int = 40
@@ -107,15 +108,8 @@ def polish(
     pins : (k,) int, optional
         Vertices that are held, two of each part where the piece falls apart; by default two that are far apart.
     options : PolishOptions, optional
-
-    Raises
-    ------
-    SolverError
-        If there are more vertices than `options.direct_limit`, or triangles become flat.
     """
     options = options or PolishOptions()
-    if len(z) > options.direct_limit:
-        raise SolverError(f"{len(z):,} vertices are more than the {options.direct_limit:,} that are polished")
     extent = np.abs(z - z.mean()).max()
     z = (z - z.mean()) / extent
     pins = distant_pair(z) if pins is None else pins
@@ -123,18 +117,21 @@ def polish(
     problem = Problem(piece, weights, spread, scale)
     fit = problem.at(z)
     equations: NormalEquations | None = None
-    system: GaussNewton | None = None
+    system: GaussNewton | IterativeGaussNewton | None = None
     factorisations, steps, length, converged = 0, 0, np.inf, False
     while steps < options.max_steps and not converged:
         jacobian = WeightJacobian(piece, fit.z, spread)
         fresh = system is None
         if system is None:
             fitted = fit.weights if scale is None else None
-            if equations is None:
-                equations = NormalEquations(jacobian, pins)
+            if len(z) <= options.direct_limit:
+                if equations is None:
+                    equations = NormalEquations(jacobian, pins)
+                else:
+                    equations.renew(jacobian)
+                system = GaussNewton(jacobian, equations, fitted)
             else:
-                equations.renew(jacobian)
-            system = GaussNewton(jacobian, equations, fitted)
+                system = IterativeGaussNewton(IterativeNormalEquations(piece, jacobian, fit.z, fitted))
             factorisations += 1
         move = system(jacobian, fit.misfit)
         previous, length = length, float(np.abs(move).max())
@@ -142,6 +139,8 @@ def polish(
         if slow and length > options.rounding and not fresh:
             if factorisations == options.max_factorisations:
                 break
+            if isinstance(system, IterativeGaussNewton):
+                system.release()
             system, length = None, np.inf
             continue
         better = downhill(problem, fit, move)
@@ -207,10 +206,23 @@ def downhill(problem: Problem, fit: Fit, move: NDArray) -> Fit | None:
     return None
 
 
+class Equations(Protocol):
+    """The linearised problem without the scale."""
+
+    def renew(self, jacobian: WeightJacobian) -> None:
+        """Factorise anew for other positions."""
+
+    def fitted(self, jacobian: WeightJacobian, change: NDArray) -> NDArray:
+        """Displacement d (n,) complex that explains a change (e,) of the weights best: least |J d - r|."""
+
+    def release(self) -> None:
+        """Give the memory of the factor back."""
+
+
 class GaussNewton:
     """Steps of the linearised problem min |J d + g w - r| over displacements d and log-scale g."""
 
-    def __init__(self, jacobian: WeightJacobian, equations: NormalEquations, weights: NDArray | None):
+    def __init__(self, jacobian: WeightJacobian, equations: Equations, weights: NDArray | None):
         self._equations = equations
         self._weights = weights  # None where the scale is known
         if weights is not None:
@@ -226,6 +238,21 @@ class GaussNewton:
             return move
         log_scale = float(self._weights @ (misfit - jacobian.forward(move))) / self._complement
         return move - log_scale * self._response
+
+    def release(self) -> None:
+        """Give the memory of the factor back."""
+        self._equations.release()
+
+
+class IterativeGaussNewton:
+    """The same steps: conjugate gradients take the scale along."""
+
+    def __init__(self, equations: IterativeNormalEquations):
+        self._equations = equations
+
+    def __call__(self, jacobian: WeightJacobian, misfit: NDArray) -> NDArray:
+        """Displacement d (n,) complex; the best scale has left nothing of w in the misfit."""
+        return self._equations.solve(jacobian.transpose(misfit))
 
     def release(self) -> None:
         """Give the memory of the factor back."""
