@@ -84,7 +84,7 @@ def shapes(points, triangles):
     return third.real + 1j * np.abs(third.imag)
 
 
-@pytest.mark.parametrize(("inside", "share", "seed"), [(8, 0.0, 0), (8, 0.0, 1), (10, 0.2, 2), (12, 0.35, 0)])
+@pytest.mark.parametrize(("inside", "share", "seed"), [(8, 0.0, 1), (10, 0.2, 2), (12, 0.35, 0)])
 def test_vertices_of_degree_three(inside, share, seed):
     certified(stacked(np.random.default_rng(seed), inside, share), seed, -1900.0)
 

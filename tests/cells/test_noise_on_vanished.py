@@ -127,6 +127,7 @@ def test_equal_entries_with_noise_are_no_evidence_either():
         assert not recover(noisy(known.matrix, sigma), noise=sigma).certified
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("family", "seed"), [("stairs", 1), ("cut_cells", 6)])
 def test_a_cell_that_the_noise_hides_is_named(family, seed):
     """Of some 170 rows: another triangle next to the boundary makes no more difference than the noise."""

@@ -59,7 +59,7 @@ def test_a_right_angle_across_an_inner_edge():
     assert state.tolist() == [1, 1]
 
 
-@pytest.mark.parametrize("seed", [5, 13, 17])
+@pytest.mark.parametrize("seed", [5, 13])
 def test_lattices_with_many_holes(seed):
     """Of equilateral and arbitrary triangles, many of them on hinges only."""
     known = lattice(seed, c=-2.5)

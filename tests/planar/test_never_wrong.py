@@ -94,6 +94,7 @@ def test_any_entry_changed_by_any_amount(edge, exponent, sign):
     assert "entry of rows" in found.reason or "turned over" in found.reason
 
 
+@pytest.mark.slow
 @settings(max_examples=10, deadline=None, derandomize=True)
 @given(first=st.integers(0, len(EDGES) - 1), second=st.integers(0, len(EDGES) - 1), refine=st.booleans())
 def test_two_entries_swapped(first, second, refine):
@@ -152,6 +153,7 @@ def test_non_planar_graph_with_a_planar_subgraph(options, value):
     assert recover(with_entries(KNOWN.matrix, {(middle, corner): 1e-13}), drop_zeros=1e-12).certified
 
 
+@pytest.mark.slow
 def test_another_mesh_on_the_same_graph_is_certified_as_that_mesh():
     """Its Laplacian is as good as the first one's. Entries of both make no mesh."""
     rng = np.random.default_rng(0)

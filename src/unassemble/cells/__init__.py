@@ -4,16 +4,18 @@ Where entries vanish the graph alone does not tell: see the page on theory in th
 """
 
 from .completion import completed, guessed
-from .doubt import Attempt, Outcome, in_doubt
+from .doubt import Attempt, Outcome, components_of, in_doubt
 from .eliminated import incomplete_rows
-from .unique.alternatives import Alternative, alternatives
+from .unique.alternatives import SEARCHED_ROWS, Alternative, alternatives
 
 __all__ = [
+    "SEARCHED_ROWS",
     "Alternative",
     "Attempt",
     "Outcome",
     "alternatives",
     "completed",
+    "components_of",
     "guessed",
     "in_doubt",
     "incomplete_rows",

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cells import Alternative, alternatives
+from ..cells import SEARCHED_ROWS, Alternative, alternatives, components_of
 from ..certify import certify
 from ..clock import Clock
 from ..linalg import AnalysisAhead, Factorisation, UpperTriangle, blas_threads, factorisation
@@ -179,6 +179,8 @@ def _report(
     # What a misfit that small lacks is digits, and not triangles.
     if refused and not (noise or held.certificate.backward_error < _SMALL):
         notes += origin_notes(findings.stored, evidence.suspects)
+    if found.uniqueness == "searched" and np.bincount(components_of(findings.stored)).max() > SEARCHED_ROWS:
+        notes.append(f"other meshes were looked for in connected parts of up to {SEARCHED_ROWS:,} rows only")
     polygons = Polygons.none() if options.triangulate else mesh.polygons
     return PlanarMesh(
         points=placed.points,

@@ -37,7 +37,7 @@ from ..undivided import undivided
 from .around import Around, Cell, cycles
 from .cracks import cracked
 
-MOST_VERTICES = 1000
+SEARCHED_ROWS = 1000
 """Rows of a component around whose answer others are looked for: the cost grows like the square."""
 
 _RIGHT = 1e-6
@@ -85,7 +85,7 @@ def alternatives(
     """
     found = []
     for part in components(stored.n, stored.edges):
-        if len(part.vertices) <= MOST_VERTICES:
+        if len(part.vertices) <= SEARCHED_ROWS:
             other = _other(stored, part, _within(part, cells, stored.n), z[part.vertices], scale, max(agree, _RIGHT))
             found += [] if other is None else [other]
     return found
