@@ -53,7 +53,7 @@ def test_symmetry_planes_of_a_pipe_of_curved_hexahedra(mu, numbered, order):
     truth = judged(found, case)
     assert found.status == "certified"
     assert truth.error < 1e-11
-    assert truth.missing <= (0.14 if order == "by component" else 0)
+    assert truth.missing <= (0.16 if order == "by component" else 0)
     assert truth.split == 0
 
 
