@@ -122,7 +122,7 @@ def _labelled(
         return _part(matrix, numbering, inside)
     errors = None if matrix.errors is None else matrix.errors[numbering.edge_rows]
     labelling = label_cells(len(numbering.vertices), numbering.edges, weights, scale, errors)
-    if labelling is not None and (labelling.fits or labelling.has_wrong_entries):
+    if labelling is not None and labelling.fits:
         return _part(matrix, numbering, labelling)
     before = _misfit_of_own(misfit_of_triangles(), numbering, own, attempt, scale)
     if labelling is not None and labelling.size < _BETTER * before and labelling.misfit.max() < 1:

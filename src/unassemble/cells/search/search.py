@@ -66,13 +66,14 @@ def label_cells(
         best = better(best, start)
         if n <= options.most_vertices and not judge.spent:
             judge.budget, whole = judge.budget.share(options.first if number == 0 else 0.5), judge.budget
-            start = leapt(start, judge)
-            best = better(best, start if start.fits else BestFirst(start).run(judge))
+            start = leapt(start, judge, options)
+            best = better(best, start if start.fits else BestFirst(start, options=options).run(judge))
             judge.budget = whole
         if best.fits:
             break
     if best is not None and not best.fits and best.size < options.close and n <= options.most_vertices:
-        best = better(best, BestFirst(_widened(best)).run(Judge(Budget(float(options.widened_solves * n)))))
+        last = Judge(Budget(float(options.widened_solves * n)))
+        best = better(best, BestFirst(_widened(best), options=options).run(last))
     return best
 
 
@@ -87,7 +88,6 @@ def _widened(labelling: Labelling[Candidates]) -> Labelling[Candidates]:
 def _with_holes(candidates: Candidates, options: SearchOptions) -> Labelling[Candidates] | None:
     """Triangles that fit best, where every edge lies on one; with the c that lone triangles tell, if they do."""
     sides, weights = candidates.triangle_sides, candidates.weights
-    state = np.zeros(len(sides), dtype=np.int8)
     best: Labelling[Candidates] | None = None
     for c in lone_scales(sides, weights) if candidates.scale is None else [candidates.scale]:
         with suppress(ContradictionError):
@@ -95,7 +95,7 @@ def _with_holes(candidates: Candidates, options: SearchOptions) -> Labelling[Can
             best = _relaxed(known, peeled(sides, 2 * weights / c), options)
             break
     if candidates.scale is None and (best is None or not best.fits):
-        best = _relaxed(candidates, state, options) or best
+        best = _relaxed(candidates, np.zeros(len(sides), dtype=np.int8), options) or best
     return best
 
 
