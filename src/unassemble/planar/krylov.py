@@ -15,8 +15,6 @@ from .pencil import ConformalPencil
 
 _log = logging.getLogger(__name__)
 
-_APART = 1e-6  # of the shift from a quotient that may be a map's to all digits
-
 
 class ShiftedSearch:
     """Shift-and-invert Krylov steps on the pencil, in units in which c is near 1.
@@ -40,7 +38,6 @@ class ShiftedSearch:
         self._analyse = analyse
         self._most_steps = most_steps
         self._factor: Factorisation | None = None
-        self._space: tuple[NDArray, NDArray, NDArray] | None = None
         self.factorisations = 0
         self.solves = 0
 
@@ -86,33 +83,8 @@ class ShiftedSearch:
                 break
         if not len(y):
             raise GeometryError("no map has positive area: the entries, or the given scale, fit no mesh on this graph")
-        m = len(y)
-        self._space = basis[:m], energy[:m, :m], area[:m, :m]
         _log.debug("shift %.12g: c = %.16g, last change %.1e", shift, c, spread)
         return _combination(basis[: len(y)], y), c, spread
-
-    def maps(self) -> list[tuple[NDArray, float]]:
-        """Maps z (n,) complex of the last Krylov space and their quotients c, positive ones, the least first."""
-        assert self._space is not None
-        basis, energy, area = self._space
-        inverse, vectors = scipy.linalg.eigh(area, energy, lower=False)
-        return [(_combination(basis, vectors[:, k]), 1 / float(inverse[k])) for k in np.flatnonzero(inverse > 0)[::-1]]
-
-    def nearest(self, c: float, z: NDArray) -> tuple[NDArray, float]:
-        """One step of inverse iteration to the map nearest to some c, from z; and its quotient."""
-        matrix = self._pencil.matrix(c * (1 - _APART))  # PARDISO does not survive singular ones
-        assert self._factor is not None
-        self._factor.factorise(matrix)
-        self.factorisations += 1
-        self.solves += 1
-        z = np.append(self._factor.solve(self._pencil.area_form(z)[:-1]), 0)
-        z = z / np.abs(z).max()
-        energy, area = (
-            float(_products(z[None], form)[0].real) for form in (self._pencil.energy_form(z), self._pencil.area_form(z))
-        )
-        if not area:
-            raise GeometryError("a map has no area")
-        return z, energy / area
 
     def corrected(self, z: NDArray, c: float) -> NDArray:
         """One step of inverse iteration on a correction of z, with the last factorisation.

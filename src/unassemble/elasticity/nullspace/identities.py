@@ -132,10 +132,6 @@ class Identities:
         """(m, d, d, d, k) what sticks out of the boundary terms; zero for the true coordinates."""
         return self._projected(self.apply(x))
 
-    def of_values(self, value: NDArray) -> NDArray[np.float64]:
-        """(m, d, d, d, k) the same of values in the places c, b, a, those that are not valid left out."""
-        return self._projected(value * self.valid[..., None])
-
     def _projected(self, value: NDArray) -> NDArray[np.float64]:
         for rows, basis in self._kinds:
             part = np.einsum("cbap,ncbak->npk", basis, value[rows], optimize=True)
