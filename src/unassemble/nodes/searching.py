@@ -28,6 +28,7 @@ _LARGE = 20_000  # rows beyond which entries that vanished are not put back, whi
 _WORK = 2e10  # for directions: half a minute or so
 _IN_TURN = 0.1  # by which neighbouring rows have more in common than rows far apart, if they stand node by node
 _ANNIHILATED = 0.9  # share of whole rows that annihilate translations when directions are right
+_WHOLE = 0.01  # share of rows that add up to zero over all directions, below which sums tell no directions
 _EVEN = 0.6  # share of rows, far from supports, in patterns with as many rows in each direction
 
 
@@ -100,6 +101,9 @@ def _of_runs(group: NDArray[np.int64], d: int) -> NDArray[np.int64]:
 def _readings(inner: sp.csr_array, sizes: tuple[int, ...], as_stored: bool) -> Iterator[tuple[str, int, Reading]]:
     """Order, number of directions, and nodes; with entries as they are stored, then with those that vanished."""
     if inner.shape[0] < 2 * min(sizes) or not inner.diagonal().all():  # an elastic body resists every displacement
+        return
+    size = row_sizes(inner)
+    if np.mean(adding_up(inner, size) | with_penalty(inner, size)) < _WHOLE:
         return
     for d in sizes:
         direction = directions_by_component(inner, d)
