@@ -67,12 +67,12 @@ def with_exact_sums(matrix: sp.csr_array) -> tuple[sp.csr_array, Rounding | None
     error = sp.csr_array((digits.unit / 2, matrix.indices, matrix.indptr), shape=matrix.shape)
     size = abs(matrix)
     total, of_row = (np.asarray(part.sum(axis=1)).ravel() for part in (size, error))
-    off = np.maximum(of_row / np.where(total > 0, total, np.inf), ROUNDING)
+    off = of_row / np.where(total > 0, total, np.inf)
     rounding = Rounding(digits.name, float(np.median(off)))
     if rounding.level <= _FULL:
         return matrix, None
     best, most = None, _LEAST
-    for direction, b in _readings(matrix, off):
+    for direction, b in _readings(matrix, np.maximum(off, ROUNDING)):
         labels = (direction[:, None] == np.arange(b)).astype(float)
         sums, sizes = matrix @ labels, size @ labels
         zero = (np.abs(sums) <= error @ labels + _EXACT * total[:, None]) & (sizes > _EXACT * total[:, None])
