@@ -9,13 +9,11 @@ import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
+from ..budget import DENSE
+from ..tolerances import SINGULAR
 from ..topology import Piece
 from ..topology.together import united
 from .normal import distant_pair
-
-_INDEPENDENT = 1e-9  # singular values of equations at hinges, over the largest, above which they are independent
-_MOST_PIECES = 300
-"""Above this their equations at hinges, which are dense here, take too long."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +43,7 @@ class Hinged:
     @classmethod
     def of(cls, pieces: Sequence[Piece], positions: Sequence[NDArray]) -> Hinged | None:
         """Pieces in one frame, mirrored or not; None where there are too many, or no ring holds any of them."""
-        if len(pieces) > _MOST_PIECES:
+        if len(pieces) > DENSE:
             return None
         union = united(pieces)
         vertices, local = np.unique(union.vertices, return_inverse=True)
@@ -74,7 +72,7 @@ def _freedoms(owner: NDArray, local: NDArray, z: NDArray, n: int) -> tuple[NDArr
     equations[row, p], equations[row, q] = at, -at
     equations[row, n + p], equations[row, n + q] = 1, -1
     _, size, directions = np.linalg.svd(np.linalg.qr(equations, mode="r"))  # of many equations, no large left factor
-    rank = int((size > _INDEPENDENT * size[0]).sum())
+    rank = int((size > SINGULAR * size[0]).sum())
     return directions[rank:].conj().T, 2 * (len(one) - rank)
 
 

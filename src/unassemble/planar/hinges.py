@@ -7,15 +7,14 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
+from ..budget import DENSE
 from ..linalg import least_norm
+from ..tolerances import ALIKE, ROUNDED
 from ..topology import Topology
-
-CLOSED = 1e-6  # distance at shared vertices, relative to the largest piece, below which rings count as closed
-_DENSE = 100  # pieces; above, sparse linear algebra is faster, and none is turned over by itself
 
 
 def join(
-    topology: Topology, positions: list[NDArray], known: NDArray | None = None, closed: float = CLOSED
+    topology: Topology, positions: list[NDArray], known: NDArray | None = None, closed: float = ALIKE
 ) -> list[NDArray]:
     """Move pieces by similarities close to translations so that shared vertices coincide.
 
@@ -57,7 +56,7 @@ def free_images(topology: Topology, joined: list[NDArray]) -> NDArray[np.int64]:
     joined : list of (n_p,) complex128
         Positions by :func:`join`.
     """
-    if rings(topology) <= 0 or len(joined) > _DENSE:
+    if rings(topology) <= 0 or len(joined) > DENSE:
         return np.empty(0, dtype=np.int64)
     held = _held(groups(topology), np.zeros(len(joined), dtype=np.int64))
     shared = [np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces]
@@ -65,12 +64,12 @@ def free_images(topology: Topology, joined: list[NDArray]) -> NDArray[np.int64]:
     for piece in np.flatnonzero(~held & (np.array(shared) > 1)):
         turned = list(joined)
         turned[piece] = np.conj(turned[piece])
-        if _joined(topology, turned, held)[1] <= CLOSED:
+        if _joined(topology, turned, held)[1] <= ALIKE:
             free.append(piece)
     return np.array(free, dtype=np.int64)
 
 
-def gap(topology: Topology, positions: list[NDArray], closed: float = CLOSED) -> float:
+def gap(topology: Topology, positions: list[NDArray], closed: float = ALIKE) -> float:
     """How far apart the pieces stay at shared vertices when they are joined, relative to the largest piece.
 
     Rings count as closed below `closed`, where no other images are tried.
@@ -95,7 +94,7 @@ def _matching_images(
         drawn = _as_drawn(topology, positions, held)
         left = _joined(topology, drawn, held)[1]
         positions, best = (drawn, left) if left <= closed else (positions, best)
-    if len(positions) > _DENSE:
+    if len(positions) > DENSE:
         return positions
     while best > closed:
         trials = []
@@ -136,10 +135,10 @@ def _joined(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_
     extent = float(size.max())
     weight = np.r_[np.where(held, 0.0, 1.0), np.where(held, 0.0, 1e3 * extent)]
     system = coo_array((values * weight[columns], (rows, columns)), shape=(len(rhs), 2 * n)).tocsr()
-    solution = np.linalg.lstsq(system.toarray(), rhs, rcond=1e-12)[0] if n <= _DENSE else least_norm(system, rhs)
+    solution = np.linalg.lstsq(system.toarray(), rhs, rcond=ROUNDED)[0] if n <= DENSE else least_norm(system, rhs)
     turn, shift = 1 + (weight * solution)[:n], (weight * solution)[n:]
     left = float(np.abs(system @ solution - rhs).max(initial=0.0) / extent)
-    if (np.abs(turn) * size <= CLOSED * extent).any():
+    if (np.abs(turn) * size <= ALIKE * extent).any():
         left = max(left, 1.0)
     return [turn[p] * z + shift[p] for p, z in enumerate(positions)], left
 

@@ -14,12 +14,12 @@ from ..matrix import OperatorMatrix
 from ..nodes.anchoring import anchored, checked_anchors, digits_lost, near_enough
 from ..nodes.rounded import Rounding, with_exact_sums
 from ..recovery import Structure
-from ..tolerances import CERTIFIED
+from ..tolerances import ALIKE, CERTIFIED
 from ..words import count_of
 from .certificate import forces
 from .members import members_and_cells, mispaired
 from .nodes import Nodes, nodes_of
-from .placed import SURE, Placed, covered
+from .placed import Placed, covered
 from .recognise import StructuralNumbering
 from .turning import turning_positions
 
@@ -79,7 +79,7 @@ def serve_structure(
         reason += f": {covered(used, abs(whole[used]).sum(axis=0) > 0)}"
     notes = list(found.notes)
     fields: dict[str, Any] = {}
-    if cells and error < 1e-6:
+    if cells and error < ALIKE:
         with clock("members"):
             fields = members_and_cells(nodes, found.points)
         notes.append("members and cells were read off the graph; what is certified is the coordinates")
@@ -132,7 +132,7 @@ def _verdict(error: float, found: Placed, rounding: Rounding | None) -> tuple[st
         )
     loosest = min(found.evidence, key=lambda one: one.gap / np.sqrt(one.rows))
     doubt = error * np.sqrt(loosest.rows) / loosest.gap  # each equation may be off by as much
-    if not error <= CERTIFIED or doubt > SURE:
+    if not error <= CERTIFIED or doubt > ALIKE:
         return "uncertified", (
             f"rigid rotations of the nodes cause forces of {error:.1e} of those that make them up, and another field, "
             f"no translation, only {loosest.gap:.1e}: positions may be off by {doubt:.0e} of the size"
