@@ -7,9 +7,6 @@ from dataclasses import dataclass
 AT_ONCE = 1 << 22
 """Numbers that array code makes in one go: 32 MB of them in double precision."""
 
-DENSE = 200
-"""Order up to which dense linear algebra serves where sparse would have a few long rows, or no factor at all."""
-
 LARGE = 20_000
 """Order beyond which what is far from linear, in time or in memory, is left out or replaced."""
 

@@ -9,11 +9,13 @@ import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
-from ..budget import DENSE
 from ..tolerances import SINGULAR
 from ..topology import Piece
 from ..topology.together import united
 from .normal import distant_pair
+
+_MOST_PIECES = 300
+"""Above this their equations at hinges, which are dense here, take too long."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +45,7 @@ class Hinged:
     @classmethod
     def of(cls, pieces: Sequence[Piece], positions: Sequence[NDArray]) -> Hinged | None:
         """Pieces in one frame, mirrored or not; None where there are too many, or no ring holds any of them."""
-        if len(pieces) > DENSE:
+        if len(pieces) > _MOST_PIECES:
             return None
         union = united(pieces)
         vertices, local = np.unique(union.vertices, return_inverse=True)

@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
-from ..budget import DENSE
 from ..linalg import least_norm
 from ..tolerances import ALIKE, ROUNDED
 from ..topology import Topology
+
+_DENSE = 100  # pieces; above, sparse linear algebra is faster, and none is turned over by itself
 
 
 def join(
@@ -56,7 +57,7 @@ def free_images(topology: Topology, joined: list[NDArray]) -> NDArray[np.int64]:
     joined : list of (n_p,) complex128
         Positions by :func:`join`.
     """
-    if rings(topology) <= 0 or len(joined) > DENSE:
+    if rings(topology) <= 0 or len(joined) > _DENSE:
         return np.empty(0, dtype=np.int64)
     held = _held(groups(topology), np.zeros(len(joined), dtype=np.int64))
     shared = [np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces]
@@ -94,7 +95,7 @@ def _matching_images(
         drawn = _as_drawn(topology, positions, held)
         left = _joined(topology, drawn, held)[1]
         positions, best = (drawn, left) if left <= closed else (positions, best)
-    if len(positions) > DENSE:
+    if len(positions) > _DENSE:
         return positions
     while best > closed:
         trials = []
@@ -135,7 +136,7 @@ def _joined(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_
     extent = float(size.max())
     weight = np.r_[np.where(held, 0.0, 1.0), np.where(held, 0.0, 1e3 * extent)]
     system = coo_array((values * weight[columns], (rows, columns)), shape=(len(rhs), 2 * n)).tocsr()
-    solution = np.linalg.lstsq(system.toarray(), rhs, rcond=ROUNDED)[0] if n <= DENSE else least_norm(system, rhs)
+    solution = np.linalg.lstsq(system.toarray(), rhs, rcond=ROUNDED)[0] if n <= _DENSE else least_norm(system, rhs)
     turn, shift = 1 + (weight * solution)[:n], (weight * solution)[n:]
     left = float(np.abs(system @ solution - rhs).max(initial=0.0) / extent)
     if (np.abs(turn) * size <= ALIKE * extent).any():
