@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..budget import LARGE, Budget
-from ..tolerances import CANCELLED, LITTLE, MOST, NEARLY_ALL
+from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST, NEARLY_ALL
 from .constants import adding_up, proven_directions, row_sizes, unaccounted, uncoupled_rows, with_penalty
 from .equilibrium import spread_directions
 from .filling import filled, filled_by_direction
@@ -97,6 +97,9 @@ def _of_runs(group: NDArray[np.int64], d: int) -> NDArray[np.int64]:
 def _readings(inner: sp.csr_array, sizes: tuple[int, ...], as_stored: bool) -> Iterator[tuple[str, int, Reading]]:
     """Order, number of directions, and nodes; with entries as they are stored, then with those that vanished."""
     if inner.shape[0] < 2 * min(sizes) or not inner.diagonal().all():  # an elastic body resists every displacement
+        return
+    size = row_sizes(inner)
+    if np.mean(adding_up(inner, size) | with_penalty(inner, size)) < HARDLY_ANY:  # sums tell no directions
         return
     for d in sizes:
         direction = directions_by_component(inner, d)
