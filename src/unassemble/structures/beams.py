@@ -23,14 +23,13 @@ from ..clock import Clock
 from ..matrix import OperatorMatrix
 from ..nodes.anchoring import anchored, checked_anchors
 from ..recovery import Evidence, Structure
-from ..tolerances import CERTIFIED
+from ..tolerances import ALIKE, CERTIFIED
 from ..words import count_of
 from .layouts import PLANE
 from .placed import covered
 from .recognise import StructuralNumbering
 
 MOST = 5  # entries of a bending row off the diagonal: four of the neighbours, one of its own node
-_BLOCK = 1e-6  # to which a block looks like that of a member; the certificate asks for more
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +123,8 @@ def _members(off: sp.csr_array) -> _Blocks:
     lower, upper = np.maximum(t, 0), np.maximum(other_t, 0)
     corner = np.where((neighbours[lower] == other_t[..., None]) & (t >= 0)[..., None], values[lower], 0).sum(axis=-1)
     good = (t >= 0) & (other_t >= 0) & (t != w[:, None]) & (other_t != other_w[:, None]) & (corner > 0) & (t != other_t)
-    good &= np.abs(left + right) <= _BLOCK * np.abs(right)
-    good &= np.abs(1.5 * corner * -least[:, None] - right**2) <= _BLOCK * right**2
+    good &= np.abs(left + right) <= ALIKE * np.abs(right)
+    good &= np.abs(1.5 * corner * -least[:, None] - right**2) <= ALIKE * right**2
     k, which = np.nonzero(good)
     return _Blocks(w[k], lower[k, which], other_w[k], upper[k, which], -2 * right[k, which] / least[k])
 
