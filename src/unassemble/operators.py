@@ -12,6 +12,7 @@ from .errors import GeometryError, InputError, RecoveryError
 from .matrix import OperatorMatrix
 from .matrix.digits import Digits
 from .tolerances import ROUNDED
+from .topology import components
 
 if TYPE_CHECKING:
     from .nodes import Numbering
@@ -124,8 +125,9 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     from .nodes.unknowns import find_numbering
     from .structures import find_structure
 
-    # Every unknown of an elastic body has a stiffness, and no body has entries of one size: graphs have.
-    if not matrix.diagonal.all() or np.ptp(np.abs(matrix.entries)) <= ROUNDED * np.abs(matrix.entries).max(initial=0.0):
+    # Every unknown of an elastic body has a stiffness. Sums by direction vanish: entries of one sign couple none.
+    one_sign = matrix.entries.min(initial=0.0) >= 0 or matrix.entries.max(initial=0.0) <= 0
+    if not matrix.diagonal.all() or (one_sign and len(components(matrix.n, matrix.edges)) == 1):
         return None
     whole, exact = _exact(matrix)
     structure = find_structure(whole)
