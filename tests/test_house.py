@@ -16,7 +16,7 @@ WITHOUT = "paper"  # the paper of 2002 as it is, with its own numbers
 
 
 def is_number(value: ast.expr) -> bool:
-    """Whether nothing but numbers stand in an expression: tuples, sums, tables and options made of them included."""
+    """Whether nothing but numbers stand in an expression: tuples, sums and options made of them included."""
     match value:
         case ast.Constant(value=bool() | str() | bytes() | None):
             return False
@@ -36,6 +36,15 @@ def is_number(value: ast.expr) -> bool:
     return False
 
 
+def is_table(value: ast.expr) -> bool:
+    """Whether tuples of whole numbers stand in a tuple, or matrix: which corners make a side, which steps a cell."""
+    rows = value.args[0] if isinstance(value, ast.Call) and value.args else value
+    return isinstance(rows, ast.Tuple | ast.List) and all(
+        isinstance(row, ast.Tuple | ast.List) and all(type(ast.literal_eval(one)) is int for one in row.elts)
+        for row in rows.elts
+    )
+
+
 def numbers(source: str) -> Iterator[str]:
     """Names of a module to which numbers are assigned."""
     for statement in ast.parse(source).body:
@@ -46,7 +55,7 @@ def numbers(source: str) -> Iterator[str]:
                 targets = [one]
             case _:
                 continue
-        if is_number(value):
+        if is_number(value) and not is_table(value):
             yield from (node.id for one in targets for node in ast.walk(one) if isinstance(node, ast.Name))
 
 
@@ -62,6 +71,8 @@ def files() -> list[Path]:
         ("A, B = 1, (2, 3)", ["A", "B"]),
         ("A = {2: 6000, 3: 1900}", ["A"]),
         ("A = Options(steps=8)", ["A"]),
+        ("A = ((0, 1), (1, 2))", []),
+        ("A = ((0.5, 1), (1, 2))", ["A"]),
         ("A = 'one'; B = other; C = Kind('quad', 4); D = True", []),
         ("def f():\n    a = 1", []),
     ],
