@@ -58,7 +58,9 @@ class Recovery:
         What is known of other meshes that fit: none can, a search found none, there is one; None where this one does
         not fit.
     reason : str
-        Why, in one sentence.
+        Why, in one sentence or two.
+    advice : str
+        What to do next, where the mesh is not certified.
     operator : str
         ``"laplacian"``, or ``"anisotropic laplacian"`` where a tensor was undone; ``"elasticity"``, or ``"vector
         laplacian"`` where the directions of a vector-valued matrix are not coupled; ``"frame or shell"``, ``"plane
@@ -96,6 +98,7 @@ class Recovery:
     status: str
     uniqueness: str | None = None
     reason: str
+    advice: str = ""
     operator: str
     reaction: float = 0.0
     backward_error: float
@@ -185,12 +188,16 @@ class PlanarMesh(Recovery):
         With noise, or entries that were rounded: ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``,
         ``largest``, ``largest_p_value``; see :func:`unassemble.certify.chi_square_verdict`.
     estimated_noise : float or None
-        Standard deviation of independent errors of the entries that would leave the misfit found.
+        Standard deviation of independent errors of the entries that would leave the misfit found; None where the
+        misfit is no noise, since a term that the model lacks explains it.
     suspects : (k, 2) int64
         Entries that the mesh would fit the others far better without, the gravest first.
     alternatives : tuple of Alternative
         Cells in doubt where other meshes fit as well, and what these have instead; see
         :class:`unassemble.cells.Alternative`.
+    n_entries, n_fitting : int
+        Entries above the diagonal, of the matrix or the mesh; those that the mesh gives back to 1e-9 of their row's
+        largest.
     """
 
     n_holes: int
@@ -201,6 +208,8 @@ class PlanarMesh(Recovery):
     estimated_noise: float | None = None
     suspects: NDArray[np.int64] = field(default_factory=_none(2))
     alternatives: tuple[Alternative, ...] = ()
+    n_entries: int = 0
+    n_fitting: int = 0
 
     @property
     def element(self) -> str:
