@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .clock import Clock
+from .diagnosis import explained, judged
 from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
@@ -169,7 +170,10 @@ class _Task:
                 reading = asked_for(self.matrix, self.about.block_size, self.about.numbering)
             return self._as_vector(reading)
         if self.about.operator == "laplacian":
-            return self._as_scalar(self.matrix, self.frame.anchors)
+            try:
+                return judged(self._as_scalar(self.matrix, self.frame.anchors), self.matrix)
+            except RecoveryError as error:
+                raise explained(error, self.matrix) from error
         at_sight = vector_valued(self.matrix)
         return self._first_that_fits() if at_sight is None else self._as_vector(at_sight)
 
@@ -184,13 +188,12 @@ class _Task:
             other = self._as_second_reading()
             if other is not None:
                 return other
-            if isinstance(error, NotPlanarError) and (why := about_translations(self.matrix)):
-                raise NotPlanarError(f"the graph of the matrix is not planar; {why}", error.witness) from error
-            raise
+            nodes = about_translations(self.matrix) if isinstance(error, NotPlanarError) else ""
+            raise explained(error, self.matrix, nodes) from error
         if found.certified or not found.node_status.any():
-            return found
+            return judged(found, self.matrix)
         other = self._as_second_reading()
-        return other if other is not None and other.certified else found
+        return other if other is not None and other.certified else judged(found, self.matrix)
 
     def _as_second_reading(self) -> Recovery | None:
         """The matrix as a vector-valued one, if anything speaks for that."""

@@ -27,6 +27,7 @@ _MOST, _ROWS = 0.9, 6  # part of the squared misfit whose rows are named, and ho
 _MANY = 50  # entries, of which it can be said what their misfit looks like
 
 _CHECK_MODEL = "see what `inspect_matrix` says the matrix is: a wrong model leaves a misfit everywhere"
+_ONE_COEFFICIENT = "see whether a coefficient varies, the surface is curved or it is a network: all rows add up to zero"
 _GIVE_NOISE = "if the entries are measured, give the standard deviation of their errors as `noise`"
 
 
@@ -57,16 +58,17 @@ def misfit(f: Findings, notes: Sequence[str]) -> Reason:
     if topology.failures:
         parts = count_of(len(topology.failures), "part of the matrix has", "parts of the matrix have")
         return Reason.of(f"{parts} no mesh: {topology.failures[0]}", advice=_CHECK_MODEL)
+    model = _ONE_COEFFICIENT if _adds_up(f.stored) else _CHECK_MODEL
     bare = topology.bare_edges[f.solved.matrix.entries[topology.bare_edges] != 0]
     if len(bare):
         i, j = topology.edges[bare[0]]
         one = f"the nonzero entry of rows {i} and {j} belongs to no triangle"
         many = f"{len(bare):,} nonzero entries belong to no triangle, the first that of rows {i} and {j}"
-        return Reason.of(one if len(bare) == 1 else many, advice=_CHECK_MODEL)
+        return Reason.of(one if len(bare) == 1 else many, advice=model)
     if not np.isfinite(certificate.backward_error):
-        return Reason.of("the mesh has triangles that are flat, or points that are not finite", advice=_CHECK_MODEL)
+        return Reason.of("the mesh has triangles that are flat, or points that are not finite", advice=model)
     if len(certificate.flipped):
-        return Reason.of(_turned_over(topology, certificate), *notes, advice=_CHECK_MODEL)
+        return Reason.of(_turned_over(topology, certificate), *notes, advice=model)
     if evidence.term:
         return lacking(f, evidence.term)
     differs = _differs(certificate)
@@ -89,7 +91,7 @@ def misfit(f: Findings, notes: Sequence[str]) -> Reason:
         )
     if remark:
         return Reason.of(remark, differs, *notes, advice=_GIVE_NOISE)
-    return Reason.of(_unexplained(certificate), differs, *notes, advice=_CHECK_MODEL)
+    return Reason.of(_unexplained(certificate), differs, *notes, advice=model)
 
 
 def lacking(f: Findings, term: Term) -> Reason:
