@@ -111,13 +111,6 @@ def test_a_graph_in_the_plane_is_one_too():
     assert found.advice == facts.advice
 
 
-@pytest.mark.parametrize("element", [fem.ElementTriP1(), fem.ElementTriP2()])
-def test_stored_zeros_do_not_hide_the_cells(element):
-    """On right angles entries vanish, and some assemblers drop them."""
-    A = shuffled(stiffness(fem.MeshTri().refined(3), element))
-    assert inspect_matrix(A).kind == ("laplacian" if isinstance(element, fem.ElementTriP1) else "quadratic")
-
-
 def test_large_matrices_are_diagnosed_from_a_part():
     A = shuffled(stiffness(fem.MeshTet().refined(5), fem.ElementTetP1()))
     assert A.shape[0] > 30_000

@@ -27,6 +27,8 @@ _HELP = getattr(click.exceptions, "NoArgsIsHelpError", ())
 class CommandLine(click.Group):
     """A group of commands that return their exit status."""
 
+    debug = False  # whether tracebacks and details are wanted
+
     def main(
         self,
         args: Sequence[str] | None = None,
@@ -38,7 +40,7 @@ class CommandLine(click.Group):
     ) -> NoReturn:
         """Run a command and leave with its status."""
         given = list(sys.argv[1:] if args is None else args)
-        debug = "--debug" in given
+        debug = self.debug = "--debug" in given
         if debug:
             logging.basicConfig(level=logging.DEBUG, format="%(name)s: %(message)s")
         try:
@@ -95,12 +97,15 @@ def verdict(error: BaseException) -> tuple[int, str]:
 
 def outcome(recovery: Recovery, written: Sequence[str | None], *, quiet: bool) -> int:
     """Say what came of a recovery, and return the exit status."""
-    commands = [click.get_current_context().command]
+    context = click.get_current_context()
+    commands = [context.command]
+    details = recovery.certified or getattr(context.find_root().command, "debug", False)
     if not quiet:
-        from ..summary import summary
+        from ..summary import summary, three_lines
 
         files = ", ".join(click.format_filename(name) for name in written if name is not None)
-        say(as_typed(summary(recovery), commands) + f"\n  {'written':<15} {files}")
+        text = f"{summary(recovery)}\n  {'written':<15} {files}" if details else three_lines(recovery, files)
+        say(as_typed(text, commands))
     elif not recovery.certified:
         click.echo(f"unassemble: {recovery.status}: {as_typed(recovery.reason, commands)}", err=True)
     return CERTIFIED if recovery.certified else UNCERTIFIED
