@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import FormatError
+from .errors import FormatError, OutputError
 from .files import check_target, whole_file
 from .formats import MeshFormat, format_of
 from .recovery import PlanarMesh, Recovery
@@ -33,6 +33,8 @@ def check_output(path: str | os.PathLike[str]) -> None:
     FormatError
         If the format can hold no mesh of ours.
     """
+    if Path(path).is_dir():
+        raise OutputError(f"cannot write {os.fspath(path)!r}: it is a folder, so name a file in it, such as mesh.vtu")
     format_of(path)
     check_target(path)
 

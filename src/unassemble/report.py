@@ -21,7 +21,8 @@ from .recovery import Body, Mechanical, PlanarMesh, Recovery
 def build_report(recovery: Recovery) -> dict[str, Any]:
     """Everything but the mesh, made of what JSON knows; numbers that are not finite become None.
 
-    Keys: ``status``, ``uniqueness``, ``reason``, ``advice`` (what to do next), ``operator``, ``element``, ``reaction``, ``n_points``, ``n_cells``,
+    Keys: ``status``, ``uniqueness``, ``reason``, ``advice`` (what to do next), ``operator``, ``element``,
+    ``reaction``, ``n_points``, ``n_cells``,
     ``n_components``, ``n_holes`` (null but for planar meshes), ``scale`` (one for each piece), ``backward_error``,
     ``timings`` (seconds by stage), ``warnings``; further ``n_polygons`` (cells that the matrix leaves undivided),
     ``n_hinges``, ``n_undetermined``, ``n_boundary_edges``, ``worst_entries`` (``row``, ``column``, ``misfit``, worst
@@ -120,10 +121,7 @@ def check_report(path: str | os.PathLike[str]) -> None:
     OutputError
         If the extension is not ``.json``, or the file cannot be written.
     """
-    suffix = PurePath(path).suffix.lower()
-    if suffix == ".html":
-        raise OutputError("reports in HTML are not available in this version: name a .json file")
-    if suffix != ".json":
+    if PurePath(path).suffix.lower() != ".json":
         raise OutputError(f"a report is a .json file, not {os.fspath(path)!r}")
     check_target(path)
 

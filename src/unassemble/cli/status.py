@@ -8,6 +8,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
@@ -39,7 +40,7 @@ class CommandLine(click.Group):
         **extra: Any,
     ) -> NoReturn:
         """Run a command and leave with its status."""
-        given = list(sys.argv[1:] if args is None else args)
+        given = self.with_command(list(sys.argv[1:] if args is None else args))
         debug = self.debug = "--debug" in given
         if debug:
             logging.basicConfig(level=logging.DEBUG, format="%(name)s: %(message)s")
@@ -59,6 +60,12 @@ class CommandLine(click.Group):
             if sentence:
                 click.echo(f"unassemble: {as_typed(sentence, self.in_use(given))}", err=True)
         sys.exit(status or CERTIFIED)
+
+    def with_command(self, words: list[str]) -> list[str]:
+        """The words with ``recover`` before them, where they begin with a file instead of a command."""
+        first = words[0] if words else ""
+        is_file = first == "-" or (not first.startswith("-") and (Path(first).suffix or Path(first).is_file()))
+        return ["recover", *words] if is_file and first not in self.commands else words
 
     def in_use(self, words: Sequence[str]) -> list[click.Command]:
         """All commands, the one that is called first."""

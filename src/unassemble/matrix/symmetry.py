@@ -127,7 +127,8 @@ def _not_symmetric(A: sp.csr_array, pairs: Triangles, i: int, j: int, noise: flo
             f"{first}, while other rows still use these unknowns, as where Dirichlet conditions were put into rows "
             "only. Take these rows and columns out, or put zeros into the columns as well"
         )
-    unlike = np.abs(pairs.upper - pairs.lower) > SUMMED * np.maximum(np.abs(pairs.upper), np.abs(pairs.lower))
+    with np.errstate(over="ignore"):
+        unlike = np.abs(pairs.upper - pairs.lower) > SUMMED * np.maximum(np.abs(pairs.upper), np.abs(pairs.lower))
     here, there = _shown(A, i, j), _shown(A, j, i)
     if len(pairs.edges) >= _SEVERAL and unlike.mean() > _MOST and not pairs.one_sided:
         return MatrixError(
