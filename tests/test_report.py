@@ -88,7 +88,7 @@ def test_written_report_reads_back(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "why"), [("r.html", "HTML"), ("r.txt", r"\.json"), ("report", r"\.json"), ("no/r.json", "no folder")]
+    ("name", "why"), [("r.html", r"\.json"), ("r.txt", r"\.json"), ("report", r"\.json"), ("no/r.json", "no folder")]
 )
 def test_what_is_no_report_file(name, why, tmp_path):
     for attempt in (check_report, lambda path: write_report(lake(), path)):

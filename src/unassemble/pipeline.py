@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,8 @@ from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
 from .operators import VectorReading, about_translations, asked_for, second_reading, vector_valued
 from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, listed_anchors
 from .outputs import PlanarMesh, Recovery
+from .progress import StageDisplay
+from .quiet import quiet_libraries
 from .scalar import recover_scalar
 from .scalar.placement import Placement
 
@@ -29,7 +31,7 @@ def recover(
     scale: float | None = None,
     noise: float | None = None,
     drop_zeros: float | None = None,
-    anchors: Sequence[Any] | None = None,
+    anchors: Sequence[Any] | Mapping[int, Any] | None = None,
     tensor: tuple[float, float, float] | None = None,
     direction: Direction | None = None,
     handed: str | None = None,
@@ -40,7 +42,7 @@ def recover(
     cells: bool = True,
     variable: str | None = None,
     threads: int | None = None,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[str], None] | bool | None = None,
 ) -> Recovery:
     """Recover the mesh that a matrix was assembled on.
 
@@ -71,7 +73,7 @@ def recover(
     drop_zeros : float, optional
         Forget stored entries of at most this times the largest off-diagonal entry of their row and of their
         transpose's.
-    anchors : sequence of (row, x, y) or (row, x, y, z), optional
+    anchors : sequence of (row, x, y) or (row, x, y, z), or mapping of row to (x, y) or (x, y, z), optional
         Known positions. Two fix the similarity of their piece, a third, not in line, the mirror image. Elasticity
         knows its axes: two fix all.
     tensor : (kxx, kxy, kyy), optional
@@ -95,8 +97,8 @@ def recover(
         Name of the variable in a ``.mat`` file.
     threads : int, optional
         Threads of the linear algebra libraries.
-    progress : callable, optional
-        Called with the name of each stage as it starts.
+    progress : callable or bool, optional
+        Called with the name of each stage as it starts; True shows the stage on standard error.
 
     Returns
     -------
@@ -142,13 +144,14 @@ def recover(
         "handed": handed, "standard_deviations": standard_deviations or None,
     }  # fmt: skip
     given = tuple(name for name, value in scalar_only.items() if value is not None)
-    clock = Clock(progress)
-    with clock("read"):
-        matrix = read_matrix(A, variable=variable) if is_file(A) else A
-    with clock("check"):
-        checked = check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
-    with thread_limit(threads):
-        return _Task(checked, clock, about, frame, planar, given).answer()
+    with quiet_libraries(), StageDisplay(enabled=progress is True, wanted=True) as display:
+        clock = Clock(progress if callable(progress) else display if progress else None)
+        with clock("read"):
+            matrix = read_matrix(A, variable=variable) if is_file(A) else A
+        with clock("check"):
+            checked = check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
+        with thread_limit(threads):
+            return _Task(checked, clock, about, frame, planar, given).answer()
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ def _none(*columns: int) -> Callable[[], NDArray[np.int64]]:
     return lambda: np.empty((0, *columns), np.int64)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Recovery:
     """What was recovered from a matrix: the part that all kinds of answer share.
 
@@ -112,10 +112,11 @@ class Recovery:
     choice: str = ""
 
     # Put here by :mod:`unassemble.outputs`.
-    report: ClassVar[Callable[[Recovery], dict[str, Any]]]
+    report: ClassVar[Callable[..., dict[str, Any]]]
     to_meshio: ClassVar[Callable[[Recovery], meshio.Mesh]]
     save: ClassVar[Callable[[Recovery, str | PathLike[str]], None]]
     plot: ClassVar[Callable[..., Figure]]
+    _repr_html_: ClassVar[Callable[[Recovery], str]]
     rigid_body_modes: ClassVar[Callable[[Recovery], NDArray[np.float64]]]
 
     @property
@@ -170,7 +171,7 @@ class Recovery:
         return 1 if self.direction_of_row is None else int(self.direction_of_row.max()) + 1
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class PlanarMesh(Recovery):
     """A planar mesh of triangles: from a scalar matrix, or from directions that are not coupled.
 
@@ -268,7 +269,7 @@ class Evidence:
     settled: bool = False
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Mechanical(Recovery):
     """What bodies and structures share: positions that solve linear identities.
 
@@ -284,7 +285,7 @@ class Mechanical(Recovery):
     quads: NDArray[np.int64] = field(default_factory=_none(4))
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Body(Mechanical):
     """An elastic body in the plane or in space.
 
@@ -317,7 +318,7 @@ class Body(Mechanical):
         return {f"{kind}{cells.shape[1]}": cells for kind, cells in whole.items()}
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Structure(Mechanical):
     """A frame, shell, plate or truss.
 

@@ -22,6 +22,13 @@ def summary(recovery: Recovery) -> str:
     return "\n".join(lines)
 
 
+def table(recovery: Recovery) -> list[tuple[str, str]]:
+    """Names and values of what matters most: status, reason, what to do next, sizes."""
+    rows = [("status", recovery.status), ("reason", recovery.reason)]
+    rows += [("next", recovery.advice)] if recovery.advice else []
+    return [*rows, *(row for row in _rows(recovery) if row[0] not in ("time", "note"))]
+
+
 def three_lines(recovery: Recovery, files: str = "") -> str:
     """What fits, why that is not certified, and what to do next.
 

@@ -13,6 +13,7 @@ from ..diagnosis import LINEAR, PLANAR, diagnosed
 from ..errors import NotPlanarError, TopologyError
 from ..matrix import OperatorMatrix, load
 from ..operators import VectorReading, second_reading, vector_valued
+from ..quiet import quiet_libraries
 from ..topology import Topology, recognise, surfaces
 from ..words import count_of
 from .facts import matrix_facts, mesh_facts, nodes_facts
@@ -193,7 +194,12 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
     >>> inspection.n_triangles, inspection.n_holes, inspection.operator
     (1, 0, 'laplacian, linear triangles')
     """
-    matrix = A if isinstance(A, OperatorMatrix) else load(A, variable=variable, drop_zeros=drop_zeros)
+    with quiet_libraries():
+        matrix = A if isinstance(A, OperatorMatrix) else load(A, variable=variable, drop_zeros=drop_zeros)
+        return _inspected(matrix)
+
+
+def _inspected(matrix: OperatorMatrix) -> Inspection:
     facts = matrix_facts(matrix)
     vector = vector_valued(matrix)
     if vector is not None:

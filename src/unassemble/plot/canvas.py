@@ -83,6 +83,18 @@ def panels(extents: Sequence[NDArray]) -> tuple[Figure, list[Axes]]:
     return figure, axes
 
 
+def panel(extent: NDArray, ax: Axes | None) -> tuple[Figure, Axes]:
+    """A box for what `extent` (2, 2) encloses: an axes of the caller's, or that of a figure of its own."""
+    if ax is None:
+        figure, (ax,) = panels([extent])
+        return figure, ax
+    low, high = extent
+    pad = 0.012 * float((high - low).max())
+    ax.set(xlim=(low[0] - pad, high[0] + pad), ylim=(low[1] - pad, high[1] + pad), aspect="equal")
+    ax.set_axis_off()
+    return ax.figure, ax  # type: ignore[return-value]
+
+
 def header(figure: Figure, headline: str, details: str, colour: str) -> None:
     """A bold line and a plain one below, left-aligned at the top."""
     width, height = figure.get_size_inches()
