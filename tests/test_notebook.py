@@ -20,9 +20,11 @@ from unassemble import InputError, recover
 TRUE = specimen(*random_mesh(150, seed=5), c=2.0)
 
 
-@pytest.mark.parametrize(
-    "result", [lake(), solid("hexahedron"), with_loose_row(lake()), lake(status="uncertified", advice="look")]
-)
+BODY = solid("hexahedron")
+UNCERTIFIED = lake(status="uncertified", reason="a < b", advice="look there")
+
+
+@pytest.mark.parametrize("result", [lake(), BODY, with_loose_row(lake()), UNCERTIFIED])
 def test_a_result_stands_on_one_screen(result):
     assert len(repr(result)) < 240
     assert "\n" not in repr(result)
@@ -32,9 +34,7 @@ def test_a_result_stands_on_one_screen(result):
     assert str(result).startswith(f"{result.status}: {result.reason}")
 
 
-@pytest.mark.parametrize(
-    "result", [lake(), solid("hexahedron"), lake(status="uncertified", reason="a < b", advice="look there")]
-)
+@pytest.mark.parametrize("result", [lake(), BODY, UNCERTIFIED])
 def test_a_result_has_a_picture(result):
     html = result._repr_html_()
     assert result.status in html
