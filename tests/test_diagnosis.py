@@ -71,6 +71,7 @@ UNREAD = {
     "cubic triangles": ("cubic", lambda: stiffness(DISC, fem.ElementTriP3()), "cubic"),
     "mass, triangles": ("mass", lambda: masses(DISC, fem.ElementTriP1()), "mass matrix"),
     "mass, tetrahedra": ("mass", lambda: masses(TETS, fem.ElementTetP1()), "mass matrix"),
+    "surface": ("surface", lambda: pyamg.gallery.load_example("knot")["A"], "surface"),
     "graph": (
         "graph",
         lambda: networkx.laplacian_matrix(networkx.random_geometric_graph(60, 0.3, seed=1)).astype(float),

@@ -16,6 +16,7 @@ UNREAD: Mapping[str, str] = {
     "quadrilaterals": "of scalar matrices only linear triangles are read yet: assemble on triangles",
     "quadratic": "of scalar matrices only linear triangles are read yet: assemble with linear elements",
     "cubic": "of scalar matrices only linear triangles are read yet: assemble with linear elements",
+    "surface": "curved surfaces are not read yet, as scalar matrices of meshes in the plane are",
     "mass": "pass the stiffness matrix of the same mesh: a mass matrix is not read yet",
     "graph": "a graph without weights has no coordinates: a layout of the graph may draw it",
     "segments": "the length of each segment is the reciprocal of its entry, with nothing left to solve",
@@ -31,8 +32,8 @@ class Diagnosis:
     ----------
     kind : str
         ``"laplacian"`` (linear triangles in the plane), ``"quadrilaterals"``, ``"quadratic"``, ``"cubic"``,
-        ``"tetrahedra"``, ``"hexahedra"``, ``"grid in space"``, ``"segments"``, ``"mass"``, ``"graph"`` or
-        ``"unknown"``.
+        ``"tetrahedra"``, ``"hexahedra"``, ``"grid in space"``, ``"surface"`` (triangles, but not in the plane),
+        ``"segments"``, ``"mass"``, ``"graph"`` or ``"unknown"``.
     name : str
         The same in words, to follow "the matrix is".
     evidence : tuple of str

@@ -138,6 +138,10 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
         if not (often(cells.often) or several) and mostly(cells.in_fours):
             shown = f"{cells.in_fours:.0%} of the coupled pairs of rows lie in a clique of four"
             return _of_kind("tetrahedra", f"{operator} of linear elements on tetrahedra", shown, *sums.evidence)
+        if not (often(cells.in_fours) or several) and mostly(cells.in_threes) and len(edges) >= 2.5 * matrix.n:
+            shown = f"{cells.in_threes:.0%} of the coupled pairs of rows lie in triangles, few in a clique of four"
+            name = f"{operator} of linear elements on triangles, on a surface that cannot be laid flat"
+            return _of_kind("surface", name, shown, *sums.evidence)
         if _is_grid(matrix.n, edges, cells):
             shown = "no three rows are coupled to each other, and most rows are coupled to six"
             return _of_kind("grid in space", "that of a grid in space, a seven-point stencil", shown, *sums.evidence)

@@ -28,6 +28,7 @@ _MANY = 50  # entries, of which it can be said what their misfit looks like
 
 _CHECK_MODEL = "see what `inspect_matrix` says the matrix is: a wrong model leaves a misfit everywhere"
 _ONE_COEFFICIENT = "see whether a coefficient varies, the surface is curved or it is a network: all rows add up to zero"
+_KEEP_ROWS = "keep the rows and columns of all unknowns, those on the boundary too: some rows do not add up to zero"
 _GIVE_NOISE = "if the entries are measured, give the standard deviation of their errors as `noise`"
 
 
@@ -58,7 +59,8 @@ def misfit(f: Findings, notes: Sequence[str]) -> Reason:
     if topology.failures:
         parts = count_of(len(topology.failures), "part of the matrix has", "parts of the matrix have")
         return Reason.of(f"{parts} no mesh: {topology.failures[0]}", advice=_CHECK_MODEL)
-    model = _ONE_COEFFICIENT if _adds_up(f.stored) else _CHECK_MODEL
+    without = incomplete_rows(f.stored).any()
+    model = _KEEP_ROWS if without else _ONE_COEFFICIENT if _adds_up(f.stored) else _CHECK_MODEL
     bare = topology.bare_edges[f.solved.matrix.entries[topology.bare_edges] != 0]
     if len(bare):
         i, j = topology.edges[bare[0]]
@@ -76,11 +78,11 @@ def misfit(f: Findings, notes: Sequence[str]) -> Reason:
         return Reason.of(
             _culprits(evidence), *notes, differs, advice="check the entries that stand out, which the report lists"
         )
-    if incomplete_rows(f.stored).any():
+    if without:
         return Reason.of(
             _unexplained(certificate) or differs,
             "only some rows add up to zero, as next to unknowns that were eliminated",
-            advice="keep the rows and columns of all unknowns, those on the boundary too",
+            advice=_KEEP_ROWS,
         )
     remark = _like_noise(certificate, evidence, f.solved.scales)
     if remark and _adds_up(f.stored):
