@@ -169,13 +169,16 @@ def test_nodes_without_cells_are_points(tmp_path):
         save(recovery, tmp_path / "mesh.stl")
 
 
+WORTH = {"status", "uniqueness", "backward_error"}
+
+
 def test_npz_of_vector_valued_matrices(tmp_path):
     recovery = solid("hexahedron")
     save(recovery, tmp_path / "mesh.npz")
     with np.load(tmp_path / "mesh.npz") as content:
         shared = {"points", "component", "hinges", "scale", "node_status"}
-        assert set(content) == shared | {"hexahedra", "node_of_row", "direction_of_row"}
-        for name in content:
+        assert set(content) == shared | WORTH | {"hexahedra", "node_of_row", "direction_of_row"}
+        for name in set(content) - WORTH:
             assert content[name].dtype == getattr(recovery, name).dtype
         assert content["node_status"].dtype == np.int8
 
@@ -215,8 +218,8 @@ def test_npz_has_exactly_the_keys_that_have_content(tmp_path):
     recovery = lake()
     save(recovery, tmp_path / "mesh.npz")
     with np.load(tmp_path / "mesh.npz", allow_pickle=False) as content:
-        assert set(content) == {"points", "triangles", "component", "hinges", "scale", "node_status"}
-        for name in content:
+        assert set(content) == {"points", "triangles", "component", "hinges", "scale", "node_status"} | WORTH
+        for name in set(content) - WORTH:
             expected = getattr(recovery, name)
             np.testing.assert_array_equal(content[name], expected)
             assert content[name].dtype == expected.dtype
@@ -348,3 +351,21 @@ def test_the_same_npz_on_every_run(tmp_path):
         save(recovery, tmp_path / f"{name}.npz")
     with np.load(tmp_path / "a.npz") as a, np.load(tmp_path / "b.npz") as b:
         assert all((a[key] == b[key]).all() for key in a)
+
+
+@pytest.mark.parametrize("status", ["certified", "uncertified"])
+def test_what_a_mesh_is_worth_stands_in_its_file(tmp_path, status):
+    known = lake(status=status, uniqueness="searched" if status == "certified" else None, backward_error=3e-16)
+    known.save(tmp_path / "mesh.npz")
+    with np.load(tmp_path / "mesh.npz") as content:
+        assert str(content["status"]) == status
+        assert str(content["uniqueness"]) == (known.uniqueness or "")
+        assert float(content["backward_error"]) == 3e-16
+    known.save(tmp_path / "mesh.vtu")
+    mesh = meshio.read(tmp_path / "mesh.vtu")
+    assert bytes(mesh.field_data["status"]).decode() == status
+    assert mesh.field_data["backward_error"].tolist() == [3e-16]
+    np.testing.assert_array_equal(mesh.field_data["scale"], known.scale)
+    if known.uniqueness:
+        assert bytes(mesh.field_data["uniqueness"]).decode() == known.uniqueness
+    np.testing.assert_allclose(mesh.points[:, :2], known.points)

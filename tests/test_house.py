@@ -11,7 +11,7 @@ import unassemble
 
 ROOT = Path(unassemble.__file__).parent
 MOST_NUMBERS = 120
-MOST_LINES = 350
+MOST_LINES = 400
 WITHOUT = "paper"  # the paper of 2002 as it is, with its own numbers
 
 

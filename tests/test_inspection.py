@@ -45,7 +45,7 @@ def test_nonplanar_graphs_have_a_witness():
     facts = inspect_matrix(np.full((5, 5), -1.0))
     assert not facts.planar
     assert sorted(facts.witness) == [(i, j) for i in range(5) for j in range(i + 1, 5)]
-    assert "subdivision of K5" in str(facts)
+    assert "K5" not in str(facts)
     assert facts.n_triangles == 0
     assert facts.recoverable.startswith("nothing")
 
@@ -54,8 +54,8 @@ def test_planar_graphs_without_cells():
     facts = inspect_matrix(sp.diags_array([[1.0], [1.0]], offsets=[-1, 1]))
     assert facts.planar
     assert facts.cells_from == ""
-    assert "no cell shows" in facts.recoverable
-    assert facts.operator == "none that this version knows"
+    assert facts.recoverable.startswith("nothing: ")
+    assert facts.operator == "none that is known"
 
 
 GRIDS = {

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import FormatError
+from .errors import FormatError, OutputError
 from .files import check_target, whole_file
 from .formats import MeshFormat, format_of
 from .recovery import PlanarMesh, Recovery
@@ -33,6 +33,8 @@ def check_output(path: str | os.PathLike[str]) -> None:
     FormatError
         If the format can hold no mesh of ours.
     """
+    if os.path.isdir(path):  # noqa: PTH112 - which takes any name, however long
+        raise OutputError(f"cannot write {os.fspath(path)!r}: it is a folder, so name a file in it, such as mesh.vtu")
     format_of(path)
     check_target(path)
 
@@ -42,7 +44,8 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
 
     ``.npz`` holds ``points``, cells (``triangles``, ``quads``, ``tetrahedra``, ``hexahedra``, ``mid_nodes``, ``lines``,
     ``polygons_offsets`` and ``polygons_data``), ``eliminated_points`` if any, ``component``, ``hinges``, ``scale``,
-    ``node_status`` and, of vector-valued matrices, ``node_of_row`` and ``direction_of_row``.
+    ``node_status``, of vector-valued matrices ``node_of_row`` and ``direction_of_row``, and what the mesh is worth:
+    ``status``, ``uniqueness`` and ``backward_error``, which ``.vtu`` holds as field data, with ``scale``.
     Other formats are those of meshio (:mod:`unassemble.formats`); of these ``.vtu`` holds polygons, the others get
     them divided into triangles.
 
@@ -64,6 +67,8 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
     with whole_file(path, suffix) as draft:
         if mesh_format.name:
             _write_by_meshio(_mesh_for(recovery, mesh_format), draft, suffix, mesh_format)
+            if mesh_format.name == "vtu":
+                _add_field_data(draft, worth(recovery) | {"scale": recovery.scale})
         else:
             np.savez(draft, **arrays(recovery))
 
@@ -83,7 +88,16 @@ def arrays(recovery: Recovery) -> dict[str, Any]:
     content["node_status"] = recovery.node_status
     if recovery.vector_valued:
         content |= {"node_of_row": recovery.node_of_row, "direction_of_row": recovery.direction_of_row}
-    return content
+    return content | worth(recovery)
+
+
+def worth(recovery: Recovery) -> dict[str, NDArray]:
+    """Status, uniqueness (empty where the mesh does not fit) and backward error, for the mesh file itself."""
+    return {
+        "status": np.array(recovery.status),
+        "uniqueness": np.array(recovery.uniqueness or ""),
+        "backward_error": np.array(recovery.backward_error),
+    }
 
 
 def to_meshio(recovery: Recovery) -> meshio.Mesh:
@@ -231,6 +245,25 @@ def _write_by_meshio(mesh: meshio.Mesh, draft: Path, suffix: str, mesh_format: M
     finally:
         if said.getvalue():
             _log.debug("meshio: %s", " ".join(said.getvalue().split()))
+
+
+def _add_field_data(draft: Path, values: dict[str, NDArray]) -> None:
+    """Put field data into a ``.vtu``, which meshio reads but does not write; words as the codes of their letters."""
+    arrays = []
+    for name, value in values.items():
+        words = value.dtype.kind == "U"
+        numbers = list(str(value).encode()) if words else [repr(float(x)) for x in value.ravel()]
+        kind = "UInt8" if words else "Float64"
+        if not numbers:
+            continue
+        arrays.append(
+            f'<DataArray type="{kind}" Name="{name}" NumberOfTuples="{len(numbers)}" format="ascii">'
+            f"{' '.join(map(str, numbers))}</DataArray>"
+        )
+    opening = b"<UnstructuredGrid>"
+    before, after = draft.read_bytes().split(opening, 1)
+    field = f"<FieldData>{''.join(arrays)}</FieldData>".encode()
+    draft.write_bytes(before + opening + field + after)
 
 
 def _sentence(error: Any) -> str:

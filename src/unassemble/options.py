@@ -5,7 +5,7 @@ Each is checked when it is made, before any work: what is refused here has no me
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -128,14 +128,20 @@ class ScalarOptions:
 def listed_anchors(anchors: Any) -> tuple[tuple[Any, ...], ...]:
     """Anchors as (row, x, y) or (row, x, y, z), rows as int where they are whole; arrays are taken row by row.
 
+    A mapping has rows as keys and positions as values.
+
     Raises
     ------
     InputError
     """
     try:
+        if isinstance(anchors, Mapping):
+            anchors = [(row, *place) for row, place in anchors.items()]
         return tuple(_anchor(one) for one in (() if anchors is None else anchors))
     except (TypeError, ValueError, IndexError, OverflowError) as error:
-        raise InputError("`anchors` are (row, x, y), in space (row, x, y, z), with whole rows") from error
+        raise InputError(
+            "`anchors` are (row, x, y), in space (row, x, y, z), or a mapping of rows to positions, with whole rows"
+        ) from error
 
 
 def _anchor(one: Any) -> tuple[Any, ...]:
@@ -147,7 +153,7 @@ def _anchor(one: Any) -> tuple[Any, ...]:
 
 def _known(name: str, value: str, words: tuple[str, ...]) -> None:
     if not isinstance(value, str) or value not in words:
-        raise InputError(f"`{name}={value}` is not available: use {' or '.join(map(repr, words))}")
+        raise InputError(f"`{name}={value}` is unknown: use {' or '.join(map(repr, words))}")
 
 
 def _whole(name: str, value: Any) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +10,15 @@ import numpy as np
 
 from .boundaries import recover_lattice
 from .clock import Clock
+from .diagnosis import explained, judged
 from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
 from .operators import VectorReading, about_translations, asked_for, second_reading, vector_valued
 from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, listed_anchors
 from .outputs import PlanarMesh, Recovery
+from .progress import StageDisplay
+from .quiet import quiet_libraries
 from .scalar import recover_scalar
 from .scalar.placement import Placement
 
@@ -29,7 +32,7 @@ def recover(
     scale: float | None = None,
     noise: float | None = None,
     drop_zeros: float | None = None,
-    anchors: Sequence[Any] | None = None,
+    anchors: Sequence[Any] | Mapping[int, Any] | None = None,
     tensor: tuple[float, float, float] | None = None,
     direction: Direction | None = None,
     handed: str | None = None,
@@ -40,7 +43,7 @@ def recover(
     cells: bool = True,
     variable: str | None = None,
     threads: int | None = None,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[str], None] | bool | None = None,
 ) -> Recovery:
     """Recover the mesh that a matrix was assembled on.
 
@@ -71,7 +74,7 @@ def recover(
     drop_zeros : float, optional
         Forget stored entries of at most this times the largest off-diagonal entry of their row and of their
         transpose's.
-    anchors : sequence of (row, x, y) or (row, x, y, z), optional
+    anchors : sequence of (row, x, y) or (row, x, y, z), or mapping of row to (x, y) or (x, y, z), optional
         Known positions. Two fix the similarity of their piece, a third, not in line, the mirror image. Elasticity
         knows its axes: two fix all.
     tensor : (kxx, kxy, kyy), optional
@@ -95,8 +98,8 @@ def recover(
         Name of the variable in a ``.mat`` file.
     threads : int, optional
         Threads of the linear algebra libraries.
-    progress : callable, optional
-        Called with the name of each stage as it starts.
+    progress : callable or bool, optional
+        Called with the name of each stage as it starts; True shows the stage on standard error.
 
     Returns
     -------
@@ -142,13 +145,14 @@ def recover(
         "handed": handed, "standard_deviations": standard_deviations or None,
     }  # fmt: skip
     given = tuple(name for name, value in scalar_only.items() if value is not None)
-    clock = Clock(progress)
-    with clock("read"):
-        matrix = read_matrix(A, variable=variable) if is_file(A) else A
-    with clock("check"):
-        checked = check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
-    with thread_limit(threads):
-        return _Task(checked, clock, about, frame, planar, given).answer()
+    with quiet_libraries(), StageDisplay(enabled=progress is True, wanted=True) as display:
+        clock = Clock(progress if callable(progress) else display if progress else None)
+        with clock("read"):
+            matrix = read_matrix(A, variable=variable) if is_file(A) else A
+        with clock("check"):
+            checked = check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
+        with thread_limit(threads):
+            return _Task(checked, clock, about, frame, planar, given).answer()
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +174,10 @@ class _Task:
                 reading = asked_for(self.matrix, self.about.block_size, self.about.numbering)
             return self._as_vector(reading)
         if self.about.operator == "laplacian":
-            return self._as_scalar(self.matrix, self.frame.anchors)
+            try:
+                return judged(self._as_scalar(self.matrix, self.frame.anchors), self.matrix)
+            except RecoveryError as error:
+                raise explained(error, self.matrix) from error
         at_sight = vector_valued(self.matrix)
         return self._first_that_fits() if at_sight is None else self._as_vector(at_sight)
 
@@ -185,13 +192,12 @@ class _Task:
             other = self._as_second_reading()
             if other is not None:
                 return other
-            if isinstance(error, NotPlanarError) and (why := about_translations(self.matrix)):
-                raise NotPlanarError(f"the graph of the matrix is not planar; {why}", error.witness) from error
-            raise
+            nodes = about_translations(self.matrix) if isinstance(error, NotPlanarError) else ""
+            raise explained(error, self.matrix, nodes) from error
         if found.certified or not found.node_status.any():
-            return found
+            return judged(found, self.matrix)
         other = self._as_second_reading()
-        return other if other is not None and other.certified else found
+        return other if other is not None and other.certified else judged(found, self.matrix)
 
     def _as_second_reading(self) -> Recovery | None:
         """The matrix as a vector-valued one, if anything speaks for that."""

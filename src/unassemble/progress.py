@@ -37,12 +37,20 @@ class StageDisplay:
     stream : text stream, optional
         Standard error by default.
     enabled : bool
+    wanted : bool
+        Whether it was asked for, and is shown on a stream that is no terminal as well, as in a notebook.
     delay, interval : float
         Seconds before the line appears, and between its updates.
     """
 
     def __init__(
-        self, stream: IO[str] | None = None, *, enabled: bool = True, delay: float = 1.0, interval: float = 0.2
+        self,
+        stream: IO[str] | None = None,
+        *,
+        enabled: bool = True,
+        wanted: bool = False,
+        delay: float = 1.0,
+        interval: float = 0.2,
     ):
         self._stream = stream or sys.stderr
         self._delay = delay
@@ -51,7 +59,9 @@ class StageDisplay:
         self._start = time.time()
         self._done = threading.Event()
         # A thread, because stages may spend minutes in compiled code that calls nobody.
-        self._thread = threading.Thread(target=self._show, daemon=True) if enabled and self._stream.isatty() else None
+        self._thread = (
+            threading.Thread(target=self._show, daemon=True) if enabled and (wanted or self._stream.isatty()) else None
+        )
 
     def __call__(self, stage: str) -> None:
         """Tell that a stage begins."""

@@ -27,7 +27,7 @@ def _none(*columns: int) -> Callable[[], NDArray[np.int64]]:
     return lambda: np.empty((0, *columns), np.int64)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Recovery:
     """What was recovered from a matrix: the part that all kinds of answer share.
 
@@ -58,7 +58,9 @@ class Recovery:
         What is known of other meshes that fit: none can, a search found none, there is one; None where this one does
         not fit.
     reason : str
-        Why, in one sentence.
+        Why, in one sentence or two.
+    advice : str
+        What to do next, where the mesh is not certified.
     operator : str
         ``"laplacian"``, or ``"anisotropic laplacian"`` where a tensor was undone; ``"elasticity"``, or ``"vector
         laplacian"`` where the directions of a vector-valued matrix are not coupled; ``"frame or shell"``, ``"plane
@@ -96,6 +98,7 @@ class Recovery:
     status: str
     uniqueness: str | None = None
     reason: str
+    advice: str = ""
     operator: str
     reaction: float = 0.0
     backward_error: float
@@ -109,10 +112,11 @@ class Recovery:
     choice: str = ""
 
     # Put here by :mod:`unassemble.outputs`.
-    report: ClassVar[Callable[[Recovery], dict[str, Any]]]
+    report: ClassVar[Callable[..., dict[str, Any]]]
     to_meshio: ClassVar[Callable[[Recovery], meshio.Mesh]]
     save: ClassVar[Callable[[Recovery, str | PathLike[str]], None]]
     plot: ClassVar[Callable[..., Figure]]
+    _repr_html_: ClassVar[Callable[[Recovery], str]]
     rigid_body_modes: ClassVar[Callable[[Recovery], NDArray[np.float64]]]
 
     @property
@@ -167,7 +171,7 @@ class Recovery:
         return 1 if self.direction_of_row is None else int(self.direction_of_row.max()) + 1
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class PlanarMesh(Recovery):
     """A planar mesh of triangles: from a scalar matrix, or from directions that are not coupled.
 
@@ -185,7 +189,8 @@ class PlanarMesh(Recovery):
         With noise, or entries that were rounded: ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``,
         ``largest``, ``largest_p_value``; see :func:`unassemble.certify.chi_square_verdict`.
     estimated_noise : float or None
-        Standard deviation of independent errors of the entries that would leave the misfit found.
+        Standard deviation of independent errors of the entries that would leave the misfit found; None where the
+        misfit is no noise, since a term that the model lacks explains it.
     suspects : (k, 2) int64
         Entries that the mesh would fit the others far better without, the gravest first.
     alternatives : tuple of Alternative
@@ -193,6 +198,9 @@ class PlanarMesh(Recovery):
         :class:`unassemble.cells.Alternative`.
     eliminated_points : (k, 2) float64
         Vertices that the matrix has no rows for, where it determines them; see :mod:`unassemble.boundaries`.
+    n_entries, n_fitting : int
+        Entries above the diagonal, of the matrix or the mesh; those that the mesh gives back to 1e-9 of their row's
+        largest.
     """
 
     n_holes: int
@@ -204,6 +212,8 @@ class PlanarMesh(Recovery):
     suspects: NDArray[np.int64] = field(default_factory=_none(2))
     alternatives: tuple[Alternative, ...] = ()
     eliminated_points: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    n_entries: int = 0
+    n_fitting: int = 0
 
     @property
     def element(self) -> str:
@@ -262,7 +272,7 @@ class Evidence:
     settled: bool = False
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Mechanical(Recovery):
     """What bodies and structures share: positions that solve linear identities.
 
@@ -278,7 +288,7 @@ class Mechanical(Recovery):
     quads: NDArray[np.int64] = field(default_factory=_none(4))
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Body(Mechanical):
     """An elastic body in the plane or in space.
 
@@ -311,7 +321,7 @@ class Body(Mechanical):
         return {f"{kind}{cells.shape[1]}": cells for kind, cells in whole.items()}
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Structure(Mechanical):
     """A frame, shell, plate or truss.
 

@@ -21,7 +21,8 @@ from .recovery import Body, Mechanical, PlanarMesh, Recovery
 def build_report(recovery: Recovery) -> dict[str, Any]:
     """Everything but the mesh, made of what JSON knows; numbers that are not finite become None.
 
-    Keys: ``status``, ``uniqueness``, ``reason``, ``operator``, ``element``, ``reaction``, ``n_points``, ``n_cells``,
+    Keys: ``status``, ``uniqueness``, ``reason``, ``advice`` (what to do next), ``operator``, ``element``,
+    ``reaction``, ``n_points``, ``n_cells``,
     ``n_components``, ``n_holes`` (null but for planar meshes), ``scale`` (one for each piece), ``backward_error``,
     ``timings`` (seconds by stage), ``warnings``; further ``n_polygons`` (cells that the matrix leaves undivided),
     ``n_hinges``, ``n_undetermined``, ``n_boundary_edges``, ``worst_entries`` (``row``, ``column``, ``misfit``, worst
@@ -32,6 +33,7 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
             "status": recovery.status,
             "uniqueness": recovery.uniqueness,
             "reason": recovery.reason,
+            "advice": recovery.advice,
             "operator": recovery.operator,
             "element": recovery.element,
             "reaction": recovery.reaction,
@@ -62,12 +64,15 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
 def _planar_facts(mesh: PlanarMesh) -> dict[str, Any]:
     """What only planar meshes have.
 
-    ``chi_square``, ``estimated_noise``, ``largest_standard_deviation``, ``suspects`` (``row``, ``column``) and
+    ``chi_square``, ``estimated_noise``, ``n_entries`` above the diagonal and ``n_fitting`` of these to 1e-9 of their
+    row's largest, ``largest_standard_deviation``, ``suspects`` (``row``, ``column``) and
     ``alternatives``, where other cells fit as well: ``cells`` and ``other_cells``, lists of rows.
     """
     return {
         "chi_square": mesh.chi_square,
         "estimated_noise": mesh.estimated_noise,
+        "n_entries": mesh.n_entries,
+        "n_fitting": mesh.n_fitting,
         "largest_standard_deviation": mesh.largest_deviation,
         "suspects": [{"row": i, "column": j} for i, j in mesh.suspects],
         "alternatives": [asdict(other) for other in mesh.alternatives],
@@ -116,10 +121,7 @@ def check_report(path: str | os.PathLike[str]) -> None:
     OutputError
         If the extension is not ``.json``, or the file cannot be written.
     """
-    suffix = PurePath(path).suffix.lower()
-    if suffix == ".html":
-        raise OutputError("reports in HTML are not available in this version: name a .json file")
-    if suffix != ".json":
+    if PurePath(path).suffix.lower() != ".json":
         raise OutputError(f"a report is a .json file, not {os.fspath(path)!r}")
     check_target(path)
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from .recovery import Body, Mechanical, PlanarMesh, Recovery
-from .tolerances import SUSPICIOUS
+from .tolerances import CERTIFIED, SUSPICIOUS
 from .words import count_of
 
 _SHOWN = 3
@@ -20,6 +20,43 @@ def summary(recovery: Recovery) -> str:
     lines = [f"{recovery.status}: {recovery.reason}"]
     lines += [f"  {name:<15} {value}" for name, value in _rows(recovery)]
     return "\n".join(lines)
+
+
+def table(recovery: Recovery) -> list[tuple[str, str]]:
+    """Names and values of what matters most: status, reason, what to do next, sizes."""
+    rows = [("status", recovery.status), ("reason", recovery.reason)]
+    rows += [("next", recovery.advice)] if recovery.advice else []
+    return [*rows, *(row for row in _rows(recovery) if row[0] not in ("time", "note"))]
+
+
+def three_lines(recovery: Recovery, files: str = "") -> str:
+    """What fits, why that is not certified, and what to do next.
+
+    Parameters
+    ----------
+    recovery : Recovery
+        Ambiguous or uncertified.
+    files : str
+        Names of those that were written, the mesh first.
+    """
+    mesh = f"{' and '.join(counted_cells(recovery))} on {_points(recovery)} points"
+    if isinstance(recovery, PlanarMesh) and recovery.n_entries:
+        entries = f"{recovery.n_fitting:,} of {recovery.n_entries:,} entries"
+        fits = f"{entries} fit {mesh}, to {CERTIFIED:g} of the row's largest"
+    else:
+        fits = f"{mesh}, with a backward error of {recovery.backward_error:.1e} relative to the row's largest entry"
+    written = f" (written: {files})" if files else ""
+    after = recovery.advice or "see `report()` for all that is known"
+    return f"{recovery.status}: {fits}{written}\n  why   {recovery.reason}\n  next  {after}"
+
+
+def one_line(recovery: Recovery) -> str:
+    """Kind, sizes, status and backward error, for a list or a prompt."""
+    sizes = f"{_points(recovery)} points, {', '.join(counted_cells(recovery))}"
+    return (
+        f"<{type(recovery).__name__}: {recovery.status}, {recovery.operator}, {sizes}, "
+        f"backward error {recovery.backward_error:.1e}>"
+    )
 
 
 def _rows(recovery: Recovery) -> list[tuple[str, str]]:
@@ -34,7 +71,7 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
         rows += [("holes", f"{recovery.n_holes:,}"), ("scale c", scale_text(recovery))]
     if isinstance(recovery, Mechanical):
         rows += _elastic_rows(recovery)
-    rows.append(("backward error", f"{recovery.backward_error:.1e}"))
+    rows.append(("backward error", f"{recovery.backward_error:.1e} (relative)"))
     if recovery.uniqueness is not None:
         rows.append(("other meshes", _OTHERS[recovery.uniqueness]))
     if isinstance(recovery, PlanarMesh):
@@ -96,7 +133,7 @@ def _cell_rows(recovery: Recovery) -> list[tuple[str, str]]:
 def _noise_rows(mesh: PlanarMesh) -> list[tuple[str, str]]:
     rows = []
     if mesh.estimated_noise is not None and mesh.backward_error > SUSPICIOUS:
-        rows.append(("noise", f"the misfit is that of a standard deviation of {mesh.estimated_noise:.1e}"))
+        rows.append(("noise", f"the misfit is that of a standard deviation of {mesh.estimated_noise:.1e} (absolute)"))
     if mesh.largest_deviation is not None:
         rows.append(("std deviation", f"at most {mesh.largest_deviation:.1e} in a coordinate"))
     return rows

@@ -22,3 +22,17 @@ def count_of(number: int, noun: str, plural: str | None = None) -> str:
 def words_of(rows: Iterable[int]) -> str:
     """Row numbers in a sentence: ``3, 17, 18``."""
     return ", ".join(map(str, rows))
+
+
+def sentences(parts: Iterable[str], most: int = 2) -> str:
+    """The first few of some sentences, the important ones first: ``one thing. Another thing``.
+
+    Parameters
+    ----------
+    parts : iterable of str
+        Each without its full stop, and beginning small; empty ones are left out.
+    most : int
+        How many a message may have.
+    """
+    chosen = [part for part in parts if part][:most]
+    return ". ".join(part if k == 0 else part[:1].upper() + part[1:] for k, part in enumerate(chosen))

@@ -122,5 +122,5 @@ def test_entries_are_not_blamed_where_others_do_not_fit_either():
     assert found.status == "uncertified"
     assert not len(found.suspects)
     assert found.reason.startswith("no set of cells was found that fits: ")
-    rows = found.reason.split("misfit in ")[1].split(";")[0].removeprefix("the rows ").removeprefix("row ")
+    rows = found.reason.split("misfit in ")[1].split(".")[0].removeprefix("the rows ").removeprefix("row ")
     assert {int(row) for row in rows.split(", ")} & set(found.worst_entries[0][:2])

@@ -36,12 +36,31 @@ def test_3_written_but_not_certified(work):
     result = work.recover("--report", "r.json", "--plot", "p.png", matrix="B.mtx")
     assert result.exit_code == 3, result.stderr
     assert result.stdout.startswith("uncertified: ")
-    assert "\n  stands out" in result.stdout
+    what, why, following = result.stdout.splitlines()
+    assert " entries fit " in what
+    assert "(written: mesh.npz, r.json, p.png)" in what
+    assert why.startswith("  why   the entry of rows")
+    assert ";" not in why
+    assert following.startswith("  next  check the entries that stand out")
     assert work.files() == {"A.mtx", "B.mtx", "mesh.npz", "r.json", "p.png"}
     report = json.loads((work.folder / "r.json").read_text())
     assert report["status"] == "uncertified"
     assert report["backward_error"] > 1e-9
     assert report["worst_entries"][0]["misfit"] > 1e-3
+
+
+def test_3_with_all_details(work):
+    work.write("B.mtx", spoilt(work.true.matrix))
+    result = work.recover("--debug", matrix="B.mtx")
+    assert result.exit_code == 3
+    assert "\n  stands out" in result.stdout
+
+
+def test_3_a_wrong_scale_names_the_right_one(work):
+    result = work.recover("--scale", "-2.9")
+    assert result.exit_code == 3
+    assert "the scale -2.9 does not fit, and -3 does" in result.stdout
+    assert "leave out --scale, or give --scale -3" in result.stdout
 
 
 def test_3_is_not_silent_even_if_quiet(work, one_sentence):
@@ -60,6 +79,7 @@ def test_3_of_several_meshes_that_fit(work):
     result = work.recover("--report", "r.json", "--plot", "p.png", matrix="B.mtx")
     assert result.exit_code == 3, result.stderr
     assert result.stdout.startswith("ambiguous: ")
+    assert len(result.stdout.splitlines()) == 3
     report = json.loads((work.folder / "r.json").read_text())
     assert (report["status"], report["uniqueness"]) == ("ambiguous", "ambiguous")
     assert report["alternatives"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gzip
+
 import pytest
 from click.testing import CliRunner
 
@@ -50,12 +52,12 @@ BAD = [
     (["--direction", "0,1"], "ROW,ROW,DEGREES"),
     (["--direction", "0,0,30"], "rows that differ"),
     (["--direction", "0,1,30", "--anchor", "0,0,0", "--anchor", "1,1,1"], "fix the same freedom"),
-    (["--operator", "surface"], "--operator surface is not available in this version"),
+    (["--operator", "surface"], "'surface'"),
     (["--operator", "heat"], "'heat'"),
-    (["--method", "metric"], "--method metric is not available in this version"),
-    (["--realise"], "--realise is not available in this version"),
+    (["--method", "metric"], "'metric'"),
+    (["--realise"], "--realise"),
     (["--threads", "0"], "x>=1"),
-    (["--report", "r.html"], "not available in this version"),
+    (["--report", "r.html"], "a report is a .json file"),
     (["--report", "r.txt"], ".json"),
     (["--report", "no/r.json"], "no folder"),
     (["--plot", "p.jpg"], ".png"),
@@ -80,7 +82,7 @@ def test_refused(work, one_sentence, words, why):
         ("mesh", "extension"),
         ("mesh.xyz", "extension"),
         ("no/mesh.vtu", "no folder"),
-        (".", "extension"),
+        (".", "it is a folder, so name a file in it"),
         ("-", "extension"),
     ],
 )
@@ -90,10 +92,59 @@ def test_no_such_output(work, one_sentence, out, why):
     assert why in one_sentence(result)
 
 
-def test_output_is_missing(work, one_sentence):
-    result = work.run("recover", "A.mtx")
+@pytest.mark.parametrize("words", [["A.mtx"], ["recover", "A.mtx"], ["recover", "./A.mtx"]])
+def test_the_mesh_goes_beside_the_matrix_where_nothing_is_said(work, one_sentence, words):
+    result = work.run(*words)
+    assert result.exit_code == 0, result.stderr
+    assert "A.vtu" in result.stdout
+    assert work.files() == {"A.mtx", "A.vtu"}
+    written = (work.folder / "A.vtu").read_bytes()
+    result = work.run(*words)
     assert result.exit_code == 2
-    assert "'-o' / '--output'" in one_sentence(result)
+    assert "'A.vtu' is there already" in one_sentence(result)
+    assert (work.folder / "A.vtu").read_bytes() == written
+    assert work.run(*words, "-o", "A.vtu").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "out"),
+    [
+        (["recover", "A.mtx", "mesh.npz"], "mesh.npz"),
+        (["A.mtx", "mesh.npz"], "mesh.npz"),
+        (["A.mtx", "-o", "mesh.npz", "--quiet"], "mesh.npz"),
+        (["in/B.mtx.gz"], "in/B.vtu"),
+    ],
+)
+def test_the_words_recover_and_o_may_be_left_out(work, words, out):
+    (work.folder / "in").mkdir()
+    (work.folder / "in" / "B.mtx.gz").write_bytes(gzip.compress((work.folder / "A.mtx").read_bytes()))
+    result = work.run(*words)
+    assert result.exit_code == 0, result.stderr
+    assert (work.folder / out).is_file()
+
+
+def test_standard_input_without_a_name_for_the_mesh(work):
+    result = work.run("-", stdin=(work.folder / "A.mtx").read_bytes())
+    assert result.exit_code == 0, result.stderr
+    assert work.files() == {"A.mtx", "mesh.vtu"}
+
+
+@pytest.mark.parametrize("name", ["mesh.vtu", "mesh.msh", "mesh.npz", "mesh.off", "mesh.inp", "mesh.obj", "mesh.bdf"])
+def test_a_mesh_given_as_a_matrix(work, one_sentence, name):
+    assert work.recover(out=name).exit_code == 0
+    result = work.run("recover", name, "-o", "again.vtu")
+    assert result.exit_code == 2
+    sentence = one_sentence(result)
+    assert f"{name} is a mesh (" in sentence
+    assert "a matrix is asked for" in sentence
+
+
+def test_a_folder_as_the_mesh(work, one_sentence):
+    (work.folder / "out.vtu").mkdir()
+    for folder in ("out.vtu", "."):
+        result = work.run("A.mtx", folder)
+        assert result.exit_code == 2
+        assert "it is a folder" in one_sentence(result)
 
 
 def test_matrix_is_missing(work, one_sentence):

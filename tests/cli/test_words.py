@@ -102,12 +102,14 @@ def test_why_a_graph_is_not_planar(work, one_sentence, n, joined):
         full[0, 1] = full[1, 0] = 0
         full[[0, 6, 6, 1], [6, 0, 1, 6]] = -1
     work.write("K.mtx", sp.coo_array(full + 9 * np.eye(len(full))))
-    result = work.recover("--operator", "laplacian", matrix="K.mtx")
-    assert result.exit_code == 4
-    sentence = one_sentence(result)
-    assert joined in sentence
-    assert "pairs of rows with an entry" in sentence
-    assert sentence[sentence.index("the edges") :] in work.run("inspect", "K.mtx").stdout
+    for words in (["--operator", "laplacian"], []):
+        result = work.recover(*words, matrix="K.mtx")
+        assert result.exit_code == 4
+        assert one_sentence(result).startswith("the graph of the matrix is not planar")
+        assert "subdivision" not in result.stderr
+        result = work.recover("--debug", *words, matrix="K.mtx")
+        assert joined in result.stderr
+        assert "pairs of rows with an entry" in result.stderr
 
 
 def test_numbers_agree_with_their_nouns():

@@ -1,4 +1,4 @@
-"""MATLAB files of versions 5 to 7, written by scipy; 7.3 is refused."""
+"""MATLAB files of versions 5 to 7, written by scipy."""
 
 from __future__ import annotations
 
@@ -96,13 +96,6 @@ def test_no_sparse_variable(variables: dict[str, Any], options: dict[str, Any], 
 def test_truncated(options: dict[str, Any], cut: int, refused) -> None:
     content = mat({"B": A}, **options).getvalue()
     refused(MatrixFileError, "truncated", read_matrix, io.BytesIO(content[:-cut]))
-
-
-@pytest.mark.parametrize(
-    "start", [b"MATLAB 7.3 MAT-file, Platform: GLNXA64", b"\x89HDF\r\n\x1a\n", b"\0" * 512 + b"\x89HDF\r\n\x1a\n"]
-)
-def test_version_7_3_says_how_to_save(start: bytes, refused) -> None:
-    refused(MatrixFileError, ("HDF5", "7.3", "-v7"), read_matrix, io.BytesIO(start.ljust(600, b"\0")))
 
 
 def element(kind: int, data: bytes) -> bytes:

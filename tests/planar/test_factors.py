@@ -186,7 +186,7 @@ def test_loose_pieces_do_not_vouch_for_each_other(sigma, enough):
     found = recover(noisy(known.matrix, sigma * C, 1), noise=sigma * C)
     assert triangle_set(found.triangles) == triangle_set(known.triangles)
     assert found.certified == enough
-    assert enough or "they agree too roughly" in found.reason
+    assert enough or "They agree too roughly" in found.reason
 
 
 def test_common_fit_that_does_not_converge_is_left_out(monkeypatch):
@@ -205,7 +205,7 @@ def test_pieces_too_large_to_be_fitted_together_are_said_to_be(monkeypatch):
     monkeypatch.setattr("unassemble.scalar.factors.PolishOptions", lambda: PolishOptions(direct_limit=10))
     found = recover(noisy(known.matrix, sigma, 1), noise=sigma)
     assert found.status == "uncertified"
-    assert "errors of the entries explain that, but they have too many vertices to be fitted together" in found.reason
+    assert "Errors of the entries explain that, but they have too many vertices to be fitted together" in found.reason
 
 
 def test_deviation_of_a_factor():

@@ -159,7 +159,7 @@ def test_polish_that_does_not_get_there_says_so():
     matrix = noisy(known.matrix, sigma, seed=4)
     found = recover(matrix, noise=sigma)
     assert found.status == "uncertified"
-    assert "the polish has not come to a mesh that explains the matrix" in found.reason
+    assert "The polish has not come to a mesh that explains the matrix" in found.reason
     assert "was not polished" in recover(matrix, noise=sigma, refine=False).reason
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from .status import CERTIFIED, UNCERTIFIED, say
+from .status import Exit, say
 
 
 @click.command()
@@ -18,4 +18,4 @@ def demo(folder: str) -> int:
     from ..demo import run
 
     recoveries = run(folder, echo=say)
-    return CERTIFIED if all(recovery.certified for recovery in recoveries) else UNCERTIFIED
+    return Exit.CERTIFIED if all(recovery.certified for recovery in recoveries) else Exit.UNCERTIFIED

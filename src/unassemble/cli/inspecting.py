@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from .options import matrix_options
-from .status import CERTIFIED, say
+from .status import Exit, say
 from .values import OptionalTolerance
 
 
@@ -26,4 +26,4 @@ def inspect(matrix: str, variable: str | None, drop_zeros: float | None, as_json
         display("read")
         facts = inspect_matrix(matrix, variable=variable, drop_zeros=drop_zeros)
     say(json.dumps(facts.to_dict(), indent=2, allow_nan=False) if as_json else str(facts))
-    return CERTIFIED
+    return Exit.CERTIFIED

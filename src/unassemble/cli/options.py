@@ -13,6 +13,8 @@ from .values import DROP_ZEROS
 if TYPE_CHECKING:
     from ..recovery import Recovery
 
+_MATRICES = (".mtx", ".mat", ".npz", ".npy", ".txt", ".ijv", ".coo")
+
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
 
@@ -52,6 +54,29 @@ def nodes_options(command: _Command) -> _Command:
     ):
         command = decorate(command)
     return command
+
+
+def target(matrix: str, word: str | None, option: str | None) -> str:
+    """The file that the mesh goes to: as named by a word or an option, or else beside the matrix.
+
+    Raises
+    ------
+    click.UsageError
+        If it is named twice, or there is already a file where nobody named one.
+    """
+    if word is not None and option is not None:
+        raise click.UsageError(f"OUT is given twice, as {word!r} and as -o {option!r}")
+    named = option if word is None else word
+    if named is not None:
+        return named
+    beside = Path("mesh.vtu") if matrix == "-" else Path(matrix)
+    while beside.suffix.lower() in (".gz", *_MATRICES):
+        beside = beside.with_suffix("")
+    beside = beside.with_name(beside.name + ".vtu") if matrix != "-" else beside
+    if beside.exists():
+        name = click.format_filename(beside)
+        raise click.UsageError(f"{name!r} is there already, and was not named: replace it by -o {name}")
+    return str(beside)
 
 
 def check_files(matrix: str, files: Mapping[str, tuple[str | None, Callable[[str], Any]]]) -> None:

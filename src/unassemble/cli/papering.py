@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from .status import CERTIFIED, say
+from .status import Exit, say
 
 
 @click.command()
@@ -23,4 +23,4 @@ def paper(folder: str) -> int:
     say(claims_table(made.claims))
     say(comparison_table(made.comparisons))
     say("\n".join(click.format_filename(path) for path in made.files))
-    return CERTIFIED
+    return Exit.CERTIFIED

@@ -6,27 +6,18 @@ from typing import Any
 
 import click
 
-from .options import check_files, matrix_options, nodes_options, recovered, spelled_numbering
+from .options import check_files, matrix_options, nodes_options, recovered, spelled_numbering, target
 from .status import outcome
 from .values import Numbers, OptionalTolerance
-
-_LATER_OPERATORS = ("surface",)
-_LATER_METHODS = ("metric",)
 
 
 @click.command(cls=OptionalTolerance)
 @matrix_options
 @nodes_options
-@click.option("-o", "--output", "out", metavar="OUT", required=True, help="The mesh: .npz, or any format of meshio.")
-@click.option(
-    "--operator",
-    type=click.Choice(["auto", "laplacian", "elasticity", *_LATER_OPERATORS]),
-    default="auto",
-    show_default=True,
-)
-@click.option(
-    "--method", type=click.Choice(["conformal", "angles", *_LATER_METHODS]), help="The default picks the best."
-)
+@click.argument("out", metavar="[OUT]", required=False)
+@click.option("-o", "--output", metavar="OUT", help="The mesh: .npz, or any format of meshio.")
+@click.option("--operator", type=click.Choice(["auto", "laplacian", "elasticity"]), default="auto", show_default=True)
+@click.option("--method", type=click.Choice(["conformal", "angles"]), help="The default picks the best.")
 @click.option("--no-refine", is_flag=True, help="Leave out the polish.")
 @click.option("--scale", type=float, metavar="C", help="The factor c is known.")
 @click.option(
@@ -51,23 +42,25 @@ _LATER_METHODS = ("metric",)
     "--direction", type=Numbers("ROW,ROW,DEGREES"), help="Angle from the x axis of the line between two rows."
 )
 @click.option("--handed", type=click.Choice(["left", "right"]), help="Side of that line on which the centroid lies.")
-@click.option("--realise", is_flag=True, help="Surfaces: coordinates in space (not available in this version).")
 @click.option("--triangulate", is_flag=True, help="Divide cells that the matrix leaves undivided.")
 @click.option("--standard-deviations", is_flag=True, help="Error bars of the coordinates.")
 @click.option("--report", metavar="FILE", help="Write a report: .json.")
 @click.option("--plot", metavar="FILE", help="Write a picture: .png, .svg or .pdf.")
 @click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads of the linear algebra libraries.")
 @click.option("--quiet", is_flag=True, help="Print nothing but errors.")
-def recover(matrix: str, out: str, report: str | None, plot: str | None, quiet: bool, **options: Any) -> int:
+def recover(
+    matrix: str, out: str | None, output: str | None, report: str | None, plot: str | None, quiet: bool, **options: Any
+) -> int:
     """Recover the mesh of MATRIX and write it to OUT.
 
     MATRIX belongs to the Laplacian on a planar mesh of triangles, c L + D, or to isotropic elasticity in the plane or
     in space.
 
-    MATRIX is Matrix Market (also .gz), scipy's .npz or MATLAB's .mat; - reads Matrix Market from standard input.
-    Rows count from 0.
+    MATRIX is Matrix Market (also .gz), scipy's .npz, NumPy's .npy, MATLAB's .mat, or lines of row, column and entry; -
+    reads Matrix Market from standard input. Rows count from 0. Without OUT the mesh goes to a .vtu beside MATRIX, if
+    there is none yet.
     """
-    _check_available(options.pop("realise"), options["operator"], options["method"])
+    out = target(matrix, out, output)
     options["numbering"] = spelled_numbering(options["numbering"])
     options["refine"] = not options.pop("no_refine")
     from ..export import check_output
@@ -86,14 +79,3 @@ def recover(matrix: str, out: str, report: str | None, plot: str | None, quiet: 
             display("plot")
             recovery.plot(plot)
     return outcome(recovery, [out, report, plot], quiet=quiet)
-
-
-def _check_available(realise: bool, operator: str, method: str | None) -> None:
-    later = [
-        ("--realise", realise),
-        (f"--operator {operator}", operator in _LATER_OPERATORS),
-        (f"--method {method}", method in _LATER_METHODS),
-    ]
-    for name, wanted in later:
-        if wanted:
-            raise click.UsageError(f"{name} is not available in this version")

@@ -25,6 +25,7 @@ def as_typed(text: str, commands: Iterable[click.Command]) -> str:
         The one in use first; an argument that only another one has is said to be that one's. What none of them has
         stays as it is.
     """
+    text = text.replace("`report()`", "the `report`").replace("`inspect_matrix`", "'unassemble inspect'")
     known = [(command.name, flags_of(command)) for command in commands]
 
     def typed(match: re.Match[str]) -> str:

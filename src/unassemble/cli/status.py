@@ -8,17 +8,29 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
+from enum import IntEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from ..errors import InputError, OutputError, RecoveryError, UnassembleError
+from ..errors import InputError, NotPlanarError, OutputError, RecoveryError, UnassembleError
 from .spelling import as_typed
 
 if TYPE_CHECKING:
     from ..recovery import Recovery
 
-CERTIFIED, BUG, USAGE, UNCERTIFIED, NOTHING, INTERRUPTED = 0, 1, 2, 3, 4, 130
+
+class Exit(IntEnum):
+    """What a command came to."""
+
+    CERTIFIED = 0
+    BUG = 1
+    USAGE = 2
+    UNCERTIFIED = 3
+    NOTHING = 4
+    INTERRUPTED = 130
+
 
 # From click 8.2 on, a command without arguments raises the help text.
 _HELP = getattr(click.exceptions, "NoArgsIsHelpError", ())
@@ -26,6 +38,8 @@ _HELP = getattr(click.exceptions, "NoArgsIsHelpError", ())
 
 class CommandLine(click.Group):
     """A group of commands that return their exit status."""
+
+    debug = False  # whether tracebacks and details are wanted
 
     def main(
         self,
@@ -37,8 +51,8 @@ class CommandLine(click.Group):
         **extra: Any,
     ) -> NoReturn:
         """Run a command and leave with its status."""
-        given = list(sys.argv[1:] if args is None else args)
-        debug = "--debug" in given
+        given = self.with_command(list(sys.argv[1:] if args is None else args))
+        debug = self.debug = "--debug" in given
         if debug:
             logging.basicConfig(level=logging.DEBUG, format="%(name)s: %(message)s")
         try:
@@ -50,9 +64,19 @@ class CommandLine(click.Group):
             status, sentence = verdict(error)
             if debug and not isinstance(error, (SystemExit, click.exceptions.ClickException)):
                 traceback.print_exception(error)
+            if debug and isinstance(error, NotPlanarError) and error.witness:
+                from ..topology.obstruction import obstruction_text
+
+                click.echo(f"unassemble: {obstruction_text(error.witness)}", err=True)
             if sentence:
                 click.echo(f"unassemble: {as_typed(sentence, self.in_use(given))}", err=True)
-        sys.exit(status or CERTIFIED)
+        sys.exit(status or Exit.CERTIFIED)
+
+    def with_command(self, words: list[str]) -> list[str]:
+        """The words with ``recover`` before them, where they begin with a file instead of a command."""
+        first = words[0] if words else ""
+        is_file = first == "-" or (not first.startswith("-") and (Path(first).suffix or Path(first).is_file()))
+        return ["recover", *words] if is_file and first not in self.commands else words
 
     def in_use(self, words: Sequence[str]) -> list[click.Command]:
         """All commands, the one that is called first."""
@@ -63,43 +87,46 @@ def verdict(error: BaseException) -> tuple[int, str]:
     """Exit status and sentence for whatever ended a command."""
     match error:
         case SystemExit():
-            return (error.code if isinstance(error.code, int) else BUG), ""
+            return (error.code if isinstance(error.code, int) else Exit.BUG), ""
         case click.exceptions.Abort() if not isinstance(error.__cause__, EOFError):
-            return INTERRUPTED, "interrupted"
+            return Exit.INTERRUPTED, "interrupted"
         case KeyboardInterrupt():
-            return INTERRUPTED, "interrupted"
+            return Exit.INTERRUPTED, "interrupted"
         case click.exceptions.ClickException() if isinstance(error, _HELP):
-            return USAGE, error.format_message()
+            return Exit.USAGE, error.format_message()
         case click.exceptions.ClickException():
-            return USAGE, _one_line(error.format_message())
+            return Exit.USAGE, _one_line(error.format_message())
         case InputError():
-            return USAGE, _one_line(str(error))
+            return Exit.USAGE, _one_line(str(error))
         case RecoveryError():
-            return NOTHING, _one_line(str(error))
+            return Exit.NOTHING, _one_line(str(error))
         case UnassembleError():
-            return BUG, _one_line(str(error))
+            return Exit.BUG, _one_line(str(error))
         case OSError():
-            return USAGE, _one_line(system_sentence(error))
+            return Exit.USAGE, _one_line(system_sentence(error))
         case MemoryError():
-            return BUG, "there is not enough memory for a matrix of this size"
+            return Exit.BUG, "there is not enough memory for a matrix of this size"
         case _:
             cause = error.__cause__ if isinstance(error, click.exceptions.Abort) and error.__cause__ else error
-            return BUG, f"internal error, please report it ({_one_line(f'{type(cause).__name__}: {cause}')}); " + (
+            return Exit.BUG, f"internal error, please report it ({_one_line(f'{type(cause).__name__}: {cause}')}); " + (
                 "--debug shows where"
             )
 
 
 def outcome(recovery: Recovery, written: Sequence[str | None], *, quiet: bool) -> int:
     """Say what came of a recovery, and return the exit status."""
-    commands = [click.get_current_context().command]
+    context = click.get_current_context()
+    commands = [context.command]
+    details = recovery.certified or getattr(context.find_root().command, "debug", False)
     if not quiet:
-        from ..summary import summary
+        from ..summary import summary, three_lines
 
         files = ", ".join(click.format_filename(name) for name in written if name is not None)
-        say(as_typed(summary(recovery), commands) + f"\n  {'written':<15} {files}")
+        text = f"{summary(recovery)}\n  {'written':<15} {files}" if details else three_lines(recovery, files)
+        say(as_typed(text, commands))
     elif not recovery.certified:
         click.echo(f"unassemble: {recovery.status}: {as_typed(recovery.reason, commands)}", err=True)
-    return CERTIFIED if recovery.certified else UNCERTIFIED
+    return Exit.CERTIFIED if recovery.certified else Exit.UNCERTIFIED
 
 
 def system_sentence(error: OSError) -> str:

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import guessed
+from ..diagnosis import LINEAR, PLANAR, diagnosed
 from ..errors import NotPlanarError, TopologyError
 from ..matrix import OperatorMatrix, load
-from ..operators import vector_valued
+from ..operators import VectorReading, second_reading, vector_valued
+from ..quiet import quiet_libraries
 from ..topology import Topology, recognise, surfaces
 from ..words import count_of
 from .facts import matrix_facts, mesh_facts, nodes_facts
@@ -73,6 +75,14 @@ class Inspection:
         What the cells were taken from: cycles of three edges are cells, unless edges are left over and the entries
         suggest others. These are what :func:`unassemble.recover` begins with; it solves, holds the result against the
         entries, and changes cells where that asks for it. Empty where there is no mesh.
+    kind : str
+        ``"vector-valued"``, or as in :class:`unassemble.diagnosis.Diagnosis`.
+    name : str
+        The same in words.
+    evidence : tuple of str
+        What speaks for it, the strongest first.
+    advice : str
+        What to do next; empty where recovery is.
     """
 
     n_rows: int
@@ -104,6 +114,10 @@ class Inspection:
     n_polygons: int = 0
     n_vanished_sides: int = 0
     cells_from: str = ""
+    kind: str = "vector-valued"
+    name: str = ""
+    evidence: tuple[str, ...] = ()
+    advice: str = ""
 
     @property
     def operator(self) -> str:
@@ -115,11 +129,13 @@ class Inspection:
         if self.n_nodes:
             kind = "elasticity, if the material is isotropic" if self.coupled else "laplacian in each direction"
             return f"vector-valued, {self.block_size} components, {self.numbering}: {kind}"
+        if self.kind != PLANAR:
+            return self.name
         if self.obstacle:
-            return "none that this version knows"
+            return "none that is known"
         if self.mixed_signs:
             return "not a Laplacian: its diagonal has one sign, and the off-diagonal sums here have both"
-        return "laplacian, linear triangles" + ("" if self.n_zero_sums == self._n_rows_used else ", plus a diagonal")
+        return "laplacian, linear triangles" + self.name.removeprefix(LINEAR)
 
     @property
     def recoverable(self) -> str:
@@ -134,8 +150,8 @@ class Inspection:
             )
         if self.n_nodes:
             return "what each direction's scalar matrix holds"
-        if not self.planar:
-            return "nothing: the graph is not that of a mesh in the plane"
+        if self.kind != PLANAR:
+            return f"nothing: {self.advice}"
         if self.obstacle:
             return f"nothing: {self.obstacle}"
         mesh = f"{mesh_text(self)} on {self.n_rows - self.n_undetermined:,} points"
@@ -143,10 +159,6 @@ class Inspection:
             return f"{mesh}, but no positions that could be certified: look at row {self.mixed_signs[0]}"
         each = f", each of the {self.n_pieces:,} pieces by itself" if self.n_pieces > 1 else ""
         return f"{mesh}, up to position, rotation, size and mirror image{each}, {_IF}"
-
-    @property
-    def _n_rows_used(self) -> int:
-        return self.n_rows - self.n_isolated
 
     def to_dict(self) -> dict[str, Any]:
         """All attributes, ready for JSON."""
@@ -182,11 +194,16 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
     >>> inspection.n_triangles, inspection.n_holes, inspection.operator
     (1, 0, 'laplacian, linear triangles')
     """
-    matrix = A if isinstance(A, OperatorMatrix) else load(A, variable=variable, drop_zeros=drop_zeros)
+    with quiet_libraries():
+        matrix = A if isinstance(A, OperatorMatrix) else load(A, variable=variable, drop_zeros=drop_zeros)
+        return _inspected(matrix)
+
+
+def _inspected(matrix: OperatorMatrix) -> Inspection:
     facts = matrix_facts(matrix)
     vector = vector_valued(matrix)
     if vector is not None:
-        return Inspection(**facts, planar=False, obstacle=vector.why, **nodes_facts(matrix, vector))
+        return _vector_valued(matrix, facts, vector)
     topology = surfaces(matrix.n, matrix.edges)
     read = matrix
     if _left_over(matrix, topology):
@@ -197,11 +214,24 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
         except (NotPlanarError, TopologyError) as error:
             planar = not isinstance(error, NotPlanarError)
             if not (planar and topology.pieces):
+                vector = second_reading(matrix)  # as recovery does
+                if vector is not None:
+                    return _vector_valued(matrix, facts, vector)
+                facts |= _diagnosis(matrix, planar=planar)
                 return Inspection(**facts, planar=planar, obstacle=str(error), witness=getattr(error, "witness", ()))
         else:
             if not topology.pieces:
                 read, topology = matrix, plain
-    return Inspection(**facts, **mesh_facts(read, topology))
+    return Inspection(**facts, **mesh_facts(read, topology), **_diagnosis(matrix, planar=True))
+
+
+def _vector_valued(matrix: OperatorMatrix, facts: dict[str, Any], vector: VectorReading) -> Inspection:
+    return Inspection(**facts, planar=False, obstacle=vector.why, **nodes_facts(matrix, vector))
+
+
+def _diagnosis(matrix: OperatorMatrix, *, planar: bool) -> dict[str, Any]:
+    found = diagnosed(matrix, planar=planar)
+    return {"kind": found.kind, "name": found.name, "evidence": found.evidence, "advice": found.advice}
 
 
 def _left_over(matrix: OperatorMatrix, topology: Topology) -> bool:

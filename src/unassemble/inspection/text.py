@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..tolerances import ROUNDED
-from ..topology.obstruction import obstruction_text
 from ..words import count_of
 
 if TYPE_CHECKING:
@@ -35,7 +34,9 @@ def lines_of(facts: Inspection) -> list[tuple[str, str]]:
             ("pieces", _pieces(facts)),
         ]
         lines.append(("scale c", _scale(facts)))
-    lines += [("operator", facts.operator), ("recoverable", facts.recoverable)]
+    lines.append(("operator", facts.operator))
+    lines += [("evidence", one) for one in facts.evidence]
+    lines.append(("recoverable", facts.recoverable))
     return lines + [("note", warning) for warning in facts.warnings]
 
 
@@ -62,8 +63,7 @@ def _row_sums(facts: Inspection) -> str:
     used = facts.n_rows - facts.n_isolated
     if facts.n_zero_sums == used:
         return "zero"
-    where = f"zero in {facts.n_zero_sums:,} of {used:,} rows only" if facts.n_zero_sums else "not zero"
-    return where if facts.n_nodes else f"{where}, so a diagonal was added"
+    return f"zero in {facts.n_zero_sums:,} of {used:,} rows only" if facts.n_zero_sums else "not zero"
 
 
 def _planar(facts: Inspection) -> str:
@@ -71,7 +71,7 @@ def _planar(facts: Inspection) -> str:
         return "yes"
     if facts.n_nodes:
         return "not looked for, since the rows form nodes of several unknowns"
-    return f"no: {obstruction_text(facts.witness)}"
+    return "no"
 
 
 def mesh_text(facts: Inspection) -> str:

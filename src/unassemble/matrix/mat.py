@@ -1,7 +1,7 @@
-"""MATLAB files of versions 5 to 7, SuiteSparse's ``Problem.A`` included.
+"""MATLAB files of versions 4 to 7.3, SuiteSparse's ``Problem.A`` included.
 
-The reader of scipy (1.17) ends the process by a segmentation fault on some damaged files; this one looks at every
-length before it believes it, and unpacks nothing but what may hold a sparse matrix.
+The reader of scipy (1.17) ends the process by a segmentation fault on some damaged files of version 5; the one here
+looks at every length before it believes it, and unpacks nothing but what may hold a sparse matrix.
 """
 
 from __future__ import annotations
@@ -43,8 +43,66 @@ def read_mat(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
         If the file is truncated or damaged, in a few words.
     """
     variables = read_mat5(stream.read())
-    found = dict(_sparse_variables(variables))
-    held = _listed({key: A.shape for key, A in found.items()} or {v.name: v.shape for v in variables})
+    others = {v.name: v.shape for v in variables}
+    return _chosen(dict(_sparse_variables(variables)), others, name, variable)
+
+
+def read_mat4(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
+    """Read a matrix from a MATLAB file of version 4, dense or sparse; as :func:`read_mat`."""
+    from scipy.io import loadmat
+
+    held = {key: value for key, value in loadmat(stream).items() if not key.startswith("__")}
+    found = {key: sp.coo_array(value) for key, value in held.items() if _is_matrix(value)}
+    return _chosen(found, {key: np.shape(value) for key, value in held.items()}, name, variable)
+
+
+def read_mat73(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
+    """Read the sparse variable of a MATLAB file of version 7.3, which is HDF5; as :func:`read_mat`.
+
+    A sparse variable is a group with the data sets ``ir``, ``jc`` and ``data``, and the number of rows as the
+    attribute ``MATLAB_sparse``; empty ones lack some of these. Structures are groups of variables.
+    """
+    import h5py
+
+    found: dict[str, Any] = {}
+    others: dict[str, tuple[int, ...]] = {}
+
+    def visit(key: str, item: Any) -> None:
+        if key.startswith("#"):  # where MATLAB keeps what is referred to
+            return
+        if "MATLAB_sparse" in item.attrs:
+            found[key.replace("/", ".")] = _sparse_group(item)
+        elif isinstance(item, h5py.Dataset) and not item.parent.attrs.get("MATLAB_sparse"):
+            others[key.replace("/", ".")] = item.shape[::-1]
+
+    with h5py.File(stream, "r") as file:
+        file.visititems(visit)
+        for key in [key for key in found if key.endswith(".A") and f"{key[:-1]}Zeros" in found]:
+            found[key] = _with_zeros(found[key], found.pop(f"{key[:-1]}Zeros"))
+    return _chosen(found, others, name, variable)
+
+
+def _sparse_group(group: Any) -> Any:
+    rows, columns = int(group.attrs["MATLAB_sparse"]), len(group["jc"]) - 1
+    if "data" not in group or "ir" not in group:
+        return sp.csc_array((rows, columns))
+    values = group["data"][()]
+    if values.dtype.names:  # complex ones
+        values = values["real"] + 1j * values["imag"]
+    if group.attrs.get("MATLAB_class") == b"logical":
+        values = values.astype(bool)
+    index = np.int32 if max(rows, columns, len(values)) < 2**31 else np.int64
+    return sp.csc_array((values, group["ir"][()].astype(index), group["jc"][()].astype(index)), shape=(rows, columns))
+
+
+def _is_matrix(value: Any) -> bool:
+    dense = isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "biufc" and min(value.shape) > 1
+    return bool(sp.issparse(value) or dense)
+
+
+def _chosen(found: dict[str, Any], others: dict[str, tuple[int, ...]], name: str, variable: str | None) -> Any:
+    """The variable that is asked for, or the only square one."""
+    held = _listed({key: A.shape for key, A in found.items()} or others)
     if variable is not None:
         if variable not in found:
             raise MatrixFileError(f"{name} has no sparse variable {variable!r}: it holds {held}")

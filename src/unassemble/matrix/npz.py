@@ -1,4 +1,4 @@
-"""Sparse matrices of ``scipy.sparse.save_npz``; nothing is ever unpickled."""
+"""Sparse matrices of ``scipy.sparse.save_npz``, dense ones of ``numpy.save``; nothing is ever unpickled."""
 
 from __future__ import annotations
 
@@ -44,12 +44,45 @@ def read_npz(stream: BinaryIO, name: str) -> Any:
         raise MatrixFileError(f"{name} {error}") from error
 
 
+def read_npy(stream: BinaryIO, name: str) -> Any:
+    """Read a dense array of ``numpy.save``; its zeros are absent entries.
+
+    Raises
+    ------
+    MatrixFileError
+        If it holds Python objects, or no matrix of numbers.
+    """
+    try:
+        dense = np.load(stream, allow_pickle=False)
+    except ValueError as error:
+        if "allow_pickle" in str(error):
+            raise MatrixFileError(f"{name} holds Python objects, which are never loaded") from error
+        raise
+    return from_dense(dense, name)
+
+
+def from_dense(dense: NDArray, name: str) -> sp.coo_array:
+    """A dense matrix without its zeros.
+
+    Raises
+    ------
+    MatrixFileError
+        If it is no matrix of numbers.
+    """
+    if dense.ndim != 2 or dense.dtype.kind not in _NUMBERS:
+        what = "an array of numbers" if dense.dtype.kind in _NUMBERS else f"an array of type {dense.dtype}"
+        raise MatrixFileError(f"{name} holds {what} with {dense.ndim} dimensions, and a matrix of numbers has two")
+    return sp.coo_array(dense.astype(working_dtype(dense.dtype), copy=False))
+
+
 class _ArchiveError(Exception):
     """What is wrong with an archive, to follow its name."""
 
 
 def _matrix(archive: Any) -> Any:
     if "format" not in archive.files:
+        if {"points", "node_status"} <= set(archive.files):
+            raise _ArchiveError("is a mesh (as `recover` writes it), and a matrix is asked for: name the matrix's file")
         names = ", ".join(repr(key[:40]) for key in archive.files[:5]) + ", ..." * (len(archive.files) > 5)
         what = f"only {names}" if names else "it is an empty archive"
         raise _ArchiveError(f"holds no sparse matrix ({what}): save one with scipy.sparse.save_npz")

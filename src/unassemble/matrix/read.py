@@ -18,19 +18,23 @@ import scipy.sparse as sp
 from ..errors import InputError, MatrixFileError, UnassembleError
 from .canonical import canonical, inconsistency
 from .market import read_market
-from .mat import read_mat
-from .npz import read_npz
+from .mat import read_mat, read_mat4, read_mat73
+from .npz import read_npy, read_npz
 from .signatures import HEAD, foreign, kind_of
+from .triplets import read_triplets
 
-_FORMATS = {"market": "Matrix Market", "npz": ".npz", "mat": ".mat"}
+_FORMATS = {"market": "Matrix Market", "npz": ".npz", "npy": ".npy", "triplets": "lines of row, column and entry"}
+
+
+_READERS = {"market": read_market, "npz": read_npz, "npy": read_npy, "triplets": read_triplets}
+_MATLAB = {"mat": read_mat, "mat4": read_mat4, "hdf5": read_mat73}
 
 
 def read_matrix(source: str | os.PathLike[str] | IO[Any], *, variable: str | None = None) -> sp.csr_array:
-    """Read a sparse matrix from Matrix Market, scipy's ``.npz`` or ``.mat``, as its first bytes tell.
+    """Read a matrix from Matrix Market, scipy's ``.npz``, ``.npy``, ``.mat`` or triplets, as its first bytes tell.
 
-    Explicit zeros of the file are kept as structure; zeros of a dense Matrix Market array and of scipy's
-    diagonal storage, which cannot be told from padding, are not. Duplicates are summed. Pickles are never
-    loaded.
+    Explicit zeros of the file are kept as structure; zeros of dense arrays and of scipy's diagonal storage, which
+    cannot be told from padding, are not. Duplicates are summed. Pickles are never loaded.
 
     Parameters
     ----------
@@ -76,11 +80,11 @@ def _read(stream: Any, name: str, variable: str | None) -> Any:
         return _read_gzip(stream, name, variable)
     if kind is None:
         raise MatrixFileError(f"{name} {foreign(_head(stream))}")
-    if variable is not None and kind != "mat":
+    if kind in _MATLAB:
+        return _MATLAB[kind](stream, name, variable)
+    if variable is not None:
         raise InputError(f"{name} is {_FORMATS[kind]}, and only .mat files have variables: leave out `variable`")
-    if kind == "mat":
-        return read_mat(stream, name, variable)
-    return read_npz(stream, name) if kind == "npz" else read_market(stream, name)
+    return _READERS[kind](stream, name)
 
 
 def _read_gzip(stream: BinaryIO, name: str, variable: str | None) -> Any:
@@ -89,7 +93,7 @@ def _read_gzip(stream: BinaryIO, name: str, variable: str | None) -> Any:
             kind = kind_of(_head(unpacked))
             if kind == "gzip":
                 raise MatrixFileError(f"{name} is compressed twice: unpack it once")
-            if kind in ("market", None):  # read, or refused, as it is unpacked
+            if kind in ("market", "triplets", None):  # read, or refused, as it is unpacked
                 return _read(unpacked, name, variable)
             return _read(io.BytesIO(unpacked.read()), name, variable)
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:

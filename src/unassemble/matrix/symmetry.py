@@ -14,6 +14,8 @@ from ..words import count_of
 from .canonical import entry_rows
 from .operator import row_sizes
 
+_SEVERAL, _MOST = 10, 0.5  # pairs, and their share that differs, from which a whole term is not symmetric
+
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
@@ -117,11 +119,36 @@ def _not_symmetric(A: sp.csr_array, pairs: Triangles, i: int, j: int, noise: flo
         for which, held in (("upper", (A.indices >= rows).all()), ("lower", (A.indices <= rows).all())):
             if held:
                 return _one_triangle(A, which, *((i, j) if which == "upper" else (j, i)))
+    identity = _rows_of_identity(A)
+    if identity.any():
+        k, first = int(identity.sum()), int(identity.argmax())
+        return MatrixError(
+            f"the matrix is not symmetric: {count_of(k, 'row is that', 'rows are those')} of the identity, first row "
+            f"{first}, while other rows still use these unknowns, as where Dirichlet conditions were put into rows "
+            "only. Take these rows and columns out, or put zeros into the columns as well"
+        )
+    with np.errstate(over="ignore"):
+        unlike = np.abs(pairs.upper - pairs.lower) > SUMMED * np.maximum(np.abs(pairs.upper), np.abs(pairs.lower))
+    here, there = _shown(A, i, j), _shown(A, j, i)
+    if len(pairs.edges) >= _SEVERAL and unlike.mean() > _MOST and not pairs.one_sided:
+        return MatrixError(
+            f"the matrix is not symmetric: {unlike.mean():.0%} of all entries differ from their transposes, as where "
+            f"convection or another first derivative was added (row {i}, column {j} is {here}, and row {j}, column "
+            f"{i} is {there}). Assemble the matrix without that term"
+        )
     remedy = "" if noise is not None else " (if the entries are measured, give their `noise`)"
     return MatrixError(
-        f"the matrix is not symmetric, most at row {i}, column {j}: that entry is {_shown(A, i, j)} and its transpose, "
-        f"row {j}, column {i}, is {_shown(A, j, i)}; both must be the same number{remedy}"
+        f"the matrix is not symmetric, most at row {i}, column {j}: that entry is {here} and its transpose, row {j}, "
+        f"column {i}, is {there}. Both must be the same number{remedy}"
     )
+
+
+def _rows_of_identity(A: sp.csr_array) -> NDArray[np.bool_]:
+    """(n,) rows with nothing but a diagonal entry, whose columns hold more than that."""
+    off = (A.indices != entry_rows(A)) & (A.data != 0)
+    in_row = np.bincount(entry_rows(A)[off], minlength=A.shape[0])
+    in_column = np.bincount(A.indices[off], minlength=A.shape[0])
+    return np.asarray((in_row == 0) & (in_column > 0) & (A.diagonal() != 0))
 
 
 def _one_triangle(A: sp.csr_array, which: str, i: int, j: int) -> MatrixError:

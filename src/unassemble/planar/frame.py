@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tolerances import ALIKE
+from ..tolerances import ALIKE, SMALL
 
 
 @dataclass(frozen=True)
@@ -23,16 +23,18 @@ class Similarity:
         return self.turn * (np.conj(z) if self.mirror else z) + self.shift
 
 
-def canonical_frame(z: NDArray, edges: NDArray) -> tuple[Similarity, str | None]:
+def canonical_frame(z: NDArray, edges: NDArray, boundary: NDArray | None = None) -> tuple[Similarity, str | None]:
     """The frame that positions have where nothing else is known.
 
     Centroid at the origin, mean edge length 1, first principal axis along x, and the mirror image and half
-    turn for which the third moments of x and y are positive.
+    turn for which the third moments of x and y are positive. Where second moments are equal in all directions the
+    axes follow the edges, those of the boundary before others.
 
     Parameters
     ----------
     z : (n,) complex128
     edges : (e, 2) int
+    boundary : (b, 2) int, optional
 
     Returns
     -------
@@ -45,7 +47,8 @@ def canonical_frame(z: NDArray, edges: NDArray) -> tuple[Similarity, str | None]
     d = (z - centre) / size
     second = (d * d).sum()  # of argument twice the principal axis', and modulus the difference of the moments
     spread = float((np.abs(d) ** 2).sum())
-    axis = np.exp(-0.5j * np.angle(second)) if abs(second) > 0 else 1.0
+    tie = not abs(second) > ALIKE * spread
+    axis = _along_edges(d, edges, boundary) if tie else np.exp(-0.5j * np.angle(second))
     x, y = (axis * d).real, (axis * d).imag
     third = [float((t * t * t).sum()) for t in (x, y)]  # a power would take ten times as long
     sure = [abs(m) > ALIKE * float((np.abs(t) ** 3).sum()) for m, t in zip(third, (x, y), strict=True)]
@@ -55,12 +58,25 @@ def canonical_frame(z: NDArray, edges: NDArray) -> tuple[Similarity, str | None]
     if mirror:  # conjugation turns y over after the half turn has set x
         turn = np.conj(turn)
     shift = -turn * (np.conj(centre) if mirror else centre)
-    return Similarity(complex(turn), complex(shift), mirror), _ambiguity(abs(second) > ALIKE * spread, *sure)
+    return Similarity(complex(turn), complex(shift), mirror), _ambiguity(not tie, *sure)
+
+
+def _along_edges(z: NDArray, edges: NDArray, boundary: NDArray | None) -> complex:
+    """The turn that lays edges along the axes: the fourth powers of their directions agree, or else the sixth ones."""
+    for some, power in ((boundary, 4), (edges, 4), (boundary, 6), (edges, 6)):
+        if some is None or not len(some):
+            continue
+        line = z[some[:, 1]] - z[some[:, 0]]
+        length = np.abs(line)
+        mean = np.sum(length * (line / np.where(length > 0, length, 1.0)) ** power) / max(float(length.sum()), 1e-300)
+        if abs(mean) > SMALL:
+            return complex(np.exp(-1j * np.angle(mean) / power))
+    return 1.0
 
 
 def _ambiguity(axis: bool, x: bool, y: bool) -> str | None:
     if not axis:
-        return "the second moments are equal in all directions, so the principal axis is arbitrary"
+        return "the second moments are equal in all directions, so that the axes follow the edges, up to symmetry"
     if x and y:
         return None
     vanishing = " and ".join(name for name, known in (("x", x), ("y", y)) if not known)

@@ -213,6 +213,18 @@ def _polished(
     return again if again.residual < found.residual or not finite else found
 
 
+def collapsed(piece: Piece, z: NDArray) -> str:
+    """Why positions are no mesh at all: not finite, points that coincide, all in line; empty where they are one."""
+    if not np.isfinite(z).all():
+        return "positions are not finite"
+    d = z - z.mean()
+    size = float(np.abs(d).max())
+    if not size > 0 or not _shortest(piece, z) > LAST_DIGITS:
+        return "points coincide"
+    across = (np.exp(-0.5j * np.angle((d * d).sum())) * d).imag
+    return "all points lie in a line" if np.abs(across).max() <= LAST_DIGITS * size else ""
+
+
 def _shortest(piece: Piece, z: NDArray) -> float:
     """Length of the shortest edge, relative to the extent."""
     return float(np.abs(z[piece.edges[:, 0]] - z[piece.edges[:, 1]]).min() / np.abs(z - z.mean()).max())

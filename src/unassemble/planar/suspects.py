@@ -92,7 +92,7 @@ def find_suspects(
     jacobian = WeightJacobian(piece, z, spread)
     equations = NormalEquations(jacobian, distant_pair(z))
     fitted = edge_weights(piece, z) / spread
-    rest = _Complement(jacobian, equations, fitted if free_scale else None)
+    rest = Complement(jacobian, equations, fitted if free_scale else None)
     misfit = rest(weights[:, None] / scale / spread[:, None] - fitted[:, None])[:, 0]
     candidates = np.argsort(-np.abs(misfit), kind="stable")[: _OPTIONS.candidates]
     columns = np.zeros((len(weights), len(candidates)))
@@ -136,7 +136,7 @@ def _forward(misfit: NDArray, columns: NDArray, freedom: int) -> tuple[list[int]
     return chosen, left / total if total > 0 else 0.0
 
 
-class _Complement:
+class Complement:
     """The projector I - H off what displacements, and a change of scale, can explain."""
 
     def __init__(self, jacobian: WeightJacobian, equations: NormalEquations, weights: NDArray | None):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..recovery import Body, Recovery, Structure
 from . import style
-from .canvas import panels
+from .canvas import panel
 from .mesh import line_handle
 
 if TYPE_CHECKING:
@@ -23,13 +23,13 @@ _TOWARDS = np.array([0.52, -0.69, 0.50]) / np.linalg.norm([0.52, -0.69, 0.50])
 _LIGHT = np.array([0.25, -0.55, 0.80]) / np.linalg.norm([0.25, -0.55, 0.80])
 
 
-def plot_body(recovery: Recovery) -> tuple[Figure, list[Artist]]:
+def plot_body(recovery: Recovery, ax: Axes | None = None) -> tuple[Figure, list[Artist]]:
     """A body or structure, pieces side by side, and handles for the legend."""
     flat, depth = _projected(recovery.points)
     flat = _side_by_side(flat, recovery)
     known = np.isfinite(flat).all(axis=1)
     shown = flat[known] if known.any() else np.array([[0.0, 0.0], [1.0, 1.0]])
-    figure, (ax,) = panels([np.stack([shown.min(axis=0), shown.max(axis=0)])])
+    figure, ax = panel(np.stack([shown.min(axis=0), shown.max(axis=0)]), ax)
     handles: list[Artist] = []
     if not recovery.n_cells:
         ax.plot(*shown.T, "o", markersize=float(np.clip(120 / np.sqrt(len(shown)), 1, 4)), color=style.EDGE)

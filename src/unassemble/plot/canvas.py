@@ -59,34 +59,46 @@ def panels(extents: Sequence[NDArray]) -> tuple[Figure, list[Axes]]:
 
     sizes = np.array([high - low for low, high in extents])
     sizes = np.maximum(sizes, 1e-3 * max(float(sizes.max()), 1e-300))
-    gap = style.MARGIN * 2 * (len(extents) - 1)
-    room = np.array(style.LARGEST) * (1 + 0.4 * (len(extents) > 1), 1)
+    gap = style.PAGE.margin * 2 * (len(extents) - 1)
+    room = np.array(style.PAGE.largest) * (1 + 0.4 * (len(extents) > 1), 1)
     scale = min((room[0] - gap) / sizes[:, 0].sum(), room[1] / sizes[:, 1].max())
     sizes = sizes * scale
     height = float(sizes[:, 1].max())
     content = float(sizes[:, 0].sum() + gap)
-    width = max(content, style.NARROWEST)
-    total = np.array([width + 2 * style.MARGIN, height + style.HEADER + style.FOOTER])
+    width = max(content, style.PAGE.narrowest)
+    total = np.array([width + 2 * style.PAGE.margin, height + style.PAGE.header + style.PAGE.footer])
     figure = Figure(figsize=(float(total[0]), float(total[1])), facecolor="white")
     FigureCanvasAgg(figure)
     axes = []
-    left = style.MARGIN + (width - content) / 2
+    left = style.PAGE.margin + (width - content) / 2
     for (low, high), size in zip(extents, sizes, strict=True):
-        bottom = style.FOOTER + (height - size[1]) / 2
+        bottom = style.PAGE.footer + (height - size[1]) / 2
         # A margin inside the box keeps the boundary line from being cut.
         pad = 0.012 * float((high - low).max())
         ax = figure.add_axes((left / total[0], bottom / total[1], size[0] / total[0], size[1] / total[1]))
         ax.set(xlim=(low[0] - pad, high[0] + pad), ylim=(low[1] - pad, high[1] + pad), aspect="equal")
         ax.set_axis_off()
         axes.append(ax)
-        left += size[0] + 2 * style.MARGIN
+        left += size[0] + 2 * style.PAGE.margin
     return figure, axes
+
+
+def panel(extent: NDArray, ax: Axes | None) -> tuple[Figure, Axes]:
+    """A box for what `extent` (2, 2) encloses: an axes of the caller's, or that of a figure of its own."""
+    if ax is None:
+        figure, (ax,) = panels([extent])
+        return figure, ax
+    low, high = extent
+    pad = 0.012 * float((high - low).max())
+    ax.set(xlim=(low[0] - pad, high[0] + pad), ylim=(low[1] - pad, high[1] + pad), aspect="equal")
+    ax.set_axis_off()
+    return ax.figure, ax  # type: ignore[return-value]
 
 
 def header(figure: Figure, headline: str, details: str, colour: str) -> None:
     """A bold line and a plain one below, left-aligned at the top."""
     width, height = figure.get_size_inches()
-    x = style.MARGIN / width
+    x = style.PAGE.margin / width
     figure.text(x, 1 - 0.16 / height, headline, color=colour, size=12, weight="bold", va="top")
     figure.text(x, 1 - 0.41 / height, details, color=style.TEXT, size=8.5, va="top")
 
@@ -98,7 +110,7 @@ def footer(figure: Figure, handles: Sequence[Artist]) -> None:
         legend = figure.legend(
             handles=list(handles),
             loc="lower left",
-            bbox_to_anchor=(style.MARGIN / width, 0),
+            bbox_to_anchor=(style.PAGE.margin / width, 0),
             ncols=len(handles),
             frameon=False,
             fontsize=8.5,

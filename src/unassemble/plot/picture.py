@@ -13,16 +13,17 @@ from ..summary import counted_cells, scale_text
 from ..words import count_of
 from . import style
 from .body import plot_body
-from .canvas import check_plot, footer, header, panels, write_figure
+from .canvas import check_plot, footer, header, panel, write_figure
 from .layout import laid_out
 from .mesh import draw_hinges, draw_mesh, draw_worst, extent, outer_loops
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
-def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None) -> Figure:
+def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None, *, ax: Axes | None = None) -> Figure:
     """Draw a recovered mesh: cells, outer boundary, holes, hinges, and what fits worst if uncertified.
 
     Pieces whose frames overlap are drawn side by side. Points without coordinates are left out. Of bodies in space
@@ -33,6 +34,8 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     recovery : Recovery
     path : path, optional
         Write the picture there, whole or not at all: ``.png``, ``.svg`` or ``.pdf``.
+    ax : Axes, optional
+        Draw there, without heading and legend, and return the figure that it belongs to.
 
     Raises
     ------
@@ -41,18 +44,19 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     """
     if path is not None:
         check_plot(path)
-    figure, handles = planar_mesh(recovery) if isinstance(recovery, PlanarMesh) else plot_body(recovery)
-    header(figure, recovery.status, details(recovery), style.STATUS.get(recovery.status, style.TEXT))
-    footer(figure, handles)
+    figure, handles = planar_mesh(recovery, ax) if isinstance(recovery, PlanarMesh) else plot_body(recovery, ax)
+    if ax is None:
+        header(figure, recovery.status, details(recovery), style.STATUS.get(recovery.status, style.TEXT))
+        footer(figure, handles)
     if path is not None:
         write_figure(figure, path)
     return figure
 
 
-def planar_mesh(mesh: PlanarMesh) -> tuple[Figure, Sequence[Artist]]:
+def planar_mesh(mesh: PlanarMesh, ax: Axes | None = None) -> tuple[Figure, Sequence[Artist]]:
     """A planar mesh, and handles for the legend."""
     points = laid_out(mesh)
-    figure, (ax,) = panels([extent(points, mesh.component >= 0)])
+    figure, ax = panel(extent(points, mesh.component >= 0), ax)
     handles = draw_mesh(ax, mesh, points, outer_loops(mesh))
     handles += draw_hinges(ax, points[mesh.hinges])
     if not mesh.certified:

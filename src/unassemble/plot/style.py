@@ -1,5 +1,19 @@
 """Colours and sizes of the pictures."""
 
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Page:
+    """Lengths in inches: the box that a mesh is fitted into, what a line of text needs, and the rims."""
+
+    largest: tuple[float, float]
+    narrowest: float
+    margin: float
+    header: float
+    footer: float
+
+
 FILL = "#edf3fa"
 EDGE = "#4f7cac"
 OUTER = "#12304f"
@@ -11,8 +25,4 @@ STATUS = {"certified": "#2a7f4f", "ambiguous": "#b3441e", "uncertified": "#b3441
 
 MOST_VECTOR = 20_000  # shapes in a vector format; more become an image in it
 DPI = 160
-LARGEST = (9.0, 7.2)  # inches: the box that a mesh is fitted into
-NARROWEST = 6.2  # inches: what a line of text needs
-MARGIN = 0.25
-HEADER = 0.76
-FOOTER = 0.42
+PAGE = Page(largest=(9.0, 7.2), narrowest=6.2, margin=0.25, header=0.76, footer=0.42)

@@ -14,7 +14,8 @@ from ..planar.cautious import CautiousOptions
 from ..planar.cotangent import edge_weights, weight_roundings
 from ..planar.robust import differences_without
 from ..planar.suspects import find_suspects
-from ..tolerances import CHANCE, LITTLE, NOISY, SUMMED
+from ..planar.terms import Term, lacking_term
+from ..tolerances import CERTIFIED, CHANCE, LARGEST_NOISE, LITTLE, NOISY, SUMMED
 from .solving import Solved
 from .wrong_entries import settled
 
@@ -27,16 +28,19 @@ class Evidence:
     ----------
     noise : float or None
         Standard deviation of independent errors of one size in the entries that would leave this misfit; None where
-        there are no more entries than unknowns.
+        there are no more entries than unknowns, and where the misfit is no noise.
     suspects : (k, 2) int64
         Entries without which a mesh fits all others, as well as right entries are fitted.
     certain : bool
         Whether that few entries explain nearly all of the misfit cannot be chance.
+    term : Term or None
+        A term that the model lacks, where it cannot be chance that it explains so much of the misfit.
     """
 
     noise: float | None
     suspects: NDArray[np.int64]
     certain: bool
+    term: Term | None = None
 
 
 NONE = np.empty((0, 2), dtype=np.int64)
@@ -52,7 +56,24 @@ def weigh(solved: Solved, certificate: Certificate, *, free_scale: bool, search:
     suspects, certain = NONE, False
     if search and freedom > 1:
         suspects, certain = _suspects(solved, free_scale=free_scale)
-    return Evidence(noise, suspects, certain)
+    term = None
+    if noise and certificate.backward_error > CERTIFIED and not len(certificate.flipped):
+        term = _term(solved, noise, free_scale=free_scale)
+    return Evidence(None if term else noise, suspects, certain, term)
+
+
+def _term(solved: Solved, noise: float, *, free_scale: bool) -> Term | None:
+    """What the model lacks, as the piece tells in which chance is least likely; no entry is blamed for that."""
+    if not noise <= LARGEST_NOISE * np.abs(solved.scales).min() or (solved.noise and solved.noise.digits):
+        return None
+    found = []
+    for piece, mesh in zip(solved.topology.pieces, solved.meshes, strict=True):
+        weights = -solved.matrix.entries[piece.edge_rows]
+        if mesh.aside is None:
+            term = lacking_term(piece, weights, mesh.z, mesh.scale, mesh.spread, free_scale=free_scale)
+            found += [] if term is None else [term]
+    least = min(found, key=lambda term: term.probability, default=None)
+    return least if least and least.probability * len(found) < CHANCE else None
 
 
 def pooled_noise(solved: Solved, freedom: int) -> float:

@@ -213,8 +213,8 @@ def _explained(misfit: NDArray, freedom: int) -> bool:
     return min(float(gammaincc(freedom / 2, misfit @ misfit / 2)), largest) >= CONFIDENCE
 
 
-def discord(topology: Topology, factors: Factors, backward_error: float, noise: Noise | None = None) -> str | None:
-    """What is wrong where pieces share vertices but not c, errors of the entries being allowed for.
+def discord(topology: Topology, factors: Factors, backward_error: float, noise: Noise | None = None) -> tuple[str, ...]:
+    """What is wrong where pieces share vertices but not c, errors of entries allowed for; up to two sentences.
 
     Parameters
     ----------
@@ -232,10 +232,10 @@ def discord(topology: Topology, factors: Factors, backward_error: float, noise: 
     if apart.max() > allowed:
         more = f", more than {noise} explains" if noise else ""
         why = factors.apart.get(int(factors.first[apart.argmax()]))
-        more = f"; errors of the entries explain that, but {why}" if why else more
-        return f"pieces that share vertices have different factors c: {_named(topology, factors, apart)}{more}"
+        which = f"pieces that share vertices have different factors c: {_named(topology, factors, apart)}"
+        return (which, f"errors of the entries explain that, but {why}") if why else (which + more,)
     if not noise or not difference.max() > ALIKE:
-        return None
+        return ()
     # The first piece of each group tells c, and others confirm it to within their errors; so do rings that close. What
     # may be something else has to agree itself: neither pieces that are beyond doubt nor other groups vouch for it.
     others = together & (np.arange(len(difference)) != factors.first)
@@ -249,11 +249,11 @@ def discord(topology: Topology, factors: Factors, backward_error: float, noise: 
     rough = (unproved & alone & (own > np.log(CHANCE))).any()
     if rough or (chance[factors.first[unproved]] > np.log(CHANCE)).any():
         return (
-            f"{noise} explains that pieces which share vertices have different "
-            f"factors c by themselves ({_named(topology, factors, difference)}), but they agree too roughly, or are "
-            "too few, for a certificate"
+            f"{noise} explains that pieces which share vertices have different factors c by themselves "
+            f"({_named(topology, factors, difference)})",
+            "they agree too roughly, or are too few, for a certificate",
         )
-    return None
+    return ()
 
 
 def _named(topology: Topology, factors: Factors, difference: NDArray[np.float64]) -> str:

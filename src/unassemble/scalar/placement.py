@@ -140,7 +140,7 @@ class Placement:
                 "give three anchors that are not in line, or `direction` and `handed`"
             )
         else:
-            frame, note = canonical_frame(z, piece.edges)
+            frame, note = canonical_frame(z, piece.edges, piece.boundary)
             positions, notes = frame(z), [note] if note else []
         if len(rows) == 1:
             positions = positions + (targets[0] - positions[rows[0]])
@@ -183,7 +183,7 @@ class Placement:
         elif self.tensor:
             raise InputError("two anchors leave the mirror image open: give a third, not in line, or `handed`")
         else:
-            frame = fits[canonical_frame(z, piece.edges)[0].mirror][0]
+            frame = fits[canonical_frame(z, piece.edges, piece.boundary)[0].mirror][0]
             notes.append("the anchors leave two mirror images; the choice between them is by convention")
         placed = frame(z)
         misfit = float(np.abs(placed[rows] - known).max())
@@ -204,7 +204,7 @@ class Placement:
         elif self.tensor:
             raise InputError("`direction` leaves the mirror image open: add `handed`")
         else:
-            frame = frames[canonical_frame(z, piece.edges)[0].mirror]
+            frame = frames[canonical_frame(z, piece.edges, piece.boundary)[0].mirror]
         placed = frame(z)
         placed = self.tensor.from_laplacian(placed) if self.tensor else placed
         length = np.abs(placed[piece.edges[:, 0]] - placed[piece.edges[:, 1]]).mean()

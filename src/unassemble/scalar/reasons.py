@@ -1,18 +1,21 @@
-"""Why a mesh has its status, in sentences."""
+"""Why a mesh has its status, in at most two sentences, the important one first; and what to do about it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cells import Alternative
+from ..cells import Alternative, incomplete_rows
 from ..certify import Certificate
-from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE, NEARLY_ALL
+from ..matrix import OperatorMatrix
+from ..planar.terms import COEFFICIENT, MASS, ONE_SIGN, Term
+from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE, NEARLY_ALL, SUMMED
 from ..topology import Topology
-from ..words import count_of, words_of
+from ..words import count_of, sentences, words_of
 from .evidence import Evidence
 from .noise import NoiseTest
 
@@ -22,45 +25,117 @@ if TYPE_CHECKING:
 _ROWS = 6  # at most, named as those that hold nearly all of a misfit
 _MANY = 50  # entries, of which it can be said what their misfit looks like
 
+_CHECK_MODEL = "see what `inspect_matrix` says the matrix is: a wrong model leaves a misfit everywhere"
+_ONE_COEFFICIENT = "see whether a coefficient varies, the surface is curved or it is a network: all rows add up to zero"
+_KEEP_ROWS = "keep the rows and columns of all unknowns, those on the boundary too: some rows do not add up to zero"
+_GIVE_NOISE = "if the entries are measured, give the standard deviation of their errors as `noise`"
 
-def misfit(f: Findings, notes: Sequence[str]) -> str:
-    """What does not fit, the gravest first."""
-    topology, certificate = f.solved.topology, f.certificate
+
+@dataclass(frozen=True)
+class Reason:
+    """Why a mesh has its status.
+
+    Attributes
+    ----------
+    text : str
+        At most two sentences.
+    advice : str
+        What to do next; empty where there is nothing to do.
+    """
+
+    text: str
+    advice: str = ""
+
+    @classmethod
+    def of(cls, *parts: str, advice: str = "") -> Reason:
+        """Of sentences, the important one first; only two are kept."""
+        return cls(sentences(parts), advice)
+
+
+def misfit(f: Findings, notes: Sequence[str]) -> Reason:
+    """What does not fit, the gravest first; `notes` are stages that did not converge."""
+    topology, certificate, evidence = f.solved.topology, f.certificate, f.evidence
     if topology.failures:
         parts = count_of(len(topology.failures), "part of the matrix has", "parts of the matrix have")
-        return f"{parts} no mesh: {topology.failures[0]}"
+        return Reason.of(f"{parts} no mesh: {topology.failures[0]}", advice=_CHECK_MODEL)
+    without = incomplete_rows(f.stored).any()
+    model = _KEEP_ROWS if without else _ONE_COEFFICIENT if _adds_up(f.stored) else _CHECK_MODEL
     bare = topology.bare_edges[f.solved.matrix.entries[topology.bare_edges] != 0]
     if len(bare):
         i, j = topology.edges[bare[0]]
-        if len(bare) == 1:
-            return f"the nonzero entry of rows {i} and {j} belongs to no triangle"
-        return f"{len(bare):,} nonzero entries belong to no triangle, the first that of rows {i} and {j}"
+        one = f"the nonzero entry of rows {i} and {j} belongs to no triangle"
+        many = f"{len(bare):,} nonzero entries belong to no triangle, the first that of rows {i} and {j}"
+        return Reason.of(one if len(bare) == 1 else many, advice=model)
     if not np.isfinite(certificate.backward_error):
-        return "the mesh has triangles that are flat, or points that are not finite"
+        return Reason.of("the mesh has triangles that are flat, or points that are not finite", advice=model)
     if len(certificate.flipped):
-        return _turned_over(topology, certificate) + because(notes)
-    (i, j), misfit = certificate.pairs[certificate.misfits.argmax()], certificate.misfits.max()
-    differs = (
-        f"the re-assembled matrix differs, most in the entry of rows {i} and {j} (by {misfit:.1e} of the row's "
-        f"largest; {CERTIFIED:g} is allowed)"
+        return Reason.of(_turned_over(topology, certificate), *notes, advice=model)
+    if evidence.term:
+        return lacking(f, evidence.term)
+    differs = _differs(certificate)
+    if len(evidence.suspects):
+        return Reason.of(
+            _culprits(evidence), *notes, differs, advice="check the entries that stand out, which the report lists"
+        )
+    if without:
+        return Reason.of(
+            _unexplained(certificate) or differs,
+            "only some rows add up to zero, as next to unknowns that were eliminated",
+            advice=_KEEP_ROWS,
+        )
+    remark = _like_noise(certificate, evidence, f.solved.scales)
+    if remark and _adds_up(f.stored):
+        return Reason.of(
+            differs,
+            "all rows add up to zero, which errors of single entries would not leave",
+            advice="see whether a coefficient varies from cell to cell: it must be constant",
+        )
+    if remark:
+        return Reason.of(remark, differs, *notes, advice=_GIVE_NOISE)
+    return Reason.of(_unexplained(certificate), differs, *notes, advice=model)
+
+
+def lacking(f: Findings, term: Term) -> Reason:
+    """The reason of a misfit that a term explains which the model does not have."""
+    share = f"{term.share:.0%}" if term.share < 0.995 else "nearly all"
+    begun = f"the misfit is no noise, since a term that the model lacks explains {share} of its square"
+    if term.name == MASS:
+        sums = "" if _adds_up(f.stored) else ", and the rows do not add up to zero"
+        which = f"it has the form of a mass matrix{sums}: A = c L + s M"
+        return Reason.of(begun, which, advice="assemble the stiffness matrix alone, or lump the mass matrix")
+    if term.name == COEFFICIENT:
+        which = "it has the form of a coefficient that varies in space, and a constant one is assumed"
+        return Reason.of(begun, which, advice="assemble the matrix with a constant coefficient")
+    assert term.name == ONE_SIGN
+    return Reason.of(begun, "most entries are off in one direction", advice=_CHECK_MODEL)
+
+
+def _adds_up(matrix: OperatorMatrix) -> bool:
+    """Whether all rows add up to zero, up to rounding."""
+    sums = matrix.diagonal + np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n)
+    return bool((np.abs(sums) <= SUMMED * (np.abs(matrix.diagonal) + matrix.row_size)).all())
+
+
+def _differs(certificate: Certificate) -> str:
+    (i, j), largest = certificate.pairs[certificate.misfits.argmax()], certificate.misfits.max()
+    return (
+        f"the re-assembled matrix differs most in the entry of rows {i} and {j}, by {largest:.1e} of the row's largest "
+        f"entry where {CERTIFIED:g} is allowed"
     )
-    remark = _like_noise(certificate, f.evidence, f.solved.scales)
-    begun = _culprits(f.evidence) or ("" if remark else _unexplained(certificate))
-    return begun + differs + remark + because(notes)
 
 
 def _culprits(evidence: Evidence) -> str:
-    """The beginning of a sentence where entries are to blame."""
+    """The sentence on entries that are to blame; empty where none are."""
     if not len(evidence.suspects):
         return ""
     k, (i, j) = len(evidence.suspects), evidence.suspects[0]
     if k == 1:
-        return f"the entry of rows {i} and {j} stands out: without it a mesh fits all others; "
-    return f"{k} entries stand out, first that of rows {i} and {j}: without them a mesh fits all others; "
+        return f"the entry of rows {i} and {j} stands out: without it a mesh fits all others"
+    return f"{k} entries stand out, first that of rows {i} and {j}: without them a mesh fits all others"
 
 
 def _unexplained(certificate: Certificate) -> str:
-    """The beginning of a sentence where no few entries are to blame: how much is left, and around which rows."""
+    """The sentence where no few entries are to blame: how much is left, and around which rows."""
     if certificate.backward_error <= ALIKE:
         return ""
     squares = certificate.misfits**2
@@ -75,25 +150,22 @@ def _unexplained(certificate: Certificate) -> str:
     return (
         f"no set of cells was found that fits: {count_of(count, 'entry', 'entries')} of {len(squares):,} "
         f"{'is' if count == 1 else 'are'} left unexplained, with {share:.0%} of the squared misfit in "
-        f"{'row' if len(rows) == 1 else 'the rows'} {words_of(sorted(rows))}; "
+        f"{'row' if len(rows) == 1 else 'the rows'} {words_of(sorted(rows))}"
     )
 
 
 def _like_noise(certificate: Certificate, evidence: Evidence, scale: NDArray) -> str:
     """The remark that the misfit is small and nowhere concentrated; of few entries that cannot be said."""
     size = np.abs(certificate.differences)
-    if len(evidence.suspects) or not evidence.noise or not evidence.noise <= LARGEST_NOISE * np.abs(scale).min():
+    if not evidence.noise or not evidence.noise <= LARGEST_NOISE * np.abs(scale).min():
         return ""
     if size.max() > 8 * np.sqrt(np.mean(size**2)):
         return ""
+    size_of = f"noise of standard deviation {evidence.noise:.2g} in the entries"
+    absolute = "(in their own units, not relative)"
     if len(size) < _MANY:
-        return f"; noise of standard deviation {evidence.noise:.2g} in the entries would leave as much"
-    return f"; the misfit looks like noise of standard deviation {evidence.noise:.2g} in the entries"
-
-
-def because(notes: Sequence[str]) -> str:
-    """The end of a sentence: stages that did not converge."""
-    return "; " + "; ".join(notes) if notes else ""
+        return f"{size_of} would leave as much {absolute}"
+    return f"the misfit looks like {size_of} {absolute}"
 
 
 def _turned_over(topology: Topology, certificate: Certificate) -> str:
@@ -104,32 +176,41 @@ def _turned_over(topology: Topology, certificate: Certificate) -> str:
     return f"{which} flat or turned over, the first that of rows {rows}"
 
 
-def with_noise(f: Findings, test: NoiseTest) -> str:
+def with_noise(f: Findings, test: NoiseTest) -> Reason:
     """What a test against known noise says."""
     certificate = f.certificate
     if test.drowned:
-        return (
+        return Reason.of(
             f"{test.noise} drowns the cotangents, and almost any mesh would pass: the test is worth something up to "
-            f"{test.limit:.2g}, {LARGEST_NOISE:g} times the scale"
+            f"{test.limit:.2g}, {LARGEST_NOISE:g} times the scale",
+            advice="give less noise, if the entries are that good",
         )
     if len(certificate.flipped):
-        return _turned_over(f.solved.topology, certificate) + astray(f, f.trouble)
+        return Reason.of(_turned_over(f.solved.topology, certificate), *astray(f), advice=_CHECK_MODEL)
+    if f.evidence.term:
+        return lacking(f, f.evidence.term)
     if not test.likely:
-        return _culprits(f.evidence) + unlikely(test, certificate) + astray(f, f.trouble)
+        return Reason.of(
+            _culprits(f.evidence), unlikely(test, certificate), *astray(f), advice="check the noise, and the entries"
+        )
     chance = ", but there are too few different entries beyond the unknowns to tell that from chance"
-    return f"{test.noise} explains the misfit {_figures(test)}" + (chance if test.coincidence else "")
+    return Reason.of(
+        f"{test.noise} explains the misfit {_figures(test)}" + (chance if test.coincidence else ""),
+        advice="write the entries with more digits" if test.coincidence else "",
+    )
 
 
-def astray(f: Findings, notes: Sequence[str]) -> str:
-    """The end of the sentence on a mesh that is not the one of known noise: where the polish has ended."""
+def astray(f: Findings) -> list[str]:
+    """Sentences on a mesh that is not the one of known noise: where the polish has ended."""
     if len(f.evidence.suspects):
-        return because(notes)
+        return f.trouble
     if not f.polished:
-        return "; the mesh was not polished" + because(notes)
-    return (
-        "; the polish has not come to a mesh that explains the matrix, and whether that is because of the start, "
-        "wrong entries or wrong cells cannot be told"
-    ) + because(notes)
+        return ["the mesh was not polished", *f.trouble]
+    return [
+        "the polish has not come to a mesh that explains the matrix, and whether that is because of the start, "
+        "wrong entries or wrong cells cannot be told",
+        *f.trouble,
+    ]
 
 
 def unlikely(test: NoiseTest, certificate: Certificate) -> str:
@@ -148,37 +229,48 @@ def _figures(test: NoiseTest) -> str:
     return f"(chi-square {statistic:.4g} with {freedom:.4g} degrees of freedom, p = {p_value:.3g})"
 
 
-def ambiguous(others: list[Alternative], certificate: Certificate) -> str:
+def ambiguous(others: list[Alternative], certificate: Certificate) -> Reason:
     """The reason of a mesh that fits, where others do as well."""
     first = others[0]
-    more = f"; likewise in {count_of(len(others) - 1, 'more part')} of the matrix" if len(others) > 1 else ""
     instead = f" in place of {_cells(first.cells)}" if first.cells else " besides"
-    return (
+    return Reason.of(
         f"the mesh gives the matrix back to {certificate.backward_error:.1e}, but so does another, with the cells "
-        f"{_cells(first.other_cells)}{instead}{more}"
+        f"{_cells(first.other_cells)}{instead}",
+        f"likewise in {count_of(len(others) - 1, 'more part')} of the matrix" if len(others) > 1 else "",
+        advice="choose by what else is known of the mesh: the report lists all cells in doubt",
     )
 
 
-def nothing_to_spare(certificate: Certificate, rows: NDArray[np.int64]) -> str:
+def nothing_to_spare(certificate: Certificate, rows: NDArray[np.int64], *, known_scale: bool) -> Reason:
     """The reason of a mesh with pieces of as many unknowns as equations, by a row of each."""
     which = (
         f"the piece of row {rows[0]} has"
         if len(rows) == 1
         else f"{len(rows)} pieces, the first that of row {rows[0]}, have"
     )
-    return (
+    return Reason.of(
         f"{which} no entry to spare: nearly any entries belong to such a mesh, and that it gives the matrix back to "
-        f"{certificate.backward_error:.1e} proves nothing; give the scale if it is known"
+        f"{certificate.backward_error:.1e} proves nothing",
+        advice="" if known_scale else "give `scale` if it is known",
     )
 
 
-def far_away(origins: NDArray, written: Certificate, near: Certificate) -> str:
+def far_away(origins: NDArray, written: Certificate, near: Certificate) -> Reason:
     """The reason of a mesh that fits until its coordinates are written, too far from the origin."""
     origin = complex(origins[np.abs(origins).argmax()])
-    return (
+    return Reason.of(
         f"the mesh gives the matrix back to {near.backward_error:.1e}, but its coordinates lie so far from the origin "
-        f"that they have too few digits left: as written they give it back to {written.backward_error:.1e}; subtract a "
-        f"point near ({origin.real:.6g}, {origin.imag:.6g}) from all of `anchors`"
+        f"that they have too few digits left: as written they give it back to {written.backward_error:.1e}",
+        advice=f"subtract a point near ({origin.real:.6g}, {origin.imag:.6g}) from all of `anchors`",
+    )
+
+
+def other_scale(given: float, fitting: float, backward_error: float) -> Reason:
+    """The reason of a mesh whose scale was given, and is not the one that fits."""
+    return Reason.of(
+        f"the scale {given:.10g} does not fit, and {fitting:.10g} does: with that the mesh gives the matrix back to "
+        f"{backward_error:.1e} of each row's largest entry",
+        advice=f"leave out `scale`, or give `scale={fitting:.10g}`",
     )
 
 

@@ -18,7 +18,7 @@ from ..options import ScalarOptions
 from ..planar.hinges import free_images, join
 from ..planar.pencil import pencil_pattern
 from ..recovery import PlanarMesh
-from ..tolerances import SIGMAS, SMALL
+from ..tolerances import ALIKE, CERTIFIED, SIGMAS, SMALL
 from ..topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
 from .deviations import coordinate_deviations
 from .evidence import weigh
@@ -26,6 +26,7 @@ from .joined import JoinedMesh
 from .noise import Noise, NoiseTest
 from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
 from .placement import Placement
+from .reasons import other_scale
 from .solving import Solved, Task, solve
 from .verdict import Findings, Held, Verdict, verdict
 
@@ -44,6 +45,18 @@ class _Placed:
 def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, options: ScalarOptions) -> PlanarMesh:
     """The mesh of a checked scalar matrix."""
     task = Task(options=options, placement=placement, noise=Noise.known(stored, options.noise))
+    found = _by_digits(stored, clock, task)
+    if options.scale is None or found.status != "uncertified":
+        return found
+    free = _by_digits(stored, clock, replace(task, options=replace(options, scale=None)))
+    if not free.certified or np.ptp(free.scale) > ALIKE * np.abs(free.scale).max():
+        return found
+    why = other_scale(options.scale, float(free.scale[0]), free.backward_error)
+    return replace(found, reason=why.text, advice=why.advice)
+
+
+def _by_digits(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:
+    """The mesh of entries of as few digits as they seem to have, or else of exact ones."""
     found = _recovered(stored, clock, task)
     searched = "faces" in clock.timings  # for cells
     if searched and found.status == "uncertified" and task.noise and task.noise.digits:
@@ -193,7 +206,8 @@ def _report(
         node_status=(topology.multiplicity == 0).astype(np.int8),
         status=found.status,
         uniqueness=found.uniqueness,
-        reason=found.reason,
+        reason=found.reason.text,
+        advice=found.reason.advice,
         operator="anisotropic laplacian" if task.placement.tensor else "laplacian",
         backward_error=held.certificate.backward_error,
         n_holes=topology.n_holes,
@@ -204,6 +218,8 @@ def _report(
         standard_deviations=deviations,
         chi_square=held.test.figures if held.test else None,
         estimated_noise=evidence.noise,
+        n_entries=len(held.certificate.misfits),
+        n_fitting=int(np.count_nonzero(held.certificate.misfits <= CERTIFIED)),
         suspects=evidence.suspects,
         alternatives=tuple(found.others),
     )

@@ -16,7 +16,7 @@ from ..linalg import Factorisation, UpperTriangle, blas_threads, factorisation
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.cotangent import left_by_all
-from ..planar.piece import PieceMesh, brought_near, positions, refined
+from ..planar.piece import PieceMesh, brought_near, collapsed, positions, refined
 from ..planar.triangles import lone_triangles
 from ..tolerances import NOISY
 from ..topology import Piece, Polygons, Topology
@@ -144,6 +144,7 @@ def solve(
         if noise and noise.digits and not _is_rounding(topology, matrix, meshes, noise):
             noise = None
             meshes = _polished(topology, matrix, starts, scale, noise) if refine else starts
+        topology, meshes = _successes(topology, [_sound(*both) for both in zip(topology.pieces, meshes, strict=True)])
         meshes, factors = fitted_together(topology, -matrix.entries, meshes, noise, scale, refine=refine)
     return Solved(matrix, topology, meshes, factors, noise)
 
@@ -175,6 +176,12 @@ def _polished(
         )
         for piece, mesh in zip(topology.pieces, meshes, strict=True)
     ]
+
+
+def _sound(piece: Piece, mesh: PieceMesh) -> Outcome:
+    """A mesh whose points have places of their own; else why it is none."""
+    why = collapsed(piece, mesh.z)
+    return GeometryError(f"no mesh fits, and {why} in the nearest one") if why else mesh
 
 
 def _is_spoilt(mesh: Outcome) -> bool:

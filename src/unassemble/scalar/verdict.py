@@ -16,7 +16,7 @@ from .evidence import Evidence
 from .factors import discord
 from .joined import JoinedMesh
 from .noise import NoiseTest
-from .reasons import ambiguous, astray, because, far_away, misfit, nothing_to_spare, unlikely, with_noise
+from .reasons import Reason, ambiguous, astray, far_away, misfit, nothing_to_spare, unlikely, with_noise
 from .solving import Solved
 
 
@@ -108,7 +108,7 @@ class Verdict:
     status : {"certified", "uncertified", "ambiguous"}
     uniqueness : {"proved", "searched", "ambiguous"} or None
         Whether other meshes fit; None where this one does not.
-    reason : str
+    reason : Reason
     others : sequence of Alternative
         Other meshes that fit.
     distant : bool
@@ -117,7 +117,7 @@ class Verdict:
 
     status: str
     uniqueness: str | None
-    reason: str
+    reason: Reason
     others: Sequence[Alternative] = ()
     distant: bool = False
 
@@ -128,7 +128,8 @@ def verdict(f: Findings, other_meshes: Callable[[], tuple[list[Alternative], str
     if good:
         points, triangles = f.mesh.points, f.mesh.triangles
         loose = without_spare_equations(f.stored.edges, points, triangles, known_scale=f.known_scale)
-        good, reason = (False, nothing_to_spare(f.certificate, loose)) if len(loose) else (good, reason)
+        if len(loose):
+            good, reason = False, nothing_to_spare(f.certificate, loose, known_scale=f.known_scale)
     if not good:
         return Verdict("uncertified", None, reason)
     others, uniqueness = other_meshes()
@@ -140,41 +141,48 @@ def verdict(f: Findings, other_meshes: Callable[[], tuple[list[Alternative], str
     return Verdict("certified", uniqueness, reason)
 
 
-def _by_itself(f: Findings) -> tuple[bool, str]:
+def _by_itself(f: Findings) -> tuple[bool, Reason]:
     """Whether the mesh fits as well as it is sure of its positions, and the reason."""
     error, test, topology = f.certificate.backward_error, f.near.test, f.solved.topology
     good, apart = f.near.passes, discord(topology, f.solved.factors, error, f.solved.noise)
     if good and apart:
-        return False, f"the matrix is given back to {error:.1e}, but {apart}"
+        return False, Reason.of(f"the matrix is given back to {error:.1e}, but {apart[0]}", *apart[1:])
     if test and f.near.by_noise:
         return _by_noise(f, test)
     doubt = max(mesh.doubt for mesh in f.solved.meshes)
     fits = f"the operator re-assembled on this mesh gives the matrix back to {error:.1e}"
     if not good or f.evidence.certain:
         bare = good and len(topology.bare_edges) > 0
-        return (False, _bare(f)) if bare else (False, misfit(f, f.trouble) + (f"; {apart}" if apart else ""))
+        why = misfit(f, f.trouble)
+        return False, _bare(f) if bare else Reason.of(*apart, advice=why.advice) if apart else why
     if not doubt <= PLACED:
-        return False, (
+        return False, Reason.of(
             f"{fits}, but so may others: in double precision the entries determine the positions to about {doubt:.0e} "
             "of the size only"
         )
-    return (False, _bare(f)) if len(topology.bare_edges) else (True, fits)
+    return (False, _bare(f)) if len(topology.bare_edges) else (True, Reason(fits))
 
 
-def _by_noise(f: Findings, test: NoiseTest) -> tuple[bool, str]:
-    """Where a test against the errors of the entries decides."""
+def _by_noise(f: Findings, test: NoiseTest) -> tuple[bool, Reason]:
+    """Where a test against the errors of the entries decides: likely, and no part of it explained by another model."""
     if test.noise.digits and not (test.drowned or test.likely):
-        return False, misfit(f, (*f.trouble, unlikely(test, f.certificate))) + astray(f, ())
+        why = misfit(f, ())
+        short = "." not in why.text  # of a single sentence
+        more = (unlikely(test, f.certificate), *astray(f))
+        return False, Reason.of(why.text, *more, advice=why.advice) if short else why
     reason = with_noise(f, test)
+    if f.near.passes and f.evidence.term:
+        return False, reason
     doubt = max(mesh.doubt for mesh in f.solved.meshes)
     if f.near.passes and not doubt <= max(PLACED, test.noise.sigma / float(np.abs(f.solved.scales).min())):
-        return False, f"{reason}, but that mesh need not be the likeliest{because(f.trouble)}"
+        return False, Reason.of(f"{reason.text}, but that mesh need not be the likeliest", *f.trouble)
     return f.near.passes, reason
 
 
-def _bare(f: Findings) -> str:
+def _bare(f: Findings) -> Reason:
     i, j = f.solved.topology.edges[f.solved.topology.bare_edges[0]]
-    return (
+    return Reason.of(
         f"the mesh gives the matrix back to {f.certificate.backward_error:.1e}, but the stored zero of rows {i} and "
-        f"{j} belongs to no cell"
+        f"{j} belongs to no cell",
+        advice="forget stored zeros by `drop_zeros`, if they are no part of the structure",
     )

@@ -1,0 +1,54 @@
+"""The diagnosis in what recovery says: in its errors, and in the reasons of meshes that do not fit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..errors import GeometryError, NotPlanarError, RecoveryError
+from ..matrix import OperatorMatrix
+from ..recovery import PlanarMesh
+from ..words import sentences
+from .kinds import UNKNOWN
+from .scalar import diagnosed
+
+
+def explained(error: RecoveryError, matrix: OperatorMatrix, otherwise: str = "") -> RecoveryError:
+    """An error of recovery, with what the matrix is in place of what its graph is not.
+
+    Parameters
+    ----------
+    error : RecoveryError
+    matrix : OperatorMatrix
+    otherwise : str
+        What else may be said, where it is of no kind that is known.
+    """
+    planar = not isinstance(error, NotPlanarError)
+    found = diagnosed(matrix, planar=planar)
+    if isinstance(error, NotPlanarError):
+        begun = "the graph of the matrix is not planar"
+        if found.kind == UNKNOWN:
+            said = sentences([begun + (f": {error.why}" if error.why else ""), otherwise or found.advice])
+        else:
+            said = found.sentence(f"{begun}, for this is")
+        return NotPlanarError(said, error.witness, error.why)
+    return (
+        GeometryError(found.sentence("no planar mesh has these entries: they are those of")) if found.unread else error
+    )
+
+
+def judged(mesh: PlanarMesh, matrix: OperatorMatrix) -> PlanarMesh:
+    """A mesh that does not fit, with what the matrix is as the reason, where that shows.
+
+    Raises
+    ------
+    GeometryError
+        If the matrix is a mass matrix, or one of segments on a line, so that the mesh means nothing.
+    """
+    if mesh.status != "uncertified":
+        return mesh
+    found = diagnosed(matrix, planar=True)
+    if not found.unread:
+        return mesh
+    if found.kind in ("mass", "segments"):
+        raise GeometryError(found.sentence())
+    return replace(mesh, reason=sentences([f"the matrix is {found.name}", *found.evidence]), advice=found.advice)

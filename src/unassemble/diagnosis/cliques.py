@@ -1,0 +1,118 @@
+"""Which cells a graph is made of: two nodes that only one cell has in common show that cell.
+
+All nodes of a cell are coupled to each other. Where a pair belongs to one cell only, its common neighbours are the
+other nodes of that cell, so that these form a clique: of four for bilinear quadrilaterals, whose diagonals are such
+pairs, of six for quadratic triangles, and so on. Neighbouring cells share the nodes of a side. Linear triangles and
+tetrahedra have no such pairs inside of a mesh; of the latter nearly every pair lies in a clique of four.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse import csgraph
+
+_ROWS, _PAIRS = 6000, 1500  # looked at, of larger graphs
+_OFTEN = 0.15  # share of pairs that show their cell: a fifth of those of quadratic tetrahedra, more of all others
+_MOSTLY = 0.8  # share of anything that a kind of mesh is told by
+
+
+@dataclass(frozen=True)
+class Cells:
+    """What pairs of coupled rows have in common.
+
+    Attributes
+    ----------
+    nodes : int
+        Of a cell, where pairs show such; else 0.
+    shared : int
+        Nodes that neighbouring ones of these have in common.
+    often : float
+        Share of pairs that show a cell.
+    in_fours, in_threes : float
+        Share of pairs that lie in a clique of four, and of three.
+    twins : float
+        Share of rows with the neighbours of another row: several unknowns of one node.
+    """
+
+    nodes: int
+    shared: int
+    often: float
+    in_fours: float
+    in_threes: float
+    twins: float
+
+
+def cells_of(n: int, edges: NDArray[np.int64]) -> Cells:
+    """Look at some thousand pairs of a graph, all near to each other.
+
+    Parameters
+    ----------
+    n : int
+    edges : (e, 2) int64
+        Pairs i < j, at least one.
+    """
+    graph = sp.csr_array((np.ones(len(edges), np.int32), edges.T), shape=(n, n))
+    graph = graph + graph.T
+    rows = csgraph.breadth_first_order(graph, int(edges[0, 0]), directed=False, return_predecessors=False)[:_ROWS]
+    near = graph[rows][:, rows].tocsr()
+    inner = np.diff(near.indptr) == np.diff(graph.indptr)[rows]  # those with all of their neighbours
+    pairs = np.column_stack(sp.triu(near, 1).nonzero())
+    pairs = pairs[inner[pairs].any(axis=1)] if inner.any() else pairs
+    pairs = pairs[:: max(1, len(pairs) // _PAIRS)]
+    others = [set(near.indices[a:b].tolist()) for a, b in zip(near.indptr[:-1], near.indptr[1:], strict=True)]
+    found: Counter[int] = Counter()
+    cells: set[frozenset[int]] = set()
+    fours = threes = 0
+    for i, j in pairs.tolist():
+        common = others[i] & others[j]
+        threes += bool(common)
+        inside = [len(common & others[k]) for k in common]
+        fours += any(inside)
+        if common and min(inside) == len(common) - 1:
+            found[len(common) + 2] += 1
+            cells.add(frozenset(common | {i, j}))
+    size, count = found.most_common(1)[0] if found else (0, 0)
+    told = count >= _MOSTLY * found.total() and count >= _OFTEN * len(pairs)
+    return Cells(
+        size if told else 0,
+        _shared([cell for cell in cells if len(cell) == size]) if told else 0,
+        count / len(pairs),
+        fours / len(pairs),
+        threes / len(pairs),
+        _twins(near),
+    )
+
+
+def _twins(graph: sp.csr_array) -> float:
+    """Share of rows that are coupled to the same rows as another one, and to each other."""
+    keys = np.random.default_rng(0).integers(2**40, size=graph.shape[0])
+    key = graph @ keys + keys  # of equal neighbourhoods equal; and exact, in integers
+    _, which, count = np.unique(key, return_inverse=True, return_counts=True)
+    return float((count[which] > 1).mean())
+
+
+def _shared(cells: list[frozenset[int]]) -> int:
+    """The most nodes that two cells have in common."""
+    at: dict[int, list[int]] = {}
+    for k, cell in enumerate(cells):
+        for node in cell:
+            at.setdefault(node, []).append(k)
+    most = Counter(
+        (a, b) for touching in at.values() for k, a in enumerate(touching[:30]) for b in touching[k + 1 : 30]
+    )
+    return max(most.values(), default=0)
+
+
+def often(share: float) -> bool:
+    """Whether a share is more than chance or boundaries leave."""
+    return share >= _OFTEN
+
+
+def mostly(share: float) -> bool:
+    """Whether a share is that of a rule, boundaries being exceptions."""
+    return share >= _MOSTLY

@@ -1,0 +1,57 @@
+"""The kinds of scalar matrix that are told apart, and what to do with each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ..words import sentences
+
+PLANAR, UNKNOWN = "laplacian", "unknown"
+
+UNREAD: Mapping[str, str] = {
+    "tetrahedra": "scalar matrices of meshes in space are not read yet, but elasticity matrices of such meshes are",
+    "hexahedra": "scalar matrices of meshes in space are not read yet, but elasticity matrices of such meshes are",
+    "grid in space": "scalar matrices of meshes in space are not read yet, but elasticity matrices of such meshes are",
+    "quadrilaterals": "of scalar matrices only linear triangles are read yet: assemble on triangles",
+    "quadratic": "of scalar matrices only linear triangles are read yet: assemble with linear elements",
+    "cubic": "of scalar matrices only linear triangles are read yet: assemble with linear elements",
+    "surface": "curved surfaces are not read yet, as scalar matrices of meshes in the plane are",
+    "mass": "pass the stiffness matrix of the same mesh: a mass matrix is not read yet",
+    "graph": "a graph without weights has no coordinates: a layout of the graph may draw it",
+    "segments": "the length of each segment is the reciprocal of its entry, with nothing left to solve",
+}
+"""What to do with kinds that :func:`unassemble.recover` refuses; who builds the recovery of one takes its line out."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What a scalar matrix is.
+
+    Attributes
+    ----------
+    kind : str
+        ``"laplacian"`` (linear triangles in the plane), ``"quadrilaterals"``, ``"quadratic"``, ``"cubic"``,
+        ``"tetrahedra"``, ``"hexahedra"``, ``"grid in space"``, ``"surface"`` (triangles, but not in the plane),
+        ``"segments"``, ``"mass"``, ``"graph"`` or ``"unknown"``.
+    name : str
+        The same in words, to follow "the matrix is".
+    evidence : tuple of str
+        What speaks for it, the strongest first.
+    advice : str
+        What to do next; empty where recovery is.
+    """
+
+    kind: str
+    name: str
+    evidence: tuple[str, ...] = ()
+    advice: str = ""
+
+    @property
+    def unread(self) -> bool:
+        """Whether recovery refuses such matrices."""
+        return self.kind in UNREAD
+
+    def sentence(self, begun: str = "the matrix is") -> str:
+        """What it is, and what to do next."""
+        return sentences([f"{begun} {self.name}" + (f": {self.evidence[0]}" if self.evidence else ""), self.advice])

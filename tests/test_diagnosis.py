@@ -1,0 +1,196 @@
+"""What a scalar matrix is: the same answer from inspect and recover, on matrices that other packages assembled."""
+
+from __future__ import annotations
+
+import networkx
+import numpy as np
+import pyamg
+import pytest
+import scipy.sparse as sp
+import skfem as fem
+from skfem.helpers import dot, grad
+from skfem.models.poisson import laplace, mass
+
+from unassemble import MatrixError, NotPlanarError, RecoveryError, inspect_matrix, recover
+
+
+def shuffled(A, seed=3):
+    place = np.random.default_rng(seed).permutation(A.shape[0])
+    return sp.csr_array(A)[place][:, place]
+
+
+def moved(mesh, size=0.02):
+    points = mesh.p + np.random.default_rng(0).uniform(-size, size, mesh.p.shape)
+    return type(mesh)(points, mesh.t)
+
+
+DISC = moved(fem.MeshTri.init_circle(3), 0.01)
+TETS = moved(fem.MeshTet().refined(2))
+
+
+def stiffness(mesh, element):
+    return laplace.assemble(fem.Basis(mesh, element))
+
+
+def masses(mesh, element):
+    return mass.assemble(fem.Basis(mesh, element))
+
+
+def outcome(A):
+    """A recovery and its advice, or else None and what was said."""
+    try:
+        found = recover(A)
+    except RecoveryError as error:
+        return None, str(error)
+    return found, found.advice
+
+
+UNREAD = {
+    "tetrahedra": ("tetrahedra", lambda: stiffness(TETS, fem.ElementTetP1()), "in space"),
+    "tetrahedra, K + M": (
+        "tetrahedra",
+        lambda: stiffness(TETS, fem.ElementTetP1()) + masses(TETS, fem.ElementTetP1()),
+        "in space",
+    ),
+    "hexahedra": ("hexahedra", lambda: stiffness(fem.MeshHex().refined(2), fem.ElementHex1()), "in space"),
+    "seven-point stencil": ("grid in space", lambda: pyamg.gallery.poisson((6, 5, 7), format="csr"), "in space"),
+    "quadrilaterals": (
+        "quadrilaterals",
+        lambda: stiffness(moved(fem.MeshQuad().refined(3)), fem.ElementQuad1()),
+        "quadrilaterals",
+    ),
+    "nine-point stencil": (
+        "quadrilaterals",
+        lambda: pyamg.gallery.stencil_grid(
+            pyamg.gallery.diffusion_stencil_2d(0.1, 0.5, type="FE"), (9, 8), format="csr"
+        ),
+        "quadrilaterals",
+    ),
+    "quadratic triangles": ("quadratic", lambda: stiffness(DISC, fem.ElementTriP2()), "quadratic"),
+    "quadratic tetrahedra": ("quadratic", lambda: stiffness(TETS, fem.ElementTetP2()), "quadratic"),
+    "cubic triangles": ("cubic", lambda: stiffness(DISC, fem.ElementTriP3()), "cubic"),
+    "mass, triangles": ("mass", lambda: masses(DISC, fem.ElementTriP1()), "mass matrix"),
+    "mass, tetrahedra": ("mass", lambda: masses(TETS, fem.ElementTetP1()), "mass matrix"),
+    "surface": ("surface", lambda: pyamg.gallery.load_example("knot")["A"], "surface"),
+    "graph": (
+        "graph",
+        lambda: networkx.laplacian_matrix(networkx.random_geometric_graph(60, 0.3, seed=1)).astype(float),
+        "graph without weights",
+    ),
+    "line": ("segments", lambda: pyamg.gallery.poisson((40,), format="csr"), "on a line"),
+}
+
+
+@pytest.mark.parametrize("name", UNREAD)
+def test_what_is_not_read_yet_is_named(name):
+    """With evidence and what to do; two sentences at most, without the drawing of a graph that is not planar."""
+    kind, assembled, words = UNREAD[name]
+    A = shuffled(assembled())
+    facts = inspect_matrix(A)
+    assert facts.kind == kind
+    assert words in facts.operator + facts.advice
+    assert facts.evidence
+    assert facts.advice
+    found, said = outcome(A)
+    if found is not None:  # recovery has learnt to read it
+        assert found.certified
+        return
+    assert facts.name in said
+    assert facts.evidence[0] in said
+    assert "subdivision" not in said
+    assert "unknowns each" not in said
+    assert said.count(". ") <= 1
+    assert facts.recoverable.startswith("nothing: ")
+
+
+def test_a_graph_in_the_plane_is_one_too():
+    A = shuffled(networkx.laplacian_matrix(networkx.grid_2d_graph(6, 6)).astype(float))
+    facts, found = inspect_matrix(A), recover(A)
+    assert facts.kind == "graph"
+    assert found.status == "uncertified"
+    assert facts.name in found.reason
+    assert found.advice == facts.advice
+
+
+def test_large_matrices_are_diagnosed_from_a_part():
+    A = shuffled(stiffness(fem.MeshTet().refined(5), fem.ElementTetP1()))
+    assert A.shape[0] > 30_000
+    with pytest.raises(NotPlanarError, match="linear elements on tetrahedra"):
+        recover(A)
+
+
+def test_a_mass_matrix_beside_the_stiffness_matrix():
+    A = shuffled(stiffness(DISC, fem.ElementTriP1()) + masses(DISC, fem.ElementTriP1()))
+    facts, found = inspect_matrix(A), recover(A)
+    assert "plus a diagonal or a mass matrix" in facts.operator
+    assert found.certified == bool(found.reaction)
+    if not found.certified:
+        assert "mass matrix" in found.reason
+
+
+def test_a_strongly_varying_coefficient():
+    @fem.BilinearForm
+    def varying(u, v, w):
+        return (1 + 3 * w.x[0] ** 2) * dot(grad(u), grad(v))
+
+    A = shuffled(varying.assemble(fem.Basis(DISC, fem.ElementTriP1())))
+    found = recover(A)
+    assert found.status == "uncertified"
+    assert inspect_matrix(A).evidence == ("all rows add up to zero",)
+    assert "coefficient" in found.advice + found.reason
+    assert "noise" not in found.advice
+
+
+def boundary_conditions():
+    K, D = stiffness(DISC, fem.ElementTriP1()), DISC.boundary_nodes()
+    rows = K.tolil(copy=True)
+    rows[D, :] = 0
+    rows[D, D] = 1
+    both = rows.copy()
+    both[:, D] = 0
+    both[D, D] = 1
+    return K, D, {"rows": rows.tocsr(), "enforced": fem.enforce(K, D=D), "both": both.tocsr()}
+
+
+@pytest.mark.parametrize("which", ["rows", "enforced"])
+def test_rows_of_the_identity_are_no_noise(which):
+    A = shuffled(boundary_conditions()[2][which])
+    found, said = outcome(A)
+    assert "noise" not in said
+    if found is None:  # recovery has not learnt to read them
+        assert "of the identity" in said
+        with pytest.raises(MatrixError, match="of the identity"):
+            inspect_matrix(A)
+
+
+def test_rows_and_columns_of_the_identity():
+    A = shuffled(boundary_conditions()[2]["both"])
+    facts = inspect_matrix(A)
+    assert "32 rows are those of the identity" in facts.evidence[0]
+    assert any("eliminated" in one for one in facts.evidence)
+
+
+def test_penalties():
+    K, D, _ = boundary_conditions()
+    A = shuffled(fem.penalize(K, D=D))
+    facts = inspect_matrix(A)
+    assert facts.evidence[0].startswith("32 diagonal entries are a penalty")
+    assert recover(A).certified
+
+
+def test_unknowns_that_are_gone():
+    K, D, _ = boundary_conditions()
+    inside = np.setdiff1d(np.arange(K.shape[0]), D)
+    facts = inspect_matrix(shuffled(K[inside][:, inside]))
+    assert "28 of 113 rows do not add up to zero" in facts.evidence[0]
+    assert "without some unknowns" in facts.operator
+
+
+def test_convection_is_named():
+    @fem.BilinearForm
+    def convection(u, v, w):
+        return dot(grad(u), grad(v)) + 3 * grad(u)[0] * v
+
+    A = shuffled(convection.assemble(fem.Basis(DISC, fem.ElementTriP1())))
+    with pytest.raises(MatrixError, match=r"not symmetric: .* as where convection .* was added"):
+        recover(A)
