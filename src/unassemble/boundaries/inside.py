@@ -1,0 +1,140 @@
+"""The mesh of a piece of which some entries are whole, and what of it they determine."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..topology import Piece
+from .embedding import tutte
+from .fit import Fit, FitOptions, WholeEntries
+from .judge import determined
+from .rim import Rim
+
+_log = logging.getLogger(__name__)
+
+_FADING = (0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
+_AGAIN = (0.03, 0.01, 1e-3, 1e-4, 0.0)
+
+
+@dataclass(frozen=True)
+class InsideOptions:
+    """Settings of the search.
+
+    Attributes
+    ----------
+    outlines : int
+        Boundary loops, the longest ones, that are tried as the outer one.
+    first : float
+        Weight of the prior to begin with.
+    rounds : int
+        Fits, with fewer vertices at the rim each.
+    exact : float
+        Root mean square misfit of whole entries that is none, in units of typical ones.
+    """
+
+    outlines: int = 4
+    first: float = 0.3
+    rounds: int = 15
+    exact: float = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class InsideMesh:
+    """Positions, and how much they are worth.
+
+    Attributes
+    ----------
+    z : (n,) complex128
+    scale : float
+    whole : (e,) bool
+        Entries that were fitted.
+    exact : bool
+        Whether they all fit.
+    determined : (n,) bool
+        Vertices that they determine, up to a similarity of all of them; none where they do not fit.
+    factorisations : int
+    """
+
+    z: NDArray[np.complex128]
+    scale: float
+    whole: NDArray[np.bool_]
+    exact: bool
+    determined: NDArray[np.bool_]
+    factorisations: int
+
+
+def fit_inside(
+    piece: Piece,
+    weights: NDArray,
+    given: NDArray[np.bool_],
+    *,
+    scale: float | None = None,
+    options: InsideOptions | None = None,
+) -> InsideMesh | None:
+    """A mesh that fits whole entries; None where there are too few.
+
+    Parameters
+    ----------
+    piece : Piece
+    weights : (e,) float64
+        -A_ij.
+    given : (e,) bool
+        Entries that are those of the piece's triangles, and of no others.
+    scale : float, optional
+        c, where it is known.
+    options : InsideOptions, optional
+    """
+    options = options or InsideOptions()
+    rim = Rim.of(piece, given)
+    if not rim.whole.any():
+        return None
+    unit = float(np.median(np.abs(weights[rim.whole]))) * (1 if weights[rim.whole].sum() > 0 else -1)
+    problem = WholeEntries(piece, weights / unit, None if scale is None else scale / unit)
+    try:
+        first = _start(problem, rim, options)
+        if first is None:
+            return None
+        fit, work = first, first.factorisations
+        for turn in range(options.rounds):
+            whole = rim.whole
+            for mu in _FADING if not turn else _AGAIN:
+                fit = problem.fit(fit.z, fit.scale, whole, mu)
+                work += fit.factorisations
+            _log.debug("%d whole entries: misfit %.1e after %d factorisations", whole.sum(), fit.misfit, work)
+            if fit.misfit <= options.exact:
+                break
+            peeled = rim.peeled(np.abs(problem.misfits(fit.z, fit.scale)))
+            if peeled is None or not peeled.whole.any():
+                break
+            rim = peeled
+    finally:
+        problem.release()
+    exact = fit.misfit <= options.exact
+    known = determined(piece, fit.z, whole, known_scale=scale is not None) if exact else np.zeros(len(fit.z), bool)
+    return InsideMesh(fit.z, fit.scale * unit, whole, exact, known, work)
+
+
+def _start(problem: WholeEntries, rim: Rim, options: InsideOptions) -> Fit | None:
+    """The best first fit from drawings with one loop or another as the outer one."""
+    loops = np.argsort(-np.diff(problem.piece.loop_offsets), kind="stable")[: options.outlines]
+    whole, best, least = rim.whole, None, np.inf
+    for loop in loops.tolist():
+        z = tutte(problem.piece, loop)
+        if not _upright(problem.piece, z):
+            continue
+        c = problem.best_scale(z, whole)
+        c = c if c > 0 else 1.0
+        fit = problem.fit(z, c, whole, options.first, FitOptions(steps=40, damping=1e-2))
+        cost = whole.sum() * fit.misfit**2 + (options.first * fit.prior) ** 2
+        if cost < least:
+            best, least = fit, cost
+    return best
+
+
+def _upright(piece: Piece, z: NDArray) -> bool:
+    a, b, c = z[piece.triangles].T
+    return bool(((np.conj(b - a) * (c - a)).imag > 0).all())
