@@ -23,6 +23,15 @@ def mesh_of(points: NDArray, triangles: NDArray) -> MeshTri:
     return MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(triangles.T))
 
 
+def jittered(levels: int = 3, seed: int = 0) -> MeshTri:
+    """A square of triangles in no order but with decent angles, on the boundary too."""
+    mesh = MeshTri.init_sqsymmetric().refined(levels)
+    rng = np.random.default_rng(seed)
+    move = rng.uniform(-1, 1, mesh.p.shape) * 0.12 / 2**levels
+    sides = np.isclose(mesh.p, 0) | np.isclose(mesh.p, 1)
+    return MeshTri(mesh.p + np.where(sides, 0, move), mesh.t)
+
+
 def shuffled(matrix: sp.csr_array, points: NDArray, seed: int = 0) -> Given:
     order = np.random.default_rng(seed).permutation(len(points))
     place = np.argsort(order)

@@ -50,18 +50,18 @@ class InsideMesh:
     ----------
     z : (n,) complex128
     scale : float
-    whole : (e,) bool
-        Entries that were fitted.
+    entries : (e,) bool
+        Whole ones that determine and check vertices.
     exact : bool
-        Whether they all fit.
+        Whether all that were fitted fit.
     determined : (n,) bool
-        Vertices that they determine, up to a similarity of all of them; none where they do not fit.
+        These vertices, up to a similarity of all of them; none where entries do not fit.
     factorisations : int
     """
 
     z: NDArray[np.complex128]
     scale: float
-    whole: NDArray[np.bool_]
+    entries: NDArray[np.bool_]
     exact: bool
     determined: NDArray[np.bool_]
     factorisations: int
@@ -114,8 +114,10 @@ def fit_inside(
     finally:
         problem.release()
     exact = fit.misfit <= options.exact
-    known = determined(piece, fit.z, whole, known_scale=scale is not None) if exact else np.zeros(len(fit.z), bool)
-    return InsideMesh(fit.z, fit.scale * unit, whole, exact, known, work)
+    known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(whole)
+    if exact:
+        known, entries = determined(piece, fit.z, whole, known_scale=scale is not None)
+    return InsideMesh(fit.z, fit.scale * unit, entries, exact, known, work)
 
 
 def _start(problem: WholeEntries, rim: Rim, options: InsideOptions) -> Fit | None:

@@ -160,10 +160,9 @@ class _Judged:
         found = certify(matrix.edges, matrix.entries, np.nan_to_num(mesh.points), mesh.triangles, factor, known)
         rows, spare = [], []
         for piece, inside in zip(placed.topology.pieces, placed.meshes, strict=True):
-            own = inside.whole & inside.determined[piece.stencil].all(axis=0)
             if inside.determined.any():
-                rows.append(piece.edge_rows[own])
-                spare.append(int(own.sum()) - (2 * int(inside.determined.sum()) - (4 if known_scale else 3)))
+                rows.append(piece.edge_rows[inside.entries])
+                spare.append(int(inside.entries.sum()) - (2 * int(inside.determined.sum()) - (4 if known_scale else 3)))
         pairs = matrix.edges[np.concatenate(rows)]
         key = found.pairs @ [matrix.n, 1]
         misfit = found.misfits[np.searchsorted(key, pairs @ [matrix.n, 1])]
