@@ -16,7 +16,8 @@ Madsen, Nielsen, Tingleff, "Methods for non-linear least squares problems", 2004
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -158,6 +159,14 @@ class WholeEntries:
         rest, size = float(np.linalg.norm(misfit)) / np.sqrt(count), float(np.linalg.norm(prior.residual(z)))
         _log.debug("mu %.0e: misfit %.1e, prior %.1e, %d factorisations", mu, rest, size, factorisations)
         return Fit(z, scale, rest, size, factorisations)
+
+    def faded(self, z: NDArray, scale: float, whole: NDArray[np.bool_], mus: Sequence[float]) -> Fit:
+        """One fit after the other, with less and less prior; parameters as for :meth:`fit`."""
+        work = 0
+        for mu in mus:
+            found = self.fit(z, scale, whole, mu)
+            z, scale, work = found.z, found.scale, work + found.factorisations
+        return replace(found, factorisations=work)
 
     def _residuals(
         self, z: NDArray, scale: float, whole: NDArray, prior: ShapePrior, mu: float

@@ -32,6 +32,8 @@ class InsideOptions:
         Weight of the prior to begin with.
     rounds : int
         Fits, with fewer vertices at the rim each.
+    grown : int
+        Fits with vertices at the rim that were taken off before.
     exact : float
         Root mean square misfit of whole entries that is none, in units of typical ones.
     """
@@ -39,6 +41,7 @@ class InsideOptions:
     outlines: int = 4
     first: float = 0.3
     rounds: int = 15
+    grown: int = 4
     exact: float = 1e-12
 
 
@@ -98,26 +101,44 @@ def fit_inside(
         first = _start(problem, rim, options)
         if first is None:
             return None
-        fit, work = first, first.factorisations
-        for turn in range(options.rounds):
-            whole = rim.whole
-            for mu in _FADING if not turn else _AGAIN:
-                fit = problem.fit(fit.z, fit.scale, whole, mu)
-                work += fit.factorisations
-            _log.debug("%d whole entries: misfit %.1e after %d factorisations", whole.sum(), fit.misfit, work)
-            if fit.misfit <= options.exact:
-                break
-            peeled = rim.peeled(np.abs(problem.misfits(fit.z, fit.scale)))
-            if peeled is None or not peeled.whole.any():
-                break
-            rim = peeled
+        core, rim, work = _shrunk(problem, rim, first, options)
+        whole = rim.whole
+        exact = core.misfit <= options.exact
+        fit = core
+        if exact:
+            grown = Rim(piece, given, np.ones(len(piece.triangles), dtype=bool))
+            for _ in range(options.grown):
+                tried = problem.faded(core.z, core.scale, grown.whole, _AGAIN)
+                work += tried.factorisations
+                _log.debug("grown to %d whole entries: misfit %.1e", grown.whole.sum(), tried.misfit)
+                if tried.misfit <= options.exact:
+                    fit, whole = tried, grown.whole
+                    break
+                less = grown.peeled(np.abs(problem.misfits(tried.z, tried.scale)), keep=rim.left)
+                if less is None:
+                    break
+                grown = less
     finally:
         problem.release()
-    exact = fit.misfit <= options.exact
     known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(whole)
     if exact:
         known, entries = determined(piece, fit.z, whole, known_scale=scale is not None)
     return InsideMesh(fit.z, fit.scale * unit, entries, exact, known, work)
+
+
+def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -> tuple[Fit, Rim, int]:
+    """Fits with fewer vertices at the rim each, until one has all whole entries."""
+    work = fit.factorisations
+    for turn in range(options.rounds):
+        fit = problem.faded(fit.z, fit.scale, rim.whole, _AGAIN if turn else _FADING)
+        work += fit.factorisations
+        _log.debug("%d whole entries: misfit %.1e after %d factorisations", rim.whole.sum(), fit.misfit, work)
+        peeled = None if fit.misfit <= options.exact else rim.peeled(np.abs(problem.misfits(fit.z, fit.scale)))
+        peeled = None if peeled is None else peeled.pruned()
+        if peeled is None or not peeled.whole.any():
+            break
+        rim = peeled
+    return fit, rim, work
 
 
 def _start(problem: WholeEntries, rim: Rim, options: InsideOptions) -> Fit | None:

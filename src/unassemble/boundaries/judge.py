@@ -25,8 +25,8 @@ from ..planar.cotangent import edge_weights, weight_gradient
 from ..topology import Piece
 from .fit import jacobian_rows
 
-_SHIFT = 1e-13  # of the normal matrix, relative to its typical diagonal entry
-_SOFT = 1e-11  # eigenvalue, relative likewise, below which a displacement counts as free: entries know it to 1e-10
+_SHIFT = 1e-14  # of the normal matrix, relative to its typical diagonal entry
+_SOFT = 1e-12  # eigenvalue, relative likewise, below which a displacement counts as free: entries know it to 1e-10
 _MOVES = 1e-9  # of the length of edges: what a null vector of length 1 may move a vertex that is determined
 _UNCHECKED = 1e-6  # what is left of a standard normal number at an entry that nothing checks
 _SOLVES, _PROBES = 4, 8

@@ -60,11 +60,6 @@ class Rim:
         """(e,) edges of triangles that are left, without a whole entry."""
         return np.asarray((self._sides > 0) & ~self.whole)
 
-    def without(self, vertices: NDArray) -> Rim:
-        """Without the triangles at some vertices, and at those that have too few entries then."""
-        left = self.left & ~np.isin(self.piece.triangles, vertices).any(axis=1)
-        return Rim(self.piece, self.given, left).pruned()
-
     def pruned(self) -> Rim:
         """Without vertices, alone or in rows along the rim, that have no more entries than coordinates."""
         rim = self
@@ -97,24 +92,29 @@ class Rim:
                     yield from row
                     break
 
-    def peeled(self, misfit: NDArray) -> Rim | None:
-        """Without the vertices of the rim that are nearest to the largest misfits (e,); None where there are none."""
+    def peeled(self, misfit: NDArray, keep: NDArray[np.bool_] | None = None) -> Rim | None:
+        """Without the vertices of the rim that are nearest to the largest misfits (e,); None where there are none.
+
+        Triangles marked in `keep`, (m,) bool, stay.
+        """
         n, edges = self.piece.n_vertices, self.piece.edges
         opened = np.zeros(n, dtype=bool)
         opened[edges[self._open]] = True
         graph = sp.coo_array((np.ones(len(edges), np.int8), edges.T), shape=(n, n)).tocsr()
-        left = np.where(self.whole, misfit, 0.0)
-        least, gone = _PEAKS * left.max(), np.zeros(n, dtype=bool)
+        rest = np.where(self.whole, misfit, 0.0)
+        least, gone = _PEAKS * rest.max(), np.zeros(n, dtype=bool)
         for _ in range(max(3, n // 300)):
-            if left.max() < least or not left.max():
+            if rest.max() < least or not rest.max():
                 break
-            ends = edges[left.argmax()]
+            ends = edges[rest.argmax()]
             far = csgraph.dijkstra(graph, directed=False, unweighted=True, indices=ends, limit=_REACH, min_only=True)
-            left[(far[edges] <= _APART).any(axis=1)] = 0
+            rest[(far[edges] <= _APART).any(axis=1)] = 0
             near = far[opened]
             if near.min(initial=np.inf) <= _REACH:
                 gone |= opened & (far <= near.min())
-        return self.without(np.flatnonzero(gone)) if gone.any() else None
+        stay = False if keep is None else keep
+        left = self.left & (~gone[self.piece.triangles].any(axis=1) | stay)
+        return Rim(self.piece, self.given, left) if (left != self.left).any() else None
 
 
 def _rows(v: int, along: dict[int, list[int]]) -> Iterator[list[int]]:
