@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .boundaries import recover_lattice
+from .boundaries import recover_lattice, recover_partial
 from .clock import Clock
 from .diagnosis import explained, judged
 from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
@@ -213,7 +213,25 @@ class _Task:
             _check_proportion(scale, float(np.abs(part.entries).max()))
         placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
         lattice = recover_lattice(part, placement, self.clock, self.planar)
-        return lattice or recover_scalar(part, placement, self.clock, self.planar)
+        return lattice or self._with_boundary_conditions(part, placement)
+
+    def _with_boundary_conditions(self, part: OperatorMatrix, placement: Placement) -> PlanarMesh:
+        """The whole mesh; or what is determined where unknowns were taken out, or boundary edges have other terms."""
+        shown = part.replaced is not None or part.incomplete_rows.any()
+        whole = None if part.replaced is None else np.asarray(~part.replaced[part.edges].all(axis=1))
+        found = recover_partial(part, whole, placement, self.clock, self.planar) if shown else None
+        if found is not None:
+            return found
+        try:
+            linear = recover_scalar(part, placement, self.clock, self.planar)
+        except RecoveryError:
+            found = None if shown else recover_partial(part, whole, placement, self.clock, self.planar)
+            if found is None:
+                raise
+            return found
+        if linear.status != "uncertified" or shown:
+            return linear
+        return recover_partial(part, whole, placement, self.clock, self.planar) or linear
 
     def _as_vector(self, reading: VectorReading) -> Recovery:
         from .vector import recover_vector

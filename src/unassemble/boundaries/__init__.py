@@ -3,6 +3,7 @@
 Entries next to them contain cells that are gone, so that each says less than those of a whole mesh.
 """
 
-from .recover import recover_lattice
+from .lattices import recover_lattice
+from .partial import recover_partial
 
-__all__ = ["recover_lattice"]
+__all__ = ["recover_lattice", "recover_partial"]

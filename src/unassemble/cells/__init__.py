@@ -5,7 +5,6 @@ Where entries vanish the graph alone does not tell: see the page on theory in th
 
 from .completion import completed, guessed
 from .doubt import Attempt, Outcome, components_of, in_doubt
-from .eliminated import incomplete_rows
 from .unique.alternatives import SEARCHED_ROWS, Alternative, alternatives
 
 __all__ = [
@@ -18,5 +17,4 @@ __all__ = [
     "components_of",
     "guessed",
     "in_doubt",
-    "incomplete_rows",
 ]

@@ -16,7 +16,6 @@ from ..tolerances import LITTLE
 from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar
 from ..topology.keys import contains, distinct, pair_keys
 from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained, with_pieces
-from .eliminated import incomplete_rows, without_boundary
 from .judge.labelling import Labelling, add_differing_factors
 from .search.search import first_labelling, label_cells
 from .undivided import undivided
@@ -75,12 +74,11 @@ def completed(
     def misfit_of_triangles() -> NDArray[np.float64]:
         return misfits_of(matrix, [(piece, attempt(piece)) for piece in topology.pieces])
 
-    incomplete = incomplete_rows(matrix)
     for part, own in components_with_pieces:
         if not doubtful[part.vertices[0]]:
             continue
         try:
-            parts.append(_labelled(matrix, part, own, attempt, misfit_of_triangles, scale, incomplete[part.vertices]))
+            parts.append(_labelled(matrix, part, own, attempt, misfit_of_triangles, scale))
         except RecoveryError as error:
             failures.append(located(error, part, named=len(components_with_pieces) > 1))
     if not any(part.pieces for part in parts):
@@ -112,13 +110,9 @@ def _labelled(
     attempt: Attempt,
     misfit_of_triangles: Callable[[], NDArray[np.float64]],
     scale: float | None,
-    incomplete: NDArray[np.bool_],
 ) -> _Part:
     """One component: the labelling that fits, or the triangles that there were, or the best labelling."""
     weights = -matrix.entries[numbering.edge_rows]
-    inside = without_boundary(len(numbering.vertices), numbering.edges, weights, incomplete, scale)
-    if inside is not None:
-        return _part(matrix, numbering, inside)
     errors = None if matrix.errors is None else matrix.errors[numbering.edge_rows]
     labelling = label_cells(len(numbering.vertices), numbering.edges, weights, scale, errors)
     if labelling is not None and labelling.fits:

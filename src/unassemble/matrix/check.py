@@ -12,6 +12,7 @@ from ..errors import InputError, MatrixError
 from ..words import count_of
 from .canonical import canonical, place, working_dtype
 from .operator import OperatorMatrix, row_sizes
+from .replaced import from_columns
 from .symmetry import symmetric_entries, triangles
 
 
@@ -61,14 +62,16 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
     pairs = triangles(csr)
     if not len(pairs.edges):
         raise MatrixError("the matrix is diagonal: it has no off-diagonal entry, and so no mesh edge")
+    pairs, replaced, kept = from_columns(csr.shape[0], pairs)
     entries, asymmetry, warnings = symmetric_entries(csr, pairs, noise)
+    warnings += kept
     if not entries.any():
         raise MatrixError("every stored off-diagonal entry is zero: the matrix says nothing about the shape of a mesh")
     edges = pairs.edges
     if drop_zeros is not None:
         edges, entries, dropped = _without_zeros(csr.shape[0], edges, entries, drop_zeros)
         warnings += dropped
-    return OperatorMatrix(csr.shape[0], edges, entries, csr.diagonal(), asymmetry, warnings)
+    return OperatorMatrix(csr.shape[0], edges, entries, csr.diagonal(), asymmetry, warnings, replaced=replaced)
 
 
 def _check_options(drop_zeros: float | None, noise: float | None) -> None:

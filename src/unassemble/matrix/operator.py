@@ -8,6 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..tolerances import SUMMED
+
 
 @dataclass(frozen=True, eq=False)
 class OperatorMatrix:
@@ -31,6 +33,9 @@ class OperatorMatrix:
         What was changed on the way, in sentences.
     errors : (e,) float64 or None
         Standard deviations of the errors of the entries, where they are known; 0 for those that have vanished.
+    replaced : (n,) bool or None
+        Rows that were replaced by those of the identity while their columns were kept: of an entry between two of
+        them nothing is left.
     """
 
     n: int
@@ -40,11 +45,26 @@ class OperatorMatrix:
     asymmetry: float = 0.0
     warnings: tuple[str, ...] = ()
     errors: NDArray[np.float64] | None = None
+    replaced: NDArray[np.bool_] | None = None
 
     @property
     def row_size(self) -> NDArray[np.float64]:
         """(n,) largest absolute off-diagonal entry of each row."""
         return row_sizes(self.n, self.edges, np.abs(self.entries))
+
+    @property
+    def incomplete_rows(self) -> NDArray[np.bool_]:
+        """(n,) rows that do not add up to zero, if any others do; none otherwise.
+
+        A mass matrix that was added leaves none. How many there are is no matter: of small grids most rows are next to
+        the boundary.
+        """
+        size, sums = np.abs(self.diagonal), self.diagonal.copy()
+        for end in self.edges.T:
+            sums += np.bincount(end, self.entries, self.n)
+            size += np.bincount(end, np.abs(self.entries), self.n)
+        incomplete = np.abs(sums) > SUMMED * size
+        return np.asarray(incomplete & ~incomplete.all())
 
     def without(self, gone: NDArray[np.bool_]) -> OperatorMatrix:
         """The same with some entries, (e,) bool, not stored."""

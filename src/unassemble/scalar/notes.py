@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cells import incomplete_rows
 from ..matrix import OperatorMatrix
 from ..tolerances import ROUNDED
 from ..topology import Topology
@@ -90,7 +89,7 @@ def origin_notes(matrix: OperatorMatrix, suspects: NDArray) -> list[str]:
     Row sums tell of unknowns that were taken out; not if the entries that stand out, (k, 2), are in all of these rows:
     a wrong entry spoils two sums.
     """
-    rest = np.flatnonzero(incomplete_rows(matrix))
+    rest = np.flatnonzero(matrix.incomplete_rows)
     size = np.abs(matrix.entries)
     if not len(rest) and np.ptp(matrix.entries) <= ROUNDED * size.max():
         return [

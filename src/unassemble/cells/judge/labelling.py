@@ -116,11 +116,6 @@ class Labelling(Generic[C]):
         """Whether every entry is reproduced."""
         return bool(len(self.pieces) and (self.misfit <= ALIKE).all())
 
-    @property
-    def has_wrong_entries(self) -> bool:
-        """Whether entries have been set aside as wrong; those that are left may have small errors."""
-        return any(mesh is not None and mesh.aside is not None for mesh in self.meshes)
-
     @cached_property
     def size(self) -> float:
         """Root mean square of the misfit."""

@@ -1,0 +1,256 @@
+"""A mesh that fits those entries that are whole: Levenberg-Marquardt on positions and c.
+
+Minimised is
+
+    sum over whole entries of (a_e / c - w_e(z))^2 + mu^2 sum over triangles with others of their shape prior squared ,
+
+a_e = -A_ij. The prior holds what few entries hold, and fades: each mu starts where the one before has ended, the last
+is zero. Cotangents have poles where triangles are flat, and meshes beyond them are no meshes: steps end before any
+triangle turns over.
+
+References
+----------
+Madsen, Nielsen, Tingleff, "Methods for non-linear least squares problems", 2004.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..errors import SolverError
+from ..linalg import Factorisation, UpperTriangle, factorisation
+from ..planar.cotangent import edge_weights, weight_gradient
+from ..topology import Piece
+from .shape import ShapePrior
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """Settings of the iteration.
+
+    Attributes
+    ----------
+    steps : int
+        Most of them for one mu.
+    last_steps : int
+        For mu = 0.
+    gain : float
+        A relative decrease below this ends the iteration.
+    exact : float
+        Root mean square misfit, in units of typical weights, that is rounding.
+    damping : float
+        To begin with, in units of the diagonal of the normal matrix.
+    trials : int
+        Of a step, each with ten times the damping.
+    """
+
+    steps: int = 12
+    last_steps: int = 30
+    gain: float = 1e-3
+    exact: float = 1e-13
+    damping: float = 1e-6
+    trials: int = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Where the iteration has ended.
+
+    Attributes
+    ----------
+    z : (n,) complex128
+    scale : float
+    misfit : float
+        Root mean square of a / c - w over whole entries.
+    prior : float
+        Root of the sum of squares of the prior.
+    factorisations : int
+    """
+
+    z: NDArray[np.complex128]
+    scale: float
+    misfit: float
+    prior: float
+    factorisations: int
+
+
+class WholeEntries:
+    """The problem on one piece; the pattern of its normal matrix is analysed once.
+
+    Parameters
+    ----------
+    piece : Piece
+    weights : (e,) float64
+        -A_ij of each edge, of any size where they are not whole.
+    scale : float, optional
+        c, where it is known.
+    """
+
+    def __init__(self, piece: Piece, weights: NDArray, scale: float | None = None):
+        self.piece, self.weights, self.known_scale = piece, weights, scale
+        self._factor: Factorisation | None = None
+
+    def release(self) -> None:
+        """Give the memory of the factor back."""
+        if self._factor is not None:
+            self._factor.release()
+        self._factor = None
+
+    def best_scale(self, z: NDArray, whole: NDArray[np.bool_]) -> float:
+        """c that fits positions best."""
+        if self.known_scale is not None:
+            return self.known_scale
+        w, a = edge_weights(self.piece, z)[whole], self.weights[whole]
+        return float(w @ a / (w @ w))
+
+    def misfits(self, z: NDArray, scale: float) -> NDArray[np.float64]:
+        """(e,) a / c - w."""
+        return np.asarray(self.weights / scale - edge_weights(self.piece, z))
+
+    def fit(
+        self, z: NDArray, scale: float, whole: NDArray[np.bool_], mu: float, options: FitOptions | None = None
+    ) -> Fit:
+        """Improve positions, in which no triangle is turned over.
+
+        Parameters
+        ----------
+        z : (n,) complex128
+        scale : float
+        whole : (e,) bool
+            Entries to be fitted; sides of the others have a prior.
+        mu : float
+            Weight of the prior.
+        options : FitOptions, optional
+        """
+        options = options or FitOptions()
+        prior = ShapePrior.of(self.piece, ~whole)
+        count, damping, small, factorisations = max(int(whole.sum()), 1), options.damping, 0, 0
+        misfit, shape = self._residuals(z, scale, whole, prior, mu)
+        cost = float(misfit @ misfit + shape @ shape)
+        for _ in range(options.steps if mu else options.last_steps):
+            if not mu and misfit @ misfit <= count * options.exact**2:
+                break
+            system = _System(self, z, scale, whole, prior, mu, misfit, shape)
+            better = None
+            for _ in range(options.trials):
+                factorisations += 1
+                step = self._step(system, damping)
+                if step is not None:
+                    better = self._along(z, scale, *step, whole, prior, mu, cost)
+                if better is not None:
+                    break
+                damping = max(10 * damping, 1e-12)
+            if better is None:
+                break
+            z, scale, misfit, shape, share = better
+            before, cost = cost, float(misfit @ misfit + shape @ shape)
+            damping = max(damping / 10, 1e-15) if share == 1 else 1.5 * damping
+            small = small + 1 if cost > (1 - options.gain) * before else 0
+            if small >= (1 if mu else 4):
+                break
+        rest, size = float(np.linalg.norm(misfit)) / np.sqrt(count), float(np.linalg.norm(prior.residual(z)))
+        _log.debug("mu %.0e: misfit %.1e, prior %.1e, %d factorisations", mu, rest, size, factorisations)
+        return Fit(z, scale, rest, size, factorisations)
+
+    def faded(self, z: NDArray, scale: float, whole: NDArray[np.bool_], mus: Sequence[float]) -> Fit:
+        """One fit after the other, with less and less prior; parameters as for :meth:`fit`."""
+        work = 0
+        for mu in mus:
+            found = self.fit(z, scale, whole, mu)
+            z, scale, work = found.z, found.scale, work + found.factorisations
+        return replace(found, factorisations=work)
+
+    def _residuals(
+        self, z: NDArray, scale: float, whole: NDArray, prior: ShapePrior, mu: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return np.where(whole, self.misfits(z, scale), 0.0), mu * prior.residual(z)
+
+    def _step(self, system: _System, damping: float) -> tuple[NDArray, float] | None:
+        """Displacement and change of log c; None where the normal matrix cannot be factorised."""
+        matrix = system.damped(damping)
+        if self._factor is None:
+            self._factor = factorisation(matrix, definite=True)
+        try:
+            self._factor.factorise(matrix)
+        except SolverError:
+            self.release()
+            return None
+        gradient, response = self._factor.solve(np.column_stack([system.right, system.slope])).T
+        move = 0.0
+        if self.known_scale is None:
+            left = system.size - system.slope @ response
+            move = float((system.along - system.slope @ gradient) / max(left, 1e-12 * system.size))
+        step = np.ascontiguousarray(gradient - move * response).view(np.complex128)
+        return (step, move) if np.isfinite(step).all() and np.isfinite(move) else None
+
+    def _along(
+        self, z: NDArray, scale: float, step: NDArray, move: float, whole: NDArray, prior: ShapePrior, mu: float,
+        cost: float,
+    ) -> tuple[NDArray, float, NDArray, NDArray, float] | None:  # fmt: skip
+        """The longest part of a step, of a few, that turns no triangle over and lowers the cost."""
+        share = min(1.0, 0.5 / max(abs(move), 1e-300), 0.9 * first_flip(self.piece, z, step))
+        for _ in range(5):
+            there, c = z + share * step, scale * float(np.exp(share * move))
+            with np.errstate(all="ignore"):
+                misfit, shape = self._residuals(there, c, whole, prior, mu)
+                if misfit @ misfit + shape @ shape < cost:
+                    return there, c, misfit, shape, share
+            share *= 0.4
+        return None
+
+
+class _System:
+    """The linearised problem: normal matrix, right-hand side, and the column of log c beside them."""
+
+    def __init__(
+        self, problem: WholeEntries, z: NDArray, scale: float, whole: NDArray, prior: ShapePrior, mu: float,
+        misfit: NDArray, shape: NDArray,
+    ):  # fmt: skip
+        piece, n = problem.piece, len(z)
+        entries = np.where(whole, weight_gradient(piece, z), 0)
+        gradient = mu * prior.gradient(z)
+        jacobian = jacobian_rows(n, [(entries, piece.stencil), (gradient, prior.corners)])
+        product = jacobian.T.tobsr() @ jacobian
+        self._upper = UpperTriangle.of(product)
+        fitted = np.where(whole, problem.weights / scale, 0.0)  # what a / c changes by with -log c
+        self.right = jacobian.T @ np.concatenate([misfit, -shape])
+        self.slope = jacobian.T @ np.concatenate([fitted, np.zeros(len(shape))])
+        self.size, self.along = float(fitted @ fitted), float(fitted @ misfit)
+
+    def damped(self, damping: float) -> UpperTriangle:
+        """The matrix with its diagonal enlarged."""
+        data, start = self._upper.data.copy(), self._upper.indptr[:-1]
+        diagonal = np.diagonal(data[start], axis1=1, axis2=2)
+        more = damping * diagonal + 1e-14 * np.median(diagonal)
+        data[start] += more[:, :, None] * np.eye(2)
+        return self._upper.with_data(data)
+
+
+def jacobian_rows(n: int, parts: list[tuple[NDArray, NDArray]]) -> sp.bsr_array:
+    """Rows Re sum_k g_k dz_(v_k) for gradients and vertices (k, m) each, in blocks of x and y."""
+    blocks = [np.stack([g.real.T, -g.imag.T], axis=-1).reshape(-1, 1, 2) for g, _ in parts]
+    vertices = [v.T.astype(np.int32).ravel() for _, v in parts]
+    count = np.concatenate([np.full(g.shape[1], len(g)) for g, _ in parts])
+    indptr = np.append(0, np.cumsum(count)).astype(np.int32)
+    shape = (len(count), 2 * n)
+    return sp.bsr_array((np.concatenate(blocks), np.concatenate(vertices), indptr), shape=shape)
+
+
+def first_flip(piece: Piece, z: NDArray, step: NDArray) -> float:
+    """The least t > 0 at which a triangle of z + t step is flat; infinite if there is none."""
+    (a, b, c), (da, db, dc) = z[piece.triangles].T, step[piece.triangles].T
+    u, v, du, dv = b - a, c - a, db - da, dc - da
+    constant, square = (np.conj(u) * v).imag, (np.conj(du) * dv).imag
+    linear = (np.conj(u) * dv + np.conj(du) * v).imag
+    root = linear**2 - 4 * square * constant
+    with np.errstate(all="ignore"):
+        times = 2 * constant / (np.stack([np.sqrt(root), -np.sqrt(root)]) - linear)
+    return float(times[times > 0].min(initial=np.inf))

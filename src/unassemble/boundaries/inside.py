@@ -1,0 +1,163 @@
+"""The mesh of a piece of which some entries are whole, and what of it they determine."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..topology import Piece
+from .embedding import tutte
+from .fit import Fit, FitOptions, WholeEntries
+from .judge import determined
+from .rim import Rim
+
+_log = logging.getLogger(__name__)
+
+_FADING = (0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
+_AGAIN = (0.03, 0.01, 1e-3, 1e-4, 0.0)
+
+
+@dataclass(frozen=True)
+class InsideOptions:
+    """Settings of the search.
+
+    Attributes
+    ----------
+    outlines : int
+        Boundary loops, the longest ones, that are tried as the outer one.
+    first : float
+        Weight of the prior to begin with.
+    rounds : int
+        Fits, with fewer vertices at the rim each.
+    grown : int
+        Fits with vertices at the rim that were taken off before.
+    exact : float
+        Root mean square misfit of whole entries that is none, in units of typical ones.
+    """
+
+    outlines: int = 4
+    first: float = 0.3
+    rounds: int = 15
+    grown: int = 4
+    exact: float = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class InsideMesh:
+    """Positions, and how much they are worth.
+
+    Attributes
+    ----------
+    z : (n,) complex128
+    scale : float
+    entries : (e,) bool
+        Whole ones that determine and check vertices.
+    exact : bool
+        Whether all that were fitted fit.
+    determined : (n,) bool
+        These vertices, up to a similarity of all of them; none where entries do not fit.
+    factorisations : int
+    """
+
+    z: NDArray[np.complex128]
+    scale: float
+    entries: NDArray[np.bool_]
+    exact: bool
+    determined: NDArray[np.bool_]
+    factorisations: int
+
+
+def fit_inside(
+    piece: Piece,
+    weights: NDArray,
+    given: NDArray[np.bool_],
+    *,
+    scale: float | None = None,
+    options: InsideOptions | None = None,
+) -> InsideMesh | None:
+    """A mesh that fits whole entries; None where there are too few.
+
+    Parameters
+    ----------
+    piece : Piece
+    weights : (e,) float64
+        -A_ij.
+    given : (e,) bool
+        Entries that are those of the piece's triangles, and of no others.
+    scale : float, optional
+        c, where it is known.
+    options : InsideOptions, optional
+    """
+    options = options or InsideOptions()
+    rim = Rim.of(piece, given)
+    if not rim.whole.any():
+        return None
+    unit = float(np.median(np.abs(weights[rim.whole]))) * (1 if weights[rim.whole].sum() > 0 else -1)
+    problem = WholeEntries(piece, weights / unit, None if scale is None else scale / unit)
+    try:
+        first = _start(problem, rim, options)
+        if first is None:
+            return None
+        core, rim, work = _shrunk(problem, rim, first, options)
+        whole = rim.whole
+        exact = core.misfit <= options.exact
+        fit = core
+        if exact:
+            grown = Rim(piece, given, np.ones(len(piece.triangles), dtype=bool))
+            for _ in range(options.grown):
+                tried = problem.faded(core.z, core.scale, grown.whole, _AGAIN)
+                work += tried.factorisations
+                _log.debug("grown to %d whole entries: misfit %.1e", grown.whole.sum(), tried.misfit)
+                if tried.misfit <= options.exact:
+                    fit, whole = tried, grown.whole
+                    break
+                less = grown.peeled(np.abs(problem.misfits(tried.z, tried.scale)), keep=rim.left)
+                if less is None:
+                    break
+                grown = less
+    finally:
+        problem.release()
+    known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(whole)
+    if exact:
+        known, entries = determined(piece, fit.z, whole, known_scale=scale is not None)
+    return InsideMesh(fit.z, fit.scale * unit, entries, exact, known, work)
+
+
+def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -> tuple[Fit, Rim, int]:
+    """Fits with fewer vertices at the rim each, until one has all whole entries."""
+    work = fit.factorisations
+    for turn in range(options.rounds):
+        fit = problem.faded(fit.z, fit.scale, rim.whole, _AGAIN if turn else _FADING)
+        work += fit.factorisations
+        _log.debug("%d whole entries: misfit %.1e after %d factorisations", rim.whole.sum(), fit.misfit, work)
+        peeled = None if fit.misfit <= options.exact else rim.peeled(np.abs(problem.misfits(fit.z, fit.scale)))
+        peeled = None if peeled is None else peeled.pruned()
+        if peeled is None or not peeled.whole.any():
+            break
+        rim = peeled
+    return fit, rim, work
+
+
+def _start(problem: WholeEntries, rim: Rim, options: InsideOptions) -> Fit | None:
+    """The best first fit from drawings with one loop or another as the outer one."""
+    loops = np.argsort(-np.diff(problem.piece.loop_offsets), kind="stable")[: options.outlines]
+    whole, best, least = rim.whole, None, np.inf
+    for loop in loops.tolist():
+        z = tutte(problem.piece, loop)
+        if not _upright(problem.piece, z):
+            continue
+        c = problem.best_scale(z, whole)
+        c = c if c > 0 else 1.0
+        fit = problem.fit(z, c, whole, options.first, FitOptions(steps=40, damping=1e-2))
+        cost = whole.sum() * fit.misfit**2 + (options.first * fit.prior) ** 2
+        if cost < least:
+            best, least = fit, cost
+    return best
+
+
+def _upright(piece: Piece, z: NDArray) -> bool:
+    a, b, c = z[piece.triangles].T
+    return bool(((np.conj(b - a) * (c - a)).imag > 0).all())

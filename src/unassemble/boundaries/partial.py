@@ -1,0 +1,205 @@
+"""Meshes of which some entries are whole and others are not: positions where the whole ones determine them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..certify import certify
+from ..clock import Clock
+from ..errors import GeometryError, SolverError
+from ..linalg import factorisation
+from ..matrix import OperatorMatrix
+from ..options import ScalarOptions
+from ..planar.cotangent import edge_weights
+from ..planar.piece import positions
+from ..recovery import PlanarMesh
+from ..scalar.joined import JoinedMesh
+from ..scalar.notes import piece_notes, topology_notes
+from ..scalar.placement import Placement
+from ..tolerances import CERTIFIED
+from ..topology import Piece, Topology, local_numbering, surfaces
+from ..words import count_of
+from .inside import InsideMesh, fit_inside
+
+_WHOLE = 1e-6  # misfit of entries, in typical ones, of a conformal map that a polish would make exact
+
+
+def recover_partial(
+    matrix: OperatorMatrix,
+    whole: NDArray[np.bool_] | None,
+    placement: Placement,
+    clock: Clock,
+    options: ScalarOptions,
+) -> PlanarMesh | None:
+    """The mesh of the 3-cycles of a matrix, fitted to entries that are those of its triangles and no others.
+
+    Parameters
+    ----------
+    matrix : OperatorMatrix
+    whole : (e,) bool or None
+        Entries that may be relied upon; None for those that have triangles on both sides, and those of rows that add
+        up to zero where others do not.
+    placement : Placement
+    clock : Clock
+    options : ScalarOptions
+
+    Returns
+    -------
+    PlanarMesh or None
+        None where no part of the mesh is determined, or all of the matrix is whole.
+    """
+    if options.method != "conformal" or options.noise is not None:
+        return None
+    with clock("topology"):
+        topology = surfaces(matrix.n, matrix.edges, local_numbering(matrix.n, matrix.edges))
+    if not topology.pieces:
+        return None
+    stretch = placement.tensor.root_determinant if placement.tensor else 1.0
+    scale = None if options.scale is None else options.scale * stretch
+    with clock("inside"):
+        given = [_given(piece, matrix, whole) for piece in topology.pieces]
+        if whole is None and all(_is_whole(piece, matrix, scale) for piece in topology.pieces):
+            return None
+        meshes = [
+            fit_inside(piece, -matrix.entries[piece.edge_rows], own, scale=scale)
+            for piece, own in zip(topology.pieces, given, strict=True)
+        ]
+    if not any(mesh is not None and mesh.determined.any() for mesh in meshes):
+        return None
+    with clock("place"):
+        placed = _Placed.of(topology, meshes, placement, stretch)
+    with clock("certify"):
+        judged = _Judged.of(matrix, placed, placement, known_scale=scale is not None)
+    return _report(matrix, placed, judged, placement, clock)
+
+
+def _given(piece: Piece, matrix: OperatorMatrix, whole: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+    """(e,) entries of a piece that are whole if all of its triangles are there."""
+    if whole is not None:
+        return whole[piece.edge_rows]
+    incomplete = matrix.incomplete_rows[piece.vertices]
+    return np.asarray(piece.inner | (incomplete.any() & ~incomplete[piece.edges].all(axis=1)))
+
+
+def _is_whole(piece: Piece, matrix: OperatorMatrix, scale: float | None) -> bool:
+    """Whether a conformal map has all entries of a piece, boundary included."""
+    weights = -matrix.entries[piece.edge_rows]
+    try:
+        mesh = positions(piece, weights, scale=scale, sharp=False, analyse=factorisation)
+    except (GeometryError, SolverError):
+        return False
+    with np.errstate(all="ignore"):
+        misfit = np.abs(weights / mesh.scale - edge_weights(piece, mesh.z))
+    return bool((misfit <= _WHOLE).all())
+
+
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """Pieces that have positions, in their final frames.
+
+    Attributes
+    ----------
+    topology : Topology
+        Of these pieces.
+    meshes : list of InsideMesh
+    mesh : JoinedMesh
+    status : (n,) int8
+        As in :class:`..recovery.Recovery`.
+    notes : list of str
+    """
+
+    topology: Topology
+    meshes: list[InsideMesh]
+    mesh: JoinedMesh
+    status: NDArray[np.int8]
+    notes: list[str]
+
+    @classmethod
+    def of(cls, topology: Topology, meshes: list[InsideMesh | None], placement: Placement, stretch: float) -> _Placed:
+        """Placed by anchors, or in the canonical frame of each."""
+        found = [(piece, mesh) for piece, mesh in zip(topology.pieces, meshes, strict=True) if mesh is not None]
+        topology = Topology(topology.n_vertices, topology.edges, tuple(piece for piece, _ in found), topology.method)
+        status = np.ones(topology.n_vertices, np.int8)
+        for piece, mesh in found:
+            status[piece.vertices[status[piece.vertices] == 1]] = 2
+            status[piece.vertices[mesh.determined]] = 0
+        placed = [placement.apply(piece, mesh.z) for piece, mesh in found]
+        scales = np.array([mesh.scale for _, mesh in found])
+        joined = JoinedMesh.of(topology, [z for z, _ in placed], scales / stretch)
+        notes = [*piece_notes([some for _, some in placed]), *placement.unused(topology), *topology_notes(topology)]
+        return cls(topology, [mesh for _, mesh in found], joined, status, notes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """Whole entries between determined vertices, held against the mesh as it is written.
+
+    Attributes
+    ----------
+    backward_error : float
+        As in :class:`..recovery.Recovery`, of these entries.
+    entries : int
+        Their number.
+    spare : int
+        What is left of it, in the piece where least is, beyond unknowns.
+    """
+
+    backward_error: float
+    entries: int
+    spare: int
+
+    @classmethod
+    def of(cls, matrix: OperatorMatrix, placed: _Placed, placement: Placement, *, known_scale: bool) -> _Judged:
+        """Assembled again from points and triangles."""
+        mesh, tensor = placed.mesh, placement.tensor
+        known = (tensor.kxx, tensor.kxy, tensor.kyy) if tensor else None
+        factor = mesh.scale[mesh.triangle_piece]
+        found = certify(matrix.edges, matrix.entries, np.nan_to_num(mesh.points), mesh.triangles, factor, known)
+        rows, spare = [], []
+        for piece, inside in zip(placed.topology.pieces, placed.meshes, strict=True):
+            if inside.determined.any():
+                rows.append(piece.edge_rows[inside.entries])
+                spare.append(int(inside.entries.sum()) - (2 * int(inside.determined.sum()) - (4 if known_scale else 3)))
+        pairs = matrix.edges[np.concatenate(rows)]
+        key = found.pairs @ [matrix.n, 1]
+        misfit = found.misfits[np.searchsorted(key, pairs @ [matrix.n, 1])]
+        flipped = (placed.status[mesh.triangles[found.flipped]] == 0).all(axis=1).any()
+        return cls(np.inf if flipped else float(misfit.max(initial=0.0)), len(pairs), min(spare))
+
+
+def _report(
+    matrix: OperatorMatrix, placed: _Placed, judged: _Judged, placement: Placement, clock: Clock
+) -> PlanarMesh | None:
+    if not (judged.backward_error <= CERTIFIED and judged.spare > 0):
+        return None
+    known, mesh, topology = int((placed.status == 0).sum()), placed.mesh, placed.topology
+    notes = [*matrix.warnings, *placed.notes]
+    if k := int((placed.status == 2).sum()):
+        notes.append(
+            f"{count_of(k, 'position is', 'positions are')} plausible and no more (`node_status` 2): next to unknowns "
+            "that were taken out, or that other terms share, entries do not determine them"
+        )
+    return PlanarMesh(
+        points=mesh.points,
+        triangles=mesh.triangles,
+        component=mesh.component,
+        hinges=topology.hinges,
+        scale=mesh.scale,
+        boundary=mesh.boundary,
+        boundary_offsets=mesh.boundary_offsets,
+        node_status=placed.status,
+        status="certified",
+        uniqueness="searched",
+        reason=(
+            f"{known:,} of {matrix.n:,} points are determined by {judged.entries:,} whole entries, which the operator "
+            f"re-assembled on them gives back to {judged.backward_error:.1e}"
+        ),
+        operator="anisotropic laplacian" if placement.tensor else "laplacian",
+        backward_error=judged.backward_error,
+        n_holes=topology.n_holes,
+        timings=clock.timings,
+        warnings=tuple(notes),
+    )

@@ -1,0 +1,130 @@
+"""Which entries a fit can rely on, from the rim inwards.
+
+A vertex at the rim has two coordinates and few whole entries: those on its edges, and on the edges that face it. Where
+there are no more than unknowns, of one vertex or a few in a row, entries may determine them, but then in several ways,
+and a fit easily takes the wrong one, which bends the rest. Such vertices are taken off, and their triangles with them;
+and where a fit ends with a misfit all the same, the vertices of the rim next to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse import csgraph
+
+from ..topology import Piece
+
+_ROW = 4  # vertices of the rim that are taken off together
+_PEAKS, _APART, _REACH = 0.25, 4, 6  # of the largest misfit; distances in edges
+
+
+@dataclass(frozen=True, eq=False)
+class Rim:
+    """Triangles that are left, and the entries that they have whole.
+
+    Attributes
+    ----------
+    piece : Piece
+    given : (e,) bool
+        Entries that are whole where both triangles of their edge are left.
+    left : (m,) bool
+        Triangles.
+    """
+
+    piece: Piece
+    given: NDArray[np.bool_]
+    left: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, piece: Piece, given: NDArray[np.bool_]) -> Rim:
+        """All triangles, but for those of vertices with too few entries."""
+        return cls(piece, given, np.ones(len(piece.triangles), dtype=bool)).pruned()
+
+    @property
+    def _sides(self) -> NDArray[np.int64]:
+        """(e,) number of triangles left on each edge."""
+        return np.bincount(self.piece.opposite[self.left].ravel(), minlength=len(self.piece.edges))
+
+    @property
+    def whole(self) -> NDArray[np.bool_]:
+        """(e,) entries that the triangles left have whole."""
+        facing = self.piece.inner + 1
+        return np.asarray(self.given & (self._sides == facing))
+
+    @property
+    def _open(self) -> NDArray[np.bool_]:
+        """(e,) edges of triangles that are left, without a whole entry."""
+        return np.asarray((self._sides > 0) & ~self.whole)
+
+    def pruned(self) -> Rim:
+        """Without vertices, alone or in rows along the rim, that have no more entries than coordinates."""
+        rim = self
+        while len(gone := list(rim._loose())):
+            left = rim.left & ~np.isin(rim.piece.triangles, gone).any(axis=1)
+            rim = Rim(rim.piece, rim.given, left)
+        return rim
+
+    def _loose(self) -> Iterator[int]:
+        piece, whole, opened = self.piece, self.whole, self._open
+        vertices = np.unique(piece.edges[opened])
+        near = self.left & np.isin(piece.triangles, vertices).any(axis=1)
+        entries: dict[int, set[int]] = {int(v): set() for v in vertices}
+        for corners, sides in zip(piece.triangles[near].tolist(), piece.opposite[near].tolist(), strict=True):
+            own = [side for side in sides if whole[side]]
+            for v in corners:
+                if v in entries:
+                    entries[v].update(own)
+        along: dict[int, list[int]] = {v: [] for v in entries}
+        for a, b in piece.edges[opened].tolist():
+            along[a].append(b)
+            along[b].append(a)
+        gone: set[int] = set()
+        for v in entries:
+            for row in _rows(v, along):
+                if gone & set(row):
+                    continue
+                if len(set().union(*(entries[w] for w in row))) <= 2 * len(row):
+                    gone.update(row)
+                    yield from row
+                    break
+
+    def peeled(self, misfit: NDArray, keep: NDArray[np.bool_] | None = None) -> Rim | None:
+        """Without the vertices of the rim that are nearest to the largest misfits (e,); None where there are none.
+
+        Triangles marked in `keep`, (m,) bool, stay.
+        """
+        n, edges = self.piece.n_vertices, self.piece.edges
+        opened = np.zeros(n, dtype=bool)
+        opened[edges[self._open]] = True
+        graph = sp.coo_array((np.ones(len(edges), np.int8), edges.T), shape=(n, n)).tocsr()
+        rest = np.where(self.whole, misfit, 0.0)
+        least, gone = _PEAKS * rest.max(), np.zeros(n, dtype=bool)
+        for _ in range(max(3, n // 300)):
+            if rest.max() < least or not rest.max():
+                break
+            ends = edges[rest.argmax()]
+            far = csgraph.dijkstra(graph, directed=False, unweighted=True, indices=ends, limit=_REACH, min_only=True)
+            rest[(far[edges] <= _APART).any(axis=1)] = 0
+            near = far[opened]
+            if near.min(initial=np.inf) <= _REACH:
+                gone |= opened & (far <= near.min())
+        stay = False if keep is None else keep
+        left = self.left & (~gone[self.piece.triangles].any(axis=1) | stay)
+        return Rim(self.piece, self.given, left) if (left != self.left).any() else None
+
+
+def _rows(v: int, along: dict[int, list[int]]) -> Iterator[list[int]]:
+    """A vertex, and rows of a few along the rim that begin with it."""
+    yield [v]
+    for second in along[v]:
+        row = [v, second]
+        while True:
+            yield row
+            onward = [w for w in along[row[-1]] if w not in row]
+            if len(row) == _ROW or len(onward) != 1:
+                break
+            row = [*row, onward[0]]

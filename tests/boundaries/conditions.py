@@ -1,0 +1,84 @@
+"""Boundary conditions put into the matrices of meshes, as libraries do it; rows in random order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from skfem import Basis, BilinearForm, ElementTriP1, FacetBasis, MeshTri, condense, enforce
+from skfem.helpers import dot, grad
+from skfem.models import laplace, mass
+
+from meshes import largest_error
+from unassemble import PlanarMesh
+
+Given = tuple[sp.csr_array, NDArray]
+
+
+def mesh_of(points: NDArray, triangles: NDArray) -> MeshTri:
+    """Centred and of size 1: shares of Robin terms and convection then do not depend on units."""
+    points = (points - points.mean(axis=0)) / np.ptp(points)
+    return MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(triangles.T))
+
+
+def jittered(levels: int = 3, seed: int = 0) -> MeshTri:
+    """A square of triangles in no order but with decent angles, on the boundary too."""
+    mesh = MeshTri.init_sqsymmetric().refined(levels)
+    rng = np.random.default_rng(seed)
+    move = rng.uniform(-1, 1, mesh.p.shape) * 0.12 / 2**levels
+    sides = np.isclose(mesh.p, 0) | np.isclose(mesh.p, 1)
+    return MeshTri(mesh.p + np.where(sides, 0, move), mesh.t)
+
+
+def shuffled(matrix: sp.csr_array, points: NDArray, seed: int = 0) -> Given:
+    order = np.random.default_rng(seed).permutation(len(points))
+    place = np.argsort(order)
+    entries = sp.coo_array(matrix)  # keeps stored zeros
+    moved = sp.coo_array((entries.data, (place[entries.row], place[entries.col])), shape=matrix.shape)
+    return moved.tocsr(), points[order]
+
+
+def eliminated(mesh: MeshTri, part: Callable[[NDArray], NDArray] | None = None) -> Given:
+    """Rows and columns of boundary vertices, or of those that `part` marks, taken out."""
+    matrix = laplace.assemble(Basis(mesh, ElementTriP1()))
+    gone = mesh.boundary_nodes() if part is None else mesh.boundary_nodes()[part(mesh.p[:, mesh.boundary_nodes()])]
+    inside = np.setdiff1d(np.arange(mesh.nvertices), gone)
+    return shuffled(condense(matrix, D=gone, expand=False), mesh.p.T[inside])
+
+
+def identity_rows(mesh: MeshTri, c: float = 1.0) -> Given:
+    """Rows of boundary vertices replaced, columns kept."""
+    matrix = c * laplace.assemble(Basis(mesh, ElementTriP1()))
+    return shuffled(enforce(matrix, D=mesh.boundary_nodes()), mesh.p.T)
+
+
+def robin(mesh: MeshTri, alpha: float) -> Given:
+    """With alpha u on the boundary."""
+    matrix = laplace.assemble(Basis(mesh, ElementTriP1()))
+    return shuffled(matrix + alpha * mass.assemble(FacetBasis(mesh, ElementTriP1())), mesh.p.T)
+
+
+def convected(mesh: MeshTri, field: tuple[float, float]) -> Given:
+    """With a constant field: not symmetric."""
+
+    @BilinearForm
+    def form(u, v, w):
+        return dot(grad(u), grad(v)) + (field[0] * grad(u)[0] + field[1] * grad(u)[1]) * v
+
+    return shuffled(form.assemble(Basis(mesh, ElementTriP1())), mesh.p.T)
+
+
+def determined(found: PlanarMesh, points: NDArray) -> float:
+    """The share of points that are said to be determined, once it is checked that they are right."""
+    known = found.node_status == 0
+    if known.sum() > 2:
+        assert largest_error_of(found, points, known) <= 1e-8
+    return float(known.mean())
+
+
+def largest_error_of(found: PlanarMesh, points: NDArray, known: NDArray) -> float:
+    """Of each piece by itself."""
+    pieces = [known & (found.component == label) for label in range(found.n_components)]
+    return max(largest_error(found.points[rows], points[rows]) for rows in pieces if rows.sum() > 2)
