@@ -12,14 +12,14 @@ from ..certify import Certificate
 from ..errors import SolverError
 from ..planar.cautious import CautiousOptions
 from ..planar.cotangent import edge_weights, weight_roundings
+from ..planar.piece import PieceMesh
 from ..planar.robust import differences_without
 from ..planar.suspects import find_suspects
-from ..tolerances import CHANCE
+from ..tolerances import CHANCE, SUMMED
+from ..topology import Piece
 from .solving import Solved
 from .wrong_entries import settled
 
-_ROUNDING = 1e-11
-"""Misfits up to this, where errors are as large as rounding makes them, prove nothing."""
 _NEARLY_ALL = 0.01  # of the squared misfit
 _LESS = 0.1  # of the squared misfit that entries may leave which are blamed; derivatives promised less
 _NOISY = 2.0  # root mean square of a misfit, over the noise, that noise explains
@@ -88,6 +88,8 @@ def _suspects(solved: Solved, *, free_scale: bool) -> tuple[NDArray[np.int64], b
             continue
         weights = -matrix.entries[piece.edge_rows]
         before = np.nan_to_num(weights - mesh.scale * edge_weights(piece, mesh.z), nan=np.inf)
+        if noise is None and _rounded(piece, mesh, before):
+            continue
         found, own = None, None if errors is None else errors[piece.edge_rows]
         if piece.n_vertices <= CautiousOptions().most_vertices:
             spread = weight_roundings(piece, mesh.z) if noise is None else mesh.spread
@@ -96,12 +98,18 @@ def _suspects(solved: Solved, *, free_scale: bool) -> tuple[NDArray[np.int64], b
         if found is None or found.log_p >= np.log(CHANCE):
             explained = explained and _fitted(weights, before, own)
             continue
-        certain = certain or (found.left < _NEARLY_ALL and found.size > _ROUNDING)
+        certain = certain or (found.left < _NEARLY_ALL and found.size > SUMMED)
         explained = explained and not np.isin(piece.edge_rows[found.edges], topology.vanished).any()  # these are exact
         left = differences_without(piece, weights, mesh.z, mesh.scale, found.edges, free_scale=free_scale)
         explained = explained and _fitted(weights, left, own) and bool(_norm(left) ** 2 < _LESS * _norm(before) ** 2)
         pairs.append(matrix.edges[piece.edge_rows[found.edges]])
     return (np.concatenate(pairs) if pairs and explained else NONE), certain
+
+
+def _rounded(piece: Piece, mesh: PieceMesh, left: NDArray) -> bool:
+    """Whether a misfit is so small, where errors are as large as rounding makes them, that it proves nothing."""
+    with np.errstate(all="ignore"):  # flat triangles
+        return _norm(left / mesh.scale / weight_roundings(piece, mesh.z)) <= SUMMED
 
 
 def _fitted(weights: NDArray, differences: NDArray, errors: NDArray | None) -> bool:

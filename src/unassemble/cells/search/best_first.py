@@ -34,14 +34,10 @@ _Waiting = tuple[float, int, Labelling, Iterator[NDArray[np.bool_]] | None]
 
 @dataclass(frozen=True)
 class Judge:
-    """Solves labellings of one graph at the expense of a budget of solves; pieces that come again cost nothing new.
-
-    Parameters
-    ----------
-    budget : Budget
-    """
+    """Solves labellings of one graph at the expense of a budget, each at a price; pieces are solved once."""
 
     budget: Budget
+    price: float
     _known: dict[bytes, PieceMesh | None] = field(default_factory=dict)
 
     def __call__(self, candidates: Candidates, labels: NDArray[np.bool_]) -> Labelling[Candidates]:
@@ -52,11 +48,11 @@ class Judge:
 
     def spend(self, solves: float) -> None:
         """Take so many solves, or what is left."""
-        self.budget.take(min(solves, self.budget.left))
+        self.budget.take(min(solves * self.price, self.budget.left))
 
     def part(self, fraction: float) -> Judge:
         """The same with a fraction of what is left."""
-        return Judge(self.budget.share(fraction), self._known)
+        return Judge(self.budget.share(fraction), self.price, self._known)
 
     @property
     def spent(self) -> bool:

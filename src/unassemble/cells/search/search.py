@@ -26,6 +26,7 @@ def label_cells(
     weights: NDArray,
     scale: float | None = None,
     errors: NDArray | None = None,
+    budget: Budget | None = None,
     options: SearchOptions = DEFAULT,
 ) -> Labelling[Candidates] | None:
     """The labelling of a connected planar graph that fits its weights, or else the one that fits best.
@@ -41,6 +42,8 @@ def label_cells(
         c, where it is known.
     errors : (e,) float64, optional
         Standard deviations of the errors of the weights, where they are known.
+    budget : Budget, optional
+        What is left for all components.
     options : SearchOptions
 
     Returns
@@ -48,7 +51,7 @@ def label_cells(
     Labelling or None
         None if no labelling makes a planar surface.
     """
-    judge = Judge(Budget(options.solves + options.work / (n + options.overhead)))
+    judge = Judge(Budget(options.worth(n), parent=budget), options.price(n))
     starts: list[Labelling[Candidates]] = []
     for number, candidates in enumerate(embedded(n, edges, weights, scale, errors)):
         for labels in likely_labels(candidates):
