@@ -20,6 +20,12 @@ CANCELLED = 1e-9
 SIGMAS = 10.0
 """Standard deviations that no difference of independent noise exceeds, in a matrix of any size."""
 
+SAME_SCALE = 1e-6
+"""Relative difference of factors c that count as one."""
+
+SCALE_ERROR = 1e5
+"""Relative error of c in small pieces, over that of the entries, at most."""
+
 # The certificate.
 
 CERTIFIED = 1e-9

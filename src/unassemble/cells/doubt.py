@@ -14,9 +14,9 @@ from ..matrix import OperatorMatrix
 from ..planar.cautious import cautious_polish
 from ..planar.piece import PieceMesh
 from ..planar.polish import PolishOptions, polish
+from ..tolerances import SAME_SCALE
 from ..topology import Numbering, Piece, Topology, components
 from ..topology.keys import Grouped
-from .agreement import SAME_SCALE
 from .judge.labelling import FITS, even, misfits
 
 _WIDE = 200  # rows of a matrix on which the misfit of a wrong cell stays near it

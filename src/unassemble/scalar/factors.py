@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc, gammaincc, ndtr
 
-from ..cells.agreement import SAME_SCALE, SCALE_ERROR
 from ..cells.judge.within_errors import GAP
 from ..planar.cotangent import left_by_all
 from ..planar.deviations import factor_deviations
@@ -18,7 +17,7 @@ from ..planar.hinged import Hinged
 from ..planar.hinges import CLOSED, groups, join, rings
 from ..planar.piece import PieceMesh, refined_together
 from ..planar.polish import PolishOptions
-from ..tolerances import CHANCE, CONFIDENCE, LARGEST_NOISE, ROUNDED
+from ..tolerances import CHANCE, CONFIDENCE, LARGEST_NOISE, ROUNDED, SAME_SCALE, SCALE_ERROR
 from ..topology import Topology
 from .noise import Noise, with_vanished
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cells.agreement import SAME_SCALE
 from ..cells.doubt import SURE, Attempt, Outcome, misfits_of, unexplained, with_pieces
 from ..cells.judge.labelling import FITS, even
 from ..matrix import OperatorMatrix
@@ -18,6 +17,7 @@ from ..planar.cautious import count_flipped
 from ..planar.cotangent import edge_weights
 from ..planar.piece import PieceMesh
 from ..planar.robust import RobustFit, robust_fit
+from ..tolerances import SAME_SCALE
 from ..topology import Numbering, Piece, Topology
 
 _MOST_VERTICES = 200_000

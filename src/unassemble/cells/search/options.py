@@ -56,7 +56,7 @@ class SearchOptions:
 
     most_vertices: int = 20_000
     solves: float = 150
-    work: float = 3e5
+    work: float = 2.5e5
     overhead: float = 500
     relaxing: float = 0.4
     first: float = 0.7
