@@ -1,11 +1,19 @@
 """A few of the inputs of ``benchmarks/hostile.py``, always the same."""
 
+import time
+from contextlib import suppress
+
+import networkx as nx
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from hostile import KINDS, tried
+import skfem
+from hostile import KINDS, SECONDS, tried
+from skfem.models import laplace, mass
 
-from unassemble import SolverError
+from families import HOPELESS
+from meshes import random_mesh
+from unassemble import RecoveryError, SolverError, recover
 from unassemble.linalg import UpperTriangle, factorisation
 
 
@@ -27,3 +35,43 @@ def test_rows_that_vanish_beside_others_are_refused():
     upper = UpperTriangle.of(sp.csr_array(np.array([[1.0, 1, 0], [1, 2, 0], [0, 0, 1e-203]])))
     with pytest.raises(SolverError, match=r"vanishes|zero|singular"):
         factorisation(upper).factorise(upper)
+
+
+def _mass_matrix():
+    points, triangles = random_mesh(500, 0, holes=False)
+    mesh = skfem.MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(triangles.T))
+    return mass.assemble(skfem.Basis(mesh, skfem.ElementTriP1()))
+
+
+def _quadrilaterals():
+    mesh = skfem.MeshQuad.init_tensor(*[np.linspace(0, 1, 31)] * 2)
+    return laplace.assemble(skfem.Basis(mesh, skfem.ElementQuad1()))
+
+
+SMALL = {
+    "grid": lambda: nx.laplacian_matrix(nx.grid_2d_graph(12, 12)),
+    "large grid": lambda: nx.laplacian_matrix(nx.grid_2d_graph(32, 31)),
+    "many components": lambda: nx.laplacian_matrix(nx.random_geometric_graph(1000, 0.03, seed=1)),
+    "triangular lattice": lambda: nx.laplacian_matrix(nx.triangular_lattice_graph(20, 40)),
+    "mass": _mass_matrix,
+    "quadrilaterals": _quadrilaterals,
+    "planar graph": lambda: HOPELESS["planar_graph"](200, 0),
+    "tree": lambda: HOPELESS["tree"](1000, 0),
+}
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_small_matrices_of_no_mesh_are_answered_soon(name):
+    matrix = sp.csr_array(SMALL[name](), dtype=float)
+    order = np.random.default_rng(0).permutation(matrix.shape[0])
+    start = time.process_time()
+    with suppress(RecoveryError):
+        assert not recover(matrix[order][:, order]).certified
+    assert time.process_time() - start < SECONDS
+
+
+def test_connected_rows_out_of_all_proportion_are_refused():
+    """Quotients of their entries would overflow."""
+    entries = sp.diags_array([[-1.0, -1e40, -1e40]] * 2, offsets=[-1, 1], shape=(4, 4))
+    with pytest.raises(RecoveryError, match=r"rows 1 and 0 .* 1e\+40 and 1"):
+        recover(entries)

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..budget import Budget
 from ..errors import GeometryError, RecoveryError
 from ..matrix import OperatorMatrix
 from ..planar.piece import PieceMesh
@@ -17,6 +18,7 @@ from ..topology import Numbering, Piece, Polygons, Topology, components, located
 from ..topology.keys import contains, distinct, pair_keys
 from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained, with_pieces
 from .judge.labelling import Labelling, add_differing_factors
+from .search.options import DEFAULT
 from .search.search import first_labelling, label_cells
 from .undivided import undivided
 
@@ -74,11 +76,12 @@ def completed(
     def misfit_of_triangles() -> NDArray[np.float64]:
         return misfits_of(matrix, [(piece, attempt(piece)) for piece in topology.pieces])
 
+    budget = Budget(DEFAULT.worth(matrix.n))
     for part, own in components_with_pieces:
         if not doubtful[part.vertices[0]]:
             continue
         try:
-            parts.append(_labelled(matrix, part, own, attempt, misfit_of_triangles, scale))
+            parts.append(_labelled(matrix, part, own, attempt, misfit_of_triangles, scale, budget))
         except RecoveryError as error:
             failures.append(located(error, part, named=len(components_with_pieces) > 1))
     if not any(part.pieces for part in parts):
@@ -110,11 +113,12 @@ def _labelled(
     attempt: Attempt,
     misfit_of_triangles: Callable[[], NDArray[np.float64]],
     scale: float | None,
+    budget: Budget,
 ) -> _Part:
     """One component: the labelling that fits, or the triangles that there were, or the best labelling."""
     weights = -matrix.entries[numbering.edge_rows]
     errors = None if matrix.errors is None else matrix.errors[numbering.edge_rows]
-    labelling = label_cells(len(numbering.vertices), numbering.edges, weights, scale, errors)
+    labelling = label_cells(len(numbering.vertices), numbering.edges, weights, scale, errors, budget)
     if labelling is not None and labelling.fits:
         return _part(matrix, numbering, labelling)
     before = _misfit_of_own(misfit_of_triangles(), numbering, own, attempt, scale)

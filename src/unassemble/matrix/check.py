@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse import csgraph
 
 from ..errors import InputError, MatrixError
 from ..words import count_of
@@ -43,8 +44,8 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
         If `drop_zeros` or `noise` is out of range.
     MatrixError
         If the matrix is not square, empty, without numbers, complex, not finite, diagonal, not symmetric, or
-        has far more rows than entries. Both triangles may differ by 1e-10 of the largest off-diagonal entry
-        of the two rows.
+        has far more rows than entries, or connected rows out of all proportion. Both triangles may differ by
+        1e-10 of the largest off-diagonal entry of the two rows.
 
     Examples
     --------
@@ -71,6 +72,7 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
     if drop_zeros is not None:
         edges, entries, dropped = _without_zeros(csr.shape[0], edges, entries, drop_zeros)
         warnings += dropped
+    _check_proportions(csr.shape[0], edges, entries)
     return OperatorMatrix(csr.shape[0], edges, entries, csr.diagonal(), asymmetry, warnings, replaced=replaced)
 
 
@@ -148,6 +150,28 @@ def _complex(csr: sp.csr_array) -> MatrixError:
         f"the matrix is complex: the entry at row {i}, column {j} is {csr.data[k]}; take the real part, A.real, if the "
         "imaginary parts mean nothing"
     )
+
+
+def _check_proportions(n: int, edges: NDArray[np.int64], entries: NDArray[np.float64]) -> None:
+    """Refuse connected rows next to which others vanish even when squared: their quotients would overflow."""
+    size = row_sizes(n, edges, np.abs(entries))
+    rows, least = np.flatnonzero(size), np.full(n, np.inf)
+    vanishing = np.finfo(float).eps ** 2
+    with np.errstate(under="ignore"):
+        if size.max(initial=0.0) * vanishing <= size[rows].min(initial=np.inf):
+            return
+        nonzero = entries != 0
+        graph = sp.coo_array((entries[nonzero], edges[nonzero].T), shape=(n, n))
+        label = csgraph.connected_components(graph, directed=False)[1]
+        np.minimum.at(least, label[rows], size[rows])
+        beside = rows[size[rows] * vanishing > least[label[rows]]]
+    if len(beside):
+        i = int(beside[0])
+        j = int(rows[(label[rows] == label[i]) & (size[rows] == least[label[i]])][0])
+        raise MatrixError(
+            f"rows {i} and {j} are connected, but out of all proportion: their largest off-diagonal entries are "
+            f"{size[i]:.3g} and {size[j]:.3g}"
+        )
 
 
 def _without_zeros(

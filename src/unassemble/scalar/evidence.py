@@ -12,10 +12,12 @@ from ..certify import Certificate
 from ..errors import SolverError
 from ..planar.cautious import CautiousOptions
 from ..planar.cotangent import edge_weights, weight_roundings
+from ..planar.piece import PieceMesh
 from ..planar.robust import differences_without
 from ..planar.suspects import find_suspects
 from ..planar.terms import Term, lacking_term
 from ..tolerances import CERTIFIED, CHANCE, LARGEST_NOISE, LITTLE, NOISY, SUMMED
+from ..topology import Piece
 from .solving import Solved
 from .wrong_entries import settled
 
@@ -103,6 +105,8 @@ def _suspects(solved: Solved, *, free_scale: bool) -> tuple[NDArray[np.int64], b
             continue
         weights = -matrix.entries[piece.edge_rows]
         before = np.nan_to_num(weights - mesh.scale * edge_weights(piece, mesh.z), nan=np.inf)
+        if noise is None and _rounded(piece, mesh, before):
+            continue
         found, own = None, None if errors is None else errors[piece.edge_rows]
         if piece.n_vertices <= CautiousOptions().most_vertices:
             spread = weight_roundings(piece, mesh.z) if noise is None else mesh.spread
@@ -117,6 +121,12 @@ def _suspects(solved: Solved, *, free_scale: bool) -> tuple[NDArray[np.int64], b
         explained = explained and _fitted(weights, left, own) and bool(_norm(left) ** 2 < LITTLE * _norm(before) ** 2)
         pairs.append(matrix.edges[piece.edge_rows[found.edges]])
     return (np.concatenate(pairs) if pairs and explained else NONE), certain
+
+
+def _rounded(piece: Piece, mesh: PieceMesh, left: NDArray) -> bool:
+    """Whether a misfit is so small, where errors are as large as rounding makes them, that it proves nothing."""
+    with np.errstate(all="ignore"):  # flat triangles
+        return _norm(left / mesh.scale / weight_roundings(piece, mesh.z)) <= SUMMED
 
 
 def _fitted(weights: NDArray, differences: NDArray, errors: NDArray | None) -> bool:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cells import Alternative, incomplete_rows
+from ..cells import Alternative
 from ..certify import Certificate
 from ..matrix import OperatorMatrix
 from ..planar.terms import COEFFICIENT, MASS, ONE_SIGN, Term
@@ -58,7 +58,7 @@ def misfit(f: Findings, notes: Sequence[str]) -> Reason:
     if topology.failures:
         parts = count_of(len(topology.failures), "part of the matrix has", "parts of the matrix have")
         return Reason.of(f"{parts} no mesh: {topology.failures[0]}", advice=_CHECK_MODEL)
-    without = incomplete_rows(f.stored).any()
+    without = f.stored.incomplete_rows.any()
     model = _KEEP_ROWS if without else _ONE_COEFFICIENT if _adds_up(f.stored) else _CHECK_MODEL
     bare = topology.bare_edges[f.solved.matrix.entries[topology.bare_edges] != 0]
     if len(bare):

@@ -93,3 +93,20 @@ def scales_of_faces(complex_: FaceComplex, cotangents: NDArray, faces: NDArray[n
         above = np.add.reduceat(angle, first) > np.pi  # angles grow with c
         low, high = np.where(above, low, middle), np.where(above, middle, high)
     return unit * np.asarray(np.exp((low + high) / 2))
+
+
+def outer_faces(blocks: FaceComplex, sums: NDArray) -> NDArray[np.bool_]:
+    """The face that bounds each block from outside: its longest, among equals that of the largest angle sum.
+
+    Parameters
+    ----------
+    blocks : FaceComplex
+    sums : (faces,) float64
+        Of angles.
+    """
+    block = blocks.block[blocks.order[blocks.offsets[:-1]]]
+    order = np.lexsort((sums, blocks.size, block))
+    last = order[np.append(np.flatnonzero(np.diff(block[order])), len(order) - 1)]
+    longest = np.zeros(len(sums), dtype=bool)
+    longest[last] = True
+    return longest

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -10,18 +10,27 @@ from numpy.typing import NDArray
 
 from ...topology import Polygons
 from ...topology.faces import FaceComplex
-from .angles import SHORT, face_sums, facing_angles, likeliest_scale, vertex_excess
-from .cell_set import CellSet
-from .corners import Corners
-from .outer_faces import outer_faces
+from .angles import SHORT, face_sums, facing_angles, likeliest_scale, outer_faces, vertex_excess
+from .corners import corners_of
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates(CellSet):
+class Candidates:
     """Cells that a graph may have; a labelling is any set of them that shares no half-edge.
 
     Attributes
     ----------
+    n_vertices : int
+    edges : (e, 2) int64
+        Pairs i < j in lexicographic order.
+    weights : (e,) float64
+        -A_ij of each edge.
+    scale : float or None
+        c, where it is known.
+    cells : Polygons
+    corner : (cells,) bool
+        Triangles a-b-c of two edges a-b, b-c; the third has vanished from the boundary, which it does if the angle at b
+        is a right one.
     embedding : FaceComplex
     relative : (e,) float64
         The weights over c, or over the likeliest c, from the angles.
@@ -33,14 +42,23 @@ class Candidates(CellSet):
         The faces that make the likeliest labelling without vanished boundary edges.
     outer : (cells,) bool
         The face of each block that bounds it from outside.
+    errors : (e,) float64 or None
+        Standard deviations of the errors of the weights, where they are known.
     """
 
+    n_vertices: int
+    edges: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    scale: float | None
+    cells: Polygons
+    corner: NDArray[np.bool_]
     embedding: FaceComplex
     relative: NDArray[np.float64]
     sides: NDArray[np.int64]
     belief: NDArray[np.float64]
     first: NDArray[np.bool_]
     outer: NDArray[np.bool_]
+    errors: NDArray[np.float64] | None = field(default=None, kw_only=True)
 
     @classmethod
     def of(
@@ -58,8 +76,8 @@ class Candidates(CellSet):
         outer = outer_faces(blocks, sums)
         faces = np.flatnonzero(blocks.simple)
         empty = (blocks.size > SHORT) | outer | ~blocks.simple
-        corners = Corners.of(blocks.joined(empty), empty[blocks.face])
-        excess = vertex_excess(blocks, angles)[corners.vertices[:, 1]]
+        corners, taken = corners_of(blocks.joined(empty), empty[blocks.face])
+        excess = vertex_excess(blocks, angles)[corners[:, 1]]
         chosen = np.isin(blocks.face[blocks.order], faces)
         number = np.full(len(blocks.size), -1)
         number[faces] = np.arange(len(faces))
@@ -72,17 +90,25 @@ class Candidates(CellSet):
             weights=weights,
             scale=scale,
             errors=errors,
-            cells=Polygons(
-                np.append(0, np.cumsum(size)), np.r_[blocks.tail[blocks.order[chosen]], corners.vertices.ravel()]
-            ),
+            cells=Polygons(np.append(0, np.cumsum(size)), np.r_[blocks.tail[blocks.order[chosen]], corners.ravel()]),
             corner=np.arange(len(size)) >= len(faces),
             embedding=embedding,
             relative=relative,
-            sides=np.concatenate([of_faces, corners.sides + [len(faces), 0]]),
+            sides=np.concatenate([of_faces, taken + [len(faces), 0]]),
             belief=np.r_[1 - np.abs(sums[faces] / np.pi - 1), 0.5 - np.abs(excess) / np.pi],
             first=np.r_[(blocks.size <= SHORT)[faces] & ~outer[faces], none],
             outer=np.r_[outer[faces], none],
         )
+
+    @property
+    def count(self) -> int:
+        """Number of cells."""
+        return self.cells.count
+
+    @property
+    def size(self) -> NDArray[np.int64]:
+        """(cells,) number of vertices."""
+        return self.cells.size
 
     @property
     def judged_by(self) -> float:

@@ -6,46 +6,27 @@ triangle adds to it: such an entry is often not stored, and the triangle shows a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ...topology.faces import FaceComplex, joined
 
 
-@dataclass(frozen=True, eq=False)
-class Corners:
-    """Triangles a-b-c of which a-c is no edge of the graph.
+def corners_of(embedding: FaceComplex, outside: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Corners a-b-c, (k, 3), of which a-c is no edge, and pairs (corner, half-edge) of what each takes up as a cell.
 
-    Attributes
-    ----------
-    vertices : (k, 3) int64
-        a, b, c.
-    sides : (s, 2) int64
-        Pairs (corner, half-edge) of what each takes up as a cell.
+    They lie along the half-edges `outside`, (2 e,) bool, those of empty faces.
+
+    Where nothing else meets at b, a face beyond both edges would contain the vanished side as a diagonal: the
+    corner takes up the far sides as well, if they belong to such a face.
     """
-
-    vertices: NDArray[np.int64]
-    sides: NDArray[np.int64]
-
-    @classmethod
-    def of(cls, embedding: FaceComplex, outside: NDArray[np.bool_]) -> Corners:
-        """Find them all along the half-edges `outside`, (2 e,), those of empty faces.
-
-        Where nothing else meets at b, a face beyond both edges would contain the vanished side as a diagonal: the
-        corner takes up the far sides as well, if they belong to such a face.
-        """
-        n, one = embedding.n_vertices, np.flatnonzero(outside)
-        other = embedding.successor[one]
-        a, b, c = embedding.tail[one], embedding.head[one], embedding.head[other]
-        apart = (a != c) & ~joined(n, embedding.edges, a, c)
-        halves, vertices = np.column_stack([one, other])[apart], np.column_stack([a, b, c])[apart]
-        near = np.column_stack([np.repeat(np.arange(len(halves)), 2), halves.ravel()])
-        lone = np.bincount(embedding.tail, minlength=n)[vertices[:, 1]] == 2
-        lone &= ~outside[halves[:, 0] ^ 1]
-        far = np.column_stack([np.repeat(np.flatnonzero(lone), 2), halves[lone].ravel() ^ 1])
-        return cls(vertices, np.concatenate([near, far]))
-
-    def __len__(self) -> int:
-        return len(self.vertices)
+    n, one = embedding.n_vertices, np.flatnonzero(outside)
+    other = embedding.successor[one]
+    a, b, c = embedding.tail[one], embedding.head[one], embedding.head[other]
+    apart = (a != c) & ~joined(n, embedding.edges, a, c)
+    halves, vertices = np.column_stack([one, other])[apart], np.column_stack([a, b, c])[apart]
+    near = np.column_stack([np.repeat(np.arange(len(halves)), 2), halves.ravel()])
+    lone = np.bincount(embedding.tail, minlength=n)[vertices[:, 1]] == 2
+    lone &= ~outside[halves[:, 0] ^ 1]
+    far = np.column_stack([np.repeat(np.flatnonzero(lone), 2), halves[lone].ravel() ^ 1])
+    return vertices, np.concatenate([near, far])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,21 +17,19 @@ from ...tolerances import ALIKE
 from ...topology import Piece, Topology
 from ...topology.keys import pair_keys, with_sides
 from ...topology.pieces import planar_pieces
-from ..candidates.cell_set import CellSet
+from ..candidates.candidates import Candidates
 from .maps import map_of
 from .triangulation import triangulation
 from .within_errors import GAP, beyond, factor_tolerances, polished
 
-C = TypeVar("C", bound=CellSet)
-
 
 @dataclass(frozen=True, eq=False)
-class Labelling(Generic[C]):
+class Labelling:
     """Cells, the triangulated pieces that they make, and how the weights of these fit.
 
     Attributes
     ----------
-    candidates : CellSet
+    candidates : Candidates
     labels : (cells,) bool
         What is taken for a cell.
     edges : (e', 2) int64
@@ -48,7 +45,7 @@ class Labelling(Generic[C]):
         of the weights are known, and it is not far beyond them, less what they explain.
     """
 
-    candidates: C
+    candidates: Candidates
     labels: NDArray[np.bool_]
     edges: NDArray[np.int64]
     weights: NDArray[np.float64]
@@ -57,7 +54,7 @@ class Labelling(Generic[C]):
     misfit: NDArray[np.float64]
 
     @classmethod
-    def unsolved(cls, candidates: C, labels: NDArray[np.bool_]) -> Labelling[C]:
+    def unsolved(cls, candidates: Candidates, labels: NDArray[np.bool_]) -> Labelling:
         """Triangulate the cells, without positions."""
         n = candidates.n_vertices
         triangles = triangulation(candidates, labels)
@@ -69,8 +66,8 @@ class Labelling(Generic[C]):
 
     @classmethod
     def of(
-        cls, candidates: C, labels: NDArray[np.bool_], known: dict[bytes, PieceMesh | None] | None = None
-    ) -> Labelling[C]:
+        cls, candidates: Candidates, labels: NDArray[np.bool_], known: dict[bytes, PieceMesh | None] | None = None
+    ) -> Labelling:
         """Triangulate the cells and solve every piece, but for those `known`, to which new ones are added."""
         bare = cls.unsolved(candidates, labels)
         weights = bare.weights
@@ -133,7 +130,7 @@ class Labelling(Generic[C]):
         return self.candidates.scale or max(solved, default=(0, 1.0))[1]
 
 
-def _crowded(candidates: CellSet, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _crowded(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Vertices with more than four right angles: the mesh would wind around them more than once."""
     apex = candidates.cells.vertices[candidates.cells.offsets[:-1] + 1]
     return np.flatnonzero(np.bincount(apex[labels & candidates.corner], minlength=candidates.n_vertices) > 4)

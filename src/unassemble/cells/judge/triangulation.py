@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...topology.keys import contains, pair_keys
-from ..candidates.cell_set import CellSet
+from ..candidates.candidates import Candidates
 
 
-def triangulation(candidates: CellSet, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
+def triangulation(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
     """(m, 3) triangles of the chosen cells, longer ones in fans.
 
     The apex of a fan moves on where a diagonal would be an edge already, of the graph or of another cell.
@@ -32,7 +32,7 @@ def triangulation(candidates: CellSet, labels: NDArray[np.bool_]) -> NDArray[np.
     return triangles
 
 
-def _fans(candidates: CellSet, labels: NDArray, shift: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+def _fans(candidates: Candidates, labels: NDArray, shift: NDArray) -> tuple[NDArray, NDArray, NDArray]:
     """Triangles, the cell of each, and whether its last side is a diagonal."""
     cells = np.flatnonzero(labels)
     size = candidates.size[cells]
@@ -43,7 +43,7 @@ def _fans(candidates: CellSet, labels: NDArray, shift: NDArray) -> tuple[NDArray
     return candidates.cells.vertices[start[:, None] + corner], cell, step < length - 2
 
 
-def fans_of(candidates: CellSet, labels: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def fans_of(candidates: Candidates, labels: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """(m, 3) triangles of cells, each in a fan about its first vertex, and (m,) the cell of each."""
     triangles, cell, _ = _fans(candidates, labels, np.zeros(candidates.count, dtype=np.int64))
     return triangles, cell

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..candidates.candidates import Candidates
-from .relaxation import Path, relaxed
+from .relaxation import relaxed
 from .sheet import Sheet
 
 _SPARE = 2  # edges to each vertex, with which a mesh has far more equations than unknowns
@@ -39,5 +39,5 @@ def with_holes(candidates: Candidates, state: NDArray[np.int8]) -> tuple[NDArray
     free[number] = (state == 0) & ~(count == 1)[sides].any(axis=1)
     sheet = Sheet(candidates, candidates.scale or candidates.judged_by, cells)
     with np.errstate(all="ignore"):  # a given scale may be out of all proportion
-        labels = relaxed(sheet, free[cells], Path())
+        labels = relaxed(sheet, free[cells])
     return None if labels is None else (labels, free)

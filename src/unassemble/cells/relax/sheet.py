@@ -192,18 +192,6 @@ class Sheet:
         w = by_label @ strength[self.chosen] / spread * (1.0 if self.free_scale else 0.0)
         return (scaled @ by_position.tocsr()).tocsr(), (scaled @ by_label).tocsr(), w
 
-    def moved(self, placed: Placed, d: NDArray, log_scale: float, factor: float = 1.0) -> Placed:
-        """Displaced, (n,) complex, and rescaled."""
-        c = placed.c * max(1 + factor * log_scale, 0.1) if self.free_scale else placed.c
-        return Placed(placed.z + factor * d, c)
-
-    def extent(self, z: NDArray) -> NDArray[np.float64]:
-        """(n,) mean length of the edges at each vertex."""
-        length = np.repeat(np.abs(z[self.edges[:, 0]] - z[self.edges[:, 1]]), 2)
-        ends = self.edges.ravel()
-        mean = np.bincount(ends, length, len(z)) / np.maximum(np.bincount(ends, minlength=len(z)), 1)
-        return np.maximum(mean, 1e-6 * np.median(mean))
-
 
 def unpinned(z: NDArray) -> NDArray[np.bool_]:
     """(2 n,) coordinates of all but two vertices."""

@@ -34,17 +34,13 @@ _Waiting = tuple[float, int, Labelling, Iterator[NDArray[np.bool_]] | None]
 
 @dataclass(frozen=True)
 class Judge:
-    """Solves labellings of one graph at the expense of a budget of solves; pieces that come again cost nothing new.
-
-    Parameters
-    ----------
-    budget : Budget
-    """
+    """Solves labellings of one graph at the expense of a budget, each at a price; pieces are solved once."""
 
     budget: Budget
+    price: float
     _known: dict[bytes, PieceMesh | None] = field(default_factory=dict)
 
-    def __call__(self, candidates: Candidates, labels: NDArray[np.bool_]) -> Labelling[Candidates]:
+    def __call__(self, candidates: Candidates, labels: NDArray[np.bool_]) -> Labelling:
         """A labelling, its cost taken."""
         labelling = Labelling.of(candidates, labels, self._known)
         self.spend(1 + len(labelling.pieces) // 20)
@@ -52,11 +48,11 @@ class Judge:
 
     def spend(self, solves: float) -> None:
         """Take so many solves, or what is left."""
-        self.budget.take(min(solves, self.budget.left))
+        self.budget.take(min(solves * self.price, self.budget.left))
 
     def part(self, fraction: float) -> Judge:
         """The same with a fraction of what is left."""
-        return Judge(self.budget.share(fraction), self._known)
+        return Judge(self.budget.share(fraction), self.price, self._known)
 
     @property
     def spent(self) -> bool:
@@ -69,7 +65,7 @@ def better(one: Labelling | None, other: Labelling) -> Labelling:
     return other if one is None or other.size < one.size else one
 
 
-def leapt(start: Labelling[Candidates], judge: Judge, options: SearchOptions = DEFAULT) -> Labelling[Candidates]:
+def leapt(start: Labelling, judge: Judge, options: SearchOptions = DEFAULT) -> Labelling:
     """The best of what all clear changes at once lead to, uphill too: with many wrong cells the misfit is no guide."""
     best = labelling = start
     sheet, seen = Sheet(start.candidates, start.scale), {start.labels.tobytes()}
@@ -95,9 +91,7 @@ class BestFirst:
     options : SearchOptions
     """
 
-    def __init__(
-        self, start: Labelling[Candidates], free: NDArray[np.bool_] | None = None, options: SearchOptions = DEFAULT
-    ):
+    def __init__(self, start: Labelling, free: NDArray[np.bool_] | None = None, options: SearchOptions = DEFAULT):
         self.best, self._options = start, options
         self._candidates, self._scale = start.candidates, start.scale
         self._n_faces = int(start.candidates.sides[:, 0].max(initial=-1)) + 1
@@ -113,7 +107,7 @@ class BestFirst:
     def _updates(self) -> Updates:
         return Updates(Sheet(self._candidates, self._scale), self._free, self._options)
 
-    def run(self, judge: Judge) -> Labelling[Candidates]:
+    def run(self, judge: Judge) -> Labelling:
         """Go on until a labelling fits, or the budget is spent, or the search is in vain; the best so far."""
         while self._waiting and not (self.best.fits or judge.spent) and self._in_vain < self._options.in_vain:
             value, number, labelling, changed = heapq.heappop(self._waiting)
@@ -143,7 +137,7 @@ class BestFirst:
             self._ranked * self._least > self._options.patience * (self._first - self._least)
         )
 
-    def _changed(self, labelling: Labelling[Candidates]) -> Iterator[NDArray[np.bool_]]:
+    def _changed(self, labelling: Labelling) -> Iterator[NDArray[np.bool_]]:
         """Small changes of the labels; where the first few are in vain, also all clear ones at once."""
         for k, move in enumerate(self._updates.ranked(labelling)):
             if k == self._options.batch and self._n_faces == self._candidates.count:

@@ -14,9 +14,9 @@ class SearchOptions:
     most_vertices : int
         Of a graph whose labels are relaxed and searched for.
     solves, work : float
-        Solves that a graph is worth: so many, and `work` over its vertices and `overhead` more.
+        Work that a graph is worth: so many solves, and as much more.
     overhead : float
-        Vertices that a graph costs as much as, whatever its size.
+        Work that a solve costs beside one for each vertex.
     relaxing, first, widening : float
         Parts of what is left: for the last wrong ones of relaxed labels; for the likeliest start of the others, half
         of what is left for each of the next; and of all, for cells that no embedding at hand has.
@@ -56,7 +56,7 @@ class SearchOptions:
 
     most_vertices: int = 20_000
     solves: float = 150
-    work: float = 3e5
+    work: float = 2.5e5
     overhead: float = 500
     relaxing: float = 0.4
     first: float = 0.7
@@ -83,6 +83,14 @@ class SearchOptions:
     near: float = 1e-3
     nearest: float = 1e-6
     faint: float = 1e-4
+
+    def price(self, n: int) -> float:
+        """Work of solving a labelling of n vertices."""
+        return n + self.overhead
+
+    def worth(self, n: int) -> float:
+        """Work for a graph of n vertices, in one component or several."""
+        return self.solves * self.price(n) + self.work
 
 
 DEFAULT = SearchOptions()

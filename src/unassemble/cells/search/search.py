@@ -26,8 +26,9 @@ def label_cells(
     weights: NDArray,
     scale: float | None = None,
     errors: NDArray | None = None,
+    budget: Budget | None = None,
     options: SearchOptions = DEFAULT,
-) -> Labelling[Candidates] | None:
+) -> Labelling | None:
     """The labelling of a connected planar graph that fits its weights, or else the one that fits best.
 
     Parameters
@@ -41,6 +42,8 @@ def label_cells(
         c, where it is known.
     errors : (e,) float64, optional
         Standard deviations of the errors of the weights, where they are known.
+    budget : Budget, optional
+        What is left for all components.
     options : SearchOptions
 
     Returns
@@ -48,8 +51,8 @@ def label_cells(
     Labelling or None
         None if no labelling makes a planar surface.
     """
-    judge = Judge(Budget(options.solves + options.work / (n + options.overhead)))
-    starts: list[Labelling[Candidates]] = []
+    judge = Judge(Budget(options.worth(n), parent=budget), options.price(n))
+    starts: list[Labelling] = []
     for number, candidates in enumerate(embedded(n, edges, weights, scale, errors)):
         for labels in likely_labels(candidates):
             start = judge(candidates, labels)
@@ -61,7 +64,7 @@ def label_cells(
             if relaxed is not None and relaxed.fits:
                 return relaxed
             starts += [relaxed] if relaxed is not None and relaxed.pieces else []
-    best: Labelling[Candidates] | None = None
+    best: Labelling | None = None
     searching = judge.part(1 - options.widening)
     for number, start in enumerate(sorted(starts, key=lambda one: one.mean_misfit)):
         best = better(best, start)
@@ -77,7 +80,7 @@ def label_cells(
     return best
 
 
-def _widened(labelling: Labelling[Candidates]) -> Labelling[Candidates]:
+def _widened(labelling: Labelling) -> Labelling:
     """The same labels among more candidates."""
     candidates = widened(labelling.candidates, labelling.edges, labelling.misfit)
     labels = np.zeros(candidates.count, dtype=bool)
@@ -85,10 +88,10 @@ def _widened(labelling: Labelling[Candidates]) -> Labelling[Candidates]:
     return Labelling.of(candidates, labels)
 
 
-def _with_holes(candidates: Candidates, judge: Judge, options: SearchOptions) -> Labelling[Candidates] | None:
+def _with_holes(candidates: Candidates, judge: Judge, options: SearchOptions) -> Labelling | None:
     """Triangles that fit best, where every edge lies on one; with the c that lone triangles tell, if they do."""
     sides, weights = candidates.triangle_sides, candidates.weights
-    best: Labelling[Candidates] | None = None
+    best: Labelling | None = None
     for c in lone_scales(sides, weights) if candidates.scale is None else [candidates.scale]:
         with suppress(ContradictionError):
             known = Candidates.of(candidates.embedding, weights, c)
@@ -99,9 +102,7 @@ def _with_holes(candidates: Candidates, judge: Judge, options: SearchOptions) ->
     return best
 
 
-def _relaxed(
-    candidates: Candidates, state: NDArray[np.int8], judge: Judge, options: SearchOptions
-) -> Labelling[Candidates] | None:
+def _relaxed(candidates: Candidates, state: NDArray[np.int8], judge: Judge, options: SearchOptions) -> Labelling | None:
     found = with_holes(candidates, state)
     if found is None:
         return None
@@ -118,7 +119,7 @@ def embedded(
         yield Candidates.of(embedding, weights, scale, errors)
 
 
-def first_labelling(n: int, edges: NDArray, weights: NDArray) -> Labelling[Candidates] | None:
+def first_labelling(n: int, edges: NDArray, weights: NDArray) -> Labelling | None:
     """What the angles suggest, without positions: the first choice of cells that makes planar surfaces."""
     for embedding in face_complexes(n, edges):
         candidates = Candidates.of(embedding, weights)

@@ -118,7 +118,7 @@ def _other(
     return None
 
 
-def _relabelled(around: Around, answer: Labelling[Candidates]) -> Iterator[Move]:
+def _relabelled(around: Around, answer: Labelling) -> Iterator[Move]:
     """Small changes that low-rank updates do not tell from the answer."""
     with suppress(RecoveryError):
         updates = Updates(Sheet(around.candidates, answer.scale))
