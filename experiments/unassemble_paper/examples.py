@@ -55,7 +55,7 @@ def perforated(side: int, holes: int, *, seed: int = 0) -> Mesh:
 
 
 def ragged(side: int, *, seed: int = 0) -> Mesh:
-    """A lattice whose points are all shaken, by up to 0.3: thin triangles along the boundary, cut off at sides of 2.6."""
+    """A lattice with all points shaken by up to 0.3: thin triangles along the boundary, up to sides of 2.6."""
     rng = np.random.default_rng(seed)
     grid = np.stack(np.meshgrid(np.arange(side), np.arange(side)), -1).reshape(-1, 2)
     points = grid + rng.uniform(-0.3, 0.3, grid.shape)

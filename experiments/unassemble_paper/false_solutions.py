@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lstsq
 from scipy.optimize import brentq
 from scipy.spatial import Delaunay
 
@@ -18,7 +19,7 @@ from unassemble.paper.equations import AngleSystem
 from .cases import Case, case_of
 from .examples import perforated
 from .meshes import Mesh, counter_clockwise
-from .tables import Table, table
+from .tables import Cell, Table, table
 
 WHEEL = ((3, 0), (3, 1), (2, 2), (-3, 1), (-1, -2))
 """Rim of the smallest example: five triangles about the origin."""
@@ -35,14 +36,14 @@ def shaken_hexagon(seed: int) -> Mesh:
     return Mesh(shaken, counter_clockwise(lattice, Delaunay(lattice).simplices))
 
 
-def exact_root(system: AngleSystem, x: NDArray, *, steps: int = 60) -> NDArray[np.float64] | None:
+def exact_root(system: AngleSystem, x: NDArray, *, steps: int = 40) -> NDArray[np.float64] | None:
     """Where Newton's method with halved steps and dense least squares ends, if the residual is then rounding."""
     value = system.residual(x)
     for _ in range(steps):
         size = float(np.linalg.norm(value))
         if size < _EXACT:
             return x
-        step = np.linalg.lstsq(system.jacobian(x).sparse().toarray(), -value, rcond=1e-11)[0]
+        step = lstsq(system.jacobian(x).sparse().toarray(), -value, cond=1e-11, lapack_driver="gelsy")[0]
         for halving in range(12):
             new, _ = system.advance(x, step / 2**halving)
             value = system.residual(new)
@@ -113,8 +114,8 @@ def wheel_table() -> Table:
     roots = wheel_roots(np.array(WHEEL))
     columns = ("rim vertices", "the mesh", *("another solution" for _ in roots[1:]))
     rows = [
-        [f"{WHEEL[k]}, {WHEEL[(k + 1) % len(WHEEL)]}", *(", ".join(f"{np.degrees(x):.3f}" for x in a[k]) for _, a in roots)]
-        for k in range(len(WHEEL))
+        [f"{p}, {q}", *(", ".join(f"{np.degrees(x):.3f}" for x in angles[k]) for _, angles in roots)]
+        for k, (p, q) in enumerate(zip(WHEEL, (*WHEEL[1:], WHEEL[0]), strict=True))
     ]
     return table("false-wheel", columns, [*rows, ["c", *(f"{c:.6f}" for c, _ in roots)]])
 
@@ -126,7 +127,7 @@ def rate_table(seeds: int = 160, hexagons: int = 20, starts: int = 20) -> Table:
     paper's method on shaken lattices, seeds 0 and following: to |F| = 1e-6 within 20,000 products, and from there to an
     exact root by dense Newton.
     """
-    rows = [["19-vertex hexagons, random starts", "unknown", *_from_random_starts(hexagons, starts)]]
+    rows: list[list[Cell]] = [["19-vertex hexagons, random starts", "unknown", *_from_random_starts(hexagons, starts)]]
     for what, scale_free, sines, holes, count in (
         ("unknown", True, False, 0, seeds),
         ("known", False, False, 0, seeds // 4),
@@ -140,7 +141,7 @@ def rate_table(seeds: int = 160, hexagons: int = 20, starts: int = 20) -> Table:
     return table("false-rate", columns, rows)
 
 
-def _from_random_starts(hexagons: int, starts: int) -> list[int | float]:
+def _from_random_starts(hexagons: int, starts: int) -> list[Cell]:
     found: list[tuple[AngleSystem, NDArray, NDArray]] = []
     for seed in range(hexagons):
         example = case_of(shaken_hexagon(seed), "hexagon")
@@ -152,7 +153,7 @@ def _from_random_starts(hexagons: int, starts: int) -> list[int | float]:
     return [hexagons * starts, *_judged(found)]
 
 
-def _from_equal_angles(scale_free: bool, sines: bool, holes: int, seeds: int) -> list[int | float]:
+def _from_equal_angles(scale_free: bool, sines: bool, holes: int, seeds: int) -> list[Cell]:
     found: list[tuple[AngleSystem, NDArray, NDArray]] = []
     for seed in range(seeds):
         example = case_of(perforated(8 + (holes > 0), holes, seed=seed), "lattice")
@@ -167,7 +168,7 @@ def _from_equal_angles(scale_free: bool, sines: bool, holes: int, seeds: int) ->
     return [seeds, *_judged(found)]
 
 
-def _judged(found: list[tuple[AngleSystem, NDArray, NDArray]]) -> list[int | float | None]:
+def _judged(found: list[tuple[AngleSystem, NDArray, NDArray]]) -> list[Cell]:
     other = [(s, x, a) for s, x, a in found if np.abs(s.angles(x)[: a.size] - a).max() > _SAME]
     if not other:
         return [len(found), 0, None, None, None]

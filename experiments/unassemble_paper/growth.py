@@ -42,7 +42,7 @@ def _timed(example: Case) -> float:
 
 
 def counts_table(cases: tuple[Case, ...]) -> Table:
-    """The numbers of section 2.3 and what section 2.2 asks: connectivity of the graph, loops of four edges, no zeros."""
+    """The numbers of section 2.3, and what section 2.2 asks: a tri-connected graph, loops of four edges, no zeros."""
     import networkx
 
     rows = []

@@ -49,8 +49,9 @@ def _triangles(piece: Piece, angles: NDArray) -> list[_Patch]:
 
 
 def _matching(neighbours: NDArray, sizes: list[int]) -> NDArray[np.int64]:
-    """Pairs of patches that have an edge in common, each patch in one pair at most: small ones first, long seams next."""
-    pairs, seams = np.unique(np.sort(neighbours[neighbours[:, 0] != neighbours[:, 1]], axis=1), axis=0, return_counts=True)
+    """Pairs of patches with an edge in common, each patch in one pair at most: small ones first, then long seams."""
+    apart = neighbours[neighbours[:, 0] != neighbours[:, 1]]
+    pairs, seams = np.unique(np.sort(apart, axis=1), axis=0, return_counts=True)
     total = np.asarray(sizes)[pairs].sum(axis=1)
     free, chosen = np.ones(len(sizes), dtype=bool), []
     for a, b in pairs[np.lexsort((-seams, total))]:
@@ -67,7 +68,7 @@ def _joined(fixed: _Patch, moved: _Patch) -> _Patch:
     turn = np.vdot(source, target) / np.vdot(source, source)
     placed = fixed.z[i].mean() + turn * (moved.z - moved.z[j].mean())
     vertices, place = np.unique(np.r_[fixed.vertices, moved.vertices], return_inverse=True)
-    weight = np.bincount(place, np.r_[fixed.weight, moved.weight])
+    weight = np.bincount(place, np.r_[fixed.weight, moved.weight]).astype(np.float64)
     weighted = np.r_[fixed.z * fixed.weight, placed * moved.weight]
     z = np.bincount(place, weighted.real) + 1j * np.bincount(place, weighted.imag)
-    return _Patch(vertices, z / weight, weight)
+    return _Patch(vertices, np.asarray(z / weight, dtype=np.complex128), weight)

@@ -1,4 +1,4 @@
-"""What the paper's iteration counts depend on: inner tolerance, forcing term, whole steps, starting guess."""
+"""What the paper's iteration depends on: the inner tolerance, whole steps, the starting guess."""
 
 from __future__ import annotations
 
@@ -15,29 +15,12 @@ def inner_tolerance_table(square: Case) -> Table:
     for power in range(1, 15):
         run = square.run(10.0**-power, max_products=4_000)
         rows.append([f"1e-{power}", run.outer if run.result.converged else None, run.inner, run.residual])
-    return table("inner-tolerance", ("relative residual of each inner system", "Newton steps", "inner steps", "residual"), rows)  # fmt: skip
-
-
-def forcing_table(cases: Iterable[Case]) -> Table:
-    """The paper's forcing beside that of Dembo, Eisenstat and Steihaug, from pi/3 and c = 1, 120,000 products at most."""
-    rows: list[list[str | int | float | None]] = []
-    for case in cases:
-        for scale_free in (False, True):
-            for rule in ("1.1^-i", "2^-i"):
-                run = case.run(rule, scale_free=scale_free, max_products=120_000)
-                done = run.result.converged
-                rows.append([
-                    f"Figure {case.figure}", "unknown" if scale_free else "known", rule,
-                    run.result.history.steps_to(1e-3), run.outer if done else None, run.inner if done else None,
-                    run.residual, run.angle_error,
-                ])  # fmt: skip
-    columns = ("mesh", "c", "forcing", "inner steps to three orders", "outer steps to 1e-6", "inner steps to 1e-6",
-               "residual", "angle error")  # fmt: skip
-    return table("forcing", columns, rows)
+    columns = ("relative residual of each inner system", "Newton steps", "inner steps", "residual")
+    return table("inner-tolerance", columns, rows)
 
 
 def damping_table(seeds: int = 10, side: int = 8) -> Table:
-    """Whole steps and halved ones on lattices with ragged boundaries, to 1e-10 within 6,000 products, with sine products."""
+    """Whole and halved steps on lattices with ragged boundaries, with sine products, to 1e-10 in 6,000 products."""
     rows = []
     for scale_free in (False, True):
         for damped in (False, True):
@@ -66,7 +49,8 @@ def large_table(sides: Iterable[int] = (39, 99), products: int = 6_000) -> Table
                 done = run.result.converged
                 rows.append([
                     large.corners.counts.v, "with the products of sines" if sines else "the paper's", start,
-                    run.result.products if done else None, run.result.history.residuals[0], run.residual, run.angle_error,
+                    run.result.products if done else None, run.result.history.residuals[0], run.residual,
+                    run.angle_error,
                 ])  # fmt: skip
     columns = ("vertices", "equations", "start", "products to 1e-6", "first residual", "least residual", "angle error")
     return table("large", columns, rows)

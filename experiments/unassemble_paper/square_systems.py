@@ -1,4 +1,4 @@
-"""Section 3.3's square system of picked interior equations, by the Krylov methods that it names and their successors."""
+"""Section 3.3's square system of picked interior equations, by the Krylov methods it names and by later ones."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from unassemble.paper.square import square_rows
 from .cases import Case
 from .tables import Table, table
 
-METHODS = ("gmres", "bicg", "bicgstab", "qmr")
+METHODS = {"GMRES": "gmres", "BiCG": "bicg", "BiCGSTAB": "bicgstab", "QMR": "qmr"}
 _RTOL, _MOST = 1e-6, 4_000  # relative residual asked for; products with J and its transpose at most, GMRES apart
 
 
@@ -39,7 +39,7 @@ def paired(matrix: sp.csr_array, rhs: NDArray) -> tuple[sp.csr_array, NDArray[np
 
 
 def solved_by(method: str, matrix: sp.csr_array, rhs: NDArray) -> tuple[int, float]:
-    """Products with the matrix and its transpose, and the relative residual; GMRES without restarts, as many as rows."""
+    """Products with the matrix and its transpose, and the relative residual; GMRES takes as many as rows at most."""
     count = 0
 
     def product(operand: sp.csr_array, v: NDArray) -> NDArray:
@@ -87,11 +87,10 @@ def square_table(cases: Iterable[Case]) -> Table:
             lost = int((values < 1e-9 * values[0]).sum())
             lu = None if lost else newton_by_lu(system, x)
             for name, form in (("as they stand", picked(system, x)), ("matched", paired(*picked(system, x)))):
-                cells = [_told(*solved_by(method, *form)) for method in METHODS]
+                cells = [_told(*solved_by(method, *form)) for method in METHODS.values()]
                 condition = None if lost else float(values[0] / values[-1])
                 rows.append([f"Figure {case.figure}", where, len(values), lost, condition, lu, name, *cells])
-    columns = ("mesh", "angles", "unknowns", "rank lost", "condition", "Newton by LU: least |F|", "rows",
-               *(m.upper() if m in ("gmres", "qmr") else {"bicg": "BiCG", "bicgstab": "BiCGSTAB"}[m] for m in METHODS))  # fmt: skip
+    columns = ("mesh", "angles", "unknowns", "rank lost", "condition", "Newton by LU: least |F|", "rows", *METHODS)
     return table("square", columns, rows)
 
 

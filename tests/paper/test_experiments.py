@@ -1,34 +1,61 @@
 """The experiments' tables as expected values: what the paper reports, and what is measured here."""
 
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from unassemble.planar.conformal import conformal_map
-from unassemble_paper import claims_table, comparison_table, regenerate
+from unassemble_paper import regenerate
 from unassemble_paper.cases import Case
+from unassemble_paper.regenerate import LONGER
+from unassemble_paper.tables import filled, read, table
 
-pytestmark = pytest.mark.slow  # a dozen seconds
+DOCS = Path(__file__).parents[2] / "docs"
+RESULTS = DOCS / "_static" / "paper" / "results.json"
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("paper")
-    result = regenerate(folder / "new" / "folder", conformal_map)
-    return SimpleNamespace(result=result, claims={c.key: c for c in result.claims}, folder=folder / "new" / "folder")
+    folder = tmp_path_factory.mktemp("paper") / "new" / "folder"
+    result = regenerate(folder, conformal_map, longer=False)
+    return SimpleNamespace(result=result, claims={c.key: c for c in result.claims}, folder=folder)
 
 
+@pytest.mark.slow  # half a minute
 def test_files(made):
+    tables = ["claims", "comparison", "forcing", "roots"]
     names = {path.name for path in made.result.files}
-    assert names == {f"figure{k:02d}.png" for k in range(3, 13)} | {"claims.md", "comparison.md", "results.json"}
+    assert names == {f"figure{k:02d}.png" for k in range(2, 13)} | {f"{t}.md" for t in tables} | {"results.json"}
     for path in made.result.files:
         assert path.stat().st_size > 500
-    assert (made.folder / "claims.md").read_text(encoding="utf-8") == claims_table(made.result.claims)
-    assert (made.folder / "comparison.md").read_text(encoding="utf-8") == comparison_table(made.result.comparisons)
+    for t in made.result.tables:
+        assert (made.folder / f"{t.name}.md").read_text(encoding="utf-8") == t.markdown()
+    assert [t.name for t in read(made.folder / "results.json")] == tables
     stored = json.loads((made.folder / "results.json").read_text(encoding="utf-8"))
-    assert len(stored["claims"]) == len(made.result.claims) == 15
+    assert [c["key"] for c in stored["claims"]] == list(made.claims)
+
+
+def test_the_page_shows_the_results():
+    """`python -m unassemble_paper.tables docs/paper.md docs/_static/paper/results.json` changes nothing."""
+    page, tables = (DOCS / "paper.md").read_text(encoding="utf-8"), read(RESULTS)
+    assert filled(page, tables) == page
+    for t in tables:
+        assert page.count(f"<!-- table: {t.name} -->") == 1
+    assert {t.name for t in tables} == {"claims", "comparison", "forcing", "roots", *LONGER}
+
+
+def test_tables_show_numbers_with_few_digits():
+    shown = table("t", ["a|b", "c"], [[None, 1234], ["x|y", 1.26e-7], ["z", 250.4], ["w", 0.0125]])
+    lines = shown.markdown().splitlines()
+    assert lines[0] == r"| a\|b | c |"
+    assert lines[2:] == ["| – | 1,234 |", r"| x\|y | 1e-7 |", "| z | 250 |", "| w | 0.013 |"]
+    page = "before\n<!-- table: t -->\nold\n<!-- end of table -->\nafter"
+    assert filled(page, [shown]) == f"before\n<!-- table: t -->\n\n{shown.markdown()}\n<!-- end of table -->\nafter"
+    with pytest.raises(KeyError):
+        filled(page, [])
 
 
 VERDICTS = {

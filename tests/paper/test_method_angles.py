@@ -15,7 +15,7 @@ from unassemble.paper import AngleOptions
 from unassemble.paper.alignment import distance
 from unassemble.paper.newton import NewtonOptions
 from unassemble.planar.conformal import conformal_map
-from unassemble_paper.claims import Claim
+from unassemble_paper.claim import Claim, claims_table
 
 
 def matrix_of(case, scale):
@@ -69,7 +69,7 @@ def test_the_paper_command(tmp_path, monkeypatch):
 
     def regenerate(folder, direct):
         asked.append((folder, direct))
-        return experiments.Regenerated((claim,), (), (tmp_path / "figure07.png",))
+        return experiments.Regenerated((claim,), (), (claims_table([claim]),), (tmp_path / "figure07.png",))
 
     monkeypatch.setattr(experiments, "regenerate", regenerate)
     result = CliRunner().invoke(main, ["paper", "-o", str(tmp_path / "figures")])

@@ -87,7 +87,7 @@ class History:
         return int(self.inner_steps[reached[0]]) if len(reached) else None
 
     def continued(self, other: History) -> History:
-        """This one, and the steps of another that started where it ended."""
+        """Its steps, and those of another that started where it ended."""
         return History(
             np.r_[self.residuals, other.residuals[1:]],
             np.r_[self.inner_steps, self.inner_steps[-1] + other.inner_steps[1:]],
