@@ -42,7 +42,9 @@ def test_matched_rows_have_a_full_diagonal_and_the_same_solution(grid):
     assert (matrix.diagonal() == 0).any()
     assert (moved.diagonal() != 0).all()
     dense = np.linalg.solve(matrix.toarray(), rhs)
-    np.testing.assert_allclose(np.linalg.solve(moved.toarray(), right), dense, rtol=1e-6, atol=1e-8 * np.abs(dense).max())
+    np.testing.assert_allclose(
+        np.linalg.solve(moved.toarray(), right), dense, rtol=1e-6, atol=1e-8 * np.abs(dense).max()
+    )
 
 
 def test_the_table_has_every_method_three_points_and_both_orders(grid):
