@@ -64,12 +64,18 @@ def ragged(side: int, *, seed: int = 0) -> Mesh:
     return Mesh(points, triangles[(sides <= 2.6).all(axis=1)])
 
 
-def two_hexagonal_holes(radius: int = 4) -> Mesh:
-    """A hexagon of the triangular lattice without two of its inner vertices: tri-connected, and h = 2."""
+def hexagon(radius: int) -> Mesh:
+    """The vertices of the triangular lattice at most `radius` steps from the origin."""
     i, j = np.meshgrid(np.arange(-radius, radius + 1), np.arange(-radius, radius + 1))
     inside = np.abs(i + j) <= radius
     points = np.column_stack([(i + j / 2)[inside], (np.sqrt(3) / 2 * j)[inside]])
-    triangles = counter_clockwise(points, Delaunay(points).simplices)
-    gone = np.flatnonzero((np.abs(points[:, 1]) < 1e-9) & (np.abs(np.abs(points[:, 0]) - 2) < 1e-9))
-    used, local = np.unique(triangles[~np.isin(triangles, gone).any(axis=1)], return_inverse=True)
-    return Mesh(points[used], local.reshape(-1, 3).astype(np.int64))
+    return Mesh(points, counter_clockwise(points, Delaunay(points).simplices))
+
+
+def two_hexagonal_holes() -> Mesh:
+    """A hexagon of the triangular lattice without two of its inner vertices: tri-connected, and h = 2."""
+    mesh = hexagon(4)
+    p = mesh.points
+    gone = np.flatnonzero(np.hypot(np.abs(p[:, 0]) - 2, p[:, 1]) < 0.5)
+    used, local = np.unique(mesh.triangles[~np.isin(mesh.triangles, gone).any(axis=1)], return_inverse=True)
+    return Mesh(p[used], local.reshape(-1, 3).astype(np.int64))

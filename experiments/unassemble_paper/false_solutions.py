@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lstsq
 from scipy.optimize import brentq
-from scipy.spatial import Delaunay
 
 from unassemble.paper.equations import AngleSystem
 
 from .cases import Case, case_of
-from .examples import perforated
-from .meshes import Mesh, counter_clockwise
+from .examples import hexagon, perforated
+from .meshes import Mesh
 from .tables import Cell, Table, table
 
 WHEEL = ((3, 0), (3, 1), (2, 2), (-3, 1), (-1, -2))
@@ -29,11 +28,9 @@ _SAME, _EXACT = 1e-3, 1e-12  # radians up to which angles are the mesh's (it is 
 
 def shaken_hexagon(seed: int) -> Mesh:
     """19 vertices of a triangular lattice, each moved by up to a fifth of a side in x and in y."""
-    i, j = np.meshgrid(np.arange(-2, 3), np.arange(-2, 3))
-    inside = np.abs(i + j) <= 2
-    lattice = np.column_stack([(i + j / 2)[inside], (np.sqrt(3) / 2 * j)[inside]])
-    shaken = lattice + 0.2 * np.random.default_rng(seed).uniform(-1, 1, lattice.shape)
-    return Mesh(shaken, counter_clockwise(lattice, Delaunay(lattice).simplices))
+    mesh = hexagon(2)
+    move = np.random.default_rng(seed).uniform(-1, 1, mesh.points.shape)
+    return Mesh(mesh.points + 0.2 * move, mesh.triangles)
 
 
 def exact_root(system: AngleSystem, x: NDArray, *, steps: int = 40) -> NDArray[np.float64] | None:

@@ -1,4 +1,4 @@
-"""With c unknown the equations (1)-(4) have exact solutions that are no meshes, without holes as well (docs/paper.md)."""
+"""With c unknown the equations (1)-(4) have exact solutions that are no meshes, even without holes (docs/paper.md)."""
 
 import numpy as np
 import pytest
