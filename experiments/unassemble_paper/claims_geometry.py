@@ -33,7 +33,7 @@ def _theorem_1() -> Claim:
     counts = case_of(two_hexagonal_holes(), "hexagon").corners.counts
     return Claim(
         "theorem-1", "2.3", "Theorem 1: e + m + w >= 3m for any planar mesh",
-        f"0 to 4 holes: {each(surplus, '{:+d}')}; a tri-connected mesh with two holes of six edges has "
+        f"0 to 4 holes: the surplus is {each(surplus)}; a tri-connected mesh with two holes of six edges has "
         f"{counts.equations} equations for {counts.unknowns} angles", "fails",
         "e + m + w - 3m = 1 - h. The base case of the proof fills a hole of four edges without counting it.",
         (*map(float, surplus), float(counts.equations), float(counts.unknowns)),

@@ -47,8 +47,12 @@ class Embeddings:
 
     @property
     def root(self) -> int:
-        """The first triangle in the middle: by triangles turned over after BFS-Embedding, then by its error."""
+        """The first triangle in the middle of those from which BFS-Embedding is not planar, as in the paper's figures.
+
+        By triangles turned over, then by error.
+        """
         order = np.lexsort((self.errors[BFS], self.turned[BFS]))
+        order = order[self.turned[BFS][order] > 0]
         return int(order[len(order) // 2])
 
     def shown(self, name: str) -> NDArray[np.complex128]:

@@ -115,14 +115,14 @@ def figure_8(ellipse: Histories, rocket: Histories, folder: Path) -> Path:
 
 
 def _embedding(found: Embeddings, method: str, number: int, folder: Path) -> Path:
-    """One embedding, from the first triangle in the middle of the distribution."""
+    """One embedding, from the first triangle of :attr:`Embeddings.root`."""
     turned, errors = found.turned[method], found.errors[method]
     figure, axes = plt.subplots(figsize=(5.4, 5.6), layout="constrained")
     draw_mesh(axes, found.shown(method), found.case.piece.triangles, mark=True)
     axes.set_title(
         f"Figure {number}. {method}, angles off by up to {found.run.angle_error:.0e}:\n"
-        f"{turned[found.root]} triangles turned over, error {errors[found.root]:.1g} of the diameter\n"
-        f"(median of {len(turned)} first triangles {np.median(turned):.0f}, at most {turned.max()})",
+        f"{turned[found.root]} turned over, error {errors[found.root]:.1g} of the diameter\n"
+        f"(of {len(turned)} first triangles {(turned > 0).mean():.0%} turn some over, {turned.max()} at most)",
         fontsize=10,
     )
     return _save(figure, folder / f"figure{number:02d}.png")

@@ -1,21 +1,13 @@
-"""Tables as data, as Markdown, and in the page that shows them.
-
-``python -m unassemble_paper.tables PAGE RESULTS`` writes the tables of a results.json into a page, each between
-``<!-- table: NAME -->`` and ``<!-- end of table -->``.
-"""
+"""Tables as data and as Markdown."""
 
 from __future__ import annotations
 
 import json
-import re
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 Cell = str | int | float | None
-
-_PLACE = re.compile(r"(<!-- table: ([\w-]+) -->\n).*?(<!-- end of table -->)", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -51,18 +43,6 @@ def read(results: Path) -> list[Table]:
     return [table(**item) for item in json.loads(results.read_text(encoding="utf-8"))["tables"]]
 
 
-def filled(page: str, tables: Iterable[Table]) -> str:
-    """A page with its tables replaced.
-
-    Raises
-    ------
-    KeyError
-        If the page has a place for a table that does not exist.
-    """
-    texts = {t.name: t.markdown() for t in tables}
-    return _PLACE.sub(lambda place: f"{place[1]}\n{texts[place[2]]}\n{place[3]}", page)
-
-
 def _shown(cell: Cell) -> str:
     if cell is None:
         return "–"
@@ -78,8 +58,3 @@ def _scientific(number: float) -> str:
         return f"{number:.0f}"
     digits, power = f"{number:.0e}".split("e")
     return f"{digits}e{int(power)}"
-
-
-if __name__ == "__main__":
-    page, results = map(Path, sys.argv[1:])
-    page.write_text(filled(page.read_text(encoding="utf-8"), read(results)), encoding="utf-8")

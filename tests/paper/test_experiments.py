@@ -10,8 +10,9 @@ import pytest
 from unassemble.planar.conformal import conformal_map
 from unassemble_paper import regenerate
 from unassemble_paper.cases import Case
+from unassemble_paper.page import filled
 from unassemble_paper.regenerate import LONGER
-from unassemble_paper.tables import filled, read, table
+from unassemble_paper.tables import read, table
 
 DOCS = Path(__file__).parents[2] / "docs"
 RESULTS = DOCS / "_static" / "paper" / "results.json"
@@ -39,7 +40,7 @@ def test_files(made):
 
 
 def test_the_page_shows_the_results():
-    """`python -m unassemble_paper.tables docs/paper.md docs/_static/paper/results.json` changes nothing."""
+    """`python -m unassemble_paper.page docs/paper.md docs/_static/paper/results.json` changes nothing."""
     page, tables = (DOCS / "paper.md").read_text(encoding="utf-8"), read(RESULTS)
     assert filled(page, tables) == page
     for t in tables:
