@@ -1,5 +1,5 @@
 """The paper's figures and claims, measured again."""
 
-from .regenerate import Regenerated, claims_table, comparison_table, measure, regenerate
+from .regenerate import Regenerated, measure, regenerate
 
-__all__ = ["Regenerated", "claims_table", "comparison_table", "measure", "regenerate"]
+__all__ = ["Regenerated", "measure", "regenerate"]

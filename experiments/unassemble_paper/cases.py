@@ -73,7 +73,7 @@ class Case:
 
     def run(
         self,
-        forcing: str,
+        forcing: str | float,
         *,
         start: str = "equal",
         tolerance: float = 1e-6,
@@ -82,10 +82,11 @@ class Case:
         sines: bool = False,
         unknowns: Unknowns = "cotangents",
         inner: str = "cgls",
+        damped: bool = False,
     ) -> Run:
         """Solve the angle equations, from c = 1."""
         system = self.system(scale_free=scale_free, sines=sines, unknowns=unknowns)
-        options = NewtonOptions(forcing, inner, tolerance=tolerance, max_products=max_products)  # type: ignore[arg-type]
+        options = NewtonOptions(forcing, inner, tolerance=tolerance, max_products=max_products, damped=damped)  # type: ignore[arg-type]
         result = solve(system, system.pack(start_angles(self.piece, self.weights, start)), options)
         angles = system.angles(result.x)
         return Run(result, angles, float(np.abs(angles - self.angles).max()))

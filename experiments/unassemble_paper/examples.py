@@ -17,9 +17,13 @@ def wheel(radii: NDArray) -> Mesh:
     """
     k = len(radii)
     rim = np.asarray(radii) * np.exp(2j * np.pi * np.arange(k) / k)
-    points = np.vstack([[0.0, 0.0], np.column_stack([rim.real, rim.imag])])
-    i = np.arange(k)
-    return Mesh(points, np.column_stack([np.zeros(k, np.int64), 1 + i, 1 + (i + 1) % k]))
+    return wheel_of(np.column_stack([rim.real, rim.imag]))
+
+
+def wheel_of(rim: NDArray) -> Mesh:
+    """A hub at the origin and rim points (k, 2) counter-clockwise about it."""
+    k, i = len(rim), np.arange(len(rim))
+    return Mesh(np.vstack([[0.0, 0.0], rim]), np.column_stack([np.zeros(k, np.int64), 1 + i, 1 + (i + 1) % k]))
 
 
 def spiral_angles(k: int, twist: float) -> NDArray[np.float64]:
@@ -48,3 +52,30 @@ def perforated(side: int, holes: int, *, seed: int = 0) -> Mesh:
         kept &= np.hypot(centre[:, 0] - x, centre[:, 1] - y) > 1.3
     used, local = np.unique(triangles[kept], return_inverse=True)
     return Mesh(grid[used], local.reshape(-1, 3).astype(np.int64))
+
+
+def ragged(side: int, *, seed: int = 0) -> Mesh:
+    """A lattice with all points shaken by up to 0.3: thin triangles along the boundary, up to sides of 2.6."""
+    rng = np.random.default_rng(seed)
+    grid = np.stack(np.meshgrid(np.arange(side), np.arange(side)), -1).reshape(-1, 2)
+    points = grid + rng.uniform(-0.3, 0.3, grid.shape)
+    triangles = counter_clockwise(points, Delaunay(points).simplices)
+    sides = np.linalg.norm(points[triangles] - points[np.roll(triangles, 1, axis=1)], axis=2)
+    return Mesh(points, triangles[(sides <= 2.6).all(axis=1)])
+
+
+def hexagon(radius: int) -> Mesh:
+    """The vertices of the triangular lattice at most `radius` steps from the origin."""
+    i, j = np.meshgrid(np.arange(-radius, radius + 1), np.arange(-radius, radius + 1))
+    inside = np.abs(i + j) <= radius
+    points = np.column_stack([(i + j / 2)[inside], (np.sqrt(3) / 2 * j)[inside]])
+    return Mesh(points, counter_clockwise(points, Delaunay(points).simplices))
+
+
+def two_hexagonal_holes() -> Mesh:
+    """A hexagon of the triangular lattice without two of its inner vertices: tri-connected, and h = 2."""
+    mesh = hexagon(4)
+    p = mesh.points
+    gone = np.flatnonzero(np.hypot(np.abs(p[:, 0]) - 2, p[:, 1]) < 0.5)
+    used, local = np.unique(mesh.triangles[~np.isin(mesh.triangles, gone).any(axis=1)], return_inverse=True)
+    return Mesh(p[used], local.reshape(-1, 3).astype(np.int64))

@@ -1,4 +1,4 @@
-"""The paper's Figures 3 to 12, drawn again."""
+"""The paper's Figures 2 to 12, drawn again."""
 
 from __future__ import annotations
 
@@ -16,9 +16,32 @@ from numpy.typing import NDArray
 
 from .cases import Case, Run
 from .convergence import Histories
-from .embeddings import Embedded
+from .embeddings import BFS, SMOOTHED, Embeddings
+from .examples import wheel
 
 INK, ACCENT, SECOND, THIRD, WRONG = "#22303c", "#0072b2", "#d55e00", "#009e73", "#d62728"
+
+
+def all_figures(
+    cases: tuple[Case, ...], runs: dict[str, Histories], embedded: dict[str, Embeddings], folder: Path
+) -> list[Path]:
+    """Draw them all."""
+    files = [figure_2(folder), figure_3(cases, folder), *figures_4_to_6(cases, folder)]
+    files += [figure_7(runs["square"], folder), figure_8(runs["ellipse"], runs["rocket"], folder)]
+    for name, numbers in (("rocket", (9, 11)), ("square", (10, 12))):
+        for number, method in zip(numbers, (BFS, SMOOTHED), strict=True):
+            files.append(_embedding(embedded[name], method, number, folder))
+    return files
+
+
+def figure_2(folder: Path) -> Path:
+    """Two meshes whose boundary entries are the same."""
+    figure, both = plt.subplots(1, 2, figsize=(7.6, 3.9), layout="constrained")
+    for axes, radii in zip(both, ([1.0] * 7, [1.0, 1.6, 1.2, 0.7, 1.4, 1.1, 1.5]), strict=True):
+        mesh = wheel(np.array(radii))
+        draw_mesh(axes, mesh.points @ np.array([1, 1j]), mesh.triangles)
+    figure.suptitle("Figure 2. All angles that face the boundary are 360/7 degrees in both", fontsize=10)
+    return _save(figure, folder / "figure02.png")
 
 
 def figure_3(cases: tuple[Case, ...], folder: Path) -> Path:
@@ -91,25 +114,17 @@ def figure_8(ellipse: Histories, rocket: Histories, folder: Path) -> Path:
     return _save(figure, folder / "figure08.png")
 
 
-def figures_9_to_12(
-    case: Case, run: Run, found: dict[str, Embedded], numbers: tuple[int, int], folder: Path
-) -> list[Path]:
-    """BFS-Embedding, and Modified BFS with Coordinate-Smoothing, of the same rough angles, beside today's layout."""
-    angle = f"largest angle error {run.angle_error:.0e}, residual {run.residual:.0e}"
-    pairs = ((numbers[0], "BFS-Embedding"), (numbers[1], "Modified BFS, Coordinate-Smoothing"))
-    return [
-        _embedding(case, found[name], found["least-squares layout"], number, angle, folder) for number, name in pairs
-    ]
-
-
-def _embedding(case: Case, shown: Embedded, layout: Embedded, number: int, angle: str, folder: Path) -> Path:
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10.4, 5.6), layout="constrained", sharex=True, sharey=True)
-    for axes, item in ((left, shown), (right, layout)):
-        draw_mesh(axes, item.z, case.piece.triangles, mark=True)
-        axes.set_title(
-            f"{item.method}\nerror {item.error:.1e} of the diameter, {item.turned} triangles turned over", fontsize=10
-        )
-    figure.suptitle(f"Figure {number}. Mesh of Figure {case.figure}, {angle}", fontsize=11)
+def _embedding(found: Embeddings, method: str, number: int, folder: Path) -> Path:
+    """One embedding, from the first triangle of :attr:`Embeddings.root`."""
+    turned, errors = found.turned[method], found.errors[method]
+    figure, axes = plt.subplots(figsize=(5.4, 5.6), layout="constrained")
+    draw_mesh(axes, found.shown(method), found.case.piece.triangles, mark=True)
+    axes.set_title(
+        f"Figure {number}. {method}, angles off by up to {found.run.angle_error:.0e}:\n"
+        f"{turned[found.root]} turned over, error {errors[found.root]:.1g} of the diameter\n"
+        f"(of {len(turned)} first triangles {(turned > 0).mean():.0%} turn some over, {turned.max()} at most)",
+        fontsize=10,
+    )
     return _save(figure, folder / f"figure{number:02d}.png")
 
 
@@ -146,6 +161,6 @@ def _finish_history(axes: Axes, title: str) -> None:
 
 
 def _save(figure: Figure, path: Path) -> Path:
-    figure.savefig(path, dpi=130)
+    figure.savefig(path, dpi=100)
     plt.close(figure)
     return path

@@ -124,6 +124,11 @@ class ScalarOptions:
         if self.noise is not None and not (_number("noise", self.noise) and self.noise > 0):
             raise InputError(f"`noise` is a positive standard deviation, not {self.noise}")
 
+    @property
+    def polished(self) -> bool:
+        """Whether positions are polished; those of the angles are not, so that a verdict on them is their own."""
+        return self.refine and self.method == "conformal"
+
 
 def listed_anchors(anchors: Any) -> tuple[tuple[Any, ...], ...]:
     """Anchors as (row, x, y) or (row, x, y, z), rows as int where they are whole; arrays are taken row by row.

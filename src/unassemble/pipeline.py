@@ -64,7 +64,8 @@ def recover(
     method : {None, "conformal", "angles"}
         How positions are found: by the conformal null vector, the default, or by the 2002 paper's equations for angles.
     refine : bool
-        Polish the positions by Gauss-Newton to the level that the entries allow.
+        Polish the positions by Gauss-Newton to the level that the entries allow; not those of ``"angles"``, whose
+        verdict is their own.
     scale : float, optional
         c, where it is known.
     noise : float, optional

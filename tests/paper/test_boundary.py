@@ -12,7 +12,7 @@ from unassemble.paper.harmonic import HarmonicReduction, tube_triangles
 from unassemble.paper.parts import part
 from unassemble.paper.starts import angles_of
 from unassemble.paper.substitution import cotangents_of, substitution
-from unassemble_paper.claims import perturbed_boundary
+from unassemble_paper.claims_geometry import perturbed_boundary
 from unassemble_paper.examples import wheel
 from unassemble_paper.ranks import Ranks
 

@@ -9,6 +9,7 @@ from unassemble.paper.layout import corner_equations, least_squares_layout
 from unassemble.paper.smoothing import coordinate_smoothing, law_of_sines
 from unassemble.paper.starts import angles_of
 from unassemble.paper.validity import inverted, signed_angles, violations
+from unassemble_paper.multilevel import multilevel_embedding
 
 
 @pytest.mark.parametrize("averaging", [False, True])
@@ -26,6 +27,16 @@ def test_layout_is_exact_for_exact_angles(paper_case):
     z = least_squares_layout(paper_case.piece, paper_case.angles)
     assert distance(z, paper_case.truth) < 1e-12
     assert np.abs(corner_equations(paper_case.piece, paper_case.angles) @ paper_case.truth).max() < 1e-12
+
+
+def test_patches_joined_two_by_two(paper_case):
+    """The multilevel embedding: exact for exact angles, in few levels, and far better than BFS-Embedding for others."""
+    z, levels = multilevel_embedding(paper_case.piece, paper_case.angles)
+    assert distance(z, paper_case.truth) < 1e-13
+    assert levels <= 2 + np.log2(len(paper_case.angles) / 3)
+    rough = paper_case.angles + 1e-3 * np.random.default_rng(0).standard_normal(paper_case.angles.size)
+    z, _ = multilevel_embedding(paper_case.piece, rough)
+    assert distance(z, paper_case.truth) < 0.3 * distance(bfs_embedding(paper_case.piece, rough), paper_case.truth)
 
 
 def test_every_triangle_is_entered_through_an_earlier_one(paper_case):

@@ -55,7 +55,7 @@ def test_holes(assemble, holes):
 
 
 def test_loop_equations_from_the_options(paper_case):
-    found = recover_angles(paper_case.piece, paper_case.weights, options=AngleOptions(outer="longest"))
+    found = recover_angles(paper_case.piece, paper_case.weights, options=AngleOptions(outer="auto"))
     assert found.converged
     assert distance(found.z, paper_case.truth) < 1e-8
 
@@ -85,7 +85,7 @@ def test_ten_thousand_vertices(assemble):
     large = assemble(perforated(100, 4))
     found = recover_angles(large.piece, large.weights)
     assert found.converged
-    assert found.products < 2_500
+    assert found.products < 3_000
     assert distance(found.z, large.truth) < 1e-7
 
 

@@ -1,5 +1,6 @@
 """What the paper gets wrong or leaves open: proofs are in docs/paper.md, counter-examples here."""
 
+import networkx
 import numpy as np
 import pytest
 from skfem import Basis, BilinearForm, ElementTriP1, MeshTri
@@ -14,8 +15,17 @@ from unassemble.paper.newton import NewtonOptions
 from unassemble.paper.nullspace import deficiency
 from unassemble.paper.validity import violations
 from unassemble_paper.cases import case_of
-from unassemble_paper.examples import perforated, spiral_angles, wheel
+from unassemble_paper.examples import perforated, spiral_angles, two_hexagonal_holes, wheel
 from unassemble_paper.meshes import Mesh
+
+
+def test_theorem_1_fails_on_a_tri_connected_mesh_without_loops_of_four(assemble):
+    """All that section 2.2 asks: the hole of the proof's base case cannot be said to be excluded."""
+    example = assemble(two_hexagonal_holes())
+    assert networkx.node_connectivity(networkx.Graph(example.piece.edges.tolist())) == 3
+    assert sorted(example.corners.loop_lengths) == [6, 6, 24]
+    assert np.abs(example.weights).min() > 0.1
+    assert example.corners.counts.surplus == -1
 
 
 @pytest.mark.parametrize("holes", [0, 1, 2, 3, 4])
@@ -111,13 +121,19 @@ def other_solution(example):
 
 @pytest.mark.parametrize(("side", "holes"), [(9, 1), (11, 2), (13, 3)])
 def test_with_a_hole_and_c_unknown_there_are_other_solutions(assemble, side, holes):
-    """Exact solutions of (1)-(4) that belong to no mesh, with the paper's c above its true value."""
+    """Exact solutions of (1)-(4) that belong to no mesh, with the paper's c above its true value.
+
+    J has as many rows as unknowns less holes, and full rank there: they come in a family of that dimension.
+    """
     example = assemble(perforated(side, holes))
     system, x, moved = other_solution(example)
     assert np.linalg.norm(system.residual(x)) < 1e-12
     assert moved > 1e-3
     assert x[:-1].min() > 0
     assert x[-1] - 1 > 1e-7  # the inequality says c >= 1
+    values = np.linalg.svd(system.jacobian(x).sparse().toarray(), compute_uv=False)
+    assert len(values) == system.n_unknowns - holes
+    assert values[-1] > 1e-7
     assert violations(example.piece, example.corners, x[:-1]).embedding > 1e-3
 
 

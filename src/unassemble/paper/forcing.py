@@ -19,7 +19,7 @@ def powers(base: float) -> Forcing:
 
 
 def exact(tolerance: float = 1e-10) -> Forcing:
-    """The same small number always: Newton's method (7)."""
+    """The same number always: Newton's method (7), if it is small."""
 
     def eta(norms: Sequence[float], previous: float) -> float:
         return tolerance
@@ -49,8 +49,10 @@ FORCINGS: dict[str, Forcing] = {
 }
 
 
-def forcing(name: str) -> Forcing:
-    """Look a forcing term up by its name."""
+def forcing(name: str | float) -> Forcing:
+    """Look a forcing term up by its name; a number is the same tolerance always."""
+    if isinstance(name, float):
+        return exact(name)
     if name not in FORCINGS:
         raise InputError(f"there is no forcing term {name!r}; the choices are {', '.join(FORCINGS)}")
     return FORCINGS[name]

@@ -29,8 +29,8 @@ class NewtonOptions:
 
     Attributes
     ----------
-    forcing : {"newton", "2^-i", "1.1^-i", "eisenstat-walker"}
-        How accurately each step is solved for; "newton" is (7) itself.
+    forcing : {"newton", "2^-i", "1.1^-i", "eisenstat-walker"} or float
+        How accurately each step is solved for; "newton" is (7) itself, with 1e-10. A number is the same always.
     inner : {"cgls", "lsqr", "bicg"}
         The Krylov method; bicg works on the square system of picked interior equations.
     square : {"interior", "edges"}
@@ -45,7 +45,7 @@ class NewtonOptions:
         Give up when |F| exceeds this many times its first value.
     """
 
-    forcing: str = "1.1^-i"
+    forcing: str | float = "1.1^-i"
     inner: Inner = "cgls"
     square: Literal["interior", "edges"] = "interior"
     tolerance: float = 1e-6
@@ -85,6 +85,14 @@ class History:
         """Krylov steps until |F| had fallen by this factor; None if it never had."""
         reached = np.flatnonzero(self.residuals <= reduction * self.residuals[0])
         return int(self.inner_steps[reached[0]]) if len(reached) else None
+
+    def continued(self, other: History) -> History:
+        """Its steps, and those of another that started where it ended."""
+        return History(
+            np.r_[self.residuals, other.residuals[1:]],
+            np.r_[self.inner_steps, self.inner_steps[-1] + other.inner_steps[1:]],
+            np.r_[self.factors, other.factors[1:]],
+        )
 
 
 @dataclass(frozen=True, eq=False)

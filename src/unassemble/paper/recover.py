@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -14,12 +14,15 @@ from .bfs import bfs_embedding
 from .corners import corners_of
 from .equations import AngleSystem, Unknowns
 from .layout import least_squares_layout
-from .newton import History, NewtonOptions, solve
+from .newton import History, NewtonOptions, NewtonResult, solve
 from .smoothing import coordinate_smoothing
 from .starts import start_angles
+from .validity import signed_angles
 
 Embedding = Literal["layout", "bfs", "modified-bfs", "smoothing"]
 EMBEDDINGS = ("layout", "bfs", "modified-bfs", "smoothing")
+
+_ROUGH = 1e-3  # of the first residual: what the iteration reaches within a hundred inner steps
 
 
 @dataclass(frozen=True)
@@ -32,9 +35,12 @@ class AngleOptions:
     start : {"equal", "barycentric", "weighted"}
     sines : bool
         Products of sines about interior vertices (paper's references [5, 10]). Without them the Jacobian is singular
-        at the solution of many meshes, all three of the paper's among them, and the angles keep few digits.
-    outer : int or "longest" or None
-        Add the loop equations, with this loop as the outer one. A wrong choice has no solution.
+        at the solution of many meshes, all three of the paper's among them, and the angles keep few digits; and with c
+        unknown there are solutions that are no meshes.
+    outer : int or "auto" or None
+        Add the loop equations, with this loop as the outer one; a wrong choice has no solution. "auto" adds them where
+        there is a hole, and asks a rough solution without them which loop is the outer one. None is the paper's choice:
+        with c unknown it leaves a family of solutions of as many dimensions as there are holes.
     embedding : {"layout", "bfs", "modified-bfs", "smoothing"}
         "smoothing" is Coordinate-Smoothing after Modified BFS-Embedding.
     newton : NewtonOptions
@@ -44,7 +50,7 @@ class AngleOptions:
     unknowns: Unknowns = "cotangents"
     start: Literal["equal", "barycentric", "weighted"] = "equal"
     sines: bool = True
-    outer: int | Literal["longest"] | None = None
+    outer: int | Literal["auto"] | None = "auto"
     embedding: Embedding = "layout"
     newton: NewtonOptions = field(default_factory=lambda: NewtonOptions(tolerance=1e-10, damped=True))
 
@@ -74,6 +80,8 @@ class AngleRecovery:
         One sentence.
     products : int
         With the Jacobian and with its transpose.
+    warnings : tuple of str
+        What a converged iteration does not show.
     """
 
     z: NDArray[np.complex128]
@@ -83,6 +91,7 @@ class AngleRecovery:
     converged: bool
     status: str
     products: int
+    warnings: tuple[str, ...] = ()
 
 
 def recover_angles(
@@ -117,20 +126,51 @@ def recover_angles(
         weights / unit,
         unknowns=options.unknowns,
         scale_free=scale is None,
-        outer=int(np.argmax(np.diff(piece.loop_offsets))) if options.outer == "longest" else options.outer,
+        outer=options.outer if isinstance(options.outer, int) else None,
         sines=options.sines,
     )
-    result = solve(system, system.pack(start), options.newton)
+    if options.outer == "auto" and piece.n_loops > 1:
+        system, result = _with_loops(system, system.pack(start), options.newton)
+    else:
+        result = solve(system, system.pack(start), options.newton)
     angles = system.angles(result.x).reshape(-1, 3)
     factor = system.factor(result.x)
+    z = embed(piece, angles, options.embedding)
     return AngleRecovery(
-        z=embed(piece, angles, options.embedding),
+        z=z,
         angles=angles,
         scale=unit / factor if factor else np.inf,
         history=result.history,
         converged=result.converged,
         status=result.status,
         products=result.products,
+        warnings=() if options.sines or scale is not None else (_may_be_none(piece, angles, z),),
+    )
+
+
+def _with_loops(system: AngleSystem, start: NDArray, options: NewtonOptions) -> tuple[AngleSystem, NewtonResult]:
+    """The system with loop equations, and its solution.
+
+    The angle sums of an outer loop and of a hole differ by 4 pi, so that angles of a digit or two tell which is which.
+    """
+    first = float(np.linalg.norm(system.residual(start)))
+    rough = solve(system, start, replace(options, tolerance=max(options.tolerance, _ROUGH * first)))
+    if not rough.converged:
+        return system, rough
+    sums = system.sum_over_loops(system.angles(rough.x)) / np.pi - system.corners.loop_lengths
+    system = replace(system, outer=int(np.argmin(sums)))
+    result = solve(system, rough.x, options)
+    return system, replace(
+        result, history=rough.history.continued(result.history), products=rough.products + result.products
+    )
+
+
+def _may_be_none(piece: Piece, angles: NDArray, z: NDArray) -> str:
+    """The warning that a solution need not be a mesh, and how far it is from one."""
+    apart = float(np.abs(signed_angles(z, piece.triangles) - angles).max())
+    return (
+        "with c unknown and without the products of sines the equations have solutions that are no meshes; the angles "
+        f"of these positions differ from those found by up to {apart:.1e}"
     )
 
 

@@ -85,7 +85,7 @@ def _recovered(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:
             deviations = coordinate_deviations(solved, task, placed.positions)
     written = _held_against(stored, solved, placed.mesh, placed.points, task) if placed.origins.any() else near
     findings = Findings(
-        stored, solved, placed.mesh, placed.origins, near, written, evidence, not free_scale, task.options.refine
+        stored, solved, placed.mesh, placed.origins, near, written, evidence, not free_scale, task.options.polished
     )
 
     def other_meshes() -> tuple[list[Alternative], str]:

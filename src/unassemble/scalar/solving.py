@@ -103,7 +103,7 @@ def solve(
     RecoveryError
         If no piece has positions.
     """
-    method, refine, scale, noise = task.options.method, task.options.refine, task.scale, task.noise
+    method, refine, scale, noise = task.options.method, task.options.polished, task.scale, task.noise
     lone = lone_triangles(topology.pieces, -matrix.entries, scale) if method == "conformal" else {}
 
     drowning = refine and noise is not None and not noise.digits  # rounding to a few digits does not
@@ -131,8 +131,8 @@ def solve(
     if doubtful.any():
         with clock("faces"), blas_threads(1):  # hundreds of small readings
             matrix, topology, outcomes = completed(matrix, topology, attempt, doubtful, scale)
-            # The search leaves c free in its solves, stops early and knows one method.
-            if scale is not None or not refine or method != "conformal":
+            # The search leaves c free in its solves, stops early and knows one method, which is polished.
+            if scale is not None or not refine:
                 found = zip(topology.pieces, outcomes, strict=True)
                 outcomes = [mesh if _is_spoilt(mesh) else attempt(piece) for piece, mesh in found]
     else:
@@ -232,7 +232,7 @@ def _start(
 
 
 def _by_angles(piece: Piece, weights: NDArray, scale: float | None) -> PieceMesh:
-    """The method of the 2002 paper."""
+    """The method of the 2002 paper, with the constraint of its references [5, 10]."""
     from ..paper import recover_angles
 
     found = recover_angles(piece, weights, scale=scale)
