@@ -162,7 +162,10 @@ class _Judged:
         for piece, inside in zip(placed.topology.pieces, placed.meshes, strict=True):
             if inside.determined.any():
                 rows.append(piece.edge_rows[inside.entries])
-                spare.append(int(inside.entries.sum()) - (2 * int(inside.determined.sum()) - (4 if known_scale else 3)))
+                unknowns = 2 * max(int(inside.determined.sum()), 2) - (
+                    4 if known_scale else 3
+                )  # one has no entry
+                spare.append(int(inside.entries.sum()) - unknowns)
         pairs = matrix.edges[np.concatenate(rows)]
         key = found.pairs @ [matrix.n, 1]
         misfit = found.misfits[np.searchsorted(key, pairs @ [matrix.n, 1])]
