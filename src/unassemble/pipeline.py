@@ -14,9 +14,11 @@ from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
 from .operators import VectorReading, about_translations, asked_for, second_reading, vector_valued
 from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, listed_anchors
-from .outputs import PlanarMesh, Recovery
+from .outputs import ConformingMesh, PlanarMesh, Recovery
 from .scalar import recover_scalar
 from .scalar.placement import Placement
+
+_NEAR = 0.1  # backward error of meshes of other elements that are worth showing though they do not fit
 
 
 def recover(
@@ -187,7 +189,7 @@ class _Task:
             if isinstance(error, NotPlanarError) and (why := about_translations(self.matrix)):
                 raise NotPlanarError(f"the graph of the matrix is not planar; {why}", error.witness) from error
             raise
-        if found.certified or not found.node_status.any():
+        if found.certified or not (found.node_status.any() or isinstance(found, ConformingMesh)):
             return found
         other = self._as_second_reading()
         return other if other is not None and other.certified else found
@@ -205,7 +207,32 @@ class _Task:
         if scale is not None:
             _check_proportion(scale, float(np.abs(part.entries).max()))
         placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
-        return recover_scalar(part, placement, self.clock, self.planar)
+        if self.planar.method != "conformal":
+            return recover_scalar(part, placement, self.clock, self.planar)
+        found = self._of_other_elements(part, placement) if len(part.edges) > 3 * part.n else None
+        if found is not None:
+            return found
+        try:
+            linear = recover_scalar(part, placement, self.clock, self.planar)
+        except RecoveryError:
+            found = self._of_other_elements(part, placement)
+            if found is None:
+                raise
+            return found
+        if linear.status != "uncertified":
+            return linear
+        found = self._of_other_elements(part, placement)
+        return found if found is not None and found.certified else linear
+
+    def _of_other_elements(self, part: OperatorMatrix, placement: Placement) -> PlanarMesh | None:
+        """A mesh of other elements than linear triangles; None where none is near."""
+        from .conforming.recover import recover_conforming
+
+        try:
+            found = recover_conforming(part, placement, self.clock, self.planar)
+        except RecoveryError:
+            return None
+        return found if found.certified or found.backward_error < _NEAR else None
 
     def _as_vector(self, reading: VectorReading) -> Recovery:
         from .vector import recover_vector

@@ -1,0 +1,127 @@
+"""Sets of rows that are the nodes of one cell, read off the graph."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..elements.cliques import Graph
+from ..matrix import OperatorMatrix
+from ..tolerances import ROUNDED
+from ..topology.keys import contains, distinct, pair_keys
+
+_AT_ONCE = 10_000_000  # products in one go
+_ABSENT = {4: 0, 6: 3, 8: 4, 9: 6, 10: 9}
+"""Pairs that a cell of so many nodes may lack, because the entry vanishes and is not stored."""
+
+
+@dataclass(frozen=True, eq=False)
+class NodeSets:
+    """Cells as sets of rows.
+
+    Attributes
+    ----------
+    order : int
+        Polynomial degree along a side, which has order + 1 nodes.
+    sets : tuple of (m, k) int64
+        One for each number of nodes; rows increase within a cell.
+    common : Common
+    """
+
+    order: int
+    sets: tuple[NDArray[np.int64], ...]
+    common: Common
+
+
+class Common:
+    """How many neighbours the two rows of each entry have in common, both themselves included.
+
+    Nodes on opposite sides of a cell have those of the cell in common and no others.
+    """
+
+    def __init__(self, matrix: OperatorMatrix):
+        size = matrix.row_size[matrix.edges].min(axis=1)
+        i, j = matrix.edges.T
+        ends = np.concatenate([i, j]), np.concatenate([j, i])
+        self.n = matrix.n
+        self.graph = Graph(sp.csr_array((np.ones(2 * len(i), np.int8), ends), shape=(matrix.n, matrix.n)))
+        self.keys = pair_keys(matrix.n, i, j)
+        self.stored = self.keys[np.abs(matrix.entries) > ROUNDED * size]
+
+    @cached_property
+    def closed(self) -> sp.csr_array:
+        """Neighbours, and the row itself."""
+        return self.graph.closed()
+
+    @cached_property
+    def count(self) -> NDArray[np.int64]:
+        """(e,) of each entry, in the order of its key."""
+        closed = self.closed
+        work = np.cumsum(closed @ np.diff(closed.indptr).astype(np.int64))
+        found = []
+        for rows in np.split(np.arange(self.n), np.searchsorted(work, np.arange(_AT_ONCE, work[-1], _AT_ONCE))):
+            block = closed[rows]
+            common = sp.csr_array((block @ closed).multiply(block))
+            common.sort_indices()
+            row = np.repeat(rows, np.diff(common.indptr))
+            found.append(common.data[common.indices > row])
+        return np.concatenate(found).astype(np.int64)
+
+    def of(self, keys: NDArray) -> NDArray[np.int64]:
+        """Of some pairs; 0 for those without an entry."""
+        place = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
+        return np.where(self.keys[place] == keys, self.count[place], 0)
+
+    def sets(self, k: int) -> NDArray[np.int64]:
+        """(m, k) rows that two of them have in common, nearly all coupled to each other."""
+        keys = self.keys[self.count == k]
+        if not len(keys):
+            return np.empty((0, k), np.int64)
+        both = sp.csr_array(self.closed[keys // self.n].multiply(self.closed[keys % self.n]))
+        both.sort_indices()
+        rows = once(both.indices.reshape(-1, k).astype(np.int64))
+        absent = np.zeros(len(rows), np.int64)
+        for a in range(k):
+            for b in range(a + 1, k):
+                absent += ~contains(self.keys, rows[:, a] * self.n + rows[:, b])
+        return rows[absent <= _ABSENT[k]]
+
+
+def once(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Rows (m, k) of increasing numbers, each once; sorting one number each is several times faster than all."""
+    label = rows.astype(np.uint64) @ np.random.default_rng(0).integers(0, 2**63, rows.shape[1], dtype=np.uint64)
+    return rows[np.sort(np.unique(label, return_index=True)[1])]
+
+
+def pairs_of(n: int, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m, k (k - 1) / 2) keys of all pairs of each cell, in the order of :func:`numpy.triu_indices`."""
+    a, b = np.triu_indices(cells.shape[1], 1)
+    return pair_keys(n, cells[:, a], cells[:, b])
+
+
+def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
+    """Sets that cover all entries, for each order of elements that the graph allows, greatest first.
+
+    Linear ones are quadrilaterals only: triangles beside them follow once diagonals are known.
+    """
+    common = Common(matrix)
+    if not len(common.keys):
+        return
+    for order, sizes in ((3, (10,)), (2, (9, 8, 6))):
+        sets = [found for k in sizes if len(found := common.sets(k))]
+        if sets and _cover(common, sets):
+            yield NodeSets(order, tuple(sets), common)
+    quads = common.sets(4)
+    if len(quads):
+        yield NodeSets(1, (quads,), common)
+
+
+def _cover(common: Common, sets: list[NDArray[np.int64]]) -> bool:
+    """Whether each entry that is not zero belongs to a cell."""
+    covered = distinct(np.concatenate([pairs_of(common.n, cells).ravel() for cells in sets]))
+    return bool(contains(covered, common.stored).all())
