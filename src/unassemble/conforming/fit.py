@@ -19,6 +19,9 @@ from .positions import corner_positions
 
 _ALIKE = 1.01  # ratio of misfits of rules between which only rounding or noise decides
 
+_NEARLY = 10.0  # ratio of misfits of rules that a polish may change
+_ROUNDING = 1e-14  # misfit, relative to c, that leaves nothing to explain
+
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
@@ -98,7 +101,7 @@ def fitted(
     z, c = corner_positions(part, weights, scale)
     straight = _by_best_rule(part, weights, z, c, noise, straight=True)
     if part.degree == 1 or not refine or straight.size < _bent(straight, noise):
-        return _polished(straight, weights, scale, noise) if refine else straight
+        return _settled(straight, scale, noise) if refine else straight
     straight, curved = _polished(straight, weights, scale, noise), None
     for rule in _rules(part, straight=False):
         trial = _polished(_with_rule(part, weights, straight.nodes, c, noise, rule, straight=False), weights, scale, noise)
@@ -112,6 +115,19 @@ def fitted(
     return curved if better else straight
 
 
+def _settled(start: Fitted, scale: float | None, noise: NDArray | None) -> Fitted:
+    """Polished, with the best of those rules that are too much alike to be told apart before."""
+    best = _polished(start, start.weights, scale, noise)
+    if best.size < _ROUNDING:
+        return best
+    for rule in _rules(best.part, straight=best.straight):
+        other = _with_rule(best.part, best.weights, best.z, best.scale, noise, rule, straight=best.straight)
+        if rule != best.rule and other.size < _NEARLY * best.size and not np.array_equal(other.misfit, best.misfit):
+            other = _polished(other, start.weights, scale, noise)
+            best = other if other.size < _ALIKE / 2 * best.size else best
+    return best
+
+
 def _bent(straight: Fitted, noise: NDArray | None) -> float:
     """Misfit beyond which sides may be curved."""
     known = 0.0 if noise is None else 2 * float(np.sqrt(np.mean(noise**2))) / abs(straight.scale)
@@ -119,7 +135,13 @@ def _bent(straight: Fitted, noise: NDArray | None) -> float:
 
 
 def _by_best_rule(
-    part: Part, weights: NDArray, z: NDArray, c: float, noise: NDArray | None, *, straight: bool
+    part: Part,
+    weights: NDArray,
+    z: NDArray,
+    c: float,
+    noise: NDArray | None,
+    *,
+    straight: bool,
 ) -> Fitted:
     """With the quadrature that fits best; of those that fit alike the first."""
     rules = _rules(part, straight=straight)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elements.cliques import Graph
+from ..elements.cliques import Graph, simplices
 from ..matrix import OperatorMatrix
 from ..tolerances import ROUNDED
 from ..topology.keys import contains, distinct, pair_keys
@@ -116,9 +117,67 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
         sets = [found for k in sizes if len(found := common.sets(k))]
         if sets and _cover(common, sets):
             yield NodeSets(order, tuple(sets), common)
-    quads = common.sets(4)
-    if len(quads):
-        yield NodeSets(1, (quads,), common)
+    for quads in _choices(common, common.sets(4)):
+        if _cover(common, [quads]):
+            yield NodeSets(1, (quads,), common)
+        triangles = _beside(common, quads)
+        if len(triangles) and _cover(common, [triangles, quads]):
+            yield NodeSets(1, (triangles, quads), common)
+
+
+def _choices(common: Common, quads: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+    """All of them, or where some overlap in three rows, so that only one of two is a cell, either.
+
+    Two triangles beside a quadrilateral have its diagonal for a pair: with the vertex between them, all are coupled.
+    """
+    if not len(quads):
+        return
+    member = sp.csr_array((np.ones(quads.size, np.int32), quads.ravel(), np.arange(0, quads.size + 1, 4)))
+    overlap = sp.triu(member @ member.T, 1, format="coo")
+    one, other = overlap.row[overlap.data == 3], overlap.col[overlap.data == 3]
+    if not len(one):
+        yield quads
+        return
+    degree = np.diff(common.closed.indptr)[quads].sum(axis=1)
+    fewer = degree[one] <= degree[other]
+    for choice in (fewer, ~fewer):
+        yield np.delete(quads, np.where(choice, other, one), axis=0)
+
+
+def _beside(common: Common, quads: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m, 3) triangles beside quadrilaterals: rows that are all coupled, and all in no quadrilateral.
+
+    Around a vertex of three cells its neighbours are all coupled as well, by diagonals; and of triangles around a
+    vertex the outline is none.
+    """
+    label = np.random.default_rng(1).integers(0, 2**63, common.n, dtype=np.uint64)  # the sum of three tells a triangle
+    halves = label[quads[:, list(combinations(range(4), 3))]].sum(axis=2)
+    triangles = simplices(common.graph, 2)
+    triangles = triangles[~np.isin(label[triangles].sum(axis=1), halves)]
+    if not len(triangles):
+        return triangles
+    keys = pairs_of(common.n, quads)
+    order = np.argsort(keys, axis=None)
+    pairs = pairs_of(common.n, triangles)
+    place = np.minimum(np.searchsorted(keys.ravel(), pairs, sorter=order), len(order) - 1)
+    by_quad = keys.ravel()[order[place]] == pairs
+    within = np.sort(halves, axis=None)
+    known = np.sort(np.concatenate([within, label[triangles].sum(axis=1)]))
+    degree = np.diff(common.closed.indptr)
+    outline = np.zeros(len(triangles), dtype=bool)
+    for k in range(3):
+        for corner in range(4):
+            hub = quads[order[place[:, k]] // keys.shape[1], corner]
+            a, b, c = triangles.T
+            around = np.stack([label[hub] + label[one] + label[other] for one, other in ((a, b), (a, c), (b, c))])
+            lone = degree[hub] == 4 + contains(within, around).sum(axis=0)  # no cells but three
+            new = (triangles != hub[:, None]).all(axis=1)
+            outline |= by_quad[:, k] & new & lone & contains(known, around).all(axis=0)
+    triangles = triangles[~outline]
+    every = np.sort(np.concatenate([pairs_of(common.n, cells).ravel() for cells in (triangles, quads)]))
+    pairs = pairs_of(common.n, triangles)
+    crowded = np.searchsorted(every, pairs, side="right") - np.searchsorted(every, pairs) > 2
+    return triangles[~crowded.all(axis=1)]
 
 
 def _cover(common: Common, sets: list[NDArray[np.int64]]) -> bool:
