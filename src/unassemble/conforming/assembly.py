@@ -10,7 +10,7 @@ Moves that are holomorphic in a cell, sum_l d_l g_l = 0, change nothing: they ar
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 import scipy.sparse as sp
@@ -62,7 +62,7 @@ class Entries:
         """The derivative at z."""
         return EntriesJacobian(self._blocks, self.nodes(z), self.n, spread)
 
-    def _summed(self, z: NDArray, of_pairs) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
+    def _summed(self, z: NDArray, of_pairs: Callable[[NDArray, NDArray], NDArray]) -> NDArray[np.float64]:
         z, total = self.nodes(z), np.zeros(len(self._part.edges))
         for block in self._blocks:
             for some, g, volume in block.at(z):
@@ -84,7 +84,7 @@ class _Block:
             for k, some in enumerate(kind.between, kind.corners):
                 np.add.at(self.local[k], list(some), 1 / len(some))
 
-    def at(self, z: NDArray):  # type: ignore[no-untyped-def]
+    def at(self, z: NDArray) -> Iterator[tuple[slice, NDArray, NDArray]]:
         """Some cells at a time: which, gradients (m, q, k) complex, and weights times det J (m, q)."""
         for first in range(0, len(self.cells), _AT_ONCE):
             some = slice(first, first + _AT_ONCE)
@@ -112,10 +112,10 @@ class EntriesJacobian:
             for some, g, volume in block.at(self._z):
                 pairs = np.conj(_pairs(g, g)) * volume[..., None]
                 value = pairs.transpose(0, 2, 1) @ (g @ block.local)
-                place = np.broadcast_to(block.places[some][:, :, None], value.shape)
-                rows.append(place.astype(np.int32).ravel())
+                row = np.broadcast_to(block.places[some][:, :, None], value.shape)
+                rows.append(row.astype(np.int32).ravel())
                 columns.append(np.broadcast_to(block.moved[some][:, None], value.shape).astype(np.int32).ravel())
-                values.append((value / self.spread[place]).ravel())
+                values.append((value / self.spread[row]).ravel())
             place = np.concatenate(rows), np.concatenate(columns)
             total = total + sp.coo_array((np.concatenate(values), place), shape=total.shape).tocsr()
         blocks = np.stack([total.data.real, -total.data.imag], axis=-1)[:, None]

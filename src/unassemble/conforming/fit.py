@@ -100,14 +100,16 @@ def fitted(
     """
     z, c = corner_positions(part, weights, scale)
     straight = _by_best_rule(part, weights, z, c, noise, straight=True)
-    if part.degree == 1 or not refine or straight.size < _bent(straight, noise):
+    if part.degree == 1 or not refine or straight.size < max(CERTIFIED**0.5, _left_by(noise, c)):
         return _settled(straight, scale, noise) if refine else straight
     straight, curved = _polished(straight, weights, scale, noise), None
     for rule in _rules(part, straight=False):
-        trial = _polished(_with_rule(part, weights, straight.nodes, c, noise, rule, straight=False), weights, scale, noise)
+        trial = _polished(
+            _with_rule(part, weights, straight.nodes, c, noise, rule, straight=False), weights, scale, noise
+        )
         if not trial.entries.flipped(trial.z) and (curved is None or trial.size < curved.size):
             curved = trial
-        if curved is not None and curved.size < _bent(curved, noise):
+        if curved is not None and curved.size < max(ROUNDED, _left_by(noise, c)):
             break
     if curved is None or curved.freedom <= 0:
         return straight
@@ -128,10 +130,9 @@ def _settled(start: Fitted, scale: float | None, noise: NDArray | None) -> Fitte
     return best
 
 
-def _bent(straight: Fitted, noise: NDArray | None) -> float:
-    """Misfit beyond which sides may be curved."""
-    known = 0.0 if noise is None else 2 * float(np.sqrt(np.mean(noise**2))) / abs(straight.scale)
-    return max(CERTIFIED**0.5, known)
+def _left_by(noise: NDArray | None, c: float) -> float:
+    """Misfit that noise may leave."""
+    return 0.0 if noise is None else 2 * float(np.sqrt(np.mean(noise**2))) / abs(c)
 
 
 def _by_best_rule(

@@ -52,7 +52,8 @@ def among_corners(part: Part, weights: NDArray) -> tuple[NDArray[np.int64], NDAr
     whole = sp.csr_array((np.concatenate([-weights, -weights, sums]), place), shape=(n, n))
     to_nodes = part.from_corners()
     reduced = sp.csr_array(to_nodes.T @ (whole @ to_nodes))
-    keys = distinct(np.concatenate([pairs_of(c, cells[:, : kind.corners]).ravel() for kind, cells in part.blocks.items()]))
+    pairs = [pairs_of(c, cells[:, : kind.corners]).ravel() for kind, cells in part.blocks.items()]
+    keys = distinct(np.concatenate(pairs))
     edges = np.column_stack([keys // c, keys % c])
     return edges, -np.asarray(reduced[edges[:, 0], edges[:, 1]]).ravel()
 

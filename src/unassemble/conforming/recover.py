@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +28,8 @@ from ..topology import Topology
 from .deviations import deviations_of
 from .fit import Fitted, fitted
 from .parts import Part, parts_of, reversal
-from .roles import ordered_cells
-from .sets import NodeSets, node_sets
+from .roles import Cells, ordered_cells
+from .sets import node_sets
 from .verdict import verdict
 
 
@@ -46,9 +48,9 @@ def recover_conforming(
     task = Task(options=options, placement=placement, noise=Noise.known(stored, options.noise))
     nearest: ConformingMesh | None = None
     failure: Exception = TopologyError("no sets of rows that are coupled to each other are cells of any known element")
-    for sets in node_sets(stored):
+    for cells in shown_cells(stored):
         try:
-            found = _recovered(stored, sets, clock, task)
+            found = _recovered(stored, cells, clock, task)
         except (TopologyError, GeometryError, SolverError) as error:
             failure = error
             continue
@@ -61,9 +63,15 @@ def recover_conforming(
     return nearest
 
 
-def _recovered(stored: OperatorMatrix, sets: NodeSets, clock: Clock, task: Task) -> ConformingMesh:
+def shown_cells(stored: OperatorMatrix) -> Iterator[Cells]:
+    """Cells that the rows may form, the likeliest first."""
+    for sets in node_sets(stored):
+        with suppress(TopologyError):
+            yield from ordered_cells(stored, sets)
+
+
+def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -> ConformingMesh:
     with clock("cells"):
-        cells = ordered_cells(stored, sets)
         parts = parts_of(stored.n, cells.blocks)
     topology = Topology(stored.n, stored.edges, tuple(part.piece for part in parts), "cliques")
     with clock("positions"):
@@ -157,9 +165,9 @@ class _Joined:
         self.blocks = {name: np.concatenate(some) for name, some in blocks.items()}
         self.piece = {name: np.concatenate(some) for name, some in pieces.items()}
 
-    def fields(self) -> dict[str, NDArray]:
+    def fields(self) -> dict[str, Any]:
         """Cells and boundary under the names that results have."""
-        fields: dict[str, NDArray] = {}
+        fields: dict[str, Any] = {}
         for name, cells in self.blocks.items():
             corners = 3 if name.startswith("triangle") else 4
             fields["triangles" if corners == 3 else "quads"] = np.ascontiguousarray(cells[:, :corners])

@@ -7,6 +7,7 @@ middle of a side is at least twice that of a corner. What the graph then leaves,
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import permutations, product
 
@@ -22,6 +23,8 @@ from .sets import NodeSets, pairs_of
 
 _KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9", 10: "triangle10"}
 _RINGS = {3: ((0, 1, 2),), 4: ((0, 1, 2, 3), (0, 1, 3, 2), (0, 2, 1, 3))}
+_DOUBTFUL = 4  # quadrilaterals whose sides are tried both ways
+_FEW = 5000  # quadrilaterals among which that is done
 _MOST = 6  # rows of a cell whose sides only entries tell
 
 
@@ -41,6 +44,15 @@ class Cells:
 
 
 @dataclass(frozen=True, eq=False)
+class _Second:
+    """Cells that could be in another order: which, the second likeliest one, and how near it comes, 1 for as near."""
+
+    which: NDArray[np.int64]
+    cells: NDArray[np.int64]
+    likeness: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
 class _Sides:
     """Sides between two cells: keys of their corners, increasing, and the rows between these, (s, order - 1)."""
 
@@ -56,8 +68,8 @@ def kind_of_size(k: int) -> Kind:
     return KINDS[_KINDS[k]]
 
 
-def ordered_cells(matrix: OperatorMatrix, found: NodeSets) -> Cells:
-    """Cells of sets of rows.
+def ordered_cells(matrix: OperatorMatrix, found: NodeSets) -> Iterator[Cells]:
+    """Cells of sets of rows, the likeliest first; then with some quadrilaterals in their second likeliest order.
 
     Raises
     ------
@@ -68,14 +80,25 @@ def ordered_cells(matrix: OperatorMatrix, found: NodeSets) -> Cells:
     sides = _sides_between(matrix.n, found, size)
     every = np.sort(np.concatenate([pairs_of(matrix.n, sets).ravel() for sets in found.sets]))
     blocks: dict[Kind, NDArray[np.int64]] = {}
-    told, first = True, 0
+    others: dict[Kind, _Second] = {}
+    first = 0
     for sets in found.sets:
         kind = kind_of_size(sets.shape[1])
         entries = ElementEntries(matrix, sets, every)
         per_cell = sides.per_cell[first : first + len(sets)]
-        blocks[kind], sure = _ordered(matrix.n, kind, sets, sides, per_cell, size, entries)
-        told, first = told and sure, first + len(sets)
-    return Cells(blocks, told and found.order == 1)
+        blocks[kind], others[kind] = _ordered(matrix.n, kind, sets, sides, per_cell, size, entries)
+        first += len(sets)
+    told = found.order == 1 and not any(len(other.which) for other in others.values())
+    yield Cells(blocks, told)
+    for kind, other in others.items():
+        if kind.corners == 4 and kind.degree == 1 and len(sets) <= _FEW:
+            doubtful = np.argsort(-other.likeness, kind="stable")[:_DOUBTFUL]
+            for turned in product((False, True), repeat=len(doubtful)):
+                if any(turned):
+                    some = doubtful[np.array(turned)]
+                    cells = blocks[kind].copy()
+                    cells[other.which[some]] = other.cells[some]
+                    yield Cells(blocks | {kind: cells}, told)
 
 
 def _sides_between(n: int, found: NodeSets, size: NDArray) -> _Sides:
@@ -117,12 +140,12 @@ def _ordered(
     per_cell: NDArray[np.int64],
     size: NDArray,
     entries: ElementEntries,
-) -> tuple[NDArray[np.int64], bool]:
-    """Cells of one kind, and whether the graph alone told their sides."""
+) -> tuple[NDArray[np.int64], _Second]:
+    """Cells of one kind, and what else they could be."""
     corners, inner, open_rows, n_open = _parted(kind, sets, sides, size)
     best = np.full(len(sets), np.inf)
-    order = np.zeros(sets.shape, np.int64)
-    choices = np.zeros(len(sets), np.int64)
+    order, other = np.zeros(sets.shape, np.int64), np.zeros(sets.shape, np.int64)
+    second = best.copy()
     for ring in _RINGS[kind.corners]:
         around = np.take_along_axis(corners, np.broadcast_to(ring, corners.shape), axis=1)
         ends = np.take_along_axis(sets, around, axis=1)
@@ -131,17 +154,24 @@ def _ordered(
         pattern = known @ (1 << np.arange(kind.corners))
         for code in np.unique(pattern[fits]):
             some = np.flatnonzero(fits & (pattern == code))
-            between = sides.between[place[some]] if kind.degree > 1 else np.empty((len(some), kind.corners, 0), int)
+            none = np.zeros((len(some), kind.corners, kind.degree - 1), np.int64)
+            between = sides.between[place[some]] if none.size and len(sides.keys) else none
             local = _local(sets[some], between)
             for fill in _fillings(kind, known[some[0]]):
                 trial = _filled(kind, around[some], local, open_rows[some], inner[some], fill)
                 misfit = entries.misfit(kind, some, trial)
-                choices[some] += 1
                 better = misfit < best[some]
+                second[some[better]], other[some[better]] = best[some[better]], order[some[better]]
                 best[some[better]], order[some[better]] = misfit[better], trial[better]
+                next_best = ~better & (misfit < second[some])
+                second[some[next_best]], other[some[next_best]] = misfit[next_best], trial[next_best]
     if not np.isfinite(best).all():
         raise TopologyError(f"row {int(sets[np.argmax(~np.isfinite(best))][0])} is in a cell whose sides do not close")
-    return np.take_along_axis(sets, order, axis=1), bool((choices == 1).all())
+    doubtful = np.flatnonzero(np.isfinite(second))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        likeness = np.nan_to_num(best[doubtful] / second[doubtful], nan=1.0)
+    left = _Second(doubtful, np.take_along_axis(sets, other, axis=1)[doubtful], likeness)
+    return np.take_along_axis(sets, order, axis=1), left
 
 
 def _parted(

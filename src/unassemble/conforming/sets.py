@@ -85,12 +85,50 @@ class Common:
             return np.empty((0, k), np.int64)
         both = sp.csr_array(self.closed[keys // self.n].multiply(self.closed[keys % self.n]))
         both.sort_indices()
-        rows = once(both.indices.reshape(-1, k).astype(np.int64))
+        return self._coupled(once(both.indices.reshape(-1, k).astype(np.int64)))
+
+    def quadratic_triangles(self, found: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(m, 6) quadratic triangles that are no cliques, beside those found already, and these.
+
+        Corners need not be coupled to the sides that face them: entries there vanish where all sides are straight. But
+        the three nodes on the sides are, unless they meet at a right angle, and the six nodes of the cell are what two
+        of these three have in common.
+        """
+        for right_angles in (False, True):
+            keys = self.stored[~contains(distinct(pairs_of(self.n, found)), self.stored)]
+            if not len(keys):
+                break
+            ends = np.concatenate([keys // self.n, keys % self.n]), np.concatenate([keys % self.n, keys // self.n])
+            alone = Graph(sp.csr_array((np.ones(2 * len(keys), np.int8), ends), shape=(self.n, self.n)))
+            middle = _paths(alone) if right_angles else simplices(alone, 2)
+            several = sp.csr_array(sum(self.closed[column] for column in middle.T))
+            several.data = (several.data >= 2).astype(np.int32)
+            several.eliminate_zeros()
+            several.sort_indices()
+            size = np.diff(several.indptr)
+            # Around a vertex of three triangles two of the three share a node more.
+            rows = several[size == 7].indices.reshape(-1, 7)
+            rows = [several[size == 6].indices.reshape(-1, 6), *(np.delete(rows, k, axis=1) for k in range(7))]
+            found = once(
+                np.concatenate([found, self._coupled(once(np.concatenate(rows).astype(np.int64)), right_angles)])
+            )
+        return found
+
+    def _coupled(self, rows: NDArray[np.int64], more: int = 0) -> NDArray[np.int64]:
+        """Sets (m, k) of which nearly all are coupled to each other."""
+        k = rows.shape[1]
         absent = np.zeros(len(rows), np.int64)
         for a in range(k):
             for b in range(a + 1, k):
                 absent += ~contains(self.keys, rows[:, a] * self.n + rows[:, b])
-        return rows[absent <= _ABSENT[k]]
+        return rows[absent <= _ABSENT[k] + more]
+
+
+def _paths(graph: Graph) -> NDArray[np.int64]:
+    """(m, 3) paths of two edges, the node between in the second place."""
+    place, end = graph.spread(graph.col)
+    first = graph.row[place]
+    return np.column_stack([first, graph.col[place], end])[first < end]
 
 
 def once(rows: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -113,10 +151,12 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
     common = Common(matrix)
     if not len(common.keys):
         return
-    for order, sizes in ((3, (10,)), (2, (9, 8, 6))):
-        sets = [found for k in sizes if len(found := common.sets(k))]
-        if sets and _cover(common, sets):
-            yield NodeSets(order, tuple(sets), common)
+    for order, k in ((3, 10), (2, 9), (2, 8), (2, 6)):
+        found = common.sets(k)
+        if k == 6 and not _cover(common, [found]):
+            found = common.quadratic_triangles(found)
+        if len(found) and _cover(common, [found]):
+            yield NodeSets(order, (found,), common)
     for quads in _choices(common, common.sets(4)):
         if _cover(common, [quads]):
             yield NodeSets(1, (quads,), common)
@@ -182,5 +222,7 @@ def _beside(common: Common, quads: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _cover(common: Common, sets: list[NDArray[np.int64]]) -> bool:
     """Whether each entry that is not zero belongs to a cell."""
+    if not sum(map(len, sets)):
+        return False
     covered = distinct(np.concatenate([pairs_of(common.n, cells).ravel() for cells in sets]))
     return bool(contains(covered, common.stored).all())

@@ -78,6 +78,7 @@ KINDS = {
     )
 }
 
+
 def kind_of(base: str, nodes: int) -> Kind:
     """The kind on the corners of `base` that has so many nodes."""
     return next(kind for kind in KINDS.values() if kind.base == base and kind.nodes == nodes)

@@ -211,7 +211,7 @@ def conformal_map(
         row = int(piece.vertices[np.argmin(sums)])
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     search = ShiftedSearch(ConformalPencil(piece, relative), analyse, options.krylov_steps)
-    z = smooth_start(piece.n_vertices, piece.boundary, piece.loop_offsets)
+    z = start = smooth_start(piece.n_vertices, piece.boundary, piece.loop_offsets)
     known = scale if scale is not None else estimate.likely
     if known is not None:
         z, c, _ = search.at(known / unit * (1 - options.margin), z, steps=2)
@@ -224,9 +224,9 @@ def conformal_map(
         spread = None
     if spread is None:
         first = max(1 - max(options.scatters * estimate.scatter, options.nearest), options.first_shift)
-        z, c, spread = search.at(first, smooth_start(piece.n_vertices, piece.boundary, piece.loop_offsets))
+        z, c, spread = search.at(first, start)
         if c < first > options.first_shift:  # not all triangles are wrong in the same sense, but many may be
-            z, c, spread = search.at(options.first_shift, smooth_start(piece.n_vertices, piece.boundary, piece.loop_offsets))
+            z, c, spread = search.at(options.first_shift, start)
         if c < _FARTHEST:
             raise GeometryError("some maps of positive area have no energy: the entries belong to no planar mesh")
     converged = near = False

@@ -151,14 +151,15 @@ def polish(
         fresh = system is None
         if system is None:
             fitted = fit.weights if scale is None else None
-            if len(z) <= options.direct_limit or not isinstance(drawn, Piece):
+            if not (isinstance(drawn, Piece) and len(z) > options.direct_limit):
                 if equations is None:
                     equations = NormalEquations(jacobian, pins)
                 else:
                     equations.renew(jacobian)
                 system = GaussNewton(jacobian, equations, fitted)
             else:
-                system = IterativeGaussNewton(IterativeNormalEquations(drawn, WeightJacobian(drawn, fit.z, spread), fit.z, fitted))
+                near = WeightJacobian(drawn, fit.z, spread)
+                system = IterativeGaussNewton(IterativeNormalEquations(drawn, near, fit.z, fitted))
             factorisations += 1
         move = system(jacobian, fit.misfit)
         previous, length = length, float(np.abs(move).max())

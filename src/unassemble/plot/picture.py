@@ -41,8 +41,10 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     """
     if path is not None:
         check_plot(path)
-    linear = isinstance(recovery, PlanarMesh) and not isinstance(recovery, ConformingMesh)
-    figure, handles = planar_mesh(recovery) if linear else plot_body(recovery)
+    if isinstance(recovery, PlanarMesh) and not isinstance(recovery, ConformingMesh):
+        figure, handles = planar_mesh(recovery)
+    else:
+        figure, handles = plot_body(recovery)
     header(figure, recovery.status, details(recovery), style.STATUS.get(recovery.status, style.TEXT))
     footer(figure, handles)
     if path is not None:
