@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain, islice
 from typing import Any
 
 import numpy as np
 
 from .clock import Clock
+from .conforming.recover import recover_conforming, shown_cells
+from .conforming.roles import Cells
 from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
@@ -172,8 +176,17 @@ class _Task:
             return self._as_vector(reading)
         if self.about.operator == "laplacian":
             return self._as_scalar(self.matrix, self.frame.anchors)
-        at_sight = vector_valued(self.matrix)
+        # Nodes of several unknowns overlap in more rows than the nodes of scalar elements do.
+        shows_elements = _crowded(self.matrix) and self._shown[0]
+        at_sight = None if shows_elements else vector_valued(self.matrix)
         return self._first_that_fits() if at_sight is None else self._as_vector(at_sight)
+
+    @cached_property
+    def _shown(self) -> tuple[list[Cells], Iterator[Cells]]:
+        """Cells of scalar elements that the matrix may have: the likeliest, if there are any, and the rest."""
+        shown = shown_cells(self.matrix)
+        with self.clock("cells"):
+            return list(islice(shown, 1)), shown
 
     def _first_that_fits(self) -> Recovery:
         """A planar mesh; or nodes of several unknowns where rows belong to no mesh.
@@ -209,9 +222,8 @@ class _Task:
         placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
         if self.planar.method != "conformal":
             return recover_scalar(part, placement, self.clock, self.planar)
-        found = self._of_other_elements(part, placement) if len(part.edges) > 3 * part.n else None
-        if found is not None:
-            return found
+        if _crowded(part):
+            return self._of_other_elements(part, placement) or recover_scalar(part, placement, self.clock, self.planar)
         try:
             linear = recover_scalar(part, placement, self.clock, self.planar)
         except RecoveryError:
@@ -226,10 +238,10 @@ class _Task:
 
     def _of_other_elements(self, part: OperatorMatrix, placement: Placement) -> PlanarMesh | None:
         """A mesh of other elements than linear triangles; None where none is near."""
-        from .conforming.recover import recover_conforming
-
+        known = part is self.matrix and _crowded(part)
+        cells = chain(*self._shown) if known else shown_cells(part)
         try:
-            found = recover_conforming(part, placement, self.clock, self.planar)
+            found = recover_conforming(part, cells, placement, self.clock, self.planar)
         except RecoveryError:
             return None
         return found if found.certified or found.backward_error < _NEAR else None
@@ -253,6 +265,11 @@ class _Task:
                 f"`{self.given[0]}` is for scalar matrices, and this one is read as vector-valued: leave it out, or "
                 "choose `operator='laplacian'`"
             )
+
+
+def _crowded(matrix: OperatorMatrix) -> bool:
+    """Whether a graph has more edges than a planar one can have."""
+    return len(matrix.edges) > 3 * matrix.n
 
 
 def _check_proportion(scale: float, largest: float) -> None:

@@ -1,16 +1,20 @@
 """Entries of a mesh as a function of its positions, by quadrature, with their derivative.
 
-With gradients of the shape functions as complex numbers g, an entry is K_ab = sum_q w_q det J Re(conj(g_a) g_b). When
-a node l moves by d, the gradients and the determinant change so that
+Let s and t be the derivatives of the position z = x + iy along the two reference coordinates, D = Im(conj(s) t) the
+determinant, and p_a, r_a the derivatives of the shape functions. Their gradients are the complex numbers
+g_a = -i (t p_a - s r_a) / D, and an entry is K_ab = sum_q w_q D Re(conj(g_a) g_b): the metric |t|^2, Re(conj(s) t),
+|s|^2 over D times products p_a p_b, p_a r_b + r_a p_b, r_a r_b, which are the same in all cells. When a node l moves by
+d, gradients and determinant change so that
 
-    dK_ab = -Re( d sum_q w_q det J g_l conj(g_a g_b) ).
+    dK_ab = -Re( d sum_q w_q D g_l conj(g_a g_b) ).
 
 Moves that are holomorphic in a cell, sum_l d_l g_l = 0, change nothing: they are locally similarities.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -48,26 +52,61 @@ class Entries:
 
     def weights(self, z: NDArray) -> NDArray[np.float64]:
         """(e,) -K_ab of the part's edges."""
-        return self._summed(z, lambda g, volume: -_weighted(volume, _pairs(np.conj(g), g).real))
+        z, total = self.nodes(z), np.zeros(len(self._part.edges))
+        for block in self._blocks:
+            for some, at in block.parts(z):
+                total -= np.bincount(block.places[some].ravel(), block.products(*at.metric).ravel(), len(total))
+        return total
 
     def roundings(self, z: NDArray) -> NDArray[np.float64]:
-        """(e,) size of the rounding errors of assembled entries, in units of the machine precision."""
-        return self._summed(z, lambda g, volume: _weighted(volume, _pairs(np.abs(g), np.abs(g))))
+        """(e,) size of the rounding errors of assembled entries, in units of the machine precision.
+
+        That of terms conj(g_a) g_b before they cancel, at most the root of K_aa K_bb.
+        """
+        z, total = self.nodes(z), np.zeros(len(self._part.edges))
+        for block in self._blocks:
+            a, b = np.triu_indices(block.cells.shape[1], 1)
+            for some, at in block.parts(z):
+                size = np.sqrt(np.abs(block.squares(*at.metric)))
+                total += np.bincount(block.places[some].ravel(), (size[:, a] * size[:, b]).ravel(), len(total))
+        return total
 
     def flipped(self, z: NDArray) -> int:
         """Cells that are not right side out at some point of the quadrature."""
-        return sum(int((volume <= 0).any(axis=1).sum()) for b in self._blocks for _, _, volume in b.at(self.nodes(z)))
+        z = self.nodes(z)
+        turned = [(at.determinant <= 0).any(axis=1).sum() for block in self._blocks for _, at in block.parts(z)]
+        return int(sum(turned))
 
     def jacobian(self, z: NDArray, spread: NDArray) -> EntriesJacobian:
         """The derivative at z."""
         return EntriesJacobian(self._blocks, self.nodes(z), self.n, spread)
 
-    def _summed(self, z: NDArray, of_pairs: Callable[[NDArray, NDArray], NDArray]) -> NDArray[np.float64]:
-        z, total = self.nodes(z), np.zeros(len(self._part.edges))
-        for block in self._blocks:
-            for some, g, volume in block.at(z):
-                total += np.bincount(block.places[some].ravel(), of_pairs(g, volume).ravel(), len(total))
-        return total
+
+@dataclass(frozen=True, eq=False)
+class _Local:
+    """Some cells at the points of a quadrature, (m, q) each: s, t, the determinant and the weights."""
+
+    s: NDArray[np.complex128]
+    t: NDArray[np.complex128]
+    determinant: NDArray[np.float64]
+    weights: NDArray[np.float64]
+
+    @property
+    def metric(self) -> tuple[NDArray, NDArray, NDArray]:
+        """What products of derivatives of shape functions are multiplied by."""
+        scaled = self.weights / self.determinant
+        cross = self.s.real * self.t.real + self.s.imag * self.t.imag
+        return scaled * np.abs(self.t) ** 2, -scaled * cross, scaled * np.abs(self.s) ** 2
+
+    def squares(self) -> tuple[NDArray, NDArray, NDArray]:
+        """The same for w D g_a g_b, complex."""
+        scaled = -self.weights / self.determinant
+        return scaled * self.t**2, -scaled * self.s * self.t, scaled * self.s**2
+
+    def gradient(self) -> tuple[NDArray, NDArray]:
+        """What derivatives of shape functions are multiplied by in g, complex."""
+        inverse = -1j / self.determinant
+        return inverse * self.t, -inverse * self.s
 
 
 class _Block:
@@ -76,25 +115,34 @@ class _Block:
     def __init__(self, part: Part, kind: Kind, cells: NDArray[np.int64], rule: Rule, straight: bool):
         self.cells, self.places = cells, part.places(cells)
         self.moved = cells[:, : kind.corners] if straight else cells
-        self._slopes, self._weights = shape_gradients(kind, rule[0]), rule[1]
-        self.local = np.eye(kind.nodes)
+        self._weights = rule[1]
+        self._p, self._r = np.ascontiguousarray(shape_gradients(kind, rule[0]).transpose(2, 0, 1))
+        a, b = np.triu_indices(kind.nodes, 1)
+        p, r = self._p, self._r
+        self.pairs = p[:, a] * p[:, b], p[:, a] * r[:, b] + r[:, a] * p[:, b], r[:, a] * r[:, b]
+        local = np.eye(kind.nodes)
         if straight:
-            self.local = np.zeros((kind.nodes, kind.corners))
-            self.local[: kind.corners] = np.eye(kind.corners)
+            local = np.zeros((kind.nodes, kind.corners))
+            local[: kind.corners] = np.eye(kind.corners)
             for k, some in enumerate(kind.between, kind.corners):
-                np.add.at(self.local[k], list(some), 1 / len(some))
+                np.add.at(local[k], list(some), 1 / len(some))
+        self.slopes = p @ local, r @ local
 
-    def at(self, z: NDArray) -> Iterator[tuple[slice, NDArray, NDArray]]:
-        """Some cells at a time: which, gradients (m, q, k) complex, and weights times det J (m, q)."""
+    def parts(self, z: NDArray) -> Iterator[tuple[slice, _Local]]:
+        """Some cells at a time."""
         for first in range(0, len(self.cells), _AT_ONCE):
             some = slice(first, first + _AT_ONCE)
             corner = z[self.cells[some]]
-            s, t = (corner @ self._slopes[:, :, r].T for r in (0, 1))
-            determinant = (np.conj(s) * t).imag
-            with np.errstate(divide="ignore", invalid="ignore"):
-                inverse = -1j / determinant
-            g = (inverse * t)[..., None] * self._slopes[:, :, 0] - (inverse * s)[..., None] * self._slopes[:, :, 1]
-            yield some, g, determinant * self._weights
+            s, t = (_matmul(corner, slopes.T) for slopes in (self._p, self._r))
+            yield some, _Local(s, t, s.real * t.imag - s.imag * t.real, self._weights)
+
+    def products(self, first: NDArray, mixed: NDArray, last: NDArray) -> NDArray:
+        """(m, pairs) sums over points, of real factors (m, q)."""
+        return first @ self.pairs[0] + mixed @ self.pairs[1] + last @ self.pairs[2]
+
+    def squares(self, first: NDArray, mixed: NDArray, last: NDArray) -> NDArray:
+        """(m, k) the same for pairs of a node with itself."""
+        return first @ self._p**2 + mixed @ (2 * self._p * self._r) + last @ self._r**2
 
 
 class EntriesJacobian:
@@ -109,9 +157,14 @@ class EntriesJacobian:
         total = sp.csr_array((len(self.spread), self.n), dtype=np.complex128)
         for block in self._blocks:
             rows, columns, values = [], [], []
-            for some, g, volume in block.at(self._z):
-                pairs = np.conj(_pairs(g, g)) * volume[..., None]
-                value = pairs.transpose(0, 2, 1) @ (g @ block.local)
+            for some, at in block.parts(self._z):
+                squares, (along_p, along_r) = at.squares(), at.gradient()
+                value = np.empty((*block.places[some].shape, block.moved.shape[1]), np.complex128)
+                for k in range(value.shape[2]):
+                    g = along_p * block.slopes[0][:, k] + along_r * block.slopes[1][:, k]
+                    factors = [g * np.conj(one) for one in squares]
+                    value[:, :, k].real = block.products(*(one.real for one in factors))
+                    value[:, :, k].imag = block.products(*(one.imag for one in factors))
                 row = np.broadcast_to(block.places[some][:, :, None], value.shape)
                 rows.append(row.astype(np.int32).ravel())
                 columns.append(np.broadcast_to(block.moved[some][:, None], value.shape).astype(np.int32).ravel())
@@ -125,9 +178,10 @@ class EntriesJacobian:
         """J d for d (n,) complex: (e,) real."""
         total = np.zeros(len(self.spread))
         for block in self._blocks:
-            for some, g, volume in block.at(self._z):
-                stretch = np.einsum("mqk,mk->mq", g @ block.local, displacement[block.moved[some]]) * volume
-                change = np.einsum("mqp,mq->mp", np.conj(_pairs(g, g)), stretch).real
+            for some, at in block.parts(self._z):
+                moves, (along_p, along_r) = displacement[block.moved[some]], at.gradient()
+                stretch = along_p * _matmul(moves, block.slopes[0].T) + along_r * _matmul(moves, block.slopes[1].T)
+                change = block.products(*((stretch * np.conj(one)).real for one in at.squares()))
                 total += np.bincount(block.places[some].ravel(), change.ravel(), len(total))
         return total / self.spread
 
@@ -136,21 +190,20 @@ class EntriesJacobian:
         result = np.zeros(self.n, dtype=np.complex128)
         change = change / self.spread
         for block in self._blocks:
-            for some, g, volume in block.at(self._z):
-                pull = np.einsum("mqp,mp->mq", _pairs(g, g), change[block.places[some]]) * volume
-                force = np.einsum("mqk,mq->mk", np.conj(g @ block.local), pull).ravel()
+            for some, at in block.parts(self._z):
+                own = change[block.places[some]]
+                pull = sum(one * (own @ pairs.T) for one, pairs in zip(at.squares(), block.pairs, strict=True))
+                along_p, along_r = at.gradient()
+                force = _matmul(np.conj(along_p) * pull, block.slopes[0])
+                force += _matmul(np.conj(along_r) * pull, block.slopes[1])
                 moved = block.moved[some].ravel()
-                result.real += np.bincount(moved, force.real, self.n)
-                result.imag += np.bincount(moved, force.imag, self.n)
+                result.real += np.bincount(moved, force.real.ravel(), self.n)
+                result.imag += np.bincount(moved, force.imag.ravel(), self.n)
         return result
 
 
-def _pairs(first: NDArray, second: NDArray) -> NDArray:
-    """(m, q, p) products of values (m, q, k) of all pairs."""
-    a, b = np.triu_indices(first.shape[2], 1)
-    return first[..., a] * second[..., b]
-
-
-def _weighted(volume: NDArray, values: NDArray) -> NDArray:
-    """(m, p) sums over the points of a quadrature."""
-    return np.einsum("mq,mqp->mp", volume, values)
+def _matmul(values: NDArray[np.complex128], factors: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Complex times real."""
+    result = np.empty((len(values), factors.shape[1]), np.complex128)
+    result.real, result.imag = values.real @ factors, values.imag @ factors
+    return result

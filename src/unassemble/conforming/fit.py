@@ -145,10 +145,13 @@ def _by_best_rule(
     straight: bool,
 ) -> Fitted:
     """With the quadrature that fits best; of those that fit alike the first."""
-    rules = _rules(part, straight=straight)
-    trials = [_with_rule(part, weights, z, c, noise, rule, straight=straight) for rule in rules]
+    trials: list[Fitted] = []
+    for rule in _rules(part, straight=straight):
+        trials.append(_with_rule(part, weights, z, c, noise, rule, straight=straight))
+        if trials[-1].size <= ROUNDED**0.75:
+            return trials[-1]
     least = min(trial.size for trial in trials)
-    return next((trial for trial in trials if trial.size <= _ALIKE * least + ROUNDED**0.75), trials[0])
+    return next((trial for trial in trials if trial.size <= _ALIKE * least), trials[0])
 
 
 def _with_rule(

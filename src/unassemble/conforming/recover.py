@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -34,9 +34,18 @@ from .verdict import verdict
 
 
 def recover_conforming(
-    stored: OperatorMatrix, placement: Placement, clock: Clock, options: ScalarOptions
+    stored: OperatorMatrix, shown: Iterable[Cells], placement: Placement, clock: Clock, options: ScalarOptions
 ) -> ConformingMesh:
     """The mesh of a checked scalar matrix, certified or the nearest.
+
+    Parameters
+    ----------
+    stored : OperatorMatrix
+    shown : iterable of Cells
+        See :func:`shown_cells`.
+    placement : Placement
+    clock : Clock
+    options : ScalarOptions
 
     Raises
     ------
@@ -48,7 +57,7 @@ def recover_conforming(
     task = Task(options=options, placement=placement, noise=Noise.known(stored, options.noise))
     nearest: ConformingMesh | None = None
     failure: Exception = TopologyError("no sets of rows that are coupled to each other are cells of any known element")
-    for cells in shown_cells(stored):
+    for cells in shown:
         try:
             found = _recovered(stored, cells, clock, task)
         except (TopologyError, GeometryError, SolverError) as error:

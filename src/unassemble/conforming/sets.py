@@ -153,9 +153,7 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
         return
     for order, k in ((3, 10), (2, 9), (2, 8), (2, 6)):
         found = common.sets(k)
-        if k == 6 and not _cover(common, [found]):
-            found = common.quadratic_triangles(found)
-        if len(found) and _cover(common, [found]):
+        if _cover(common, [found]):
             yield NodeSets(order, (found,), common)
     for quads in _choices(common, common.sets(4)):
         if _cover(common, [quads]):
@@ -163,6 +161,10 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
         triangles = _beside(common, quads)
         if len(triangles) and _cover(common, [triangles, quads]):
             yield NodeSets(1, (triangles, quads), common)
+    if not _cover(common, [found]):
+        found = common.quadratic_triangles(found)
+        if _cover(common, [found]):
+            yield NodeSets(2, (found,), common)
 
 
 def _choices(common: Common, quads: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
