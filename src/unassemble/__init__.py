@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     )
     from .inspection import inspect_matrix
     from .pipeline import recover
-    from .recovery import Body, PlanarMesh, Recovery, Structure
+    from .recovery import Body, ConformingMesh, PlanarMesh, Recovery, Structure
 
 # Imported on first use: the command line answers --help without loading scipy.
 _HOMES = {
     "inspect_matrix": "inspection",
     "recover": "pipeline",
-    **dict.fromkeys(("Body", "PlanarMesh", "Recovery", "Structure"), "outputs"),
+    **dict.fromkeys(("Body", "ConformingMesh", "PlanarMesh", "Recovery", "Structure"), "outputs"),
     **dict.fromkeys(
         (
             "FormatError",
@@ -48,6 +48,7 @@ _HOMES = {
 
 __all__ = [
     "Body",
+    "ConformingMesh",
     "FormatError",
     "GeometryError",
     "InputError",

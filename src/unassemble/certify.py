@@ -85,8 +85,12 @@ def certify(
     tensor : (kxx, kxy, kyy), optional
         K; the identity by default.
     """
-    n = len(points)
     key, value = _assemble(points, triangles, factor, tensor)
+    return compared(len(points), edges, entries, key, value, _flipped(points, triangles))
+
+
+def compared(n: int, edges: NDArray, entries: NDArray, key: NDArray, value: NDArray, flipped: NDArray) -> Certificate:
+    """The entries of a mesh of n points, at increasing keys i n + j, against those of a matrix."""
     given = edges[:, 0] * n + edges[:, 1]
     if np.array_equal(key, given):
         pairs, difference = edges, value - entries
@@ -104,7 +108,7 @@ def certify(
     with np.errstate(divide="ignore", invalid="ignore"):
         misfits = np.where(difference == 0, 0.0, np.abs(difference) / reference)
     misfits = np.where(np.isnan(misfits), np.inf, misfits)
-    return Certificate(float(misfits.max(initial=0.0)), pairs, misfits, difference, _flipped(points, triangles))
+    return Certificate(float(misfits.max(initial=0.0)), pairs, misfits, difference, flipped)
 
 
 def _flipped(points: NDArray, triangles: NDArray) -> NDArray[np.int64]:

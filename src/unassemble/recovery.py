@@ -151,7 +151,7 @@ class Recovery:
 
     @property
     def element(self) -> str | None:
-        """``P1``, ``P2``, ``Q1``, ``Q2`` or ``S2`` (serendipity), or ``mixed``; None where it is not known."""
+        """``P1`` to ``P3``, ``Q1``, ``Q2`` or ``S2`` (serendipity), or ``mixed``; None where it is not known."""
         kinds = {_ELEMENTS[kind] for kind in self.cells if kind in _ELEMENTS}
         return "mixed" if len(kinds) > 1 else next(iter(kinds), None)
 
@@ -246,6 +246,38 @@ class PlanarMesh(Recovery):
         return np.concatenate([self.triangles, fans]), np.concatenate([np.ones(self.triangles.shape, bool), outline])
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ConformingMesh(PlanarMesh):
+    """A planar mesh of other elements than linear triangles, or of these beside quadrilaterals.
+
+    Attributes
+    ----------
+    quads : (m, 4) int64
+        Quadrilaterals, counter-clockwise. Of quadratic and cubic cells, as in `triangles`, these are the corners.
+    mid_nodes : (m, k) int64
+        The nodes that each cell of a higher order has besides its corners, in meshio's order; else empty.
+    quadrature : str
+        The rule that integrated the elements, where their shape shows it.
+    straight : bool
+        Whether nodes other than corners lie on straight sides at equal distances.
+    """
+
+    quads: NDArray[np.int64] = field(default_factory=_none(4))
+    mid_nodes: NDArray[np.int64] = field(default_factory=_none(0))
+    quadrature: str
+    straight: bool
+
+    @property
+    def cells(self) -> dict[str, NDArray[np.int64]]:
+        """Cells of each kind that occurs, all their nodes, by meshio's names."""
+        return _whole(_occurring(triangle=self.triangles, quad=self.quads), self.mid_nodes)
+
+    @property
+    def element(self) -> str:
+        """``P2``, ``P3``, ``Q1``, ``Q2``, ``S2`` (serendipity), or ``mixed``."""
+        return str(Recovery.element.fget(self))  # type: ignore[attr-defined]
+
+
 @dataclass(frozen=True)
 class Evidence:
     """How uniquely the matrix determines a piece of a body or structure.
@@ -315,10 +347,7 @@ class Body(Mechanical):
     def cells(self) -> dict[str, NDArray[np.int64]]:
         """Cells of each kind that occurs, all their nodes, by meshio's names."""
         corners = _occurring(triangle=self.triangles, quad=self.quads, tetra=self.tetrahedra, hexahedron=self.hexahedra)
-        if not self.mid_nodes.size:
-            return corners
-        whole = {kind: np.hstack([cells, self.mid_nodes]) for kind, cells in corners.items()}
-        return {f"{kind}{cells.shape[1]}": cells for kind, cells in whole.items()}
+        return _whole(corners, self.mid_nodes)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -347,6 +376,7 @@ class Structure(Mechanical):
 _ELEMENTS = {
     **dict.fromkeys(("triangle", "tetra"), "P1"),
     **dict.fromkeys(("triangle6", "tetra10"), "P2"),
+    "triangle10": "P3",
     **dict.fromkeys(("quad", "hexahedron"), "Q1"),
     **dict.fromkeys(("quad9", "hexahedron27"), "Q2"),
     **dict.fromkeys(("quad8", "hexahedron20"), "S2"),
@@ -355,3 +385,11 @@ _ELEMENTS = {
 
 def _occurring(**kinds: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
     return {kind: cells for kind, cells in kinds.items() if len(cells)}
+
+
+def _whole(corners: dict[str, NDArray[np.int64]], mid_nodes: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
+    """Cells with their further nodes, where they have any."""
+    if not mid_nodes.size:
+        return corners
+    whole = {kind: np.hstack([cells, mid_nodes]) for kind, cells in corners.items()}
+    return {f"{kind}{cells.shape[1]}": cells for kind, cells in whole.items()}

@@ -162,9 +162,7 @@ class _Judged:
         for piece, inside in zip(placed.topology.pieces, placed.meshes, strict=True):
             if inside.determined.any():
                 rows.append(piece.edge_rows[inside.entries])
-                unknowns = 2 * max(int(inside.determined.sum()), 2) - (
-                    4 if known_scale else 3
-                )  # one has no entry
+                unknowns = 2 * max(int(inside.determined.sum()), 2) - (4 if known_scale else 3)  # one has no entry
                 spare.append(int(inside.entries.sum()) - unknowns)
         pairs = matrix.edges[np.concatenate(rows)]
         key = found.pairs @ [matrix.n, 1]

@@ -43,7 +43,8 @@ def candidates(graph: Graph, points: NDArray[np.float64]) -> Iterator[tuple[Bloc
         NaN where not determined; such nodes are coupled to none.
     """
     d, known = points.shape[1], int(np.isfinite(points).all(axis=1).sum())
-    kinds = {kind.name: kind for kind in KINDS.values() if kind.dim == d and not kind.linear_simplex}
+    known_kinds = (kind for kind in KINDS.values() if kind.dim == d and kind.degree < 3 and not kind.linear_simplex)
+    kinds = {kind.name: kind for kind in known_kinds}
     simplex = KINDS["triangle" if d == 2 else "tetra"]
     for kind in sorted(kinds.values(), key=lambda kind: -kind.nodes):
         sets = shared_cliques(graph, kind.nodes)

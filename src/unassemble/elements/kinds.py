@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 _TRIANGLE = ((0, 1), (1, 2), (2, 0))
+_THIRDS = ((0, 0, 1), (0, 1, 1), (1, 1, 2), (1, 2, 2), (2, 2, 0), (2, 0, 0), (0, 1, 2))
 _QUAD = ((0, 1), (1, 2), (2, 3), (3, 0))
 _TETRA = (*_TRIANGLE, (0, 3), (1, 3), (2, 3))
 _HEXAHEDRON = (*_QUAD, (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
@@ -24,7 +25,8 @@ class Kind:
     dim : {2, 3}
     corners : int
     between : tuple of tuples of int
-        For each further node, in meshio's order, the corners that it lies in the middle of where sides are straight.
+        For each further node, in meshio's order, the corners that it lies in the middle of where sides are straight;
+        a corner counts as often as it is named.
     """
 
     name: str
@@ -53,12 +55,18 @@ class Kind:
         """Whether it has nodes other than corners."""
         return bool(self.between)
 
+    @property
+    def degree(self) -> int:
+        """Polynomial degree along a side."""
+        return 1 + sum(set(some) == {0, 1} for some in self.between)
+
 
 KINDS = {
     kind.name: kind
     for kind in (
         Kind("triangle", "triangle", 2, 3),
         Kind("triangle6", "triangle", 2, 3, _TRIANGLE),
+        Kind("triangle10", "triangle", 2, 3, _THIRDS),
         Kind("quad", "quad", 2, 4),
         Kind("quad8", "quad", 2, 4, _QUAD),
         Kind("quad9", "quad", 2, 4, (*_QUAD, (0, 1, 2, 3))),

@@ -32,7 +32,7 @@ def _exponents(kind: Kind) -> NDArray[np.int64]:
     Simplices have all up to a total degree, boxes all up to a degree in each direction; serendipity boxes, which lack
     nodes inside, those in which at most one direction is squared.
     """
-    degree = 2 if kind.quadratic else 1
+    degree = kind.degree
     every = np.array(list(product(range(degree + 1), repeat=kind.dim)))
     if kind.simplex:
         return every[every.sum(axis=1) <= degree]
@@ -71,6 +71,31 @@ def rules(kind: Kind) -> Iterator[Rule]:
         yield np.full((1, kind.dim), 1 / (kind.dim + 1)), np.array([(1, 1, 1 / 2, 1 / 6)[kind.dim]])
     else:
         yield from _triangle_rules() if kind.dim == 2 else _tetrahedron_rules()
+
+
+def planar_rules(kind: Kind) -> dict[str, Rule]:
+    """Rules for the plane by the names that :mod:`unassemble.certify_elements` knows, likely ones first.
+
+    Reduced integration comes last; with a single point quadrilaterals of four nodes have fields of no energy beside the
+    constants (hourglass modes), and the matrix does not determine them.
+    """
+    if kind.simplex:
+        degree_4, degree_2, _, degree_5, _ = _triangle_rules()
+        return {"degree 4": degree_4, "degree 5": degree_5, "degree 2": degree_2}
+    orders = (3, 4, 5, 6, 7, 2) if kind.quadratic else (2, 3, 4, 5, 6)
+    return {f"{order} x {order} Gauss": _gauss(2, order) for order in orders}
+
+
+def exact_rule(kind: Kind) -> Rule:
+    """A rule that integrates products of gradients exactly on affine cells, in the plane: Gauss's, on triangles folded.
+
+    The map (s, t) -> (s, (1 - s) t) takes the box to the triangle; its determinant costs one degree.
+    """
+    at, weights = _gauss(2, kind.degree + 1)
+    if not kind.simplex:
+        return at, weights
+    s, t = at.T
+    return np.column_stack([s, (1 - s) * t]), weights * (1 - s)
 
 
 def _gauss(d: int, order: int) -> Rule:

@@ -24,9 +24,11 @@ _FACETS: dict[str, list[tuple[int, ...]]] = {
 
 def _ring(kind: Kind, corners: Sequence[int]) -> list[int]:
     """Corners in a ring, and between them the nodes on the sides."""
-    middle = {frozenset(some): kind.corners + k for k, some in enumerate(kind.between)}
-    sides = zip(corners, (*corners[1:], corners[0]), strict=True)
-    return [node for a, b in sides for node in ([a, middle[frozenset((a, b))]] if kind.quadratic else [a])]
+    ring = []
+    for a, b in zip(corners, (*corners[1:], corners[0]), strict=True):
+        on_side = [k for k, some in enumerate(kind.between) if set(some) == {a, b}]
+        ring += [a, *(kind.corners + k for k in sorted(on_side, key=lambda k: kind.between[k].count(b)))]
+    return ring
 
 
 @cache

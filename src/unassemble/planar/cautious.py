@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..topology import Piece
 from .normal import NormalEquations, WeightJacobian, distant_pair
-from .polish import GaussNewton, PolishedMesh, Problem, downhill
+from .polish import Cotangents, GaussNewton, PolishedMesh, Problem, downhill
 
 _log = logging.getLogger(__name__)
 
@@ -70,7 +70,7 @@ def cautious_polish(
     extent = np.abs(z - z.mean()).max()
     z = (z - z.mean()) / extent
     pins = distant_pair(z) if pins is None else pins
-    problem = Problem(piece, weights, spread, scale)
+    problem = Problem(Cotangents(piece), weights, spread, scale)
     fit, steps, length, converged = problem.at(z), 0, np.inf, False
     history: list[tuple[float, float]] = []
     held: NormalEquations | None = None

@@ -202,7 +202,7 @@ def conformal_map(
         row = int(piece.vertices[np.argmin(sums)])
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     search = ShiftedSearch(ConformalPencil(piece, relative), analyse, options.krylov_steps)
-    z = _smooth_start(piece)
+    z = start = smooth_start(piece.n_vertices, piece.boundary, piece.loop_offsets)
     known = scale if scale is not None else estimate.likely
     if known is not None:
         z, c, _ = search.at(known / unit * (1 - options.margin), z, steps=2)
@@ -215,9 +215,9 @@ def conformal_map(
         spread = None
     if spread is None:
         first = max(1 - max(options.scatters * estimate.scatter, options.nearest), options.first_shift)
-        z, c, spread = search.at(first, _smooth_start(piece))
+        z, c, spread = search.at(first, start)
         if c < first > options.first_shift:  # not all triangles are wrong in the same sense, but many may be
-            z, c, spread = search.at(options.first_shift, _smooth_start(piece))
+            z, c, spread = search.at(options.first_shift, start)
         if c < ALIKE:
             raise GeometryError("some maps of positive area have no energy: the entries belong to no planar mesh")
     converged = near = False
@@ -234,17 +234,23 @@ def conformal_map(
     return ConformalMap(z, float(c * unit), search.factorisations, search.solves, converged)
 
 
-def _smooth_start(piece: Piece) -> NDArray:
+def smooth_start(n: int, boundary: NDArray, loop_offsets: NDArray) -> NDArray:
     """An ellipse on each boundary loop, smooth and of positive area, and a little noise everywhere.
 
     An ellipse has both senses of rotation: which one belongs to the mesh depends on whether the loop is the outer one
     or a hole. Without the ellipses on other loops than the longest, the inversion of a ring would hide the ring from
     the Krylov space. The noise breaks symmetries that would hide the answer from every such space.
+
+    Parameters
+    ----------
+    n : int
+    boundary, loop_offsets
+        As :class:`~unassemble.topology.Piece` has them.
     """
-    z = 0.01 * np.random.default_rng(0).standard_normal((piece.n_vertices, 2)).view(np.complex128).ravel()
-    length = np.diff(piece.loop_offsets)
-    place = np.arange(len(piece.boundary)) - np.repeat(piece.loop_offsets[:-1], length)
+    z = 0.01 * np.random.default_rng(0).standard_normal((n, 2)).view(np.complex128).ravel()
+    length = np.diff(loop_offsets)
+    place = np.arange(len(boundary)) - np.repeat(loop_offsets[:-1], length)
     angle = 2 * np.pi * place / np.repeat(length, length)
     size = np.repeat(length / length.max(), length)
-    np.add.at(z, piece.boundary[:, 0], size * (np.exp(1j * angle) + 0.5 * np.exp(-1j * angle)))
+    np.add.at(z, boundary[:, 0], size * (np.exp(1j * angle) + 0.5 * np.exp(-1j * angle)))
     return z

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import SolverError
 from ..topology import Piece
 from .cotangent import edge_weights
-from .normal import NormalEquations, WeightJacobian, distant_pair
+from .normal import Jacobian, NormalEquations, WeightJacobian, distant_pair
 from .side_by_side import SideBySide
 
 
@@ -71,8 +71,40 @@ def coordinate_covariances(
     (n, 2, 2) float64
     """
     jacobian = WeightJacobian(piece, z, spread)
-    equations = NormalEquations(jacobian, distant_pair(z) if pins is None else pins)
     weights = edge_weights(piece, z) / jacobian.spread
+    pins = distant_pair(z) if pins is None else pins
+    return covariances(jacobian, weights, z, pins, beside=beside, stretch=stretch, options=options)
+
+
+def covariances(
+    jacobian: Jacobian,
+    weights: NDArray,
+    z: NDArray,
+    pins: NDArray,
+    *,
+    beside: float | None,
+    stretch: NDArray | None = None,
+    nodes: Callable[[NDArray], NDArray] = np.asarray,
+    options: SamplingOptions | None = None,
+) -> NDArray[np.float64]:
+    """Those of any model of the weights; see :func:`coordinate_covariances`.
+
+    Parameters
+    ----------
+    jacobian : Jacobian
+        By parameters, which are positions of some vertices.
+    weights : (e,) float64
+        w at z, over their standard deviations.
+    z : (n,) complex128
+        All vertices.
+    pins : (k,) int
+        Parameters that are held.
+    beside, stretch, options
+        As there.
+    nodes : callable
+        Displacements of all vertices, (n, k), for those of the parameters.
+    """
+    equations = NormalEquations(jacobian, pins)
     slope = jacobian.transpose(weights)
     response = equations.solve(slope)
     complement = float(weights @ weights) - float(np.vdot(slope, response).real) + (beside or 0.0)
@@ -84,9 +116,9 @@ def coordinate_covariances(
         if beside is not None and complement > 0:
             along = (weights @ noise - np.real(slope.conj() @ y)) / complement
             y = y - response[:, None] * along
-        total += _spread(y, gauge, root)
+        total += _spread(nodes(y), gauge, root)
     if beside is not None and complement > 0:
-        total += _spread(response[:, None] * np.sqrt(beside) / complement, gauge, root)
+        total += _spread(nodes(response[:, None]) * np.sqrt(beside) / complement, gauge, root)
     equations.release()
     return total
 

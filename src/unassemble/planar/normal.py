@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -10,6 +12,22 @@ from ..errors import SolverError
 from ..linalg import Factorisation, UpperTriangle, factorisation
 from ..topology import Piece
 from .cotangent import weight_gradient
+
+
+class Jacobian(Protocol):
+    """The derivative of weights at given positions; displacements are complex (n,)."""
+
+    n: int
+
+    @property
+    def matrix(self) -> sp.bsr_array:
+        """(e, 2 n) in blocks of x and y."""
+
+    def forward(self, displacement: NDArray) -> NDArray:
+        """J d for d (n,) complex: (e,) real."""
+
+    def transpose(self, change: NDArray) -> NDArray:
+        """J' r for r (e,) real: (n,) complex, x in the real part and y in the imaginary one."""
 
 
 class WeightJacobian:
@@ -56,18 +74,18 @@ class NormalEquations:
 
     Parameters
     ----------
-    jacobian : WeightJacobian
+    jacobian : Jacobian
     pins : (k,) int
         Vertices that stay where they are; the farther apart the better.
     """
 
-    def __init__(self, jacobian: WeightJacobian, pins: NDArray):
+    def __init__(self, jacobian: Jacobian, pins: NDArray):
         self._free = np.ones(jacobian.n, dtype=bool)
         self._free[pins] = False
         matrix = _upper_blocks(jacobian.matrix, self._free)
         self._factor = _factorised(matrix)
 
-    def renew(self, jacobian: WeightJacobian) -> None:
+    def renew(self, jacobian: Jacobian) -> None:
         """Factorise anew for other positions; that the pattern was analysed still counts."""
         matrix = _upper_blocks(jacobian.matrix, self._free)
         try:
@@ -84,7 +102,7 @@ class NormalEquations:
         result[self._free] = np.ascontiguousarray(solution.T).view(np.complex128).T
         return result
 
-    def fitted(self, jacobian: WeightJacobian, change: NDArray) -> NDArray:
+    def fitted(self, jacobian: Jacobian, change: NDArray) -> NDArray:
         """Displacement d (n,) complex that explains a change (e,) of the weights best: least |J d - r|."""
         return self.solve(jacobian.transpose(change))
 

@@ -19,7 +19,7 @@ from ..tolerances import LAST_DIGITS
 from ..topology import Piece
 from .cotangent import edge_weights
 from .iterative import IterativeNormalEquations
-from .normal import NormalEquations, WeightJacobian, distant_pair
+from .normal import Jacobian, NormalEquations, WeightJacobian, distant_pair
 
 _log = logging.getLogger(__name__)
 
@@ -83,8 +83,33 @@ class PolishedMesh:
     last_step: float
 
 
+class Model(Protocol):
+    """Weights of a mesh as a function of its positions, with their derivative."""
+
+    def weights(self, z: NDArray) -> NDArray[np.float64]:
+        """(e,) w for positions z (n,) complex; not finite where cells are flat."""
+
+    def jacobian(self, z: NDArray, spread: NDArray) -> Jacobian:
+        """dw / d(x, y), each row divided by the standard deviation of its weight."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cotangents:
+    """The weights of linear triangles."""
+
+    piece: Piece
+
+    def weights(self, z: NDArray) -> NDArray[np.float64]:
+        """See :func:`.cotangent.edge_weights`."""
+        return edge_weights(self.piece, z)
+
+    def jacobian(self, z: NDArray, spread: NDArray) -> Jacobian:
+        """See :class:`.normal.WeightJacobian`."""
+        return WeightJacobian(self.piece, z, spread)
+
+
 def polish(
-    piece: Piece,
+    drawn: Piece | Model,
     weights: NDArray,
     z: NDArray,
     *,
@@ -97,7 +122,8 @@ def polish(
 
     Parameters
     ----------
-    piece : Piece
+    drawn : Piece or Model
+        A piece of linear triangles, or weights of another kind.
     weights : (e,) float64
         a = -A_ij of each edge.
     z : (n,) complex128
@@ -116,24 +142,26 @@ def polish(
     z = (z - z.mean()) / extent
     pins = distant_pair(z) if pins is None else pins
     spread = np.ones(len(weights)) if spread is None else spread
-    problem = Problem(piece, weights, spread, scale)
+    model = Cotangents(drawn) if isinstance(drawn, Piece) else drawn
+    problem = Problem(model, weights, spread, scale)
     fit = problem.at(z)
     equations: NormalEquations | None = None
     system: GaussNewton | IterativeGaussNewton | None = None
     factorisations, steps, length, converged = 0, 0, np.inf, False
     while steps < options.max_steps and not converged:
-        jacobian = WeightJacobian(piece, fit.z, spread)
+        jacobian = model.jacobian(fit.z, spread)
         fresh = system is None
         if system is None:
             fitted = fit.weights if scale is None else None
-            if len(z) <= options.direct_limit:
+            if not (isinstance(drawn, Piece) and len(z) > options.direct_limit):
                 if equations is None:
                     equations = NormalEquations(jacobian, pins)
                 else:
                     equations.renew(jacobian)
                 system = GaussNewton(jacobian, equations, fitted)
             else:
-                system = IterativeGaussNewton(IterativeNormalEquations(piece, jacobian, fit.z, fitted))
+                near = WeightJacobian(drawn, fit.z, spread)
+                system = IterativeGaussNewton(IterativeNormalEquations(drawn, near, fit.z, fitted))
             factorisations += 1
         move = system(jacobian, fit.misfit)
         previous, length = length, float(np.abs(move).max())
@@ -185,7 +213,7 @@ class Fit:
 class Problem:
     """What is to be fitted."""
 
-    piece: Piece
+    model: Model
     weights: NDArray[np.float64]
     spread: NDArray[np.float64]
     scale: float | None
@@ -193,7 +221,7 @@ class Problem:
     def at(self, z: NDArray) -> Fit:
         """The fit of positions z, with the best c where none is given."""
         with np.errstate(divide="ignore", invalid="ignore"):  # a flat triangle makes the misfit infinite
-            w, a = edge_weights(self.piece, z) / self.spread, self.weights / self.spread
+            w, a = self.model.weights(z) / self.spread, self.weights / self.spread
             c = float(w @ a / (w @ w)) if self.scale is None else self.scale
             return Fit(z, c, w, a / c - w)
 
@@ -211,10 +239,10 @@ def downhill(problem: Problem, fit: Fit, move: NDArray) -> Fit | None:
 class Equations(Protocol):
     """The linearised problem without the scale."""
 
-    def renew(self, jacobian: WeightJacobian) -> None:
+    def renew(self, jacobian: Jacobian) -> None:
         """Factorise anew for other positions."""
 
-    def fitted(self, jacobian: WeightJacobian, change: NDArray) -> NDArray:
+    def fitted(self, jacobian: Jacobian, change: NDArray) -> NDArray:
         """Displacement d (n,) complex that explains a change (e,) of the weights best: least |J d - r|."""
 
     def release(self) -> None:
@@ -224,7 +252,7 @@ class Equations(Protocol):
 class GaussNewton:
     """Steps of the linearised problem min |J d + g w - r| over displacements d and log-scale g."""
 
-    def __init__(self, jacobian: WeightJacobian, equations: Equations, weights: NDArray | None):
+    def __init__(self, jacobian: Jacobian, equations: Equations, weights: NDArray | None):
         self._equations = equations
         self._weights = weights  # None where the scale is known
         if weights is not None:
@@ -233,7 +261,7 @@ class GaussNewton:
             left = float(weights @ (weights - jacobian.forward(self._response)))
             self._complement = left if left > LAST_DIGITS * float(weights @ weights) else 0.0
 
-    def __call__(self, jacobian: WeightJacobian, misfit: NDArray) -> NDArray:
+    def __call__(self, jacobian: Jacobian, misfit: NDArray) -> NDArray:
         """Displacement d (n,) complex; the scale follows from it by least squares."""
         move = self._equations.fitted(jacobian, misfit)
         if self._weights is None or not self._complement:
@@ -252,7 +280,7 @@ class IterativeGaussNewton:
     def __init__(self, equations: IterativeNormalEquations):
         self._equations = equations
 
-    def __call__(self, jacobian: WeightJacobian, misfit: NDArray) -> NDArray:
+    def __call__(self, jacobian: Jacobian, misfit: NDArray) -> NDArray:
         """Displacement d (n,) complex; the best scale has left nothing of w in the misfit."""
         return self._equations.solve(jacobian.transpose(misfit))
 

@@ -19,7 +19,7 @@ from ..errors import GeometryError, SolverError
 from ..topology import Piece
 from .conformal import conformal_map
 from .cotangent import edge_weights
-from .polish import SHORT, Problem, polish
+from .polish import SHORT, Cotangents, Problem, polish
 from .suspects import find_suspects
 
 _log = logging.getLogger(__name__)
@@ -102,7 +102,7 @@ def _matched(
         rest = np.ones(len(weights), dtype=bool)
         rest[aside] = False
         found = polish(piece, weights, z, scale=scale, spread=np.where(rest, size, ASIDE * size), options=SHORT)
-        fit = Problem(piece, weights, size, found.scale).at(found.z)
+        fit = Problem(Cotangents(piece), weights, size, found.scale).at(found.z)
         misfit = np.abs(fit.misfit * fit.scale)
         left = float(np.linalg.norm(misfit[rest]))
         _log.debug("%d entries set aside: misfit %.1e, then %.1e", len(aside), before, left)

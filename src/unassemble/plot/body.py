@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..recovery import Body, Recovery, Structure
+from ..recovery import Body, ConformingMesh, Recovery, Structure
 from . import style
 from .canvas import panel
 from .mesh import line_handle
@@ -77,7 +77,7 @@ def _faces(recovery: Recovery) -> list[NDArray]:
     from ..elements.surface import outer_facets, planar_outlines
 
     cells = {kind: cells for kind, cells in recovery.cells.items() if kind != "line"}
-    if not isinstance(recovery, Body):
+    if not isinstance(recovery, (Body, ConformingMesh)):
         return list(cells.values())
     if recovery.dim == 2:
         return [planar_outlines(kind, some) for kind, some in cells.items()]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..recovery import Body, Mechanical, PlanarMesh, Recovery
+from ..recovery import Body, ConformingMesh, Mechanical, PlanarMesh, Recovery
 from ..summary import counted_cells, scale_text
 from ..words import count_of
 from . import style
@@ -44,7 +44,10 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     """
     if path is not None:
         check_plot(path)
-    figure, handles = planar_mesh(recovery, ax) if isinstance(recovery, PlanarMesh) else plot_body(recovery, ax)
+    if isinstance(recovery, PlanarMesh) and not isinstance(recovery, ConformingMesh):
+        figure, handles = planar_mesh(recovery, ax)
+    else:
+        figure, handles = plot_body(recovery, ax)
     if ax is None:
         header(figure, recovery.status, details(recovery), style.STATUS.get(recovery.status, style.TEXT))
         footer(figure, handles)

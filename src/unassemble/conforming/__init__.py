@@ -1,0 +1,5 @@
+"""Scalar matrices of other conforming elements in the plane: P2, P3, Q1, Q2, serendipity, triangles beside quads.
+
+The form M = L/2 - T annihilates the coordinates whatever the element is (theory: any conforming element); cells come
+from the sets of rows that are coupled to each other.
+"""

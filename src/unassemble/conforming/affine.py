@@ -1,0 +1,66 @@
+"""How nearly the entries of a cell are those of an affine one, for any order of its nodes.
+
+On an affine cell the matrix is int grad phi_i' G grad phi_j with one symmetric 2 x 2 matrix G: a combination of three
+known ones. So the orders that the graph leaves can be told apart by a linear fit of three numbers; of curved cells,
+and quadrilaterals that are no parallelograms, the right order is the one that fits best.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..elements.kinds import Kind
+from ..elements.reference import exact_rule, shape_gradients
+from ..matrix import OperatorMatrix
+from .sets import pairs_of
+
+_SHARED = 0.1  # weight of entries that other cells have a part in: split evenly, which is a guess
+
+
+@cache
+def _components(kind: Kind) -> NDArray[np.float64]:
+    """(k, k, 3) integrals for the three components of G."""
+    at, weights = exact_rule(kind)
+    x, y = shape_gradients(kind, at).transpose(2, 0, 1)
+    products = ((x, x), (y, y), (x, y))
+    parts = [np.einsum("q,qi,qj->ij", weights, a, b) for a, b in products]
+    return np.stack([(part + part.T) / 2 for part in parts], axis=-1)
+
+
+class ElementEntries:
+    """Entries among the nodes of cells, split evenly among the cells that have a part in them.
+
+    Parameters
+    ----------
+    matrix : OperatorMatrix
+    sets : (m, k) int64
+    every : (p,) int64
+        Keys of the pairs of all cells, of other sizes too, increasing, one for each cell.
+    """
+
+    def __init__(self, matrix: OperatorMatrix, sets: NDArray[np.int64], every: NDArray[np.int64]):
+        m, k = sets.shape
+        keys = pairs_of(matrix.n, sets)
+        parts = np.searchsorted(every, keys, side="right") - np.searchsorted(every, keys)
+        stored = matrix.edges @ [matrix.n, 1]
+        place = np.minimum(np.searchsorted(stored, keys), len(stored) - 1)
+        value = np.where(stored[place] == keys, matrix.entries[place], 0.0) / parts
+        a, b = np.triu_indices(k, 1)
+        self._values, self._weights = np.zeros((m, k, k)), np.zeros((m, k, k))
+        for i, j in ((a, b), (b, a)):
+            self._values[:, i, j], self._weights[:, i, j] = value, np.where(parts == 1, 1.0, _SHARED)
+
+    def misfit(self, kind: Kind, cells: NDArray[np.int64], order: NDArray[np.int64]) -> NDArray[np.float64]:
+        """(c,) squared misfits of some cells (c,) whose nodes, as places in their sets, stand in an order (c, k)."""
+        a, b = np.triu_indices(kind.nodes, 1)
+        i, j = order[:, a], order[:, b]
+        value, weight = self._values[cells[:, None], i, j], self._weights[cells[:, None], i, j]
+        columns = _components(kind)[a, b]
+        normal = np.einsum("mp,pr,ps->mrs", weight, columns, columns, optimize=True)
+        right = np.einsum("mp,pr->mr", weight * value, columns)
+        total = (weight * value**2).sum(axis=1)
+        solution = np.linalg.solve(normal, right[..., None])[..., 0]
+        return np.asarray(total - (right * solution).sum(axis=1)) / np.where(total > 0, total, 1.0)

@@ -1,0 +1,209 @@
+"""Entries of a mesh as a function of its positions, by quadrature, with their derivative.
+
+Let s and t be the derivatives of the position z = x + iy along the two reference coordinates, D = Im(conj(s) t) the
+determinant, and p_a, r_a the derivatives of the shape functions. Their gradients are the complex numbers
+g_a = -i (t p_a - s r_a) / D, and an entry is K_ab = sum_q w_q D Re(conj(g_a) g_b): the metric |t|^2, Re(conj(s) t),
+|s|^2 over D times products p_a p_b, p_a r_b + r_a p_b, r_a r_b, which are the same in all cells. When a node l moves by
+d, gradients and determinant change so that
+
+    dK_ab = -Re( d sum_q w_q D g_l conj(g_a g_b) ).
+
+Moves that are holomorphic in a cell, sum_l d_l g_l = 0, change nothing: they are locally similarities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..elements.kinds import Kind
+from ..elements.reference import Rule, shape_gradients
+from .parts import Part
+
+_AT_ONCE = 40_000  # cells
+
+
+class Entries:
+    """Weights w = -K of all pairs of a part, for positions of its nodes, or of its corners where it is straight.
+
+    A :class:`~unassemble.planar.polish.Model`.
+
+    Parameters
+    ----------
+    part : Part
+    rules : mapping of Kind to Rule
+    straight : bool
+        Whether positions are those of corners, from which all nodes follow.
+    """
+
+    def __init__(self, part: Part, rules: Mapping[Kind, Rule], *, straight: bool):
+        self._part = part
+        self._whole = part.from_corners() if straight and part.degree > 1 else None
+        self.n = part.n_corners if straight else part.n
+        self._blocks = [_Block(part, kind, cells, rules[kind], straight) for kind, cells in part.blocks.items()]
+
+    def nodes(self, z: NDArray) -> NDArray[np.complex128]:
+        """Positions of all nodes."""
+        return z if self._whole is None else np.asarray(self._whole @ z)
+
+    def weights(self, z: NDArray) -> NDArray[np.float64]:
+        """(e,) -K_ab of the part's edges."""
+        z, total = self.nodes(z), np.zeros(len(self._part.edges))
+        for block in self._blocks:
+            for some, at in block.parts(z):
+                total -= np.bincount(block.places[some].ravel(), block.products(*at.metric).ravel(), len(total))
+        return total
+
+    def roundings(self, z: NDArray) -> NDArray[np.float64]:
+        """(e,) size of the rounding errors of assembled entries, in units of the machine precision.
+
+        That of terms conj(g_a) g_b before they cancel, at most the root of K_aa K_bb.
+        """
+        z, total = self.nodes(z), np.zeros(len(self._part.edges))
+        for block in self._blocks:
+            a, b = np.triu_indices(block.cells.shape[1], 1)
+            for some, at in block.parts(z):
+                size = np.sqrt(np.abs(block.squares(*at.metric)))
+                total += np.bincount(block.places[some].ravel(), (size[:, a] * size[:, b]).ravel(), len(total))
+        return total
+
+    def flipped(self, z: NDArray) -> int:
+        """Cells that are not right side out at some point of the quadrature."""
+        z = self.nodes(z)
+        turned = [(at.determinant <= 0).any(axis=1).sum() for block in self._blocks for _, at in block.parts(z)]
+        return int(sum(turned))
+
+    def jacobian(self, z: NDArray, spread: NDArray) -> EntriesJacobian:
+        """The derivative at z."""
+        return EntriesJacobian(self._blocks, self.nodes(z), self.n, spread)
+
+
+@dataclass(frozen=True, eq=False)
+class _Local:
+    """Some cells at the points of a quadrature, (m, q) each: s, t, the determinant and the weights."""
+
+    s: NDArray[np.complex128]
+    t: NDArray[np.complex128]
+    determinant: NDArray[np.float64]
+    weights: NDArray[np.float64]
+
+    @property
+    def metric(self) -> tuple[NDArray, NDArray, NDArray]:
+        """What products of derivatives of shape functions are multiplied by."""
+        scaled = self.weights / self.determinant
+        cross = self.s.real * self.t.real + self.s.imag * self.t.imag
+        return scaled * np.abs(self.t) ** 2, -scaled * cross, scaled * np.abs(self.s) ** 2
+
+    def squares(self) -> tuple[NDArray, NDArray, NDArray]:
+        """The same for w D g_a g_b, complex."""
+        scaled = -self.weights / self.determinant
+        return scaled * self.t**2, -scaled * self.s * self.t, scaled * self.s**2
+
+    def gradient(self) -> tuple[NDArray, NDArray]:
+        """What derivatives of shape functions are multiplied by in g, complex."""
+        inverse = -1j / self.determinant
+        return inverse * self.t, -inverse * self.s
+
+
+class _Block:
+    """Cells of one kind with their quadrature."""
+
+    def __init__(self, part: Part, kind: Kind, cells: NDArray[np.int64], rule: Rule, straight: bool):
+        self.cells, self.places = cells, part.places(cells)
+        self.moved = cells[:, : kind.corners] if straight else cells
+        self._weights = rule[1]
+        self._p, self._r = np.ascontiguousarray(shape_gradients(kind, rule[0]).transpose(2, 0, 1))
+        a, b = np.triu_indices(kind.nodes, 1)
+        p, r = self._p, self._r
+        self.pairs = p[:, a] * p[:, b], p[:, a] * r[:, b] + r[:, a] * p[:, b], r[:, a] * r[:, b]
+        local = np.eye(kind.nodes)
+        if straight:
+            local = np.zeros((kind.nodes, kind.corners))
+            local[: kind.corners] = np.eye(kind.corners)
+            for k, some in enumerate(kind.between, kind.corners):
+                np.add.at(local[k], list(some), 1 / len(some))
+        self.slopes = p @ local, r @ local
+
+    def parts(self, z: NDArray) -> Iterator[tuple[slice, _Local]]:
+        """Some cells at a time."""
+        for first in range(0, len(self.cells), _AT_ONCE):
+            some = slice(first, first + _AT_ONCE)
+            corner = z[self.cells[some]]
+            s, t = (_matmul(corner, slopes.T) for slopes in (self._p, self._r))
+            yield some, _Local(s, t, s.real * t.imag - s.imag * t.real, self._weights)
+
+    def products(self, first: NDArray, mixed: NDArray, last: NDArray) -> NDArray:
+        """(m, pairs) sums over points, of real factors (m, q)."""
+        return first @ self.pairs[0] + mixed @ self.pairs[1] + last @ self.pairs[2]
+
+    def squares(self, first: NDArray, mixed: NDArray, last: NDArray) -> NDArray:
+        """(m, k) the same for pairs of a node with itself."""
+        return first @ self._p**2 + mixed @ (2 * self._p * self._r) + last @ self._r**2
+
+
+class EntriesJacobian:
+    """dw / d(x, y); a :class:`~unassemble.planar.normal.Jacobian`."""
+
+    def __init__(self, blocks: list[_Block], z: NDArray, n: int, spread: NDArray):
+        self._blocks, self._z, self.n, self.spread = blocks, z, n, spread
+
+    @property
+    def matrix(self) -> sp.bsr_array:
+        """(e, 2 n) in blocks of x and y."""
+        total = sp.csr_array((len(self.spread), self.n), dtype=np.complex128)
+        for block in self._blocks:
+            rows, columns, values = [], [], []
+            for some, at in block.parts(self._z):
+                squares, (along_p, along_r) = at.squares(), at.gradient()
+                value = np.empty((*block.places[some].shape, block.moved.shape[1]), np.complex128)
+                for k in range(value.shape[2]):
+                    g = along_p * block.slopes[0][:, k] + along_r * block.slopes[1][:, k]
+                    factors = [g * np.conj(one) for one in squares]
+                    value[:, :, k].real = block.products(*(one.real for one in factors))
+                    value[:, :, k].imag = block.products(*(one.imag for one in factors))
+                row = np.broadcast_to(block.places[some][:, :, None], value.shape)
+                rows.append(row.astype(np.int32).ravel())
+                columns.append(np.broadcast_to(block.moved[some][:, None], value.shape).astype(np.int32).ravel())
+                values.append((value / self.spread[row]).ravel())
+            place = np.concatenate(rows), np.concatenate(columns)
+            total = total + sp.coo_array((np.concatenate(values), place), shape=total.shape).tocsr()
+        blocks = np.stack([total.data.real, -total.data.imag], axis=-1)[:, None]
+        return sp.bsr_array((blocks, total.indices, total.indptr), shape=(total.shape[0], 2 * self.n))
+
+    def forward(self, displacement: NDArray) -> NDArray:
+        """J d for d (n,) complex: (e,) real."""
+        total = np.zeros(len(self.spread))
+        for block in self._blocks:
+            for some, at in block.parts(self._z):
+                moves, (along_p, along_r) = displacement[block.moved[some]], at.gradient()
+                stretch = along_p * _matmul(moves, block.slopes[0].T) + along_r * _matmul(moves, block.slopes[1].T)
+                change = block.products(*((stretch * np.conj(one)).real for one in at.squares()))
+                total += np.bincount(block.places[some].ravel(), change.ravel(), len(total))
+        return total / self.spread
+
+    def transpose(self, change: NDArray) -> NDArray:
+        """J' r for r (e,) real: (n,) complex, x in the real part and y in the imaginary one."""
+        result = np.zeros(self.n, dtype=np.complex128)
+        change = change / self.spread
+        for block in self._blocks:
+            for some, at in block.parts(self._z):
+                own = change[block.places[some]]
+                pull = sum(one * (own @ pairs.T) for one, pairs in zip(at.squares(), block.pairs, strict=True))
+                along_p, along_r = at.gradient()
+                force = _matmul(np.conj(along_p) * pull, block.slopes[0])
+                force += _matmul(np.conj(along_r) * pull, block.slopes[1])
+                moved = block.moved[some].ravel()
+                result.real += np.bincount(moved, force.real.ravel(), self.n)
+                result.imag += np.bincount(moved, force.imag.ravel(), self.n)
+        return result
+
+
+def _matmul(values: NDArray[np.complex128], factors: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Complex times real."""
+    result = np.empty((len(values), factors.shape[1]), np.complex128)
+    result.real, result.imag = values.real @ factors, values.imag @ factors
+    return result

@@ -1,0 +1,199 @@
+"""One part from its entries to positions of all nodes, polished to the level that the entries allow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..elements.reference import planar_rules
+from ..errors import SolverError
+from ..planar.polish import polish
+from ..tolerances import CERTIFIED, ROUNDED
+from .assembly import Entries
+from .parts import Part
+from .positions import corner_positions
+
+_ALIKE = 1.01  # ratio of misfits of rules between which only rounding or noise decides
+
+_NEARLY = 10.0  # ratio of misfits of rules that a polish may change
+_ROUNDING = 1e-14  # misfit, relative to c, that leaves nothing to explain
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A part with positions.
+
+    Attributes
+    ----------
+    part : Part
+    weights : (e,) float64
+        -A_ij of the part's edges.
+    entries : Entries
+        What its entries are for given parameters.
+    z : (entries.n,) complex128
+        Positions of corners where the part is straight, else of all nodes.
+    scale : float
+        c.
+    rule : dict of str to str
+        Quadrature of each kind of cell.
+    straight : bool
+    spread : (e,) float64
+        Standard deviations of the entries' errors, up to a common factor, for which z is the least-squares solution.
+    misfit : (e,) float64
+        What is left of the weights.
+    notes : tuple of str
+    """
+
+    part: Part
+    weights: NDArray[np.float64]
+    entries: Entries
+    z: NDArray[np.complex128]
+    scale: float
+    rule: dict[str, str]
+    straight: bool
+    spread: NDArray[np.float64]
+    misfit: NDArray[np.float64]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def nodes(self) -> NDArray[np.complex128]:
+        """(n,) positions of all nodes."""
+        return self.entries.nodes(self.z)
+
+    @property
+    def freedom(self) -> int:
+        """Entries less unknowns, c among these."""
+        return len(self.misfit) - (2 * self.entries.n - 3)
+
+    @property
+    def size(self) -> float:
+        """Root mean square of the misfit, relative to c."""
+        return float(np.sqrt(np.mean((self.misfit / self.scale) ** 2)))
+
+
+def fitted(
+    part: Part, weights: NDArray, *, scale: float | None, noise: NDArray[np.float64] | None, refine: bool
+) -> Fitted:
+    """Positions of a part.
+
+    Straight cells first; where they do not fit, all nodes move, from there.
+
+    Parameters
+    ----------
+    part : Part
+    weights : (e,) float64
+        -A_ij of the part's edges.
+    scale : float, optional
+        c, where it is known.
+    noise : (e,) float64, optional
+        Standard deviations of the entries' errors, where they are known.
+    refine : bool
+        Whether to polish.
+
+    Raises
+    ------
+    GeometryError, SolverError
+    """
+    z, c = corner_positions(part, weights, scale)
+    straight = _by_best_rule(part, weights, z, c, noise, straight=True)
+    if part.degree == 1 or not refine or straight.size < max(CERTIFIED**0.5, _left_by(noise, c)):
+        return _settled(straight, scale, noise) if refine else straight
+    straight, curved = _polished(straight, weights, scale, noise), None
+    for rule in _rules(part, straight=False):
+        trial = _polished(
+            _with_rule(part, weights, straight.nodes, c, noise, rule, straight=False), weights, scale, noise
+        )
+        if not trial.entries.flipped(trial.z) and (curved is None or trial.size < curved.size):
+            curved = trial
+        if curved is not None and curved.size < max(ROUNDED, _left_by(noise, c)):
+            break
+    if curved is None or curved.freedom <= 0:
+        return straight
+    better = curved.size / np.sqrt(curved.freedom) < straight.size / np.sqrt(straight.freedom)
+    return curved if better else straight
+
+
+def _settled(start: Fitted, scale: float | None, noise: NDArray | None) -> Fitted:
+    """Polished, with the best of those rules that are too much alike to be told apart before."""
+    best = _polished(start, start.weights, scale, noise)
+    if best.size < _ROUNDING:
+        return best
+    for rule in _rules(best.part, straight=best.straight):
+        other = _with_rule(best.part, best.weights, best.z, best.scale, noise, rule, straight=best.straight)
+        if rule != best.rule and other.size < _NEARLY * best.size and not np.array_equal(other.misfit, best.misfit):
+            other = _polished(other, start.weights, scale, noise)
+            best = other if other.size < _ALIKE / 2 * best.size else best
+    return best
+
+
+def _left_by(noise: NDArray | None, c: float) -> float:
+    """Misfit that noise may leave."""
+    return 0.0 if noise is None else 2 * float(np.sqrt(np.mean(noise**2))) / abs(c)
+
+
+def _by_best_rule(
+    part: Part,
+    weights: NDArray,
+    z: NDArray,
+    c: float,
+    noise: NDArray | None,
+    *,
+    straight: bool,
+) -> Fitted:
+    """With the quadrature that fits best; of those that fit alike the first."""
+    trials: list[Fitted] = []
+    for rule in _rules(part, straight=straight):
+        trials.append(_with_rule(part, weights, z, c, noise, rule, straight=straight))
+        if trials[-1].size <= ROUNDED**0.75:
+            return trials[-1]
+    least = min(trial.size for trial in trials)
+    return next((trial for trial in trials if trial.size <= _ALIKE * least), trials[0])
+
+
+def _with_rule(
+    part: Part, weights: NDArray, z: NDArray, c: float, noise: NDArray | None, rule: dict[str, str], *, straight: bool
+) -> Fitted:
+    entries = Entries(part, {kind: planar_rules(kind)[rule[kind.name]] for kind in part.blocks}, straight=straight)
+    spread = entries.roundings(z) if noise is None else noise
+    with np.errstate(invalid="ignore", over="ignore"):
+        misfit = weights - c * entries.weights(z)
+    return Fitted(part, weights, entries, z, c, rule, straight, spread, misfit)
+
+
+def _rules(part: Part, *, straight: bool) -> Iterator[dict[str, str]]:
+    """Quadratures by kind of cell; on straight triangles the first is exact, and one order serves all others."""
+    names = {kind.name: list(planar_rules(kind)) for kind in part.blocks}
+    for kind in part.blocks:
+        if kind.simplex and (straight or kind.degree == 1):
+            names[kind.name] = names[kind.name][:1]
+    for k in range(max(map(len, names.values()))):
+        yield {name: next(islice(some, min(k, len(some) - 1), None)) for name, some in names.items()}
+
+
+def _polished(start: Fitted, weights: NDArray, scale: float | None, noise: NDArray | None) -> Fitted:
+    """Gauss-Newton; where it cannot be done the part stays as it is, with a note.
+
+    Unless the noise is known, errors are taken to be those of assembly, or, where the misfit is beyond that, of one
+    size.
+    """
+    entries = start.entries
+    if entries.flipped(start.z):
+        return replace(start, notes=("no polish: cells are flat or turned over",))
+    try:
+        found = polish(entries, weights, start.z, scale=scale, spread=start.spread)
+        spread = start.spread
+        misfit = weights - found.scale * entries.weights(found.z)
+        if noise is None and not np.sqrt(np.mean((misfit / found.scale / spread) ** 2)) < ROUNDED:
+            spread = np.ones(len(weights))
+            found = polish(entries, weights, found.z, scale=scale, spread=spread)
+            misfit = weights - found.scale * entries.weights(found.z)
+    except SolverError as error:
+        return replace(start, notes=(f"no polish: {error}",))
+    if not np.isfinite(misfit).all():
+        return replace(start, notes=("the polish did not stay finite and was left out",))
+    notes = () if found.converged else (f"the polish did not converge: its last step was {found.last_step:.0e} long",)
+    return replace(start, z=found.z, scale=found.scale, spread=spread, misfit=misfit, notes=notes)

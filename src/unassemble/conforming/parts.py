@@ -1,0 +1,155 @@
+"""Cells cut into edge-connected parts, oriented, each in a numbering of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..elements.kinds import Kind
+from ..errors import TopologyError
+from ..topology import Piece
+from ..topology.keys import distinct, with_sides
+from ..topology.pieces import planar_pieces
+from .sets import pairs_of
+
+Blocks = dict[Kind, NDArray[np.int64]]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One edge-connected, oriented part of a mesh; its corners are numbered first.
+
+    Attributes
+    ----------
+    piece : Piece
+        The part as triangles between corners, quadrilaterals divided; its `vertices` are the rows of all nodes,
+        and its `edges` the sides of cells.
+    n_corners : int
+    n_holes : int
+    blocks : dict of Kind to (m, k) int64
+        Cells, local nodes, all of one orientation.
+    edges : (e, 2) int64
+        Pairs i < j of local nodes that a cell has, in lexicographic order.
+    """
+
+    piece: Piece
+    n_corners: int
+    n_holes: int
+    blocks: Blocks
+    edges: NDArray[np.int64]
+
+    @property
+    def n(self) -> int:
+        """Number of nodes."""
+        return len(self.piece.vertices)
+
+    @property
+    def degree(self) -> int:
+        """Of the elements, along a side."""
+        return max(kind.degree for kind in self.blocks)
+
+    def places(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(m, p) rows of `edges` of all pairs of some cells (m, k)."""
+        return np.searchsorted(self.edges @ [self.n, 1], pairs_of(self.n, cells))
+
+    def from_corners(self) -> sp.csr_array:
+        """(n, n_corners) nodes of straight cells as means of corners."""
+        rows, columns, values = [np.arange(self.n_corners)], [np.arange(self.n_corners)], [np.ones(self.n_corners)]
+        seen = np.zeros(self.n, dtype=bool)
+        seen[: self.n_corners] = True
+        for kind, cells in self.blocks.items():
+            for k, some in enumerate(kind.between, kind.corners):
+                node, first = np.unique(cells[:, k], return_index=True)
+                new = ~seen[node]
+                node, first = node[new], first[new]
+                seen[node] = True
+                for corner in some:
+                    rows.append(node)
+                    columns.append(cells[first, corner])
+                    values.append(np.full(len(node), 1 / len(some)))
+        place = np.concatenate(rows), np.concatenate(columns)
+        return sp.csr_array((np.concatenate(values), place), shape=(self.n, self.n_corners))
+
+
+def parts_of(n: int, blocks: Blocks) -> list[Part]:
+    """The parts of cells in any orientation, in order of their lowest row.
+
+    Raises
+    ------
+    TopologyError
+        If cells do not glue together to surfaces in the plane.
+    """
+    triangles, owner = _divided(blocks)
+    edges, _, opposite = with_sides(n, np.empty((0, 2), np.int64), triangles)
+    pieces = planar_pieces(n, edges, triangles, opposite)
+    if not pieces:
+        raise TopologyError("the cells that the rows form do not glue together to a surface in the plane")
+    label = np.random.default_rng(0).integers(0, 2**63, n, dtype=np.uint64)  # the sum of three tells a triangle
+    key = label[triangles].sum(axis=1)
+    order = np.argsort(key)
+    which, turned = np.empty(len(triangles), np.int64), np.empty(len(triangles), dtype=bool)
+    for number, piece in enumerate(pieces):
+        found = piece.vertices[piece.triangles]
+        row = order[np.searchsorted(key, label[found].sum(axis=1), sorter=order)]
+        which[row] = number
+        start = (found == triangles[row, :1]).argmax(axis=1)
+        turned[row] = found[np.arange(len(row)), (start + 1) % 3] != triangles[row, 1]
+    oriented, piece_of, first = {}, {}, 0
+    for kind, cells in blocks.items():
+        representative = first + np.flatnonzero(np.diff(owner[first:], prepend=-1) != 0)[: len(cells)]
+        flip = turned[representative]
+        oriented[kind] = np.where(flip[:, None], cells[:, reversal(kind)], cells)
+        piece_of[kind] = which[representative]
+        first += len(cells) * (kind.corners - 2)
+    return sorted(
+        (
+            _part(n, piece, {kind: cells[piece_of[kind] == number] for kind, cells in oriented.items()})
+            for number, piece in enumerate(pieces)
+        ),
+        key=lambda part: int(part.piece.vertices.min()),
+    )
+
+
+def reversal(kind: Kind) -> list[int]:
+    """Places of a cell's nodes in the same cell seen from the other side."""
+    corner = [0, *range(kind.corners - 1, 0, -1)]
+    between = [tuple(sorted(some)) for some in kind.between]
+    return corner + [kind.corners + between.index(tuple(sorted(corner[c] for c in some))) for some in kind.between]
+
+
+def _divided(blocks: Blocks) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Triangles between corners, two for each quadrilateral, and the cell of each."""
+    triangles, owner, first = [], [], 0
+    for kind, cells in blocks.items():
+        halves = [[0, 1, 2]] if kind.corners == 3 else [[0, 1, 2], [0, 2, 3]]
+        triangles.append(cells[:, halves].reshape(-1, 3))
+        owner.append(first + np.repeat(np.arange(len(cells)), len(halves)))
+        first += len(cells)
+    return np.concatenate(triangles), np.concatenate(owner)
+
+
+def _part(n: int, piece: Piece, blocks: Blocks) -> Part:
+    """A part in a numbering of its own, corners as the piece has them and all other nodes after these."""
+    blocks = {kind: cells for kind, cells in blocks.items() if len(cells)}
+    corners = piece.vertices
+    number = np.full(n, -1)
+    number[corners] = np.arange(len(corners))
+    rest = distinct(np.concatenate([cells[:, kind.corners :].ravel() for kind, cells in blocks.items()]))
+    number[rest] = len(corners) + np.arange(len(rest))
+    local = {kind: number[cells] for kind, cells in blocks.items()}
+    count = len(corners) + len(rest)
+    keys = distinct(np.concatenate([pairs_of(count, cells).ravel() for cells in local.values()]))
+    around = [
+        np.sort(np.stack([cells[:, : kind.corners], np.roll(cells[:, : kind.corners], -1, axis=1)], axis=-1), axis=-1)
+        for kind, cells in local.items()
+    ]
+    sides = distinct(np.concatenate([some.reshape(-1, 2) for some in around]) @ [count, 1])
+    whole = replace(
+        piece,
+        vertices=np.concatenate([corners, rest]),
+        edges=np.column_stack([sides // count, sides % count]),
+    )
+    return Part(whole, len(corners), piece.n_holes, local, np.column_stack([keys // count, keys % count]))

@@ -1,0 +1,209 @@
+"""A scalar matrix of any planar element on one page: cells, positions, place, certificate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..certify import Certificate
+from ..certify_elements import certify_elements
+from ..clock import Clock
+from ..elements.surface import boundary_loops
+from ..errors import GeometryError, SolverError, TopologyError
+from ..matrix import OperatorMatrix
+from ..options import ScalarOptions
+from ..planar.hinges import join
+from ..recovery import ConformingMesh
+from ..scalar.noise import Noise, NoiseTest
+from ..scalar.notes import piece_notes, topology_notes
+from ..scalar.placement import Placement
+from ..scalar.solving import Task
+from ..scalar.verdict import Held
+from ..tolerances import SMALL
+from ..topology import Topology
+from .deviations import deviations_of
+from .fit import Fitted, fitted
+from .parts import Part, parts_of, reversal
+from .roles import Cells, ordered_cells
+from .sets import node_sets
+from .verdict import verdict
+
+
+def recover_conforming(
+    stored: OperatorMatrix, shown: Iterable[Cells], placement: Placement, clock: Clock, options: ScalarOptions
+) -> ConformingMesh:
+    """The mesh of a checked scalar matrix, certified or the nearest.
+
+    Parameters
+    ----------
+    stored : OperatorMatrix
+    shown : iterable of Cells
+        See :func:`shown_cells`.
+    placement : Placement
+    clock : Clock
+    options : ScalarOptions
+
+    Raises
+    ------
+    TopologyError
+        If rows form no cells.
+    GeometryError
+        If the entries fit none that they form.
+    """
+    task = Task(options=options, placement=placement, noise=Noise.known(stored, options.noise))
+    nearest: ConformingMesh | None = None
+    failure: Exception = TopologyError("no sets of rows that are coupled to each other are cells of any known element")
+    for cells in shown:
+        try:
+            found = _recovered(stored, cells, clock, task)
+        except (TopologyError, GeometryError, SolverError) as error:
+            failure = error
+            continue
+        if found.certified:
+            return found
+        if nearest is None or found.backward_error < nearest.backward_error:
+            nearest = found
+    if nearest is None:
+        raise failure
+    return nearest
+
+
+def shown_cells(stored: OperatorMatrix) -> Iterator[Cells]:
+    """Cells that the rows may form, the likeliest first."""
+    for sets in node_sets(stored):
+        with suppress(TopologyError):
+            yield from ordered_cells(stored, sets)
+
+
+def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -> ConformingMesh:
+    with clock("cells"):
+        parts = parts_of(stored.n, cells.blocks)
+    topology = Topology(stored.n, stored.edges, tuple(part.piece for part in parts), "cliques")
+    with clock("positions"):
+        fits = [_fit(stored, part, task) for part in parts]
+    with clock("place"):
+        placed, origins, notes = _placed(topology, fits, task)
+        mesh = _Joined(parts, placed, stored.n)
+    with clock("certify"):
+        held = [_held(stored, mesh, mesh.points + shift, fits, task) for shift in (0.0, _shift(origins, mesh))]
+    with clock("deviations"):
+        bars = deviations_of(stored.n, fits, placed, task) if task.options.standard_deviations else None
+    found = verdict(fits, held, task, told=cells.told)
+    certificate = held[1].certificate
+    noise = task.noise.at(certificate.pairs, stored) if task.noise else None
+    worst, misfits = certificate.worst(10 if found.status == "uncertified" else 0, noise=noise)
+    freedom = sum(fit.freedom for fit in fits)
+    return ConformingMesh(
+        points=mesh.points + _shift(origins, mesh),
+        **mesh.fields(),
+        component=mesh.component,
+        hinges=topology.hinges,
+        scale=np.array([fit.scale for fit in fits]) / task.stretch,
+        node_status=(topology.multiplicity == 0).astype(np.int8),
+        status=found.status,
+        uniqueness=found.uniqueness,
+        reason=found.reason,
+        operator="anisotropic laplacian" if task.placement.tensor else "laplacian",
+        backward_error=certificate.backward_error,
+        n_holes=sum(part.n_holes for part in parts),
+        timings=clock.timings,
+        warnings=(*stored.warnings, *notes),
+        worst_entries=worst,
+        worst_misfits=misfits,
+        standard_deviations=bars,
+        chi_square=held[1].test.figures if held[1].test else None,
+        estimated_noise=float(np.linalg.norm(certificate.differences) / np.sqrt(freedom)) if freedom > 0 else None,
+        quadrature=", ".join(dict.fromkeys(rule for fit in fits for rule in fit.rule.values())),
+        straight=all(fit.straight for fit in fits),
+    )
+
+
+def _fit(stored: OperatorMatrix, part: Part, task: Task) -> Fitted:
+    """A part with the positions that its entries give."""
+    rows = part.piece.vertices[part.edges]
+    keys = stored.edges @ [stored.n, 1]
+    key = rows.min(axis=1) * stored.n + rows.max(axis=1)
+    place = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
+    there = keys[place] == key
+    noise = None
+    if task.noise is not None:
+        noise = task.noise.sigma * np.where(there, task.noise.spread[place], SMALL)
+    weights = -np.where(there, stored.entries[place], 0.0)
+    return fitted(part, weights, scale=task.scale, noise=noise, refine=task.options.refine)
+
+
+def _placed(
+    topology: Topology, fits: Sequence[Fitted], task: Task
+) -> tuple[list[NDArray], NDArray[np.complex128], list[str]]:
+    """Nodes of every part in their final frame, relative to its origin; the origins; what is to be said."""
+    placement = task.placement
+    origins = placement.origins(topology)
+    placed, remarks = [], []
+    for piece, fit, origin in zip(topology.pieces, fits, origins, strict=True):
+        z, more = placement.apply(piece, fit.nodes, origin)
+        placed.append(z)
+        remarks.append((*fit.notes, *more))
+    known = np.array([placement.known_positions(piece) for piece in topology.pieces])
+    notes = [*piece_notes(remarks), *placement.unused(topology), *topology_notes(topology)]
+    return join(topology, placed, known), origins, notes
+
+
+class _Joined:
+    """Parts put together in the numbering of the matrix, those that are mirrored turned over."""
+
+    def __init__(self, parts: Sequence[Part], placed: Sequence[NDArray], n: int):
+        self.points = np.full((n, 2), np.nan)
+        self.component = np.full(n, -1, dtype=np.int64)
+        self.blocks: dict[str, NDArray[np.int64]] = {}
+        pieces: dict[str, list[NDArray]] = {}
+        blocks: dict[str, list[NDArray]] = {}
+        for label in range(len(parts))[::-1]:  # the first part at a hinge comes last
+            part, z = parts[label], placed[label]
+            self.points[part.piece.vertices] = np.column_stack([z.real, z.imag])
+            self.component[part.piece.vertices] = label
+            a, b, c = z[part.piece.triangles].T
+            mirrored = (np.conj(b - a) * (c - a)).imag.sum() < 0
+            for kind, cells in part.blocks.items():
+                own = part.piece.vertices[cells[:, reversal(kind)] if mirrored else cells]
+                blocks.setdefault(kind.name, []).insert(0, own)
+                pieces.setdefault(kind.name, []).insert(0, np.full(len(own), label))
+        self.blocks = {name: np.concatenate(some) for name, some in blocks.items()}
+        self.piece = {name: np.concatenate(some) for name, some in pieces.items()}
+
+    def fields(self) -> dict[str, Any]:
+        """Cells and boundary under the names that results have."""
+        fields: dict[str, Any] = {}
+        for name, cells in self.blocks.items():
+            corners = 3 if name.startswith("triangle") else 4
+            fields["triangles" if corners == 3 else "quads"] = np.ascontiguousarray(cells[:, :corners])
+            if cells.shape[1] > corners:
+                fields["mid_nodes"] = np.ascontiguousarray(cells[:, corners:])
+        boundary, offsets = boundary_loops(self.blocks)
+        return fields | {"boundary": boundary, "boundary_offsets": offsets}
+
+
+def _shift(origins: NDArray[np.complex128], mesh: _Joined) -> NDArray[np.float64]:
+    """(n, 2) where the origin of each point's part is."""
+    shift = origins[mesh.component]
+    return np.column_stack([shift.real, shift.imag])
+
+
+def _held(stored: OperatorMatrix, mesh: _Joined, points: NDArray, fits: Sequence[Fitted], task: Task) -> Held:
+    """A mesh with these points against the matrix, and against the errors of its entries."""
+    tensor, noise = task.placement.tensor, task.noise
+    if tensor:  # div(K grad) is a Laplacian in coordinates that K stretches
+        z = tensor.to_laplacian(points @ [1, 1j])
+        points = np.column_stack([z.real, z.imag])
+    scale = np.array([fit.scale for fit in fits])
+    rules = {name: rule for fit in fits for name, rule in fit.rule.items()}
+    factors = {name: scale[piece] for name, piece in mesh.piece.items()}
+    certificate: Certificate = certify_elements(stored.edges, stored.entries, points, mesh.blocks, factors, rules)
+    if noise is None:
+        return Held(certificate, None)
+    misfit = certificate.differences / noise.at(certificate.pairs, stored)
+    known = 1 if task.scale is not None else 0
+    return Held(certificate, NoiseTest.of(noise, misfit, sum(fit.freedom + known for fit in fits), scale))

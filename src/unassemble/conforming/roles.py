@@ -1,0 +1,252 @@
+"""From sets of rows to cells in order: which rows are corners, which lie on which side.
+
+Cells that share a side share its order + 1 rows, and only corners belong to more than two cells. Where rows belong to
+the same cells the corner is the one of the smallest diagonal entry of L: on a straight triangle that of a node in the
+middle of a side is at least twice that of a corner. What the graph then leaves, entries decide (:mod:`.affine`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..elements.kinds import KINDS, Kind
+from ..errors import TopologyError
+from ..matrix import OperatorMatrix
+from .affine import ElementEntries
+from .sets import NodeSets, pairs_of
+
+_KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9", 10: "triangle10"}
+_RINGS = {3: ((0, 1, 2),), 4: ((0, 1, 2, 3), (0, 1, 3, 2), (0, 2, 1, 3))}
+_DOUBTFUL = 4  # quadrilaterals whose sides are tried both ways
+_FEW = 5000  # quadrilaterals among which that is done
+_MOST = 6  # rows of a cell whose sides only entries tell
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Cells in meshio's order, in either orientation.
+
+    Attributes
+    ----------
+    blocks : dict of Kind to (m, k) int64
+    told : bool
+        Whether the graph alone tells them, and no entries.
+    """
+
+    blocks: dict[Kind, NDArray[np.int64]]
+    told: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Second:
+    """Cells that could be in another order: which, the second likeliest one, and how near it comes, 1 for as near."""
+
+    which: NDArray[np.int64]
+    cells: NDArray[np.int64]
+    likeness: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class _Sides:
+    """Sides between two cells: keys of their corners, increasing, and the rows between these, (s, order - 1)."""
+
+    keys: NDArray[np.int64]
+    between: NDArray[np.int64]
+    per_cell: NDArray[np.int64]
+    corner: NDArray[np.bool_]
+    middle: NDArray[np.bool_]
+
+
+def kind_of_size(k: int) -> Kind:
+    """The planar kind with so many nodes."""
+    return KINDS[_KINDS[k]]
+
+
+def ordered_cells(matrix: OperatorMatrix, found: NodeSets) -> Iterator[Cells]:
+    """Cells of sets of rows, the likeliest first; then with some quadrilaterals in their second likeliest order.
+
+    Raises
+    ------
+    TopologyError
+        If the sets do not overlap as cells do.
+    """
+    size = np.abs(np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n))
+    sides = _sides_between(matrix.n, found, size)
+    every = np.sort(np.concatenate([pairs_of(matrix.n, sets).ravel() for sets in found.sets]))
+    blocks: dict[Kind, NDArray[np.int64]] = {}
+    others: dict[Kind, _Second] = {}
+    first = 0
+    for sets in found.sets:
+        kind = kind_of_size(sets.shape[1])
+        entries = ElementEntries(matrix, sets, every)
+        per_cell = sides.per_cell[first : first + len(sets)]
+        blocks[kind], others[kind] = _ordered(matrix.n, kind, sets, sides, per_cell, size, entries)
+        first += len(sets)
+    told = found.order == 1 and not any(len(other.which) for other in others.values())
+    yield Cells(blocks, told)
+    for kind, other in others.items():
+        if kind.corners == 4 and kind.degree == 1 and len(sets) <= _FEW:
+            doubtful = np.argsort(-other.likeness, kind="stable")[:_DOUBTFUL]
+            for turned in product((False, True), repeat=len(doubtful)):
+                if any(turned):
+                    some = doubtful[np.array(turned)]
+                    cells = blocks[kind].copy()
+                    cells[other.which[some]] = other.cells[some]
+                    yield Cells(blocks | {kind: cells}, told)
+
+
+def _sides_between(n: int, found: NodeSets, size: NDArray) -> _Sides:
+    """Sides of two cells, and what they say of rows."""
+    nodes = found.order + 1
+    cell = np.concatenate([np.repeat(np.arange(len(sets)), sets.shape[1]) for sets in found.sets])
+    shift = np.cumsum([0, *(len(sets) for sets in found.sets)])
+    cell += np.repeat(shift[:-1], [sets.size for sets in found.sets])
+    rows = np.concatenate([sets.ravel() for sets in found.sets])
+    member = sp.csr_array((np.ones(len(rows), np.int32), (cell, rows)), shape=(int(shift[-1]), n))
+    common = sp.triu(member @ member.T, 1, format="coo")
+    if (common.data > nodes).any():
+        raise TopologyError("cells that the rows seem to form overlap in more than a side")
+    one, other = common.row[common.data == nodes], common.col[common.data == nodes]
+    shared = sp.csr_array(member[one].multiply(member[other]))
+    side = shared.indices.reshape(-1, nodes).astype(np.int64)
+    count = np.bincount(rows, minlength=n)
+    # Only corners belong to more than two cells; of rows that belong to the same ones a corner's diagonal is smaller.
+    rank = np.where(count > 2, -1.0, size)
+    side = np.take_along_axis(side, np.argsort(rank[side], axis=1, kind="stable"), axis=1)
+    corner, middle = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    corner[side[:, :2]] = middle[side[:, 2:]] = True
+    corner[count > 2] = True
+    if (corner & middle).any():
+        raise TopologyError("rows are corners of some cells and lie between corners of others")
+    keys = np.sort(side[:, :2], axis=1) @ [n, 1]
+    order = np.argsort(keys, kind="stable")
+    if (np.diff(keys[order]) == 0).any():
+        raise TopologyError("more than two cells share a side")
+    per_cell = np.bincount(np.concatenate([one, other]), minlength=int(shift[-1]))
+    return _Sides(keys[order], side[order, 2:], per_cell, corner, middle)
+
+
+def _ordered(
+    n: int,
+    kind: Kind,
+    sets: NDArray[np.int64],
+    sides: _Sides,
+    per_cell: NDArray[np.int64],
+    size: NDArray,
+    entries: ElementEntries,
+) -> tuple[NDArray[np.int64], _Second]:
+    """Cells of one kind, and what else they could be."""
+    corners, inner, open_rows, n_open = _parted(kind, sets, sides, size)
+    best = np.full(len(sets), np.inf)
+    order, other = np.zeros(sets.shape, np.int64), np.zeros(sets.shape, np.int64)
+    second = best.copy()
+    for ring in _RINGS[kind.corners]:
+        around = np.take_along_axis(corners, np.broadcast_to(ring, corners.shape), axis=1)
+        ends = np.take_along_axis(sets, around, axis=1)
+        place, known = _known_sides(n, ends, sides)
+        fits = (known.sum(axis=1) == per_cell) & ((kind.degree - 1) * (~known).sum(axis=1) == n_open)
+        pattern = known @ (1 << np.arange(kind.corners))
+        for code in np.unique(pattern[fits]):
+            some = np.flatnonzero(fits & (pattern == code))
+            none = np.zeros((len(some), kind.corners, kind.degree - 1), np.int64)
+            between = sides.between[place[some]] if none.size and len(sides.keys) else none
+            local = _local(sets[some], between)
+            for fill in _fillings(kind, known[some[0]]):
+                trial = _filled(kind, around[some], local, open_rows[some], inner[some], fill)
+                misfit = entries.misfit(kind, some, trial)
+                better = misfit < best[some]
+                second[some[better]], other[some[better]] = best[some[better]], order[some[better]]
+                best[some[better]], order[some[better]] = misfit[better], trial[better]
+                next_best = ~better & (misfit < second[some])
+                second[some[next_best]], other[some[next_best]] = misfit[next_best], trial[next_best]
+    if not np.isfinite(best).all():
+        raise TopologyError(f"row {int(sets[np.argmax(~np.isfinite(best))][0])} is in a cell whose sides do not close")
+    doubtful = np.flatnonzero(np.isfinite(second))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        likeness = np.nan_to_num(best[doubtful] / second[doubtful], nan=1.0)
+    left = _Second(doubtful, np.take_along_axis(sets, other, axis=1)[doubtful], likeness)
+    return np.take_along_axis(sets, order, axis=1), left
+
+
+def _parted(
+    kind: Kind, sets: NDArray[np.int64], sides: _Sides, size: NDArray
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Places in each set: of corners (m, c), of the node inside (m, 0 or 1), of rows on sides not known (m, most).
+
+    And the number of the latter; places beyond it mean nothing.
+    """
+    corner, middle = sides.corner[sets], sides.middle[sets]
+    free = ~(corner | middle)
+    rank = np.where(corner, -1.0, np.where(middle, np.inf, size[sets]))
+    by_rank = np.argsort(rank, axis=1, kind="stable")
+    corners = by_rank[:, : kind.corners]
+    if np.take_along_axis(middle, corners, axis=1).any() or (corner.sum(axis=1) > kind.corners).any():
+        raise TopologyError("rows that cells share do not form sides")
+    np.put_along_axis(free, corners, False, axis=1)
+    n_inner = kind.nodes - kind.corners * kind.degree
+    inner = np.argmax(np.where(free, size[sets], -1.0), axis=1)[:, None][:, :n_inner]
+    np.put_along_axis(free, inner, False, axis=1)
+    open_rows = np.argsort(~free, axis=1, kind="stable")
+    return corners, inner, open_rows, free.sum(axis=1)
+
+
+def _known_sides(n: int, ends: NDArray[np.int64], sides: _Sides) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """(m, c) place of each side of corners in a ring among those of two cells, and whether it is there."""
+    following = np.roll(ends, -1, axis=1)
+    keys = np.minimum(ends, following) * n + np.maximum(ends, following)
+    if not len(sides.keys):
+        return np.zeros(ends.shape, np.int64), np.zeros(ends.shape, dtype=bool)
+    place = np.minimum(np.searchsorted(sides.keys, keys), len(sides.keys) - 1)
+    return place, sides.keys[place] == keys
+
+
+def _local(sets: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Places of rows (m, c, r) in their sets."""
+    return np.stack(
+        [(sets == rows[:, s, r, None]).argmax(axis=1) for s in range(rows.shape[1]) for r in range(rows.shape[2])]
+        or [np.empty(len(sets), np.int64)],
+        axis=1,
+    )
+
+
+def _fillings(kind: Kind, known: NDArray[np.bool_]) -> list[tuple[int, ...]]:
+    """Orders of the rows on the sides: those on known sides in both directions, others in any order.
+
+    A number r below 100 is the r-th row of the known sides, and 100 + r the r-th of the others.
+    """
+    per_side = kind.degree - 1
+    if not per_side:
+        return [()]
+    n_open = int((~known).sum()) * per_side
+    if n_open > _MOST:
+        raise TopologyError("a cell shares too few sides with others")
+    directions = product((1, -1), repeat=int(known.sum())) if per_side > 1 else [(1,) * int(known.sum())]
+    fillings = []
+    for turns, free in product(list(directions), list(permutations(range(n_open)))):
+        turn, rest, filling = iter(turns), iter(free), []
+        for s, one in enumerate(known):
+            if one:
+                filling += list(range(s * per_side, (s + 1) * per_side))[:: next(turn)]
+            else:
+                filling += [100 + next(rest) for _ in range(per_side)]
+        fillings.append(tuple(filling))
+    return fillings
+
+
+def _filled(
+    kind: Kind,
+    corners: NDArray[np.int64],
+    local: NDArray[np.int64],
+    open_rows: NDArray[np.int64],
+    inner: NDArray[np.int64],
+    fill: tuple[int, ...],
+) -> NDArray[np.int64]:
+    """(m, k) places of a cell's nodes in meshio's order."""
+    on_sides = [open_rows[:, f - 100] if f >= 100 else local[:, f] for f in fill]
+    return np.column_stack([corners, *on_sides, inner])

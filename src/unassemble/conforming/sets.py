@@ -1,0 +1,230 @@
+"""Sets of rows that are the nodes of one cell, read off the graph."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..elements.cliques import Graph, simplices
+from ..matrix import OperatorMatrix
+from ..tolerances import ROUNDED
+from ..topology.keys import contains, distinct, pair_keys
+
+_AT_ONCE = 10_000_000  # products in one go
+_ABSENT = {4: 0, 6: 3, 8: 4, 9: 6, 10: 9}
+"""Pairs that a cell of so many nodes may lack, because the entry vanishes and is not stored."""
+
+
+@dataclass(frozen=True, eq=False)
+class NodeSets:
+    """Cells as sets of rows.
+
+    Attributes
+    ----------
+    order : int
+        Polynomial degree along a side, which has order + 1 nodes.
+    sets : tuple of (m, k) int64
+        One for each number of nodes; rows increase within a cell.
+    common : Common
+    """
+
+    order: int
+    sets: tuple[NDArray[np.int64], ...]
+    common: Common
+
+
+class Common:
+    """How many neighbours the two rows of each entry have in common, both themselves included.
+
+    Nodes on opposite sides of a cell have those of the cell in common and no others.
+    """
+
+    def __init__(self, matrix: OperatorMatrix):
+        size = matrix.row_size[matrix.edges].min(axis=1)
+        i, j = matrix.edges.T
+        ends = np.concatenate([i, j]), np.concatenate([j, i])
+        self.n = matrix.n
+        self.graph = Graph(sp.csr_array((np.ones(2 * len(i), np.int8), ends), shape=(matrix.n, matrix.n)))
+        self.keys = pair_keys(matrix.n, i, j)
+        self.stored = self.keys[np.abs(matrix.entries) > ROUNDED * size]
+
+    @cached_property
+    def closed(self) -> sp.csr_array:
+        """Neighbours, and the row itself."""
+        return self.graph.closed()
+
+    @cached_property
+    def count(self) -> NDArray[np.int64]:
+        """(e,) of each entry, in the order of its key."""
+        closed = self.closed
+        work = np.cumsum(closed @ np.diff(closed.indptr).astype(np.int64))
+        found = []
+        for rows in np.split(np.arange(self.n), np.searchsorted(work, np.arange(_AT_ONCE, work[-1], _AT_ONCE))):
+            block = closed[rows]
+            common = sp.csr_array((block @ closed).multiply(block))
+            common.sort_indices()
+            row = np.repeat(rows, np.diff(common.indptr))
+            found.append(common.data[common.indices > row])
+        return np.concatenate(found).astype(np.int64)
+
+    def of(self, keys: NDArray) -> NDArray[np.int64]:
+        """Of some pairs; 0 for those without an entry."""
+        place = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
+        return np.where(self.keys[place] == keys, self.count[place], 0)
+
+    def sets(self, k: int) -> NDArray[np.int64]:
+        """(m, k) rows that two of them have in common, nearly all coupled to each other."""
+        keys = self.keys[self.count == k]
+        if not len(keys):
+            return np.empty((0, k), np.int64)
+        both = sp.csr_array(self.closed[keys // self.n].multiply(self.closed[keys % self.n]))
+        both.sort_indices()
+        return self._coupled(once(both.indices.reshape(-1, k).astype(np.int64)))
+
+    def quadratic_triangles(self, found: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(m, 6) quadratic triangles that are no cliques, beside those found already, and these.
+
+        Corners need not be coupled to the sides that face them: entries there vanish where all sides are straight. But
+        the three nodes on the sides are, unless they meet at a right angle, and the six nodes of the cell are what two
+        of these three have in common.
+        """
+        for right_angles in (False, True):
+            keys = self.stored[~contains(distinct(pairs_of(self.n, found)), self.stored)]
+            if not len(keys):
+                break
+            ends = np.concatenate([keys // self.n, keys % self.n]), np.concatenate([keys % self.n, keys // self.n])
+            alone = Graph(sp.csr_array((np.ones(2 * len(keys), np.int8), ends), shape=(self.n, self.n)))
+            middle = _paths(alone) if right_angles else simplices(alone, 2)
+            several = sp.csr_array(sum(self.closed[column] for column in middle.T))
+            several.data = (several.data >= 2).astype(np.int32)
+            several.eliminate_zeros()
+            several.sort_indices()
+            size = np.diff(several.indptr)
+            # Around a vertex of three triangles two of the three share a node more.
+            rows = several[size == 7].indices.reshape(-1, 7)
+            rows = [several[size == 6].indices.reshape(-1, 6), *(np.delete(rows, k, axis=1) for k in range(7))]
+            found = once(
+                np.concatenate([found, self._coupled(once(np.concatenate(rows).astype(np.int64)), right_angles)])
+            )
+        return found
+
+    def _coupled(self, rows: NDArray[np.int64], more: int = 0) -> NDArray[np.int64]:
+        """Sets (m, k) of which nearly all are coupled to each other."""
+        k = rows.shape[1]
+        absent = np.zeros(len(rows), np.int64)
+        for a in range(k):
+            for b in range(a + 1, k):
+                absent += ~contains(self.keys, rows[:, a] * self.n + rows[:, b])
+        return rows[absent <= _ABSENT[k] + more]
+
+
+def _paths(graph: Graph) -> NDArray[np.int64]:
+    """(m, 3) paths of two edges, the node between in the second place."""
+    place, end = graph.spread(graph.col)
+    first = graph.row[place]
+    return np.column_stack([first, graph.col[place], end])[first < end]
+
+
+def once(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Rows (m, k) of increasing numbers, each once; sorting one number each is several times faster than all."""
+    label = rows.astype(np.uint64) @ np.random.default_rng(0).integers(0, 2**63, rows.shape[1], dtype=np.uint64)
+    return rows[np.sort(np.unique(label, return_index=True)[1])]
+
+
+def pairs_of(n: int, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m, k (k - 1) / 2) keys of all pairs of each cell, in the order of :func:`numpy.triu_indices`."""
+    a, b = np.triu_indices(cells.shape[1], 1)
+    return pair_keys(n, cells[:, a], cells[:, b])
+
+
+def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
+    """Sets that cover all entries, for each order of elements that the graph allows, greatest first.
+
+    Linear ones are quadrilaterals only: triangles beside them follow once diagonals are known.
+    """
+    common = Common(matrix)
+    if not len(common.keys):
+        return
+    for order, k in ((3, 10), (2, 9), (2, 8), (2, 6)):
+        found = common.sets(k)
+        if _cover(common, [found]):
+            yield NodeSets(order, (found,), common)
+    for quads in _choices(common, common.sets(4)):
+        if _cover(common, [quads]):
+            yield NodeSets(1, (quads,), common)
+        triangles = _beside(common, quads)
+        if len(triangles) and _cover(common, [triangles, quads]):
+            yield NodeSets(1, (triangles, quads), common)
+    if not _cover(common, [found]):
+        found = common.quadratic_triangles(found)
+        if _cover(common, [found]):
+            yield NodeSets(2, (found,), common)
+
+
+def _choices(common: Common, quads: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+    """All of them, or where some overlap in three rows, so that only one of two is a cell, either.
+
+    Two triangles beside a quadrilateral have its diagonal for a pair: with the vertex between them, all are coupled.
+    """
+    if not len(quads):
+        return
+    member = sp.csr_array((np.ones(quads.size, np.int32), quads.ravel(), np.arange(0, quads.size + 1, 4)))
+    overlap = sp.triu(member @ member.T, 1, format="coo")
+    one, other = overlap.row[overlap.data == 3], overlap.col[overlap.data == 3]
+    if not len(one):
+        yield quads
+        return
+    degree = np.diff(common.closed.indptr)[quads].sum(axis=1)
+    fewer = degree[one] <= degree[other]
+    for choice in (fewer, ~fewer):
+        yield np.delete(quads, np.where(choice, other, one), axis=0)
+
+
+def _beside(common: Common, quads: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m, 3) triangles beside quadrilaterals: rows that are all coupled, and all in no quadrilateral.
+
+    Around a vertex of three cells its neighbours are all coupled as well, by diagonals; and of triangles around a
+    vertex the outline is none.
+    """
+    label = np.random.default_rng(1).integers(0, 2**63, common.n, dtype=np.uint64)  # the sum of three tells a triangle
+    halves = label[quads[:, list(combinations(range(4), 3))]].sum(axis=2)
+    triangles = simplices(common.graph, 2)
+    triangles = triangles[~np.isin(label[triangles].sum(axis=1), halves)]
+    if not len(triangles):
+        return triangles
+    keys = pairs_of(common.n, quads)
+    order = np.argsort(keys, axis=None)
+    pairs = pairs_of(common.n, triangles)
+    place = np.minimum(np.searchsorted(keys.ravel(), pairs, sorter=order), len(order) - 1)
+    by_quad = keys.ravel()[order[place]] == pairs
+    within = np.sort(halves, axis=None)
+    known = np.sort(np.concatenate([within, label[triangles].sum(axis=1)]))
+    degree = np.diff(common.closed.indptr)
+    outline = np.zeros(len(triangles), dtype=bool)
+    for k in range(3):
+        for corner in range(4):
+            hub = quads[order[place[:, k]] // keys.shape[1], corner]
+            a, b, c = triangles.T
+            around = np.stack([label[hub] + label[one] + label[other] for one, other in ((a, b), (a, c), (b, c))])
+            lone = degree[hub] == 4 + contains(within, around).sum(axis=0)  # no cells but three
+            new = (triangles != hub[:, None]).all(axis=1)
+            outline |= by_quad[:, k] & new & lone & contains(known, around).all(axis=0)
+    triangles = triangles[~outline]
+    every = np.sort(np.concatenate([pairs_of(common.n, cells).ravel() for cells in (triangles, quads)]))
+    pairs = pairs_of(common.n, triangles)
+    crowded = np.searchsorted(every, pairs, side="right") - np.searchsorted(every, pairs) > 2
+    return triangles[~crowded.all(axis=1)]
+
+
+def _cover(common: Common, sets: list[NDArray[np.int64]]) -> bool:
+    """Whether each entry that is not zero belongs to a cell."""
+    if not sum(map(len, sets)):
+        return False
+    covered = distinct(np.concatenate([pairs_of(common.n, cells).ravel() for cells in sets]))
+    return bool(contains(covered, common.stored).all())

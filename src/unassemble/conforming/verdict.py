@@ -1,0 +1,93 @@
+"""From a mesh held against the matrix to its status: decided here, once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..scalar.solving import Task
+from ..scalar.verdict import Held
+from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE, SUSPICIOUS
+from ..words import count_of
+from .fit import Fitted
+
+_STANDS_OUT = 0.25  # of the sum of squared misfits; where all is rounding no entry has a twentieth
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a mesh is worth."""
+
+    status: str
+    uniqueness: str | None
+    reason: str
+
+
+def verdict(fits: Sequence[Fitted], held: Sequence[Held], task: Task, *, told: bool) -> Verdict:
+    """The status of a mesh.
+
+    Parameters
+    ----------
+    fits : sequence of Fitted
+        Its parts.
+    held : (Held, Held)
+        The mesh about the origins of its parts, and as it is written.
+    task : Task
+    told : bool
+        Whether the graph alone tells the cells.
+    """
+    near, written = held
+    reason = _obstacle(fits, near, task)
+    if reason:
+        return Verdict("uncertified", None, reason)
+    uniqueness = "proved" if told else "searched"
+    error = written.certificate.backward_error
+    if not written.passes:
+        why = (
+            f"the mesh fits, but not as it is written: so far from the origin its coordinates have too few digits, and "
+            f"the matrix is given back to {error:.1e} only"
+        )
+        return Verdict("uncertified", uniqueness, why)
+    if written.test and written.by_noise:
+        p = written.test.figures["p_value"]
+        return Verdict("certified", uniqueness, f"the misfit is that of {written.test.noise} (p = {p:.2g})")
+    fits_well = f"the operator re-assembled on this mesh gives the matrix back to {error:.1e}"
+    return Verdict("certified", uniqueness, fits_well)
+
+
+def _obstacle(fits: Sequence[Fitted], near: Held, task: Task) -> str:
+    """What speaks against a mesh, the gravest first; empty if nothing does."""
+    certificate, test = near.certificate, near.test
+    notes = list(dict.fromkeys(note for fit in fits for note in fit.notes))
+    because = f"; {notes[0]}" if notes else ""
+    if len(certificate.flipped):
+        return count_of(len(certificate.flipped), "cell is", "cells are") + f" flat, not convex or turned over{because}"
+    known = task.scale is not None
+    # Entries that vanish were supposed to.
+    loose = [fit for fit in fits if np.count_nonzero(fit.weights) - 2 * fit.entries.n + 3 + known <= 0]
+    if loose:
+        row = int(loose[0].part.piece.vertices.min())
+        return f"the part of row {row} has no more entries than unknowns, so that it fits proves nothing"
+    if test and near.by_noise:
+        if test.drowned:
+            return f"noise above {test.limit:.2g} ({LARGEST_NOISE:g} of c) drowns what the entries say of angles"
+        if test.coincidence:
+            return "entries of so few digits may fit by chance"
+        if not test.likely:
+            p = min(test.figures["p_value"], test.figures["largest_p_value"])
+            return f"the misfit is too large for {test.noise} (p = {p:.1e}; {CONFIDENCE:g} is allowed){because}"
+        return f"the mesh that fits need not be the likeliest{because}" if notes else ""
+    if not near.passes:
+        (i, j), misfit = certificate.pairs[certificate.misfits.argmax()], certificate.misfits.max()
+        return (
+            f"the re-assembled matrix differs, most in the entry of rows {i} and {j} (by {misfit:.1e} of the row's "
+            f"largest; {CERTIFIED:g} is allowed){because}"
+        )
+    for fit in fits if certificate.backward_error > SUSPICIOUS and task.options.refine else ():
+        squares = (fit.misfit / fit.spread) ** 2
+        if squares.max() > _STANDS_OUT * squares.sum():
+            i, j = fit.part.piece.vertices[fit.part.edges[int(squares.argmax())]]
+            return f"the entry of rows {i} and {j} stands out, next to others that fit to rounding level"
+    return ""
