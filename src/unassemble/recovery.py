@@ -191,6 +191,8 @@ class PlanarMesh(Recovery):
     alternatives : tuple of Alternative
         Cells in doubt where other meshes fit as well, and what these have instead; see
         :class:`unassemble.cells.Alternative`.
+    eliminated_points : (k, 2) float64
+        Vertices that the matrix has no rows for, where it determines them; see :mod:`unassemble.boundaries`.
     """
 
     n_holes: int
@@ -201,6 +203,7 @@ class PlanarMesh(Recovery):
     estimated_noise: float | None = None
     suspects: NDArray[np.int64] = field(default_factory=_none(2))
     alternatives: tuple[Alternative, ...] = ()
+    eliminated_points: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
 
     @property
     def element(self) -> str:
