@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     )
     from .inspection import inspect_matrix
     from .pipeline import recover
-    from .recovery import Body, PlanarMesh, Recovery, Structure
+    from .recovery import Body, PlanarMesh, Recovery, Structure, Surface
 
 # Imported on first use: the command line answers --help without loading scipy.
 _HOMES = {
     "inspect_matrix": "inspection",
     "recover": "pipeline",
-    **dict.fromkeys(("Body", "PlanarMesh", "Recovery", "Structure"), "outputs"),
+    **dict.fromkeys(("Body", "PlanarMesh", "Recovery", "Structure", "Surface"), "outputs"),
     **dict.fromkeys(
         (
             "FormatError",
@@ -60,6 +60,7 @@ __all__ = [
     "RecoveryError",
     "SolverError",
     "Structure",
+    "Surface",
     "TopologyError",
     "UnassembleError",
     "__version__",

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 from .export import save, to_meshio
 from .modes import modes_of
-from .recovery import Body, PlanarMesh, Recovery, Structure
+from .recovery import Body, PlanarMesh, Recovery, Structure, Surface
 from .report import build_report
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Body", "PlanarMesh", "Recovery", "Structure"]
+__all__ = ["Body", "PlanarMesh", "Recovery", "Structure", "Surface"]
 
 
 def plot(recovery: Recovery, path: str | PathLike[str] | None = None) -> Figure:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
 from .operators import VectorReading, about_translations, asked_for, second_reading, vector_valued
 from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, listed_anchors
-from .outputs import PlanarMesh, Recovery
+from .outputs import PlanarMesh, Recovery, Surface
 from .scalar import recover_scalar
 from .scalar.placement import Placement
 
@@ -37,6 +37,7 @@ def recover(
     block_size: int | None = None,
     numbering: Any = None,
     cells: bool = True,
+    realise: bool = False,
     variable: str | None = None,
     threads: int | None = None,
     progress: Callable[[str], None] | None = None,
@@ -47,16 +48,18 @@ def recover(
     plane and natural boundary conditions, c any nonzero number and D any diagonal matrix, both unknown.
     Vector-valued: isotropic linear elasticity in the plane or in space, with supports; see
     :func:`unassemble.elasticity.recover_elasticity`. And frames, shells and plates, whose nodes have rotations beside
-    displacements; see :mod:`unassemble.structures`.
+    displacements; see :mod:`unassemble.structures`. And the Laplacian of triangulated surfaces in space, c L + D, of
+    which the edge lengths are found; see :mod:`unassemble.metric`.
 
     Parameters
     ----------
     A : sparse matrix or array, ndarray, path, or "-"
         A matrix; or a file with one: Matrix Market, scipy's ``.npz``, ``.mat``; ``"-"`` reads Matrix Market from
         standard input. Explicit zeros are structure.
-    operator : {"auto", "laplacian", "elasticity"}
-        Which operator A belongs to. ``"auto"`` reads planar meshes as scalar, and matrices whose graph is none but
-        whose rows form nodes of two or three unknowns as elasticity.
+    operator : {"auto", "laplacian", "elasticity", "surface"}
+        Which operator A belongs to. ``"auto"`` reads planar meshes as scalar, matrices whose graph is none but
+        whose rows form nodes of two or three unknowns as elasticity, and what fits no mesh in the plane but a surface
+        in space as that.
     method : {None, "conformal", "angles"}
         How positions are found: by the conformal null vector, the default, or by the 2002 paper's equations for angles.
     refine : bool
@@ -90,6 +93,8 @@ def recover(
         Vector-valued matrices: how the unknowns stand; found where it is not given.
     cells : bool
         Vector-valued matrices: look for elements too, not for coordinates only.
+    realise : bool
+        Surfaces: look for coordinates in space that have the edge lengths.
     variable : str, optional
         Name of the variable in a ``.mat`` file.
     threads : int, optional
@@ -147,7 +152,7 @@ def recover(
     with clock("check"):
         checked = check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
     with thread_limit(threads):
-        return _Task(checked, clock, about, frame, planar, given).answer()
+        return _Task(checked, clock, about, frame, planar, given, realise).answer()
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +165,7 @@ class _Task:
     frame: FrameOptions
     planar: ScalarOptions
     given: tuple[str, ...]
+    realise: bool = False
 
     def answer(self) -> Recovery:
         """As the operator that is named; else as the one that the graph shows, or else the first that fits."""
@@ -168,20 +174,22 @@ class _Task:
             with self.clock("numbering"):
                 reading = asked_for(self.matrix, self.about.block_size, self.about.numbering)
             return self._as_vector(reading)
+        if self.about.operator == "surface":
+            return self._as_surface()
         if self.about.operator == "laplacian":
             return self._as_scalar(self.matrix, self.frame.anchors)
         at_sight = vector_valued(self.matrix)
         return self._first_that_fits() if at_sight is None else self._as_vector(at_sight)
 
     def _first_that_fits(self) -> Recovery:
-        """A planar mesh; or nodes of several unknowns where rows belong to no mesh.
+        """A planar mesh; or a surface in space; or nodes of several unknowns where rows belong to no mesh.
 
         A straight beam's rows, for one, fall apart into planar graphs.
         """
         try:
             found = self._as_scalar(self.matrix, self.frame.anchors)
         except RecoveryError as error:
-            other = self._as_second_reading()
+            other = self._as_certified_surface() or self._as_second_reading()
             if other is not None:
                 return other
             if isinstance(error, NotPlanarError) and (why := about_translations(self.matrix)):
@@ -189,7 +197,7 @@ class _Task:
             raise
         if found.certified or not found.node_status.any():
             return found
-        other = self._as_second_reading()
+        other = self._as_certified_surface() or self._as_second_reading()
         return other if other is not None and other.certified else found
 
     def _as_second_reading(self) -> Recovery | None:
@@ -206,6 +214,30 @@ class _Task:
             _check_proportion(scale, float(np.abs(part.entries).max()))
         placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
         return recover_scalar(part, placement, self.clock, self.planar)
+
+    def _as_surface(self) -> Surface:
+        """A surface in space, with coordinates on demand; a flat one as a planar mesh that has edge lengths too."""
+        from .metric import flattened, realised, recover_surface
+
+        unfit = tuple(name for name in self.given if name not in ("scale", "method"))
+        if unfit or self.frame.anchors:
+            name = "anchors" if self.frame.anchors else unfit[0]
+            raise InputError(f"`{name}` is not for surfaces in space: leave it out, or choose `operator='laplacian'`")
+        found = recover_surface(self.matrix, self.clock, self.planar)
+        if found.flat:
+            try:
+                return flattened(found, self._as_scalar(self.matrix, ()))
+            except RecoveryError:  # a cylinder is flat, and no planar mesh
+                pass
+        return realised(found, self.clock) if self.realise else found
+
+    def _as_certified_surface(self) -> Surface | None:
+        """The matrix as that of a surface, if it is one without doubt."""
+        try:
+            found = self._as_surface()
+        except (RecoveryError, InputError):  # options may be for planar meshes only
+            return None
+        return replace(found, choice="no mesh in the plane has these entries") if found.certified else None
 
     def _as_vector(self, reading: VectorReading) -> Recovery:
         from .vector import recover_vector

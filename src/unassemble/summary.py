@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .recovery import Body, Mechanical, PlanarMesh, Recovery
+from .recovery import Body, Mechanical, PlanarMesh, Recovery, Surface
 from .tolerances import SUSPICIOUS
 from .words import count_of
 
@@ -32,6 +32,8 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
     ]
     if isinstance(recovery, PlanarMesh):
         rows += [("holes", f"{recovery.n_holes:,}"), ("scale c", scale_text(recovery))]
+    if isinstance(recovery, Surface):
+        rows += _surface_rows(recovery)
     if isinstance(recovery, Mechanical):
         rows += _elastic_rows(recovery)
     rows.append(("backward error", f"{recovery.backward_error:.1e}"))
@@ -99,6 +101,20 @@ def _noise_rows(mesh: PlanarMesh) -> list[tuple[str, str]]:
         rows.append(("noise", f"the misfit is that of a standard deviation of {mesh.estimated_noise:.1e}"))
     if mesh.largest_deviation is not None:
         rows.append(("std deviation", f"at most {mesh.largest_deviation:.1e} in a coordinate"))
+    return rows
+
+
+def _surface_rows(surface: Surface) -> list[tuple[str, str]]:
+    rows = []
+    pieces = zip(surface.euler, surface.orientable, surface.genus, surface.loops, strict=True)
+    for euler, orientable, genus, loops in list(pieces)[:_SHOWN]:
+        parts = count_of(int(genus), "handle") if orientable else count_of(int(genus), "cross-cap") + ", one-sided"
+        rows.append(("surface", f"{parts}, {count_of(int(loops), 'boundary loop')}, Euler characteristic {euler}"))
+    rows.append(("curvature", f"{np.nanmin(surface.curvature):.3g} to {np.nanmax(surface.curvature):.3g} at a vertex"))
+    if surface.realisation is not None:
+        text = f"edge lengths off by {surface.realisation['misfit']:.1e} (root mean square), one shape of possibly many"
+        rows.append(("coordinates", text))
+    rows.append(("scale c", scale_text(surface)))
     return rows
 
 

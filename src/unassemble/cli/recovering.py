@@ -10,7 +10,6 @@ from .options import check_files, matrix_options, nodes_options, recovered, spel
 from .status import outcome
 from .values import Numbers, OptionalTolerance
 
-_LATER_OPERATORS = ("surface",)
 _LATER_METHODS = ("metric",)
 
 
@@ -20,7 +19,7 @@ _LATER_METHODS = ("metric",)
 @click.option("-o", "--output", "out", metavar="OUT", required=True, help="The mesh: .npz, or any format of meshio.")
 @click.option(
     "--operator",
-    type=click.Choice(["auto", "laplacian", "elasticity", *_LATER_OPERATORS]),
+    type=click.Choice(["auto", "laplacian", "elasticity", "surface"]),
     default="auto",
     show_default=True,
 )
@@ -51,7 +50,7 @@ _LATER_METHODS = ("metric",)
     "--direction", type=Numbers("ROW,ROW,DEGREES"), help="Angle from the x axis of the line between two rows."
 )
 @click.option("--handed", type=click.Choice(["left", "right"]), help="Side of that line on which the centroid lies.")
-@click.option("--realise", is_flag=True, help="Surfaces: coordinates in space (not available in this version).")
+@click.option("--realise", is_flag=True, help="Surfaces: coordinates in space.")
 @click.option("--triangulate", is_flag=True, help="Divide cells that the matrix leaves undivided.")
 @click.option("--standard-deviations", is_flag=True, help="Error bars of the coordinates.")
 @click.option("--report", metavar="FILE", help="Write a report: .json.")
@@ -61,13 +60,13 @@ _LATER_METHODS = ("metric",)
 def recover(matrix: str, out: str, report: str | None, plot: str | None, quiet: bool, **options: Any) -> int:
     """Recover the mesh of MATRIX and write it to OUT.
 
-    MATRIX belongs to the Laplacian on a planar mesh of triangles, c L + D, or to isotropic elasticity in the plane or
-    in space.
+    MATRIX belongs to the Laplacian on a planar mesh of triangles or a surface, c L + D, or to isotropic elasticity in
+    the plane or in space.
 
     MATRIX is Matrix Market (also .gz), scipy's .npz or MATLAB's .mat; - reads Matrix Market from standard input.
     Rows count from 0.
     """
-    _check_available(options.pop("realise"), options["operator"], options["method"])
+    _check_available(options["method"])
     options["numbering"] = spelled_numbering(options["numbering"])
     options["refine"] = not options.pop("no_refine")
     from ..export import check_output
@@ -88,12 +87,6 @@ def recover(matrix: str, out: str, report: str | None, plot: str | None, quiet: 
     return outcome(recovery, [out, report, plot], quiet=quiet)
 
 
-def _check_available(realise: bool, operator: str, method: str | None) -> None:
-    later = [
-        ("--realise", realise),
-        (f"--operator {operator}", operator in _LATER_OPERATORS),
-        (f"--method {method}", method in _LATER_METHODS),
-    ]
-    for name, wanted in later:
-        if wanted:
-            raise click.UsageError(f"{name} is not available in this version")
+def _check_available(method: str | None) -> None:
+    if method in _LATER_METHODS:
+        raise click.UsageError(f"--method {method} is not available in this version")
