@@ -217,14 +217,14 @@ class _Task:
 
     def _as_surface(self) -> Surface:
         """A surface in space, with coordinates on demand; a flat one as a planar mesh that has edge lengths too."""
-        from .metric import flattened, realised, recover_surface
+        from .metric import could_be_planar, flattened, realised, recover_surface
 
         unfit = tuple(name for name in self.given if name not in ("scale", "method"))
         if unfit or self.frame.anchors:
             name = "anchors" if self.frame.anchors else unfit[0]
             raise InputError(f"`{name}` is not for surfaces in space: leave it out, or choose `operator='laplacian'`")
         found = recover_surface(self.matrix, self.clock, self.planar)
-        if found.flat:
+        if could_be_planar(found):
             try:
                 return flattened(found, self._as_scalar(self.matrix, ()))
             except RecoveryError:  # a cylinder is flat, and no planar mesh

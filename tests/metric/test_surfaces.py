@@ -168,10 +168,10 @@ def test_lumped_mass_is_told_by_the_lengths():
 @needs_shared
 @pytest.mark.parametrize("path", PLANAR, ids=lambda path: path.stem)
 def test_planar_corpus_agrees_with_the_planar_path(path):
-    mesh = np.load(path)
-    known = specimen(mesh["points"], mesh["triangles"], c=-2.0, diagonal=True, seed=3)
     if path.stem == SLIVERS:
         pytest.skip("lengths with the digits of a double do not hold its angles")
+    mesh = np.load(path)
+    known = specimen(mesh["points"], mesh["triangles"], c=-2.0, diagonal=True, seed=3)
     found = recover(known.matrix, operator="surface")
     if path.stem in HOLES_OF_THREE:
         assert not found.certified

@@ -10,6 +10,25 @@ from ..recovery import PlanarMesh, Surface
 from ..tolerances import CERTIFIED
 
 
+def could_be_planar(surface: Surface) -> bool:
+    """Whether a surface is flat, and its boundary turns as that of a planar domain does.
+
+    The outer loop of each piece turns once to the left, and all others once to the right; those of a cylinder do not
+    turn at all. Where loops touch the question is left open.
+    """
+    if not (surface.flat and surface.orientable.all()):
+        return False
+    ends = np.bincount(surface.boundary.ravel(), minlength=surface.n_points)
+    if (ends > 2).any():
+        return True
+    first, last = surface.boundary_offsets[:-1], surface.boundary_offsets[1:]
+    vertices = [np.unique(surface.boundary[a:b]) for a, b in zip(first, last, strict=True)]
+    turns = np.array([surface.curvature[loop].sum() for loop in vertices]) / (2 * np.pi)
+    piece = surface.component[surface.boundary[first, 0]]
+    outer = np.bincount(piece, turns > 0, minlength=surface.n_components)
+    return bool((np.abs(np.abs(turns) - 1) < 1e-3).all() and (outer == 1).all())
+
+
 def flattened(surface: Surface, planar: PlanarMesh) -> Surface:
     """A flat surface with the coordinates of the planar mesh that the same matrix gives, and with its certificate.
 

@@ -17,6 +17,7 @@ from .cycles import lookup, three_cycles
 
 # A neck of three edges leaves one 3-cycle open, a solid of tetrahedra most of them.
 _OPEN = 2000
+_LEAST = 5  # triangles at the edges of a neck: two each, but for one edge that may be on the boundary
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +56,9 @@ def surface_readings(cycles: Cycles) -> Iterator[NDArray[np.bool_]]:
     Any triangle of a surface may be left out, and the graph is that of the rest as well. So the convention is that
     holes have more than three edges: of all selections those with the most triangles, which on closed surfaces have
     two on every edge. On most meshes every 3-cycle is one; necks of three edges, 3-cycles that bound no triangle, leave
-    a small integer program, solved again with each answer excluded. All selections of that size come, one by one.
+    a small integer program, solved again with each answer excluded. A neck has triangles on both
+    sides of all its edges but one at most: that tells it from a triangle with too many neighbours. All selections of
+    that size come, one by one.
 
     Parameters
     ----------
@@ -70,7 +73,7 @@ def surface_readings(cycles: Cycles) -> Iterator[NDArray[np.bool_]]:
     chosen, doubtful = _forced(cycles)
     rows = np.flatnonzero(doubtful)
     if not len(rows):
-        yield chosen
+        yield _checked(cycles, chosen)
         return
     crowded = cycles.at_edges() > 2
     solid = _all_of_component(cycles, in_four_cliques(cycles)) & crowded
@@ -81,7 +84,11 @@ def surface_readings(cycles: Cycles) -> Iterator[NDArray[np.bool_]]:
         (np.ones(3 * len(rows)), (local.ravel(), np.repeat(np.arange(len(rows)), 3))), shape=(len(at), len(rows))
     )
     taken = cycles.at_edges(chosen)[at]
-    limits = [LinearConstraint(incidence, np.maximum(1 - taken, 0), 2 - taken)]
+    each = sp.eye_array(len(rows))
+    limits = [
+        LinearConstraint(incidence, np.maximum(1 - taken, 0), 2 - taken),
+        LinearConstraint(incidence.T @ incidence + _LEAST * each, _LEAST - incidence.T @ taken, np.inf),
+    ]
     largest = None
     while True:
         # Nodes, not seconds, bound the search.
@@ -102,8 +109,18 @@ def surface_readings(cycles: Cycles) -> Iterator[NDArray[np.bool_]]:
         pick = np.round(found.x) > 0
         reading = chosen.copy()
         reading[rows[pick]] = True
-        yield reading
+        yield _checked(cycles, reading)
         limits.append(LinearConstraint(pick[None, :].astype(float), -np.inf, size - 1))
+
+
+def _checked(cycles: Cycles, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """A selection all of whose omissions are necks."""
+    sides = cycles.at_edges(chosen)[cycles.opposite]
+    wrong = ~chosen & (sides.sum(axis=1) < _LEAST)
+    if wrong.any():
+        first = int(np.argmax(wrong))
+        raise _crowded(cycles, int(cycles.opposite[first, np.argmax(sides[first])]))
+    return chosen
 
 
 def _forced(cycles: Cycles) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
