@@ -209,35 +209,46 @@ class _Task:
             return None
 
     def _as_scalar(self, part: OperatorMatrix, anchors: Sequence[Any]) -> PlanarMesh:
-        frame, scale = self.frame, self.planar.scale
-        if scale is not None:
-            _check_proportion(scale, float(np.abs(part.entries).max()))
+        frame = self.frame
+        self._check_scale(part)
         placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
         return recover_scalar(part, placement, self.clock, self.planar)
 
     def _as_surface(self) -> Surface:
-        """A surface in space, with coordinates on demand; a flat one as a planar mesh that has edge lengths too."""
-        from .metric import could_be_planar, flattened, realised, recover_surface
+        """A surface in space, with coordinates on demand; a flat one with those of the planar mesh that it is."""
+        from .metric import could_be_planar, flattened, realised
 
-        unfit = tuple(name for name in self.given if name not in ("scale", "method"))
-        if unfit or self.frame.anchors:
-            name = "anchors" if self.frame.anchors else unfit[0]
-            raise InputError(f"`{name}` is not for surfaces in space: leave it out, or choose `operator='laplacian'`")
-        found = recover_surface(self.matrix, self.clock, self.planar)
+        found = self._lengths()
         if could_be_planar(found):
             try:
-                return flattened(found, self._as_scalar(self.matrix, ()))
-            except RecoveryError:  # a cylinder is flat, and no planar mesh
+                found = flattened(found, self._as_scalar(self.matrix, ()))
+            except RecoveryError:  # it overlaps itself, or is too crooked
                 pass
-        return realised(found, self.clock) if self.realise else found
+        return realised(found, self.clock) if self.realise and found.dim == 3 else found
 
     def _as_certified_surface(self) -> Surface | None:
-        """The matrix as that of a surface, if it is one without doubt."""
+        """The matrix as that of a surface that is bent, if it is one without doubt."""
+        from .metric import could_be_planar, realised
+
         try:
-            found = self._as_surface()
+            found = self._lengths()
         except (RecoveryError, InputError):  # options may be for planar meshes only
             return None
-        return replace(found, choice="no mesh in the plane has these entries") if found.certified else None
+        if not found.certified or could_be_planar(found):
+            return None
+        chosen = replace(found, choice="no mesh in the plane has these entries")
+        return realised(chosen, self.clock) if self.realise else chosen
+
+    def _lengths(self) -> Surface:
+        from .metric import recover_surface
+
+        unfit = [name for name in self.given if name != "scale"] + ["anchors"] * bool(self.frame.anchors)
+        if unfit:
+            raise InputError(
+                f"`{unfit[0]}` is not for surfaces in space: leave it out, or choose `operator='laplacian'`"
+            )
+        self._check_scale(self.matrix)
+        return recover_surface(self.matrix, self.clock, self.planar)
 
     def _as_vector(self, reading: VectorReading) -> Recovery:
         from .vector import recover_vector
@@ -251,6 +262,10 @@ class _Task:
             cells=self.about.cells,
             scalar=self._as_scalar,
         )
+
+    def _check_scale(self, part: OperatorMatrix) -> None:
+        if self.planar.scale is not None:
+            _check_proportion(self.planar.scale, float(np.abs(part.entries).max(initial=0.0)))
 
     def _refuse_scalar_options(self) -> None:
         if self.given:

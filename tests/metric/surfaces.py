@@ -94,7 +94,7 @@ def lattice(k: int, m: int, *, round_k: bool, round_m: bool, twisted: bool = Fal
 def torus(k: int = 24, m: int = 12, seed: int = 0) -> tuple[NDArray, NDArray]:
     rng = np.random.default_rng(seed)
     i, j = np.divmod(np.arange(k * m), m)
-    s, t = 2 * np.pi * i / k + rng.uniform(-0.08, 0.08, k * m), 2 * np.pi * j / m + rng.uniform(-0.1, 0.1, k * m)
+    s, t = 2 * np.pi * (i + rng.uniform(-0.3, 0.3, k * m)) / k, 2 * np.pi * (j + rng.uniform(-0.2, 0.2, k * m)) / m
     width = 2 + np.cos(t)
     return np.stack([width * np.cos(s), width * np.sin(s), np.sin(t)], 1), lattice(k, m, round_k=True, round_m=True)
 

@@ -152,7 +152,7 @@ def test_wrong_entry_shows_in_the_row_sums():
 def test_weights_of_no_metric():
     """What is left next to a row that was taken out."""
     known = without_a_row(2)
-    with pytest.raises(GeometryError, match="no edge lengths have these entries"):
+    with pytest.raises(GeometryError, match="no edge lengths were found"):
         recover(known, operator="surface")
 
 

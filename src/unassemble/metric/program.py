@@ -136,7 +136,7 @@ def solve_metric(
     return Metric(u / u.mean(), float((weights @ u) / (own @ u)), tuple(history))
 
 
-_NONE = "no edge lengths have these entries: the triangles that come nearest have no area"
+_NONE = "no edge lengths were found that have these entries: the triangles that come nearest have no area"
 
 
 def _summed(opposite: NDArray, values: NDArray, size: int) -> NDArray[np.float64]:
