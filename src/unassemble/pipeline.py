@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -220,10 +221,8 @@ class _Task:
 
         found = self._lengths()
         if could_be_planar(found):
-            try:
+            with suppress(RecoveryError):  # it may overlap itself
                 found = flattened(found, self._as_scalar(self.matrix, ()))
-            except RecoveryError:  # it overlaps itself, or is too crooked
-                pass
         return realised(found, self.clock) if self.realise and found.dim == 3 else found
 
     def _as_certified_surface(self) -> Surface | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from .recovery import Body, Mechanical, PlanarMesh, Recovery, Surface
 from .tolerances import SUSPICIOUS
-from .words import count_of
+from .words import count_of, kind_text
 
 _SHOWN = 3
 _OTHERS = {"proved": "none fits", "searched": "none found that fits", "ambiguous": "another fits as well"}
@@ -105,11 +105,9 @@ def _noise_rows(mesh: PlanarMesh) -> list[tuple[str, str]]:
 
 
 def _surface_rows(surface: Surface) -> list[tuple[str, str]]:
-    rows = []
-    pieces = zip(surface.euler, surface.orientable, surface.genus, surface.loops, strict=True)
-    for euler, orientable, genus, loops in list(pieces)[:_SHOWN]:
-        parts = count_of(int(genus), "handle") if orientable else count_of(int(genus), "cross-cap") + ", one-sided"
-        rows.append(("surface", f"{parts}, {count_of(int(loops), 'boundary loop')}, Euler characteristic {euler}"))
+    rows: list[tuple[str, str]] = []
+    pieces = zip(surface.euler, surface.orientable, surface.loops, strict=True)
+    rows += [("surface", kind_text(*piece)) for piece in list(pieces)[:_SHOWN]]
     rows.append(("curvature", f"{np.nanmin(surface.curvature):.3g} to {np.nanmax(surface.curvature):.3g} at a vertex"))
     if surface.realisation is not None:
         text = f"edge lengths off by {surface.realisation['misfit']:.1e} (root mean square), one shape of possibly many"

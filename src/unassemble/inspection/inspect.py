@@ -14,7 +14,7 @@ from ..matrix import OperatorMatrix, load
 from ..operators import vector_valued
 from ..topology import Topology, recognise, surfaces
 from ..words import count_of
-from .facts import matrix_facts, mesh_facts, nodes_facts
+from .facts import matrix_facts, mesh_facts, nodes_facts, surface_facts
 from .text import lines_of, mesh_text
 
 _IF = "if the entries agree, which recovery tells"
@@ -73,6 +73,8 @@ class Inspection:
         What the cells were taken from: cycles of three edges are cells, unless edges are left over and the entries
         suggest others. These are what :func:`unassemble.recover` begins with; it solves, holds the result against the
         entries, and changes cells where that asks for it. Empty where there is no mesh.
+    surface : str
+        What kind of surface the graph is that of, where that is none in the plane.
     """
 
     n_rows: int
@@ -104,6 +106,7 @@ class Inspection:
     n_polygons: int = 0
     n_vanished_sides: int = 0
     cells_from: str = ""
+    surface: str = ""
 
     @property
     def operator(self) -> str:
@@ -115,6 +118,11 @@ class Inspection:
         if self.n_nodes:
             kind = "elasticity, if the material is isotropic" if self.coupled else "laplacian in each direction"
             return f"vector-valued, {self.block_size} components, {self.numbering}: {kind}"
+        if self.surface:
+            diagonal = "" if self.n_zero_sums == self._n_rows_used else ", plus a diagonal"
+            sphere = self.surface.startswith("closed, 0 handles")  # whose graph is planar
+            other = "; or of a mesh in the plane whose outline has three edges" if sphere else ""
+            return f"laplacian of a surface in space, linear triangles{diagonal}{other}"
         if self.obstacle:
             return "none that this version knows"
         if self.mixed_signs:
@@ -134,6 +142,8 @@ class Inspection:
             )
         if self.n_nodes:
             return "what each direction's scalar matrix holds"
+        if self.surface:
+            return f"lengths of {count_of(self.n_edges, 'edge')} up to size; {_IF}"
         if not self.planar:
             return "nothing: the graph is not that of a mesh in the plane"
         if self.obstacle:
@@ -189,6 +199,8 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
         return Inspection(**facts, planar=False, obstacle=vector.why, **nodes_facts(matrix, vector))
     topology = surfaces(matrix.n, matrix.edges)
     read = matrix
+    if not topology.pieces and (curved := surface_facts(matrix)):
+        return Inspection(**facts, planar=False, **curved)
     if _left_over(matrix, topology):
         read, topology = guessed(matrix, topology)
     if not topology.pieces or _left_over(read, topology):

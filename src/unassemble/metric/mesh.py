@@ -101,6 +101,12 @@ class SurfaceMesh:
         return np.unique(label, return_inverse=True)[1].astype(np.int64)
 
     @property
+    def loops(self) -> NDArray[np.int64]:
+        """(number of pieces,) boundary loops of each piece."""
+        _, one = np.unique(self.loop_of_boundary, return_index=True)
+        return np.bincount(self.piece_of_edge[self.boundary[one]], minlength=self.n_pieces)
+
+    @property
     def component(self) -> NDArray[np.int64]:
         """(n,) the lowest label of the pieces at each vertex, -1 where there is none."""
         label = np.full(self.n, self.n_pieces)

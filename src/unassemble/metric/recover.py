@@ -181,7 +181,6 @@ def _report(matrix: OperatorMatrix, found: _Found, verdict: _Verdict, notes: lis
     loop = mesh.loop_of_boundary
     order = np.argsort(loop, kind="stable")
     _, first = np.unique(loop[order], return_index=True)
-    of_edges = mesh.piece_of_edge
     return Surface(
         points=np.full((mesh.n, 3), np.nan),
         triangles=mesh.triangles,
@@ -205,5 +204,5 @@ def _report(matrix: OperatorMatrix, found: _Found, verdict: _Verdict, notes: lis
         curvature=curvature,
         euler=mesh.euler,
         orientable=mesh.orientable,
-        loops=np.bincount(of_edges[mesh.boundary[order[first]]], minlength=mesh.n_pieces),
+        loops=mesh.loops,
     )
