@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     )
     from .inspection import inspect_matrix
     from .pipeline import recover
-    from .recovery import Body, ConformingMesh, PlanarMesh, Recovery, Structure
+    from .recovery import Body, ConformingMesh, PlanarMesh, Recovery, Structure, Surface
 
 # Imported on first use: the command line answers --help without loading scipy.
 _HOMES = {
     "inspect_matrix": "inspection",
     "recover": "pipeline",
-    **dict.fromkeys(("Body", "ConformingMesh", "PlanarMesh", "Recovery", "Structure"), "outputs"),
+    **dict.fromkeys(("Body", "ConformingMesh", "PlanarMesh", "Recovery", "Structure", "Surface"), "outputs"),
     **dict.fromkeys(
         (
             "FormatError",
@@ -61,6 +61,7 @@ __all__ = [
     "RecoveryError",
     "SolverError",
     "Structure",
+    "Surface",
     "TopologyError",
     "UnassembleError",
     "__version__",

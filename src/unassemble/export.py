@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .errors import FormatError, OutputError
 from .files import check_target, whole_file
 from .formats import MeshFormat, format_of
-from .recovery import PlanarMesh, Recovery
+from .recovery import PlanarMesh, Recovery, Surface
 
 if TYPE_CHECKING:
     import meshio
@@ -43,7 +43,8 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
     """Write a recovered mesh, whole or not at all; the extension names the format.
 
     ``.npz`` holds ``points``, cells (``triangles``, ``quads``, ``tetrahedra``, ``hexahedra``, ``mid_nodes``, ``lines``,
-    ``polygons_offsets`` and ``polygons_data``), ``eliminated_points`` if any, ``component``, ``hinges``, ``scale``,
+    ``polygons_offsets`` and ``polygons_data``), ``eliminated_points`` if any, of surfaces ``edges``, ``edge_lengths``
+    and ``curvature``, and no ``points`` unless there are coordinates, ``component``, ``hinges``, ``scale``,
     ``node_status``, of vector-valued matrices ``node_of_row`` and ``direction_of_row``, and what the mesh is worth:
     ``status``, ``uniqueness`` and ``backward_error``, which ``.vtu`` holds as field data, with ``scale``.
     Other formats are those of meshio (:mod:`unassemble.formats`); of these ``.vtu`` holds polygons, the others get
@@ -75,7 +76,7 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
 
 def arrays(recovery: Recovery) -> dict[str, Any]:
     """What the ``.npz`` holds, by key; what there is nothing of has no key."""
-    content: dict[str, Any] = {"points": recovery.points}
+    content: dict[str, Any] = {} if _without_points(recovery) else {"points": recovery.points}
     for name in ("triangles", "quads", "tetrahedra", "hexahedra", "mid_nodes", "lines"):
         cells = getattr(recovery, name, None)  # each kind of result has its own
         if cells is not None and cells.size:
@@ -84,6 +85,8 @@ def arrays(recovery: Recovery) -> dict[str, Any]:
         content |= {"polygons_offsets": recovery.polygons_offsets, "polygons_data": recovery.polygons_data}
     if isinstance(recovery, PlanarMesh) and len(recovery.eliminated_points):
         content["eliminated_points"] = recovery.eliminated_points
+    if isinstance(recovery, Surface):
+        content |= {"edges": recovery.edges, "edge_lengths": recovery.edge_lengths, "curvature": recovery.curvature}
     content |= {"component": recovery.component, "hinges": recovery.hinges, "scale": recovery.scale}
     content["node_status"] = recovery.node_status
     if recovery.vector_valued:
@@ -98,6 +101,11 @@ def worth(recovery: Recovery) -> dict[str, NDArray]:
         "uniqueness": np.array(recovery.uniqueness or ""),
         "backward_error": np.array(recovery.backward_error),
     }
+
+
+def _without_points(recovery: Recovery) -> bool:
+    """Whether there are edge lengths only."""
+    return isinstance(recovery, Surface) and not np.isfinite(recovery.points).any()
 
 
 def to_meshio(recovery: Recovery) -> meshio.Mesh:
@@ -149,6 +157,8 @@ def _point_data(recovery: Recovery) -> dict[str, NDArray]:
     if isinstance(recovery, PlanarMesh) and recovery.standard_deviations is not None:
         for name, column in zip("xyz", recovery.standard_deviations.T, strict=False):
             data[f"standard_deviation_{name}"] = np.ascontiguousarray(column)
+    if isinstance(recovery, Surface):
+        data["curvature"] = recovery.curvature
     return data
 
 
@@ -170,7 +180,7 @@ def _rows(recovery: Recovery) -> dict[str, NDArray]:
 def _boundary_flag(recovery: Recovery) -> NDArray[np.int64]:
     flag = np.zeros(recovery.n_points, dtype=np.int64)
     flag[recovery.boundary] = 1
-    if recovery.dim == 3:
+    if recovery.dim == 3 and not isinstance(recovery, Surface):
         from .elements.surface import outer_nodes
 
         solid = dict(recovery.cells)
@@ -182,6 +192,11 @@ def _boundary_flag(recovery: Recovery) -> NDArray[np.int64]:
 def _check_content(recovery: Recovery, suffix: str, mesh_format: MeshFormat) -> None:
     if not mesh_format.name:
         return
+    if _without_points(recovery):
+        raise FormatError(
+            f"the format {suffix} holds coordinates, and the matrix of a surface tells edge lengths only: write .npz, "
+            "or ask for coordinates with `realise=True`"
+        )
     kinds = set(_cells(recovery)) - mesh_format.cells
     if kinds:
         what = "nodes without cells" if kinds == {"vertex"} else f"cells of kind {', '.join(sorted(kinds))}"

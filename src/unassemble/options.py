@@ -15,7 +15,7 @@ from .errors import InputError
 from .reductions import ConstantTensor
 from .tolerances import SUMMED
 
-OPERATORS = ("auto", "laplacian", "elasticity")
+OPERATORS = ("auto", "laplacian", "elasticity", "surface")
 METHODS = ("conformal", "angles")
 
 Direction = tuple[int, int, float]
@@ -33,8 +33,10 @@ class OperatorOptions:
     def __post_init__(self) -> None:
         _known("operator", self.operator, OPERATORS)
         _whole("block_size", self.block_size)
-        if self.operator == "laplacian" and self.names_nodes:
-            raise InputError("`block_size` and `numbering` are for vector-valued matrices, not `operator='laplacian'`")
+        if self.operator in ("laplacian", "surface") and self.names_nodes:
+            raise InputError(
+                f"`block_size` and `numbering` are for vector-valued matrices, not `operator={self.operator!r}`"
+            )
 
     @property
     def names_nodes(self) -> bool:

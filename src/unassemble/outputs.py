@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .export import save, to_meshio
 from .modes import modes_of
 from .quiet import quiet_libraries
-from .recovery import Body, ConformingMesh, PlanarMesh, Recovery, Structure
+from .recovery import Body, ConformingMesh, PlanarMesh, Recovery, Structure, Surface
 from .report import build_report, write_report
 from .summary import one_line, summary, table
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["Body", "ConformingMesh", "PlanarMesh", "Recovery", "Structure"]
+__all__ = ["Body", "ConformingMesh", "PlanarMesh", "Recovery", "Structure", "Surface"]
 
 
 def plot(recovery: Recovery, path: str | PathLike[str] | None = None, *, ax: Axes | None = None) -> Figure:

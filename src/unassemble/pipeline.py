@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, islice
 from typing import Any
@@ -20,7 +21,7 @@ from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
 from .operators import VectorReading, about_translations, asked_for, second_reading, vector_valued
 from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, listed_anchors
-from .outputs import ConformingMesh, PlanarMesh, Recovery
+from .outputs import ConformingMesh, PlanarMesh, Recovery, Surface
 from .progress import StageDisplay
 from .quiet import quiet_libraries
 from .scalar import recover_scalar
@@ -46,6 +47,7 @@ def recover(
     block_size: int | None = None,
     numbering: Any = None,
     cells: bool = True,
+    realise: bool = False,
     variable: str | None = None,
     threads: int | None = None,
     progress: Callable[[str], None] | bool | None = None,
@@ -56,16 +58,18 @@ def recover(
     plane and natural boundary conditions, c any nonzero number and D any diagonal matrix, both unknown.
     Vector-valued: isotropic linear elasticity in the plane or in space, with supports; see
     :func:`unassemble.elasticity.recover_elasticity`. And frames, shells and plates, whose nodes have rotations beside
-    displacements; see :mod:`unassemble.structures`.
+    displacements; see :mod:`unassemble.structures`. And the Laplacian of triangulated surfaces in space, c L + D, of
+    which the edge lengths are found; see :mod:`unassemble.metric`.
 
     Parameters
     ----------
     A : sparse matrix or array, ndarray, path, or "-"
         A matrix; or a file with one: Matrix Market, scipy's ``.npz``, ``.mat``; ``"-"`` reads Matrix Market from
         standard input. Explicit zeros are structure.
-    operator : {"auto", "laplacian", "elasticity"}
-        Which operator A belongs to. ``"auto"`` reads planar meshes as scalar, and matrices whose graph is none but
-        whose rows form nodes of two or three unknowns as elasticity.
+    operator : {"auto", "laplacian", "elasticity", "surface"}
+        Which operator A belongs to. ``"auto"`` reads planar meshes as scalar, matrices whose graph is none but
+        whose rows form nodes of two or three unknowns as elasticity, and what fits no mesh in the plane but a surface
+        in space as that.
     method : {None, "conformal", "angles"}
         How positions are found: by the conformal null vector, the default, or by the 2002 paper's equations for angles.
     refine : bool
@@ -100,6 +104,8 @@ def recover(
         Vector-valued matrices: how the unknowns stand; found where it is not given.
     cells : bool
         Vector-valued matrices: look for elements too, not for coordinates only.
+    realise : bool
+        Surfaces: look for coordinates in space that have the edge lengths.
     variable : str, optional
         Name of the variable in a ``.mat`` file.
     threads : int, optional
@@ -158,7 +164,7 @@ def recover(
         with clock("check"):
             checked = check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
         with thread_limit(threads):
-            return _Task(checked, clock, about, frame, planar, given).answer()
+            return _Task(checked, clock, about, frame, planar, given, realise).answer()
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +177,7 @@ class _Task:
     frame: FrameOptions
     planar: ScalarOptions
     given: tuple[str, ...]
+    realise: bool = False
 
     def answer(self) -> Recovery:
         """As the operator that is named; else as the one that the graph shows, or else the first that fits."""
@@ -179,6 +186,8 @@ class _Task:
             with self.clock("numbering"):
                 reading = asked_for(self.matrix, self.about.block_size, self.about.numbering)
             return self._as_vector(reading)
+        if self.about.operator == "surface":
+            return self._as_surface()
         if self.about.operator == "laplacian":
             try:
                 return judged(self._as_scalar(self.matrix, self.frame.anchors), self.matrix)
@@ -197,21 +206,21 @@ class _Task:
             return list(islice(shown, 1)), shown
 
     def _first_that_fits(self) -> Recovery:
-        """A planar mesh; or nodes of several unknowns where rows belong to no mesh.
+        """A planar mesh; or a surface in space; or nodes of several unknowns where rows belong to no mesh.
 
         A straight beam's rows, for one, fall apart into planar graphs.
         """
         try:
             found = self._as_scalar(self.matrix, self.frame.anchors)
         except RecoveryError as error:
-            other = self._as_second_reading()
+            other = self._as_certified_surface() or self._as_second_reading()
             if other is not None:
                 return other
             nodes = about_translations(self.matrix) if isinstance(error, NotPlanarError) else ""
             raise explained(error, self.matrix, nodes) from error
         if found.certified or not (found.node_status.any() or isinstance(found, ConformingMesh)):
             return judged(found, self.matrix)
-        other = self._as_second_reading()
+        other = self._as_certified_surface() or self._as_second_reading()
         return other if other is not None and other.certified else judged(found, self.matrix)
 
     def _as_second_reading(self) -> Recovery | None:
@@ -223,9 +232,8 @@ class _Task:
             return None
 
     def _as_scalar(self, part: OperatorMatrix, anchors: Sequence[Any]) -> PlanarMesh:
-        frame, scale = self.frame, self.planar.scale
-        if scale is not None:
-            _check_proportion(scale, float(np.abs(part.entries).max()))
+        frame = self.frame
+        self._check_scale(part)
         placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
         if self.planar.method != "conformal":
             return recover_scalar(part, placement, self.clock, self.planar)
@@ -277,6 +285,40 @@ class _Task:
         found = recover_conforming(part, cells, placement, self.clock, self.planar)
         return found if found.certified or found.backward_error < LITTLE else None
 
+    def _as_surface(self) -> Surface:
+        """A surface in space, with coordinates on demand; a flat one with those of the planar mesh that it is."""
+        from .metric import could_be_planar, flattened, realised
+
+        found = self._lengths()
+        if could_be_planar(found):
+            with suppress(RecoveryError):  # it may overlap itself
+                found = flattened(found, self._as_scalar(self.matrix, ()))
+        return realised(found, self.clock) if self.realise and found.dim == 3 else found
+
+    def _as_certified_surface(self) -> Surface | None:
+        """The matrix as that of a surface that is bent, if it is one without doubt."""
+        from .metric import could_be_planar, realised
+
+        try:
+            found = self._lengths()
+        except (RecoveryError, InputError):  # options may be for planar meshes only
+            return None
+        if not found.certified or could_be_planar(found):
+            return None
+        chosen = replace(found, choice="no mesh in the plane has these entries")
+        return realised(chosen, self.clock) if self.realise else chosen
+
+    def _lengths(self) -> Surface:
+        from .metric import recover_surface
+
+        unfit = [name for name in self.given if name != "scale"] + ["anchors"] * bool(self.frame.anchors)
+        if unfit:
+            raise InputError(
+                f"`{unfit[0]}` is not for surfaces in space: leave it out, or choose `operator='laplacian'`"
+            )
+        self._check_scale(self.matrix)
+        return recover_surface(self.matrix, self.clock, self.planar)
+
     def _as_vector(self, reading: VectorReading) -> Recovery:
         from .vector import recover_vector
 
@@ -289,6 +331,10 @@ class _Task:
             cells=self.about.cells,
             scalar=self._as_scalar,
         )
+
+    def _check_scale(self, part: OperatorMatrix) -> None:
+        if self.planar.scale is not None:
+            _check_proportion(self.planar.scale, float(np.abs(part.entries).max(initial=0.0)))
 
     def _refuse_scalar_options(self) -> None:
         if self.given:

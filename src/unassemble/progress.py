@@ -19,6 +19,8 @@ _SENTENCES = {
     "conformal": "solving for positions",
     "faces": "telling cells from holes",
     "polish": "polishing",
+    "metric": "solving for edge lengths",
+    "realise": "looking for coordinates in space",
     "place": "placing pieces",
     "certify": "assembling the matrix again",
     "deviations": "computing standard deviations",

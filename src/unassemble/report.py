@@ -15,7 +15,7 @@ import numpy as np
 from ._version import __version__
 from .errors import OutputError, UnassembleError
 from .files import check_target, whole_file
-from .recovery import Body, Mechanical, PlanarMesh, Recovery
+from .recovery import Body, Mechanical, PlanarMesh, Recovery, Surface
 
 
 def build_report(recovery: Recovery) -> dict[str, Any]:
@@ -26,7 +26,8 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
     ``n_components``, ``n_holes`` (null but for planar meshes), ``scale`` (one for each piece), ``backward_error``,
     ``timings`` (seconds by stage), ``warnings``; further ``n_polygons`` (cells that the matrix leaves undivided),
     ``n_hinges``, ``n_undetermined``, ``n_boundary_edges``, ``worst_entries`` (``row``, ``column``, ``misfit``, worst
-    first), ``version``, and those of :func:`_planar_facts`, :func:`_vector_facts` and :func:`_mechanical_facts`.
+    first), ``version``, and those of :func:`_planar_facts`, :func:`_surface_facts`, :func:`_vector_facts` and
+    :func:`_mechanical_facts`.
     """
     return _plain(
         {
@@ -52,6 +53,7 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
                 for (i, j), misfit in zip(recovery.worst_entries, recovery.worst_misfits, strict=True)
             ],
             **(_planar_facts(recovery) if isinstance(recovery, PlanarMesh) else {}),
+            **(_surface_facts(recovery) if isinstance(recovery, Surface) else {}),
             **(_vector_facts(recovery) if recovery.vector_valued else {}),
             **(_mechanical_facts(recovery) if isinstance(recovery, Mechanical) else {}),
             "timings": recovery.timings,
@@ -76,6 +78,25 @@ def _planar_facts(mesh: PlanarMesh) -> dict[str, Any]:
         "largest_standard_deviation": mesh.largest_deviation,
         "suspects": [{"row": i, "column": j} for i, j in mesh.suspects],
         "alternatives": [asdict(other) for other in mesh.alternatives],
+    }
+
+
+def _surface_facts(surface: Surface) -> dict[str, Any]:
+    """What only surfaces have.
+
+    One for each piece: ``euler_characteristic``, ``orientable``, ``genus`` (of pieces that are not orientable the
+    number of cross-caps), ``n_boundary_loops`` and ``total_curvature``, over 2 pi, which is the Euler characteristic by
+    the theorem of Gauss and Bonnet; ``n_edges``; ``realisation``, if coordinates were asked for: ``misfit``,
+    ``largest`` and ``misfits``.
+    """
+    return {
+        "n_edges": len(surface.edges),
+        "euler_characteristic": surface.euler,
+        "orientable": surface.orientable,
+        "genus": surface.genus,
+        "n_boundary_loops": surface.loops,
+        "largest_curvature": float(np.nanmax(np.abs(surface.curvature))),
+        "realisation": surface.realisation,
     }
 
 

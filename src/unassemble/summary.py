@@ -7,9 +7,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .recovery import Body, Mechanical, PlanarMesh, Recovery
+from .recovery import Body, Mechanical, PlanarMesh, Recovery, Surface
 from .tolerances import CERTIFIED, SUSPICIOUS
-from .words import count_of
+from .words import count_of, kind_text
 
 _SHOWN = 3
 _OTHERS = {"proved": "none fits", "searched": "none found that fits", "ambiguous": "another fits as well"}
@@ -69,6 +69,8 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
     ]
     if isinstance(recovery, PlanarMesh):
         rows += [("holes", f"{recovery.n_holes:,}"), ("scale c", scale_text(recovery))]
+    if isinstance(recovery, Surface):
+        rows += _surface_rows(recovery)
     if isinstance(recovery, Mechanical):
         rows += _elastic_rows(recovery)
     rows.append(("backward error", f"{recovery.backward_error:.1e} (relative)"))
@@ -136,6 +138,18 @@ def _noise_rows(mesh: PlanarMesh) -> list[tuple[str, str]]:
         rows.append(("noise", f"the misfit is that of a standard deviation of {mesh.estimated_noise:.1e} (absolute)"))
     if mesh.largest_deviation is not None:
         rows.append(("std deviation", f"at most {mesh.largest_deviation:.1e} in a coordinate"))
+    return rows
+
+
+def _surface_rows(surface: Surface) -> list[tuple[str, str]]:
+    rows: list[tuple[str, str]] = []
+    pieces = zip(surface.euler, surface.orientable, surface.loops, strict=True)
+    rows += [("surface", kind_text(*piece)) for piece in list(pieces)[:_SHOWN]]
+    rows.append(("curvature", f"{np.nanmin(surface.curvature):.3g} to {np.nanmax(surface.curvature):.3g} at a vertex"))
+    if surface.realisation is not None:
+        text = f"edge lengths off by {surface.realisation['misfit']:.1e} (root mean square), one shape of possibly many"
+        rows.append(("coordinates", text))
+    rows.append(("scale c", scale_text(surface)))
     return rows
 
 

@@ -36,3 +36,11 @@ def sentences(parts: Iterable[str], most: int = 2) -> str:
     """
     chosen = [part for part in parts if part][:most]
     return ". ".join(part if k == 0 else part[:1].upper() + part[1:] for k, part in enumerate(chosen))
+
+
+def kind_text(euler: int, orientable: bool, loops: int) -> str:
+    """What kind of surface has this Euler characteristic and number of boundary loops."""
+    extra = 2 - int(loops) - int(euler)
+    sort = count_of(extra // 2, "handle") if orientable else f"one-sided, {count_of(extra, 'cross-cap')}"
+    rim = count_of(int(loops), "boundary loop") if loops else "closed"
+    return f"{rim}, {sort}, Euler characteristic {euler}"

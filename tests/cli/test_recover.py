@@ -168,6 +168,7 @@ def test_settings_reach_the_library(work, monkeypatch):
         "triangulate": False,
         "block_size": None,
         "numbering": None,
+        "realise": False,
         "variable": None,
         "threads": 2,
     }

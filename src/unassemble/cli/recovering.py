@@ -16,7 +16,12 @@ from .values import Numbers, OptionalTolerance
 @nodes_options
 @click.argument("out", metavar="[OUT]", required=False)
 @click.option("-o", "--output", metavar="OUT", help="The mesh: .npz, or any format of meshio.")
-@click.option("--operator", type=click.Choice(["auto", "laplacian", "elasticity"]), default="auto", show_default=True)
+@click.option(
+    "--operator",
+    type=click.Choice(["auto", "laplacian", "elasticity", "surface"]),
+    default="auto",
+    show_default=True,
+)
 @click.option("--method", type=click.Choice(["conformal", "angles"]), help="The default picks the best.")
 @click.option("--no-refine", is_flag=True, help="Leave out the polish.")
 @click.option("--scale", type=float, metavar="C", help="The factor c is known.")
@@ -42,6 +47,7 @@ from .values import Numbers, OptionalTolerance
     "--direction", type=Numbers("ROW,ROW,DEGREES"), help="Angle from the x axis of the line between two rows."
 )
 @click.option("--handed", type=click.Choice(["left", "right"]), help="Side of that line on which the centroid lies.")
+@click.option("--realise", is_flag=True, help="Surfaces: coordinates in space.")
 @click.option("--triangulate", is_flag=True, help="Divide cells that the matrix leaves undivided.")
 @click.option("--standard-deviations", is_flag=True, help="Error bars of the coordinates.")
 @click.option("--report", metavar="FILE", help="Write a report: .json.")
@@ -53,8 +59,8 @@ def recover(
 ) -> int:
     """Recover the mesh of MATRIX and write it to OUT.
 
-    MATRIX belongs to the Laplacian on a planar mesh of triangles, c L + D, or to isotropic elasticity in the plane or
-    in space.
+    MATRIX belongs to the Laplacian on a planar mesh of triangles or a surface, c L + D, or to isotropic elasticity in
+    the plane or in space.
 
     MATRIX is Matrix Market (also .gz), scipy's .npz, NumPy's .npy, MATLAB's .mat, or lines of row, column and entry; -
     reads Matrix Market from standard input. Rows count from 0. Without OUT the mesh goes to a .vtu beside MATRIX, if

@@ -9,12 +9,13 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from ..errors import GeometryError
+from ..errors import GeometryError, RecoveryError
 from ..matrix import OperatorMatrix
 from ..operators import VectorReading
 from ..planar.conformal import estimate_scale
 from ..tolerances import ROUNDED, SUMMED
 from ..topology import Piece, Topology
+from ..words import kind_text
 
 
 def matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
@@ -95,3 +96,26 @@ def _scale_of(piece: Piece, weights: NDArray) -> tuple[float, int | None]:
     positive = np.count_nonzero(sums > 0) * 2 >= len(sums)
     other = np.flatnonzero(sums <= 0 if positive else sums >= 0)
     return scale, int(piece.vertices[other[0]]) if len(other) else None
+
+
+def surface_facts(matrix: OperatorMatrix) -> dict[str, Any]:
+    """Of a graph that is that of a surface with handles or cross-caps, or without a boundary; else empty."""
+    from ..metric.mesh import SurfaceMesh
+    from ..topology.manifold import Cycles, surface_readings
+
+    cycles = Cycles.of(matrix.n, matrix.edges)
+    try:
+        mesh = SurfaceMesh.of(cycles, next(surface_readings(cycles)))
+    except RecoveryError:
+        return {}
+    kinds = [kind_text(*kind) for kind in zip(mesh.euler, mesh.orientable, mesh.loops, strict=True)]
+    if not (~mesh.orientable | (mesh.euler + mesh.loops < 2) | (mesh.loops == 0)).any():
+        return {}
+    return {
+        "surface": "; ".join(kinds[:3]) + ("; ..." if len(kinds) > 3 else ""),
+        "n_triangles": len(mesh.triangles),
+        "n_boundary_edges": len(mesh.boundary),
+        "n_pieces": mesh.n_pieces,
+        "n_hinges": len(mesh.hinges),
+        "cells_from": "graph",
+    }

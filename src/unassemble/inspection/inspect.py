@@ -16,7 +16,7 @@ from ..operators import VectorReading, second_reading, vector_valued
 from ..quiet import quiet_libraries
 from ..topology import Topology, recognise, surfaces
 from ..words import count_of
-from .facts import matrix_facts, mesh_facts, nodes_facts
+from .facts import matrix_facts, mesh_facts, nodes_facts, surface_facts
 from .text import lines_of, mesh_text
 
 _IF = "if the entries agree, which recovery tells"
@@ -83,6 +83,8 @@ class Inspection:
         What speaks for it, the strongest first.
     advice : str
         What to do next; empty where recovery is.
+    surface : str
+        What kind of surface the graph is that of, where that is none in the plane.
     """
 
     n_rows: int
@@ -118,6 +120,7 @@ class Inspection:
     name: str = ""
     evidence: tuple[str, ...] = ()
     advice: str = ""
+    surface: str = ""
 
     @property
     def operator(self) -> str:
@@ -129,6 +132,11 @@ class Inspection:
         if self.n_nodes:
             kind = "elasticity, if the material is isotropic" if self.coupled else "laplacian in each direction"
             return f"vector-valued, {self.block_size} components, {self.numbering}: {kind}"
+        if self.surface:
+            diagonal = "" if self.n_zero_sums == self.n_rows - self.n_isolated else ", plus a diagonal"
+            sphere = self.surface.startswith("closed, 0 handles")  # whose graph is planar
+            other = "; or of a mesh in the plane whose outline has three edges" if sphere else ""
+            return f"laplacian of a surface in space, linear triangles{diagonal}{other}"
         if self.kind != PLANAR:
             return self.name
         if self.obstacle:
@@ -150,6 +158,8 @@ class Inspection:
             )
         if self.n_nodes:
             return "what each direction's scalar matrix holds"
+        if self.surface:
+            return f"lengths of {count_of(self.n_edges, 'edge')} up to size; {_IF}"
         if self.kind != PLANAR:
             return f"nothing: {self.advice}"
         if self.obstacle:
@@ -206,6 +216,8 @@ def _inspected(matrix: OperatorMatrix) -> Inspection:
         return _vector_valued(matrix, facts, vector)
     topology = surfaces(matrix.n, matrix.edges)
     read = matrix
+    if not topology.pieces and (curved := surface_facts(matrix)):
+        return Inspection(**facts, planar=False, **curved)
     if _left_over(matrix, topology):
         read, topology = guessed(matrix, topology)
     if not topology.pieces or _left_over(read, topology):

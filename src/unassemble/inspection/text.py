@@ -21,12 +21,14 @@ def lines_of(facts: Inspection) -> list[tuple[str, str]]:
         ("graph", _graph(facts)),
         ("vanished", _vanished(facts.n_vanished)),
         ("row sums", _row_sums(facts)),
-        ("planar", _planar(facts)),
+        ("surface", facts.surface) if facts.surface else ("planar", _planar(facts)),
     ]
     if facts.n_nodes:
         nodes = f"{count_of(facts.n_nodes, 'node')} with {facts.block_size} unknowns each, {facts.numbering}"
         lines.append(("nodes", nodes))
-    if not facts.obstacle:
+    if facts.surface:
+        lines += [("mesh", mesh_text(facts)), ("pieces", _pieces(facts))]
+    elif not facts.obstacle:
         lines += [
             ("mesh", _mesh(facts)),
             ("cells", _cells(facts)),

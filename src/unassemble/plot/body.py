@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..recovery import Body, ConformingMesh, Recovery, Structure
+from ..recovery import Body, ConformingMesh, Recovery, Structure, Surface
 from . import style
 from .canvas import panel
 from .mesh import line_handle
@@ -41,6 +41,8 @@ def plot_body(recovery: Recovery, ax: Axes | None = None) -> tuple[Figure, list[
         label = f"{what} of the recognised cells"
         if isinstance(recovery, Structure):
             label, colour = "cells of shells or plates, read off the graph", style.EDGE
+        if isinstance(recovery, Surface):
+            label, colour = "triangles, one shape of possibly many with their sides", style.EDGE
         handles.append(line_handle(colour, label))
     if isinstance(recovery, Structure) and len(recovery.lines):
         order = np.argsort(depth[recovery.lines].mean(axis=1), kind="stable")
@@ -102,8 +104,10 @@ def _draw_faces(ax: Axes, recovery: Recovery, faces: list[NDArray], flat: NDArra
     large = len(order) > style.MOST_VECTOR
     colours: NDArray | str = style.FILL
     edge = style.EDGE
-    if isinstance(recovery, Body) and recovery.dim == 3:
+    if isinstance(recovery, (Body, Surface)) and recovery.dim == 3:
         normals = np.concatenate([_normals(recovery.points[some]) for some in faces])
+        if isinstance(recovery, Surface):  # has two sides: that which is seen
+            normals = normals * np.sign(normals @ _TOWARDS)[:, None]
         shade = 0.3 + 0.7 * np.clip(normals[order] @ _LIGHT, 0, 1)[:, None]
         colours = shade * np.array(to_rgb(style.FILL)) + (1 - shade) * np.array(to_rgb(style.EDGE))
         edge = "face" if large else style.OUTER

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..recovery import Body, ConformingMesh, Mechanical, PlanarMesh, Recovery
+from ..clock import Clock
+from ..metric import realised
+from ..recovery import Body, ConformingMesh, Mechanical, PlanarMesh, Recovery, Surface
 from ..summary import counted_cells, scale_text
 from ..words import count_of
 from . import style
@@ -27,7 +29,8 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     """Draw a recovered mesh: cells, outer boundary, holes, hinges, and what fits worst if uncertified.
 
     Pieces whose frames overlap are drawn side by side. Points without coordinates are left out. Of bodies in space
-    the outer surface is drawn, shaded.
+    the outer surface is drawn, shaded. Surfaces that have edge lengths only are drawn in coordinates that come near
+    these; the header says how near.
 
     Parameters
     ----------
@@ -44,12 +47,15 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     """
     if path is not None:
         check_plot(path)
+    if isinstance(recovery, Surface) and recovery.realisation is None:
+        recovery = realised(recovery, Clock())  # edge lengths cannot be drawn
     if isinstance(recovery, PlanarMesh) and not isinstance(recovery, ConformingMesh):
         figure, handles = planar_mesh(recovery, ax)
     else:
         figure, handles = plot_body(recovery, ax)
     if ax is None:
-        header(figure, recovery.status, details(recovery), style.STATUS.get(recovery.status, style.TEXT))
+        about = "edge lengths " if isinstance(recovery, Surface) and recovery.dim == 3 else ""
+        header(figure, about + recovery.status, details(recovery), style.STATUS.get(recovery.status, style.TEXT))
         footer(figure, handles)
     if path is not None:
         write_figure(figure, path)
@@ -75,6 +81,8 @@ def details(recovery: Recovery) -> str:
     missing = int(np.count_nonzero(recovery.node_status))
     if missing:
         parts.append(f"{missing:,} not determined")
+    if isinstance(recovery, Surface) and recovery.realisation is not None and recovery.dim == 3:
+        parts.append(f"edge lengths off by {recovery.realisation['misfit']:.1e}")
     if not isinstance(recovery, Mechanical):
         parts.append(f"c = {scale_text(recovery, 6)}")
     elif isinstance(recovery, Body) and recovery.poisson_ratio is not None:

@@ -38,7 +38,7 @@ def three_cycles(n: int, edges: NDArray) -> tuple[NDArray, NDArray]:
     order = np.argsort(tail, kind="stable")
     tail = tail[order]
     head = np.where(swap, edges[:, 0], edges[:, 1])[order]
-    edge_id = _edge_lookup(n, edges)
+    edge_id = lookup(n, edges)
     found: list[tuple[NDArray, NDArray, NDArray]] = []
     first = np.arange(e)
     step = 1
@@ -78,7 +78,7 @@ def triangles_everywhere(n: int, edges: NDArray, sample: int = 200) -> bool:
     return not (bare & chosen[around].any(axis=1)).any()
 
 
-def _edge_lookup(n: int, edges: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
+def lookup(n: int, edges: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
     """A function from pairs of vertices to rows of `edges`, -1 where there is no edge."""
     indptr = np.zeros(n + 1, dtype=np.int32)
     np.cumsum(np.bincount(edges[:, 0], minlength=n), out=indptr[1:])

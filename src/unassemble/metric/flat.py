@@ -1,0 +1,52 @@
+"""Surfaces that are flat: the planar mesh says more, with more certainty."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..recovery import PlanarMesh, Surface
+from ..tolerances import CERTIFIED
+
+
+def could_be_planar(surface: Surface) -> bool:
+    """Whether a surface is flat, and its boundary turns as that of a planar domain does.
+
+    The outer loop of each piece turns once to the left, and all others once to the right; those of a cylinder do not
+    turn at all. Where loops touch the question is left open.
+    """
+    if not (surface.flat and surface.orientable.all()):
+        return False
+    ends = np.bincount(surface.boundary.ravel(), minlength=surface.n_points)
+    if (ends > 2).any():
+        return True
+    first, last = surface.boundary_offsets[:-1], surface.boundary_offsets[1:]
+    vertices = [np.unique(surface.boundary[a:b]) for a, b in zip(first, last, strict=True)]
+    turns = np.array([surface.curvature[loop].sum() for loop in vertices]) / (2 * np.pi)
+    piece = surface.component[surface.boundary[first, 0]]
+    outer = np.bincount(piece, turns > 0, minlength=surface.n_components)
+    return bool((np.abs(np.abs(turns) - 1) < 1e-3).all() and (outer == 1).all())
+
+
+def flattened(surface: Surface, planar: PlanarMesh) -> Surface:
+    """A flat surface with the coordinates of the planar mesh that the same matrix gives, and with its certificate.
+
+    In the plane there may be more entries than unknowns, and then rows may have any sum. A surface that is flat and no
+    planar mesh, a cylinder for one, stays as it is.
+    """
+    if planar.backward_error > CERTIFIED or planar.n_components != surface.n_components:
+        return surface
+    (ax, ay), (bx, by), (cx, cy) = planar.points[surface.triangles].transpose(1, 2, 0)
+    turned = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0
+    return replace(
+        surface,
+        points=planar.points,
+        triangles=np.where(turned[:, None], surface.triangles[:, [0, 2, 1]], surface.triangles),
+        status=planar.status,
+        uniqueness=planar.uniqueness,
+        reason=f"the surface is flat; {planar.reason}",
+        backward_error=max(planar.backward_error, surface.backward_error),
+        warnings=planar.warnings,
+        realisation={"misfit": 0.0, "largest": 0.0, "misfits": []},
+    )

@@ -1,0 +1,133 @@
+"""A triangulated surface without coordinates: pieces, sides, ends, and what kind of surface each piece is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse import csgraph
+
+from ..topology.manifold import Cycles
+from ..topology.orientation import glue, orient
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceMesh:
+    """Triangles glued along edges, at most two on each.
+
+    Attributes
+    ----------
+    n : int
+        Vertices.
+    edges : (e, 2) int64
+        Pairs i < j in lexicographic order; each is a side of a triangle.
+    triangles : (m, 3) int64
+        Neighbours run along a common edge in opposite directions, in orientable pieces.
+    opposite : (m, 3) int64
+        Rows of `edges` that face the corners.
+    piece : (m,) int64
+        Label of the edge-connected piece, in order of the pieces' lowest vertices.
+    orientable : (number of pieces,) bool
+    fan : (m, 3) int64
+        Label of the fan of triangles about a vertex that each corner belongs to; a vertex has several where sheets of
+        surface touch in it.
+    boundary : (b,) int64
+        Rows of `edges` with a triangle on one side only.
+    """
+
+    n: int
+    edges: NDArray[np.int64]
+    triangles: NDArray[np.int64]
+    opposite: NDArray[np.int64]
+    piece: NDArray[np.int64]
+    orientable: NDArray[np.bool_]
+    fan: NDArray[np.int64]
+    boundary: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, cycles: Cycles, chosen: NDArray[np.bool_]) -> SurfaceMesh:
+        """The surface that some of a graph's 3-cycles make."""
+        triangles, opposite = cycles.triangles[chosen], cycles.opposite[chosen]
+        gluing = glue(len(cycles.edges), opposite)
+        flip, piece, orientable = orient(triangles, gluing)
+        lowest = np.full(len(orientable), cycles.n)
+        np.minimum.at(lowest, piece, triangles.min(axis=1))
+        order = np.argsort(lowest, kind="stable")
+        triangles = np.where(flip[:, None], triangles[:, [0, 2, 1]], triangles)
+        opposite = np.where(flip[:, None], opposite[:, [0, 2, 1]], opposite)
+        return cls(
+            cycles.n,
+            cycles.edges,
+            triangles,
+            opposite,
+            np.argsort(order)[piece],
+            orientable[order],
+            _fans(triangles, opposite),
+            np.flatnonzero(gluing.count == 1),
+        )
+
+    @property
+    def n_pieces(self) -> int:
+        """Number of edge-connected pieces."""
+        return len(self.orientable)
+
+    @property
+    def piece_of_edge(self) -> NDArray[np.int64]:
+        """(e,) label of each edge's piece."""
+        label = np.empty(len(self.edges), np.int64)
+        label[self.opposite] = self.piece[:, None]
+        return label
+
+    @property
+    def euler(self) -> NDArray[np.int64]:
+        """(number of pieces,) Euler characteristic, with fans for vertices."""
+        count = self.n_pieces
+        _, one = np.unique(self.fan, return_index=True)
+        fans = np.bincount(self.piece[one // 3], minlength=count)
+        return fans - np.bincount(self.piece_of_edge, minlength=count) + np.bincount(self.piece, minlength=count)
+
+    @property
+    def loop_of_boundary(self) -> NDArray[np.int64]:
+        """(b,) label of the boundary loop of each boundary edge."""
+        row, corner = np.nonzero(np.isin(self.opposite, self.boundary))
+        order = np.argsort(self.opposite[row, corner])
+        row, corner = row[order], corner[order]
+        ends = self.fan[row, (corner + 1) % 3], self.fan[row, (corner + 2) % 3]
+        size = int(self.fan.max(initial=-1)) + 1
+        graph = sp.coo_array((np.ones(len(row), np.int8), ends), shape=(size, size))
+        label = csgraph.connected_components(graph, directed=False)[1][ends[0]]
+        return np.unique(label, return_inverse=True)[1].astype(np.int64)
+
+    @property
+    def loops(self) -> NDArray[np.int64]:
+        """(number of pieces,) boundary loops of each piece."""
+        _, one = np.unique(self.loop_of_boundary, return_index=True)
+        return np.bincount(self.piece_of_edge[self.boundary[one]], minlength=self.n_pieces)
+
+    @property
+    def component(self) -> NDArray[np.int64]:
+        """(n,) the lowest label of the pieces at each vertex, -1 where there is none."""
+        label = np.full(self.n, self.n_pieces)
+        np.minimum.at(label, self.triangles.ravel(), np.repeat(self.piece, 3))
+        return np.where(label == self.n_pieces, -1, label)
+
+    @property
+    def hinges(self) -> NDArray[np.int64]:
+        """Vertices shared by several pieces."""
+        pairs = np.unique(np.repeat(self.piece, 3) * self.n + self.triangles.ravel())
+        return np.flatnonzero(np.bincount(pairs % self.n, minlength=self.n) > 1)
+
+
+def _fans(triangles: NDArray, opposite: NDArray) -> NDArray[np.int64]:
+    """(m, 3) labels of corners at one vertex that inner edges join."""
+    side = np.concatenate([opposite, opposite], axis=1).ravel()  # the edge of each corner's first and second side
+    corner = np.arange(opposite.size).reshape(-1, 3)
+    ends = np.concatenate([corner[:, [1, 2, 0]], corner[:, [2, 0, 1]]], axis=1).ravel()
+    vertex = triangles.ravel()[ends]
+    order = np.lexsort((vertex, side))
+    side, vertex, ends = side[order], vertex[order], ends[order]
+    same = (side[1:] == side[:-1]) & (vertex[1:] == vertex[:-1])
+    graph = sp.coo_array((np.ones(same.sum(), np.int8), (ends[:-1][same], ends[1:][same])), shape=(corner.size,) * 2)
+    return csgraph.connected_components(graph, directed=False)[1].reshape(-1, 3).astype(np.int64)

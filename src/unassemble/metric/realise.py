@@ -1,0 +1,136 @@
+"""Coordinates in space for given edge lengths: least squares from several starts, one shape of possibly many."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse import csgraph
+
+from ..clock import Clock
+from ..errors import SolverError
+from ..linalg import UpperTriangle, factorisation
+from ..recovery import Surface
+from ..tolerances import CERTIFIED
+
+_STARTS = 4
+_STEPS = 80
+_LANDMARKS = 60
+
+
+def realised(surface: Surface, clock: Clock) -> Surface:
+    """The surface with coordinates that minimise the misfit of squared edge lengths, and with what is left of it.
+
+    Lengths do not determine a shape: surfaces that are open mostly bend, and those that do not may have several shapes,
+    mirror images of parts for one. What has the edge lengths up to rounding is a shape of this surface, perhaps not the
+    one that the matrix came from; where a misfit is left none was found.
+    """
+    with clock("realise"):
+        points = np.full((surface.n_points, 3), np.nan)
+        graph = sp.coo_array(
+            (surface.edge_lengths, surface.edges.T), shape=(surface.n_points, surface.n_points)
+        ).tocsr()
+        known = np.isfinite(surface.edge_lengths)
+        _, part = csgraph.connected_components(graph, directed=False)
+        per_start: NDArray[np.float64] = np.zeros((_STARTS, len(surface.edges)))
+        for label in np.unique(part[surface.edges[known, 0]]):
+            rows = np.flatnonzero(known & (part[surface.edges[:, 0]] == label))
+            vertices, local = np.unique(surface.edges[rows], return_inverse=True)
+            edges, lengths = local.reshape(-1, 2), surface.edge_lengths[rows]
+            shapes = [_fitted(start, edges, lengths) for start in _starts(len(vertices), edges, lengths)]
+            left = [_lengths(shape, edges) - lengths for shape in shapes]
+            per_start[:, rows] = left
+            misfits = np.linalg.norm(left, axis=1) / np.linalg.norm(lengths)
+            # Dents make a shape smaller, and fit as well.
+            fitting = np.flatnonzero(misfits <= max(float(misfits.min()), CERTIFIED))
+            points[vertices] = _in_axes(shapes[max(fitting, key=lambda k: float(np.var(shapes[k], axis=0).sum()))])
+    misfit = _lengths(points, surface.edges)[known] - surface.edge_lengths[known]
+    found = {
+        "misfit": float(np.sqrt(np.mean(misfit**2))),
+        "largest": float(np.abs(misfit).max(initial=0.0)),
+        "misfits": [float(np.sqrt(np.mean(one[known] ** 2))) for one in per_start],
+    }
+    return replace(surface, points=points, realisation=found)
+
+
+def _lengths(points: NDArray, edges: NDArray) -> NDArray[np.float64]:
+    return np.asarray(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1))
+
+
+def _in_axes(points: NDArray) -> NDArray[np.float64]:
+    """Centred, in principal axes."""
+    centred = points - points.mean(axis=0)
+    return np.asarray(centred @ np.linalg.svd(centred, full_matrices=False)[2].T)
+
+
+def _starts(n: int, edges: NDArray, lengths: NDArray) -> list[NDArray[np.float64]]:
+    """Landmark multidimensional scaling of distances along edges, and the same with distances bent and noise.
+
+    Distances along a surface are longer than those through space, the more so the longer they are.
+    """
+    graph = sp.coo_array((lengths, edges.T), shape=(n, n)).tocsr()
+    rng = np.random.default_rng(0)
+    marks = [0]
+    far = np.full(n, np.inf)
+    distances = []
+    for _ in range(min(n, _LANDMARKS)):
+        distances.append(csgraph.dijkstra(graph, directed=False, indices=marks[-1]))
+        far = np.minimum(far, distances[-1])
+        marks.append(int(np.argmax(far)))
+    table = np.array(distances)
+    starts = []
+    for k in range(_STARTS):
+        bent = table ** (1 - 0.15 * k)
+        square = bent**2
+        own = square[:, marks[: len(table)]]
+        centre = own.mean(axis=1)
+        value, vector = np.linalg.eigh(-0.5 * (own - centre[:, None] - centre + own.mean()))
+        top = np.argsort(-value)[:3]
+        axes = vector[:, top] / np.sqrt(np.maximum(value[top], 1e-12 * value.max()))
+        start = -0.5 * (square - centre[:, None]).T @ axes
+        start += 0.05 * rng.standard_normal(start.shape)  # of a mean edge: nothing stays flat, or in one place
+        now = _lengths(start, edges)
+        starts.append(start * float((now @ lengths) / (now @ now)))
+    return starts
+
+
+def _fitted(start: NDArray, edges: NDArray, lengths: NDArray) -> NDArray[np.float64]:
+    """Levenberg and Marquardt's method for (|x_i - x_j|^2 - l^2) / 2 l = 0."""
+    x, damping, solver = start, 1e-2, None
+    rows = np.repeat(np.arange(len(edges)), 6)
+    columns = (3 * edges[:, :, None] + np.arange(3)).reshape(len(edges), 6).ravel()
+
+    def residual(at: NDArray) -> tuple[NDArray, NDArray]:
+        side = at[edges[:, 0]] - at[edges[:, 1]]
+        return side / lengths[:, None], ((side**2).sum(axis=1) - lengths**2) / (2 * lengths)
+
+    side, left = residual(x)
+    for _ in range(_STEPS):
+        jacobian = sp.csr_array((np.hstack([side, -side]).ravel(), (rows, columns)), shape=(len(edges), x.size))
+        normal = UpperTriangle.of(sp.csr_array(jacobian.T @ jacobian))
+        data = normal.data.copy()
+        data[normal.indptr[:-1]] += damping
+        matrix = normal.with_data(data)
+        solver = solver or factorisation(matrix, definite=True)
+        try:
+            solver.factorise(matrix)
+            trial = x - solver.solve(jacobian.T @ left).reshape(-1, 3)
+        except SolverError:
+            damping *= 10
+            continue
+        new_side, new_left = residual(trial)
+        before, after = float(left @ left), float(new_left @ new_left)
+        if not after < before:
+            if damping > 1e6 or after <= before * (1 + 1e-12):
+                break
+            damping *= 10
+            continue
+        x, side, left = trial, new_side, new_left
+        damping = max(damping / 5, 1e-9)
+        if after > (1 - 1e-4) * before:
+            break
+    if solver is not None:
+        solver.release()
+    return np.asarray(x)
