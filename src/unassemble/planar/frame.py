@@ -77,7 +77,10 @@ def _along_edges(z: NDArray, edges: NDArray, boundary: NDArray | None) -> comple
 
 def _ambiguity(axis: bool, x: bool, y: bool) -> str | None:
     if not axis:
-        return "the second moments are equal in all directions, so that the axes follow the edges, up to symmetry"
+        return (
+            "the second moments are equal in all directions, so that the axes follow the edges, and the choice among "
+            "symmetric ones is arbitrary"
+        )
     if x and y:
         return None
     vanishing = " and ".join(name for name, known in (("x", x), ("y", y)) if not known)
