@@ -43,9 +43,9 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
     """Write a recovered mesh, whole or not at all; the extension names the format.
 
     ``.npz`` holds ``points``, cells (``triangles``, ``quads``, ``tetrahedra``, ``hexahedra``, ``mid_nodes``, ``lines``,
-    ``polygons_offsets`` and ``polygons_data``), ``component``, ``hinges``, ``scale``, ``node_status``, of
-    vector-valued matrices ``node_of_row`` and ``direction_of_row``, and what the mesh is worth: ``status``,
-    ``uniqueness`` and ``backward_error``, which ``.vtu`` holds as field data, with ``scale``.
+    ``polygons_offsets`` and ``polygons_data``), ``eliminated_points`` if any, ``component``, ``hinges``, ``scale``,
+    ``node_status``, of vector-valued matrices ``node_of_row`` and ``direction_of_row``, and what the mesh is worth:
+    ``status``, ``uniqueness`` and ``backward_error``, which ``.vtu`` holds as field data, with ``scale``.
     Other formats are those of meshio (:mod:`unassemble.formats`); of these ``.vtu`` holds polygons, the others get
     them divided into triangles.
 
@@ -82,6 +82,8 @@ def arrays(recovery: Recovery) -> dict[str, Any]:
             content[name] = cells
     if isinstance(recovery, PlanarMesh) and recovery.n_polygons:
         content |= {"polygons_offsets": recovery.polygons_offsets, "polygons_data": recovery.polygons_data}
+    if isinstance(recovery, PlanarMesh) and len(recovery.eliminated_points):
+        content["eliminated_points"] = recovery.eliminated_points
     content |= {"component": recovery.component, "hinges": recovery.hinges, "scale": recovery.scale}
     content["node_status"] = recovery.node_status
     if recovery.vector_valued:

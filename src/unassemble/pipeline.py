@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .boundaries import recover_lattice
 from .clock import Clock
 from .diagnosis import explained, judged
 from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
@@ -211,7 +212,8 @@ class _Task:
         if scale is not None:
             _check_proportion(scale, float(np.abs(part.entries).max()))
         placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
-        return recover_scalar(part, placement, self.clock, self.planar)
+        lattice = recover_lattice(part, placement, self.clock, self.planar)
+        return lattice or recover_scalar(part, placement, self.clock, self.planar)
 
     def _as_vector(self, reading: VectorReading) -> Recovery:
         from .vector import recover_vector

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
-from ..tolerances import ROUNDED, SUMMED
+from ..tolerances import MOST, ROUNDED, SMALL, SUMMED
 from ..words import count_of
 from .cliques import Cells, cells_of, mostly, often
 from .kinds import PLANAR, UNKNOWN, UNREAD, Diagnosis
@@ -26,12 +26,9 @@ _CELLS = {
     (10, 4): ("cubic", "cubic elements on triangles"),
     (16, 4): ("cubic", "bicubic elements on quadrilaterals"),
 }
-_MANY_DIAGONALS = 0.4  # of the pairs of a mesh of quadrilaterals: about half are diagonals
-_FEW_ZERO = 0.4  # of the sums in a mass matrix of quadratic triangles: those of vertices, a quarter of the rows
 LINEAR = "a stiffness matrix of linear elements on triangles"
 _SIMPLICES = {1: "segments", 2: "triangles", 3: "tetrahedra"}
 _SMALL = 10  # rows: fewer may be a mesh of few triangles, whatever their entries are
-_PENALTY = 1e4  # of a diagonal over its row: next to that a mesh's own stiffness is nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +60,7 @@ class Sums:
         sums = matrix.diagonal + np.bincount(ends, twice, matrix.n)
         alone = size == 0
         zero = (np.abs(sums) <= SUMMED * (size + np.abs(matrix.diagonal))) & ~alone
-        penalised = (np.abs(matrix.diagonal) > _PENALTY * size) & ~alone
+        penalised = (SMALL * np.abs(matrix.diagonal) > size) & ~alone
         signs = np.unique(np.sign(sums[~alone & ~penalised]))
         sign = int(signs[0]) if len(signs) == 1 and not (zero & ~alone).any() else 0
         return cls(zero, alone, penalised, sign)
@@ -131,7 +128,8 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
         several = often(cells.twins)  # unknowns in a node, or nodes inside of an edge or cell
         operator = _operator(matrix, sums, cells)
         kind, name = _CELLS.get((cells.nodes, cells.shared), ("", ""))
-        doubtful = {"quadrilaterals": cells.often < _MANY_DIAGONALS, "hexahedra": several}
+        # About half of the pairs of quadrilaterals are diagonals.
+        doubtful = {"quadrilaterals": cells.often < 1 - MOST, "hexahedra": several}
         if kind and not doubtful.get(kind):
             shown = f"rows form cliques of {cells.nodes}, neighbours of which share {cells.shared} rows"
             return _of_kind(kind, f"{operator} of {name}", shown, *sums.evidence)
@@ -169,7 +167,8 @@ def _further(sums: Sums) -> str:
 
 
 def _operator(matrix: OperatorMatrix, sums: Sums, cells: Cells) -> str:
-    if (cells.nodes, cells.shared) == (6, 3) and 0 < sums.zero.mean() < _FEW_ZERO:
+    # Of a mass matrix of quadratic triangles the sums of vertices are zero, a quarter of all.
+    if (cells.nodes, cells.shared) == (6, 3) and 0 < sums.zero.mean() < 1 - MOST:
         return "a mass matrix"
     if sums.zero.any():
         return "a stiffness matrix"

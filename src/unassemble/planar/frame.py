@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-_TIE = 1e-7  # moments nearer to a tie than this choose no axis that rounding would not change
-_ALIKE = 1e-3  # mean of powers of directions, up to which edges have none in common
+from ..tolerances import ALIKE, LITTLE
 
 
 @dataclass(frozen=True)
@@ -48,11 +47,11 @@ def canonical_frame(z: NDArray, edges: NDArray, boundary: NDArray | None = None)
     d = (z - centre) / size
     second = (d * d).sum()  # of argument twice the principal axis', and modulus the difference of the moments
     spread = float((np.abs(d) ** 2).sum())
-    tie = not abs(second) > _TIE * spread
+    tie = not abs(second) > ALIKE * spread
     axis = _along_edges(d, edges, boundary) if tie else np.exp(-0.5j * np.angle(second))
     x, y = (axis * d).real, (axis * d).imag
     third = [float((t * t * t).sum()) for t in (x, y)]  # a power would take ten times as long
-    sure = [abs(m) > _TIE * float((np.abs(t) ** 3).sum()) for m, t in zip(third, (x, y), strict=True)]
+    sure = [abs(m) > ALIKE * float((np.abs(t) ** 3).sum()) for m, t in zip(third, (x, y), strict=True)]
     flip_x, flip_y = third[0] < 0, third[1] < 0
     turn = axis / size * (-1 if flip_x else 1)
     mirror = flip_x != flip_y
@@ -70,7 +69,7 @@ def _along_edges(z: NDArray, edges: NDArray, boundary: NDArray | None) -> comple
         line = z[some[:, 1]] - z[some[:, 0]]
         length = np.abs(line)
         mean = np.sum(length * (line / np.where(length > 0, length, 1.0)) ** power) / max(float(length.sum()), 1e-300)
-        if abs(mean) > _ALIKE:
+        if abs(mean) > LITTLE:
             return complex(np.exp(-1j * np.angle(mean) / power))
     return 1.0
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import SEARCHED_ROWS, Alternative, alternatives, components_of
-from ..cells.agreement import SAME_SCALE
 from ..certify import certify
 from ..clock import Clock
 from ..linalg import AnalysisAhead, Factorisation, UpperTriangle, blas_threads, factorisation
@@ -19,7 +18,7 @@ from ..options import ScalarOptions
 from ..planar.hinges import free_images, join
 from ..planar.pencil import pencil_pattern
 from ..recovery import PlanarMesh
-from ..tolerances import CERTIFIED, SIGMAS
+from ..tolerances import ALIKE, CERTIFIED, SIGMAS, SMALL
 from ..topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
 from .deviations import coordinate_deviations
 from .evidence import weigh
@@ -30,8 +29,6 @@ from .placement import Placement
 from .reasons import other_scale
 from .solving import Solved, Task, solve
 from .verdict import Findings, Held, Verdict, verdict
-
-_SMALL = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +49,7 @@ def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, o
     if options.scale is None or found.status != "uncertified":
         return found
     free = _by_digits(stored, clock, replace(task, options=replace(options, scale=None)))
-    if not free.certified or np.ptp(free.scale) > SAME_SCALE * np.abs(free.scale).max():
+    if not free.certified or np.ptp(free.scale) > ALIKE * np.abs(free.scale).max():
         return found
     why = other_scale(options.scale, float(free.scale[0]), free.backward_error)
     return replace(found, reason=why.text, advice=why.advice)
@@ -191,7 +188,7 @@ def _report(
     if options.noise and evidence.noise is not None and evidence.noise < 0.5 * options.noise:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
     # What a misfit that small lacks is digits, and not triangles.
-    if refused and not (noise or held.certificate.backward_error < _SMALL):
+    if refused and not (noise or held.certificate.backward_error < SMALL):
         notes += origin_notes(findings.stored, evidence.suspects)
     if found.uniqueness == "searched" and np.bincount(components_of(findings.stored)).max() > SEARCHED_ROWS:
         notes.append(f"other meshes were looked for in connected parts of up to {SEARCHED_ROWS:,} rows only")

@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from ..cells import Alternative
 from ..certify import Certificate, without_spare_equations
 from ..matrix import OperatorMatrix
-from ..tolerances import CERTIFIED, SUSPICIOUS
+from ..tolerances import CERTIFIED, PLACED, SUSPICIOUS
 from .evidence import Evidence
 from .factors import discord
 from .joined import JoinedMesh
 from .noise import NoiseTest
 from .reasons import Reason, ambiguous, astray, far_away, misfit, nothing_to_spare, unlikely, with_noise
 from .solving import Solved
-
-_SURE = 1e-8  # of a piece's size: how far off certified positions may be
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +155,7 @@ def _by_itself(f: Findings) -> tuple[bool, Reason]:
         bare = good and len(topology.bare_edges) > 0
         why = misfit(f, f.trouble)
         return False, _bare(f) if bare else Reason.of(*apart, advice=why.advice) if apart else why
-    if not doubt <= _SURE:
+    if not doubt <= PLACED:
         return False, Reason.of(
             f"{fits}, but so may others: in double precision the entries determine the positions to about {doubt:.0e} "
             "of the size only"
@@ -169,14 +167,14 @@ def _by_noise(f: Findings, test: NoiseTest) -> tuple[bool, Reason]:
     """Where a test against the errors of the entries decides: likely, and no part of it explained by another model."""
     if test.noise.digits and not (test.drowned or test.likely):
         why = misfit(f, ())
-        short = "." not in why.text  # of a single sentence
+        short = ". " not in why.text  # of a single sentence
         more = (unlikely(test, f.certificate), *astray(f))
         return False, Reason.of(why.text, *more, advice=why.advice) if short else why
     reason = with_noise(f, test)
     if f.near.passes and f.evidence.term:
         return False, reason
     doubt = max(mesh.doubt for mesh in f.solved.meshes)
-    if f.near.passes and not doubt <= max(_SURE, test.noise.sigma / float(np.abs(f.solved.scales).min())):
+    if f.near.passes and not doubt <= max(PLACED, test.noise.sigma / float(np.abs(f.solved.scales).min())):
         return False, Reason.of(f"{reason.text}, but that mesh need not be the likeliest", *f.trouble)
     return f.near.passes, reason
 
