@@ -120,7 +120,7 @@ class _Rows:
             good &= opposite.sum(axis=1) == 4
         rows, opposite = rows[good], opposite[good]
         pairs = np.stack([one[good][opposite], other[good][opposite]], axis=1).reshape(-1, most // 2, 2)
-        apart = np.sort(pairs.reshape(len(rows), -1), axis=1)
+        apart = np.sort(pairs.reshape(len(rows), most), axis=1)
         good = (apart[:, 1:] != apart[:, :-1]).all(axis=1)
         return cls(graph, rows[good], pairs[good])
 
