@@ -39,8 +39,7 @@ class Recovery:
     triangles : (m, 3) int64
         Cells, rows of `points`, counter-clockwise in the plane.
     component : (n,) int64
-        Edge-connected piece of each point, -1 for points of no cell; a vertex shared by pieces carries the lowest
-        label.
+        Edge-connected piece of each point, the lowest of those that share it; -1 for points of no cell.
     hinges : (k,) int64
         Vertices shared by several pieces.
     scale : (number of pieces,) float64
@@ -55,12 +54,9 @@ class Recovery:
     status : {"certified", "ambiguous", "uncertified"}
         Whether the mesh gives the matrix back, and no other mesh is known that does.
     uniqueness : {"proved", "searched", "ambiguous", None}
-        What is known of other meshes that fit: none can, a search found none, there is one; None where this one does
-        not fit.
-    reason : str
-        Why, in one sentence or two.
-    advice : str
-        What to do next, where the mesh is not certified.
+        Of other meshes that fit: none can, a search found none, there is one; None where this one does not fit.
+    reason, advice : str
+        Why, in one sentence or two; what to do next, where the mesh is not certified.
     operator : str
         ``"laplacian"``, or ``"anisotropic laplacian"`` where a tensor was undone; ``"elasticity"``, or ``"vector
         laplacian"`` where the directions of a vector-valued matrix are not coupled; ``"frame or shell"``, ``"plane
@@ -189,18 +185,15 @@ class PlanarMesh(Recovery):
         With noise, or entries that were rounded: ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``,
         ``largest``, ``largest_p_value``; see :func:`unassemble.certify.chi_square_verdict`.
     estimated_noise : float or None
-        Standard deviation of independent errors of the entries that would leave the misfit found; None where the
-        misfit is no noise, since a term that the model lacks explains it.
+        Standard deviation of independent errors of the entries that would leave the misfit; None where it is no noise.
     suspects : (k, 2) int64
         Entries that the mesh would fit the others far better without, the gravest first.
     alternatives : tuple of Alternative
-        Cells in doubt where other meshes fit as well, and what these have instead; see
-        :class:`unassemble.cells.Alternative`.
+        Cells in doubt where other meshes fit as well, and what these have instead.
+    n_entries, n_fitting : int
+        Entries above the diagonal; those that the mesh gives back to 1e-9 of their row's largest.
     eliminated_points : (k, 2) float64
         Vertices that the matrix has no rows for, where it determines them; see :mod:`unassemble.boundaries`.
-    n_entries, n_fitting : int
-        Entries above the diagonal, of the matrix or the mesh; those that the mesh gives back to 1e-9 of their row's
-        largest.
     """
 
     n_holes: int
@@ -211,9 +204,9 @@ class PlanarMesh(Recovery):
     estimated_noise: float | None = None
     suspects: NDArray[np.int64] = field(default_factory=_none(2))
     alternatives: tuple[Alternative, ...] = ()
-    eliminated_points: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     n_entries: int = 0
     n_fitting: int = 0
+    eliminated_points: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
 
     @property
     def element(self) -> str:

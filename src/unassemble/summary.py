@@ -39,12 +39,12 @@ def three_lines(recovery: Recovery, files: str = "") -> str:
     files : str
         Names of those that were written, the mesh first.
     """
-    mesh = f"{' and '.join(counted_cells(recovery))} on {_points(recovery)} points"
-    if isinstance(recovery, PlanarMesh) and recovery.n_entries:
-        entries = f"{recovery.n_fitting:,} of {recovery.n_entries:,} entries"
-        fits = f"{entries} fit {mesh}, to {CERTIFIED:g} of the row's largest"
-    else:
-        fits = f"{mesh}, with a backward error of {recovery.backward_error:.1e} relative to the row's largest entry"
+    missing = int(np.count_nonzero(recovery.node_status))
+    mesh = f"{' and '.join(counted_cells(recovery))} on {count_of(recovery.n_points, 'point')}"
+    mesh += f", {missing:,} of these without a position," if missing else ""
+    fits = f"{mesh} give the matrix back to {recovery.backward_error:.1e} of each row's largest entry"
+    if isinstance(recovery, PlanarMesh) and 0 < recovery.n_fitting < recovery.n_entries:
+        fits += f", and {recovery.n_fitting:,} of {recovery.n_entries:,} entries to {CERTIFIED:g}"
     written = f" (written: {files})" if files else ""
     after = recovery.advice or "see `report()` for all that is known"
     return f"{recovery.status}: {fits}{written}\n  why   {recovery.reason}\n  next  {after}"

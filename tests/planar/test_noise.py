@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from meshes import delaunay, diameter, largest_error, random_mesh, specimen
-from unassemble import SolverError, recover
+from unassemble import GeometryError, SolverError, recover
 from unassemble.matrix import check_matrix
 from unassemble.planar import piece as pieces
 from unassemble.planar.cautious import cautious_polish, count_flipped
@@ -154,19 +154,27 @@ def test_start_far_off_is_polished_to_the_same_mesh_as_the_truth():
     assert recover(noisy(known.matrix, sigma), noise=sigma).certified
 
 
-def test_polish_that_does_not_get_there_says_so():
+def test_noise_that_lets_points_coincide_leaves_no_mesh():
     known, sigma = channel(200, 5), 2e-2
     matrix = noisy(known.matrix, sigma, seed=4)
-    found = recover(matrix, noise=sigma)
+    with pytest.raises(GeometryError, match=r"coincide in the nearest one\. No polish: the start is too far off"):
+        recover(matrix, noise=sigma)
+    with pytest.raises(GeometryError, match="points coincide"):
+        recover(matrix, noise=sigma, refine=False)
+
+
+def test_a_mesh_that_was_not_polished_says_so():
+    known = specimen(*random_mesh(300, seed=2))
+    found = recover(noisy(known.matrix, 1e-3), noise=5e-4, refine=False)
     assert found.status == "uncertified"
-    assert "The polish has not come to a mesh that explains the matrix" in found.reason
-    assert "was not polished" in recover(matrix, noise=sigma, refine=False).reason
+    assert "was not polished" in found.reason
 
 
 def test_misfit_that_is_no_fault_of_the_polish_is_not_told_from_one():
     known = specimen(*random_mesh(300, seed=2))
     found = recover(noisy(known.matrix, 1e-3), noise=5e-4)
     assert found.status == "uncertified"
+    assert "The polish has not come to a mesh that explains the matrix" in found.reason
     assert "cannot be told" in found.reason
 
 

@@ -18,6 +18,8 @@ __all__ = ["main"]
 # A backspace keeps click from running the lines together.
 _HELP = """Turn a sparse matrix back into the mesh it was assembled on.
 
+'unassemble A.mtx' is short for 'unassemble recover A.mtx'.
+
 \b
 Exit status:
   0    recovered and certified

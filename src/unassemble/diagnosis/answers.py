@@ -7,6 +7,7 @@ from dataclasses import replace
 from ..errors import GeometryError, NotPlanarError, RecoveryError
 from ..matrix import OperatorMatrix
 from ..recovery import PlanarMesh
+from ..tolerances import CERTIFIED
 from ..words import sentences
 from .kinds import UNKNOWN
 from .scalar import diagnosed
@@ -44,7 +45,7 @@ def judged(mesh: PlanarMesh, matrix: OperatorMatrix) -> PlanarMesh:
     GeometryError
         If the matrix is a mass matrix, or one of segments on a line, so that the mesh means nothing.
     """
-    if mesh.status != "uncertified":
+    if mesh.status != "uncertified" or mesh.backward_error <= CERTIFIED:
         return mesh
     found = diagnosed(matrix, planar=True)
     if not found.unread:

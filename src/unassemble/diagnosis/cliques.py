@@ -16,9 +16,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-_ROWS, _PAIRS = 6000, 1500  # looked at, of larger graphs
+from ..tolerances import MOST, NEARLY_ALL
+
 _OFTEN = 0.15  # share of pairs that show their cell: a fifth of those of quadratic tetrahedra, more of all others
-_MOSTLY = 0.8  # share of anything that a kind of mesh is told by
 
 
 @dataclass(frozen=True)
@@ -47,23 +47,25 @@ class Cells:
     twins: float
 
 
-def cells_of(n: int, edges: NDArray[np.int64]) -> Cells:
-    """Look at some thousand pairs of a graph, all near to each other.
+def cells_of(n: int, edges: NDArray[np.int64], most: int = 1500) -> Cells:
+    """Look at some pairs of a graph, all near to each other.
 
     Parameters
     ----------
     n : int
     edges : (e, 2) int64
         Pairs i < j, at least one.
+    most : int
+        Pairs to look at, in a part of four times as many rows.
     """
     graph = sp.csr_array((np.ones(len(edges), np.int32), edges.T), shape=(n, n))
     graph = graph + graph.T
-    rows = csgraph.breadth_first_order(graph, int(edges[0, 0]), directed=False, return_predecessors=False)[:_ROWS]
+    rows = csgraph.breadth_first_order(graph, int(edges[0, 0]), directed=False, return_predecessors=False)[: 4 * most]
     near = graph[rows][:, rows].tocsr()
     inner = np.diff(near.indptr) == np.diff(graph.indptr)[rows]  # those with all of their neighbours
     pairs = np.column_stack(sp.triu(near, 1).nonzero())
     pairs = pairs[inner[pairs].any(axis=1)] if inner.any() else pairs
-    pairs = pairs[:: max(1, len(pairs) // _PAIRS)]
+    pairs = pairs[:: max(1, len(pairs) // most)]
     others = [set(near.indices[a:b].tolist()) for a, b in zip(near.indptr[:-1], near.indptr[1:], strict=True)]
     found: Counter[int] = Counter()
     cells: set[frozenset[int]] = set()
@@ -77,7 +79,7 @@ def cells_of(n: int, edges: NDArray[np.int64]) -> Cells:
             found[len(common) + 2] += 1
             cells.add(frozenset(common | {i, j}))
     size, count = found.most_common(1)[0] if found else (0, 0)
-    told = count >= _MOSTLY * found.total() and count >= _OFTEN * len(pairs)
+    told = count >= MOST * found.total() and count >= _OFTEN * len(pairs)
     return Cells(
         size if told else 0,
         _shared([cell for cell in cells if len(cell) == size]) if told else 0,
@@ -115,4 +117,4 @@ def often(share: float) -> bool:
 
 def mostly(share: float) -> bool:
     """Whether a share is that of a rule, boundaries being exceptions."""
-    return share >= _MOSTLY
+    return share >= NEARLY_ALL

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
-from ..tolerances import ROUNDED, SUMMED
+from ..tolerances import MOST, ROUNDED, SMALL, SUMMED
 from ..words import count_of
 from .cliques import Cells, cells_of, mostly, often
 from .kinds import PLANAR, UNKNOWN, UNREAD, Diagnosis
@@ -26,11 +27,9 @@ _CELLS = {
     (10, 4): ("cubic", "cubic elements on triangles"),
     (16, 4): ("cubic", "bicubic elements on quadrilaterals"),
 }
-_PART = 0.4  # between the quarter of zero sums in quadratic masses, and the half of diagonals among quadrilaterals
 LINEAR = "a stiffness matrix of linear elements on triangles"
 _SIMPLICES = {1: "segments", 2: "triangles", 3: "tetrahedra"}
 _SMALL = 10  # rows: fewer may be a mesh of few triangles, whatever their entries are
-_PENALTY = 1e4  # of a diagonal over its row: next to that a mesh's own stiffness is nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +61,7 @@ class Sums:
         sums = matrix.diagonal + np.bincount(ends, twice, matrix.n)
         alone = size == 0
         zero = (np.abs(sums) <= SUMMED * (size + np.abs(matrix.diagonal))) & ~alone
-        penalised = (np.abs(matrix.diagonal) > _PENALTY * size) & ~alone
+        penalised = (SMALL * np.abs(matrix.diagonal) > size) & ~alone
         signs = np.unique(np.sign(sums[~alone & ~penalised]))
         sign = int(signs[0]) if len(signs) == 1 and not (zero & ~alone).any() else 0
         return cls(zero, alone, penalised, sign)
@@ -123,20 +122,24 @@ def diagnosed(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis:
 
 
 def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
-    """A matrix whose graph is not planar, by the cells that its graph shows."""
+    """A matrix whose graph is not planar, by the cells that its graph shows, or entries where it lacks zeros."""
     used = matrix.edges[matrix.entries != 0] if matrix.entries.any() else matrix.edges
     for edges in (matrix.edges, used):  # zeros that are stored show cells better than where they are left out
         cells = cells_of(matrix.n, edges)
         several = often(cells.twins)  # unknowns in a node, or nodes inside of an edge or cell
         operator = _operator(matrix, sums, cells)
         kind, name = _CELLS.get((cells.nodes, cells.shared), ("", ""))
-        doubtful = {"quadrilaterals": cells.often < _PART, "hexahedra": several}
+        # About half of the pairs of quadrilaterals are diagonals.
+        doubtful = {"quadrilaterals": cells.often < 1 - MOST, "hexahedra": several}
         if kind and not doubtful.get(kind):
             shown = f"rows form cliques of {cells.nodes}, neighbours of which share {cells.shared} rows"
             return _of_kind(kind, f"{operator} of {name}", shown, *sums.evidence)
         if not (often(cells.often) or several) and mostly(cells.in_fours):
             shown = f"{cells.in_fours:.0%} of the coupled pairs of rows lie in a clique of four"
             return _of_kind("tetrahedra", f"{operator} of linear elements on tetrahedra", shown, *sums.evidence)
+        if _has_middles(matrix):
+            shown = "most rows have the entries of middles of sides, four times those of the ends and of the other sign"
+            return _of_kind("quadratic", "a stiffness matrix of quadratic elements on triangles", shown, *sums.evidence)
         if not (often(cells.in_fours) or several) and mostly(cells.in_threes) and len(edges) >= 2.5 * matrix.n:
             shown = f"{cells.in_threes:.0%} of the coupled pairs of rows lie in triangles, few in a clique of four"
             name = f"{operator} of linear elements on triangles, on a surface that cannot be laid flat"
@@ -168,7 +171,8 @@ def _further(sums: Sums) -> str:
 
 
 def _operator(matrix: OperatorMatrix, sums: Sums, cells: Cells) -> str:
-    if (cells.nodes, cells.shared) == (6, 3) and 0 < sums.zero.mean() < _PART:
+    # Of a mass matrix of quadratic triangles the sums of vertices are zero, a quarter of all.
+    if (cells.nodes, cells.shared) == (6, 3) and 0 < sums.zero.mean() < 1 - MOST:
         return "a mass matrix"
     if sums.zero.any():
         return "a stiffness matrix"
@@ -191,6 +195,31 @@ def _mass_of_simplices(matrix: OperatorMatrix) -> int:
         (d for d in _SIMPLICES if np.allclose(d * matrix.diagonal, 2 * others, rtol=SUMMED, atol=0)),
         0,
     )
+
+
+def _has_middles(matrix: OperatorMatrix, most: int = 400) -> bool:
+    """Whether rows m have neighbours i, j with A_im = A_jm = -4 A_ij, as middles of the sides of quadratic triangles.
+
+    Both entries are multiples of the same cotangents, so that neither is left out without the other; of zeros that are
+    not stored there is no trace. Looked for in `most` rows.
+    """
+    A, least = matrix.csr(), ROUNDED * matrix.row_size
+    sample = range(0, matrix.n, max(1, matrix.n // most))
+
+    @cache
+    def entries(i: int) -> dict[int, float]:
+        row = slice(A.indptr[i], A.indptr[i + 1])
+        return {j: v for j, v in zip(A.indices[row].tolist(), A.data[row].tolist(), strict=True) if abs(v) > least[i]}
+
+    def between(m: int) -> bool:
+        ends = sorted((value, i) for i, value in entries(m).items() if i != m)
+        return any(
+            abs(u - v) <= SUMMED * abs(u) and abs(entries(i).get(j, 0.0) + u / 4) <= SUMMED * abs(u)
+            for k, (u, i) in enumerate(ends)
+            for v, j in ends[k + 1 : k + 4]
+        )
+
+    return sum(map(between, sample)) >= (1 - MOST) * len(sample)
 
 
 def _is_graph(matrix: OperatorMatrix, sums: Sums) -> bool:

@@ -105,7 +105,8 @@ def _mesh(head: bytes) -> str:
     for comment in (b"", b"# ", b"$ ", b"** "):  # which may come before the first word
         while comment and text.startswith(comment) and b"\n" in text:
             text = text.split(b"\n", 1)[1].lstrip()
-        found = next((kind for word, kind in _MESHES if text.startswith(word)), "")
+        words = [(word, kind) for word, kind in _MESHES if text.startswith(word)]
+        found = next((kind for word, kind in words if not text[len(word) : len(word) + 1].isalnum()), "")
         if found:
             return found
     return ""

@@ -9,12 +9,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import MatrixError
-from ..tolerances import ROUNDED, SIGMAS, SUMMED
+from ..tolerances import MOST, ROUNDED, SIGMAS, SUMMED
 from ..words import count_of
 from .canonical import entry_rows
 from .operator import row_sizes
-
-_SEVERAL, _MOST = 10, 0.5  # pairs, and their share that differs, from which a whole term is not symmetric
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +128,7 @@ def _not_symmetric(A: sp.csr_array, pairs: Triangles, i: int, j: int, noise: flo
     with np.errstate(over="ignore"):
         unlike = np.abs(pairs.upper - pairs.lower) > SUMMED * np.maximum(np.abs(pairs.upper), np.abs(pairs.lower))
     here, there = _shown(A, i, j), _shown(A, j, i)
-    if len(pairs.edges) >= _SEVERAL and unlike.mean() > _MOST and not pairs.one_sided:
+    if unlike.mean() > MOST and not pairs.one_sided:
         return MatrixError(
             f"the matrix is not symmetric: {unlike.mean():.0%} of all entries differ from their transposes, as where "
             f"convection or another first derivative was added (row {i}, column {j} is {here}, and row {j}, column "

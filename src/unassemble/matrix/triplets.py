@@ -11,8 +11,6 @@ import scipy.sparse as sp
 
 from ..errors import MatrixFileError
 
-_LARGEST = 2.0**53  # whole numbers that double precision holds exactly
-
 
 def read_triplets(stream: BinaryIO, name: str) -> sp.coo_array:
     """Read lines of row, column and entry, with blanks, commas or semicolons between.
@@ -46,7 +44,7 @@ def read_triplets(stream: BinaryIO, name: str) -> sp.coo_array:
             f"{name} has a line that is no row, column and entry ({_short(error)}), as its first line is"
         ) from error
     places = table[:, :2]
-    if table.shape[1] != 3 or (places != np.floor(places)).any() or (places < 0).any() or (places >= _LARGEST).any():
+    if table.shape[1] != 3 or (places != np.floor(places)).any() or (places < 0).any() or (places >= 2.0**53).any():
         raise MatrixFileError(f"{name} has lines that are no row, column and entry: two whole numbers, and a third one")
     row, column = (places - (0 if (places == 0).any() else 1)).astype(np.int64).T
     values, n = table[:, 2], int(max(row.max(), column.max())) + 1

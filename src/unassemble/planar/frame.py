@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tolerances import ALIKE, SMALL
+from ..tolerances import ALIKE, LITTLE
 
 
 @dataclass(frozen=True)
@@ -69,14 +69,17 @@ def _along_edges(z: NDArray, edges: NDArray, boundary: NDArray | None) -> comple
         line = z[some[:, 1]] - z[some[:, 0]]
         length = np.abs(line)
         mean = np.sum(length * (line / np.where(length > 0, length, 1.0)) ** power) / max(float(length.sum()), 1e-300)
-        if abs(mean) > SMALL:
+        if abs(mean) > LITTLE:
             return complex(np.exp(-1j * np.angle(mean) / power))
     return 1.0
 
 
 def _ambiguity(axis: bool, x: bool, y: bool) -> str | None:
     if not axis:
-        return "the second moments are equal in all directions, so that the axes follow the edges, up to symmetry"
+        return (
+            "the second moments are equal in all directions, so that the axes follow the edges, and the choice among "
+            "symmetric ones is arbitrary"
+        )
     if x and y:
         return None
     vanishing = " and ".join(name for name, known in (("x", x), ("y", y)) if not known)

@@ -63,10 +63,10 @@ def lacking_term(
         Whether c was fitted.
     """
     freedom = len(weights) - 2 * piece.n_vertices + 4 - free_scale
+    if freedom < 3 or piece.n_vertices > PolishOptions().direct_limit:
+        return None
     names, terms = _terms(piece, z)
     count = min(len(names), freedom // 3)  # of few entries the first ones only
-    if count < 1 or piece.n_vertices > PolishOptions().direct_limit:
-        return None
     spread = np.ones(len(weights)) if spread is None else spread
     fitted = edge_weights(piece, z) / spread
     terms = terms[:, :count] / spread[:, None]

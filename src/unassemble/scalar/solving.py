@@ -20,6 +20,7 @@ from ..planar.piece import PieceMesh, brought_near, collapsed, positions, refine
 from ..planar.triangles import lone_triangles
 from ..tolerances import NOISY
 from ..topology import Piece, Polygons, Topology
+from ..words import sentences
 from .factors import Factors, fitted_together
 from .noise import Noise, with_vanished
 from .placement import Placement
@@ -181,7 +182,7 @@ def _polished(
 def _sound(piece: Piece, mesh: PieceMesh) -> Outcome:
     """A mesh whose points have places of their own; else why it is none."""
     why = collapsed(piece, mesh.z)
-    return GeometryError(f"no mesh fits, and {why} in the nearest one") if why else mesh
+    return GeometryError(sentences([f"no mesh fits, and {why} in the nearest one", *mesh.notes])) if why else mesh
 
 
 def _is_spoilt(mesh: Outcome) -> bool:

@@ -167,7 +167,7 @@ def _by_noise(f: Findings, test: NoiseTest) -> tuple[bool, Reason]:
     """Where a test against the errors of the entries decides: likely, and no part of it explained by another model."""
     if test.noise.digits and not (test.drowned or test.likely):
         why = misfit(f, ())
-        short = "." not in why.text  # of a single sentence
+        short = ". " not in why.text  # of a single sentence
         more = (unlikely(test, f.certificate), *astray(f))
         return False, Reason.of(why.text, *more, advice=why.advice) if short else why
     reason = with_noise(f, test)
