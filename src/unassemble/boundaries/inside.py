@@ -30,6 +30,8 @@ class InsideOptions:
         Boundary loops, the longest ones, that are tried as the outer one.
     first : float
         Weight of the prior to begin with.
+    steepest : float
+        The largest guess of a weight, in units of typical ones.
     rounds : int
         Fits, with fewer vertices at the rim each.
     grown : int
@@ -40,6 +42,7 @@ class InsideOptions:
 
     outlines: int = 4
     first: float = 0.3
+    steepest: float = 3.0
     rounds: int = 15
     grown: int = 4
     exact: float = 1e-12
@@ -75,6 +78,7 @@ def fit_inside(
     weights: NDArray,
     given: NDArray[np.bool_],
     *,
+    shared: NDArray[np.bool_] | None = None,
     scale: float | None = None,
     options: InsideOptions | None = None,
 ) -> InsideMesh | None:
@@ -87,6 +91,8 @@ def fit_inside(
         -A_ij.
     given : (e,) bool
         Entries that are those of the piece's triangles, and of no others.
+    shared : (e,) bool, optional
+        Entries that have another triangle besides, which is gone. Half of them is a guess.
     scale : float, optional
         c, where it is known.
     options : InsideOptions, optional
@@ -96,7 +102,10 @@ def fit_inside(
     if not rim.whole.any():
         return None
     unit = float(np.median(np.abs(weights[rim.whole]))) * (1 if weights[rim.whole].sum() > 0 else -1)
-    problem = WholeEntries(piece, weights / unit, None if scale is None else scale / unit)
+    shared = np.zeros_like(given) if shared is None else shared & ~given
+    halved = np.where(shared, weights / 2, weights) / unit
+    likely = (halved > 0) & (halved < options.steepest)  # others have terms of another kind
+    problem = WholeEntries(piece, halved, given | (shared & likely), None if scale is None else scale / unit)
     try:
         first = _start(problem, rim, options)
         if first is None:
