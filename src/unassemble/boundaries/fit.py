@@ -31,6 +31,8 @@ from .shape import ShapePrior
 
 _log = logging.getLogger(__name__)
 
+_GUESS, _MOST_GUESS = 10.0, 0.3  # weight of a guessed entry, in units of the prior's, and beside whole entries
+
 
 @dataclass(frozen=True)
 class FitOptions:
@@ -90,12 +92,14 @@ class WholeEntries:
     piece : Piece
     weights : (e,) float64
         -A_ij of each edge, of any size where they are not whole.
+    guessed : (e,) bool
+        Weights that are about right where they are not whole: these count as the prior does.
     scale : float, optional
         c, where it is known.
     """
 
-    def __init__(self, piece: Piece, weights: NDArray, scale: float | None = None):
-        self.piece, self.weights, self.known_scale = piece, weights, scale
+    def __init__(self, piece: Piece, weights: NDArray, guessed: NDArray[np.bool_], scale: float | None = None):
+        self.piece, self.weights, self.guessed, self.known_scale = piece, weights, guessed, scale
         self._factor: Factorisation | None = None
 
     def release(self) -> None:
@@ -156,7 +160,7 @@ class WholeEntries:
             small = small + 1 if cost > (1 - options.gain) * before else 0
             if small >= (1 if mu else 4):
                 break
-        rest, size = float(np.linalg.norm(misfit)) / np.sqrt(count), float(np.linalg.norm(prior.residual(z)))
+        rest, size = float(np.linalg.norm(misfit[whole])) / np.sqrt(count), float(np.linalg.norm(prior.residual(z)))
         _log.debug("mu %.0e: misfit %.1e, prior %.1e, %d factorisations", mu, rest, size, factorisations)
         return Fit(z, scale, rest, size, factorisations)
 
@@ -168,10 +172,13 @@ class WholeEntries:
             z, scale, work = found.z, found.scale, work + found.factorisations
         return replace(found, factorisations=work)
 
+    def _trust(self, whole: NDArray, mu: float) -> NDArray[np.float64]:
+        return np.where(whole, 1.0, min(_GUESS * mu, _MOST_GUESS) * self.guessed)
+
     def _residuals(
         self, z: NDArray, scale: float, whole: NDArray, prior: ShapePrior, mu: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return np.where(whole, self.misfits(z, scale), 0.0), mu * prior.residual(z)
+        return self._trust(whole, mu) * self.misfits(z, scale), mu * prior.residual(z)
 
     def _step(self, system: _System, damping: float) -> tuple[NDArray, float] | None:
         """Displacement and change of log c; None where the normal matrix cannot be factorised."""
@@ -215,12 +222,13 @@ class _System:
         misfit: NDArray, shape: NDArray,
     ):  # fmt: skip
         piece, n = problem.piece, len(z)
-        entries = np.where(whole, weight_gradient(piece, z), 0)
+        trust = problem._trust(whole, mu)
+        entries = trust * weight_gradient(piece, z)
         gradient = mu * prior.gradient(z)
         jacobian = jacobian_rows(n, [(entries, piece.stencil), (gradient, prior.corners)])
         product = jacobian.T.tobsr() @ jacobian
         self._upper = UpperTriangle.of(product)
-        fitted = np.where(whole, problem.weights / scale, 0.0)  # what a / c changes by with -log c
+        fitted = trust * problem.weights / scale  # what a / c changes by with -log c
         self.right = jacobian.T @ np.concatenate([misfit, -shape])
         self.slope = jacobian.T @ np.concatenate([fitted, np.zeros(len(shape))])
         self.size, self.along = float(fitted @ fitted), float(fitted @ misfit)

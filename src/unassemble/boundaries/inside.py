@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import GeometryError, SolverError
+from ..planar.conformal import conformal_map
 from ..topology import Piece
 from .embedding import tutte
 from .fit import Fit, FitOptions, WholeEntries
@@ -16,8 +20,11 @@ from .rim import Rim
 
 _log = logging.getLogger(__name__)
 
-_FADING = (0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
-_AGAIN = (0.03, 0.01, 1e-3, 1e-4, 0.0)
+_UNKNOWN = 0.5  # guess of the weight of a boundary edge, in units of typical ones of whole edges
+
+# Weights of the prior, one after the other: from the start, with fewer vertices, with more again.
+_FADING, _AGAIN, _GROWN = (0.01, 1e-3, 0.0), (0.03, 1e-3, 0.0), (1e-3, 0.0)
+_SLOWLY = (0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
 
 
 @dataclass(frozen=True)
@@ -28,8 +35,8 @@ class InsideOptions:
     ----------
     outlines : int
         Boundary loops, the longest ones, that are tried as the outer one.
-    first : float
-        Weight of the prior to begin with.
+    steepest : float
+        The largest guess of a weight, in units of typical ones.
     rounds : int
         Fits, with fewer vertices at the rim each.
     grown : int
@@ -39,7 +46,7 @@ class InsideOptions:
     """
 
     outlines: int = 4
-    first: float = 0.3
+    steepest: float = 3.0
     rounds: int = 15
     grown: int = 4
     exact: float = 1e-12
@@ -75,6 +82,7 @@ def fit_inside(
     weights: NDArray,
     given: NDArray[np.bool_],
     *,
+    shared: NDArray[np.bool_] | None = None,
     scale: float | None = None,
     options: InsideOptions | None = None,
 ) -> InsideMesh | None:
@@ -87,28 +95,40 @@ def fit_inside(
         -A_ij.
     given : (e,) bool
         Entries that are those of the piece's triangles, and of no others.
+    shared : (e,) bool, optional
+        Entries that have another triangle besides, which is gone. Half of them is a guess.
     scale : float, optional
         c, where it is known.
     options : InsideOptions, optional
     """
     options = options or InsideOptions()
-    rim = Rim.of(piece, given)
+    start = rim = Rim.of(piece, given)
     if not rim.whole.any():
         return None
+    core, work = None, 0
     unit = float(np.median(np.abs(weights[rim.whole]))) * (1 if weights[rim.whole].sum() > 0 else -1)
-    problem = WholeEntries(piece, weights / unit, None if scale is None else scale / unit)
+    shared = np.zeros_like(given) if shared is None else shared & ~given
+    halved = np.where(shared, weights / 2, weights) / unit
+    likely = (halved > 0) & (halved < options.steepest)  # others have terms of another kind
+    problem = WholeEntries(piece, halved, given | (shared & likely), None if scale is None else scale / unit)
     try:
-        first = _start(problem, rim, options)
-        if first is None:
+        for weight, fading, conformal in ((0.1, _FADING, True), (0.3, _SLOWLY, False)):
+            first = _start(problem, start, weight, options, conformal=conformal)
+            if first is None:
+                continue
+            core, rim, done = _shrunk(problem, start, first, fading, options)
+            work += done
+            if core.misfit <= options.exact:
+                break
+        if core is None:
             return None
-        core, rim, work = _shrunk(problem, rim, first, options)
         whole = rim.whole
         exact = core.misfit <= options.exact
         fit = core
         if exact:
             grown = Rim(piece, given, np.ones(len(piece.triangles), dtype=bool))
             for _ in range(options.grown):
-                tried = problem.faded(core.z, core.scale, grown.whole, _AGAIN)
+                tried = problem.faded(core.z, core.scale, grown.whole, _GROWN)
                 work += tried.factorisations
                 _log.debug("grown to %d whole entries: misfit %.1e", grown.whole.sum(), tried.misfit)
                 if tried.misfit <= options.exact:
@@ -126,11 +146,13 @@ def fit_inside(
     return InsideMesh(fit.z, fit.scale * unit, entries, exact, known, work)
 
 
-def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -> tuple[Fit, Rim, int]:
+def _shrunk(
+    problem: WholeEntries, rim: Rim, fit: Fit, fading: Sequence[float], options: InsideOptions
+) -> tuple[Fit, Rim, int]:
     """Fits with fewer vertices at the rim each, until one has all whole entries."""
     work = fit.factorisations
     for turn in range(options.rounds):
-        fit = problem.faded(fit.z, fit.scale, rim.whole, _AGAIN if turn else _FADING)
+        fit = problem.faded(fit.z, fit.scale, rim.whole, _AGAIN if turn else fading)
         work += fit.factorisations
         _log.debug("%d whole entries: misfit %.1e after %d factorisations", rim.whole.sum(), fit.misfit, work)
         peeled = None if fit.misfit <= options.exact else rim.peeled(np.abs(problem.misfits(fit.z, fit.scale)))
@@ -141,23 +163,45 @@ def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -
     return fit, rim, work
 
 
-def _start(problem: WholeEntries, rim: Rim, options: InsideOptions) -> Fit | None:
-    """The best first fit from drawings with one loop or another as the outer one."""
-    loops = np.argsort(-np.diff(problem.piece.loop_offsets), kind="stable")[: options.outlines]
-    whole, best, least = rim.whole, None, np.inf
-    for loop in loops.tolist():
-        z = tutte(problem.piece, loop)
-        if not _upright(problem.piece, z):
+def _start(problem: WholeEntries, rim: Rim, weight: float, options: InsideOptions, *, conformal: bool) -> Fit | None:
+    """The best first fit from drawings without crossings.
+
+    The conformal map of guessed entries is the nearest one, if its ring is not inside out; where it turns triangles
+    over, or there are several loops, drawings with one or another of them as the outline are tried.
+    """
+    piece, whole, best, least = problem.piece, rim.whole, None, np.inf
+    drawings = [_conformal(problem)] if conformal else []
+    if piece.n_loops > 1 or not any(map(partial(_upright, piece), drawings)):
+        loops = np.argsort(-np.diff(piece.loop_offsets), kind="stable")[: options.outlines]
+        drawings += [tutte(piece, loop) for loop in loops.tolist()]
+    for z in drawings:
+        if not _upright(piece, z):
             continue
         c = problem.best_scale(z, whole)
-        c = c if c > 0 else 1.0
-        fit = problem.fit(z, c, whole, options.first, FitOptions(steps=40, damping=1e-2))
-        cost = whole.sum() * fit.misfit**2 + (options.first * fit.prior) ** 2
+        fit = problem.fit(z, c if c > 0 else 1.0, whole, weight, FitOptions(steps=40, damping=1e-2))
+        cost = whole.sum() * fit.misfit**2 + (weight * fit.prior) ** 2
         if cost < least:
             best, least = fit, cost
     return best
 
 
-def _upright(piece: Piece, z: NDArray) -> bool:
+def _conformal(problem: WholeEntries) -> NDArray[np.complex128]:
+    """The conformal map of entries that are whole or guessed, its triangles of mean area 1/2; 0 where there is none."""
+    piece = problem.piece
+    weights = np.where(problem.guessed, problem.weights, _UNKNOWN)
+    try:
+        z = conformal_map(piece, weights, scale=problem.known_scale, sharp=False).z
+    except (GeometryError, SolverError):
+        return np.zeros(piece.n_vertices, dtype=np.complex128)
+    area = float(_areas(piece, z).mean())
+    return np.asarray((z if area > 0 else np.conj(z)) / np.sqrt(abs(area)))
+
+
+def _areas(piece: Piece, z: NDArray) -> NDArray[np.float64]:
+    """(m,) twice the areas of triangles."""
     a, b, c = z[piece.triangles].T
-    return bool(((np.conj(b - a) * (c - a)).imag > 0).all())
+    return np.asarray((np.conj(b - a) * (c - a)).imag)
+
+
+def _upright(piece: Piece, z: NDArray) -> bool:
+    return bool((_areas(piece, z) > 0).all())

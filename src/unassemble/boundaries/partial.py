@@ -64,7 +64,13 @@ def recover_partial(
         if whole is None and all(_is_whole(piece, matrix, scale) for piece in topology.pieces):
             return None
         meshes = [
-            fit_inside(piece, -matrix.entries[piece.edge_rows], own, scale=scale)
+            fit_inside(
+                piece,
+                -matrix.entries[piece.edge_rows],
+                own,
+                shared=~own if whole is None else None,
+                scale=scale,
+            )
             for piece, own in zip(topology.pieces, given, strict=True)
         ]
     if not any(mesh is not None and mesh.determined.any() for mesh in meshes):
