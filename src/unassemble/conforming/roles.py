@@ -87,7 +87,7 @@ def ordered_cells(matrix: OperatorMatrix, found: NodeSets) -> Iterator[Cells]:
         per_cell = sides.per_cell[first : first + len(sets)]
         blocks[kind], others[kind] = _ordered(matrix, kind, sets, sides, per_cell, size, every)
         first += len(sets)
-    told = found.order == 1 and not any(len(other.which) for other in others.values())
+    told = found.told and not any(len(other.which) for other in others.values())
     yield Cells(blocks, told)
     for kind, other in others.items():
         if kind.corners == 4 and kind.degree == 1 and len(blocks[kind]) <= _FEW:

@@ -33,12 +33,13 @@ class NodeSets:
         Polynomial degree along a side, which has order + 1 nodes.
     sets : tuple of (m, k) int64
         One for each number of nodes; rows increase within a cell.
-    common : Common
+    told : bool
+        Whether no other sets would do as well.
     """
 
     order: int
     sets: tuple[NDArray[np.int64], ...]
-    common: Common
+    told: bool = False
 
 
 class Common:
@@ -162,17 +163,18 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
     for order, k in ((3, 10), (2, 9), (2, 8), (2, 6)):
         found = common.sets(k)
         if _cover(common, [found]):
-            yield NodeSets(order, (found,), common)
-    for quads in _choices(common, common.sets(4)):
+            yield NodeSets(order, (found,))
+    choices = list(_choices(common, common.sets(4)))
+    for quads in choices:
         if _cover(common, [quads]):
-            yield NodeSets(1, (quads,), common)
+            yield NodeSets(1, (quads,), len(choices) == 1)
         triangles = _beside(common, quads)
         if len(triangles) and _cover(common, [triangles, quads]):
-            yield NodeSets(1, (triangles, quads), common)
+            yield NodeSets(1, (triangles, quads), len(choices) == 1)
     if not _cover(common, [found]):
         found = common.quadratic_triangles(found)
         if _cover(common, [found]):
-            yield NodeSets(2, (found,), common)
+            yield NodeSets(2, (found,))
 
 
 def _choices(common: Common, quads: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:

@@ -14,8 +14,8 @@ from ..matrix import OperatorMatrix, load
 from ..operators import vector_valued
 from ..topology import Topology, recognise, surfaces
 from ..words import count_of
-from .facts import matrix_facts, mesh_facts, nodes_facts
-from .text import lines_of, mesh_text
+from .facts import element_facts, matrix_facts, mesh_facts, nodes_facts
+from .text import element_text, lines_of, mesh_text
 
 _IF = "if the entries agree, which recovery tells"
 
@@ -73,6 +73,10 @@ class Inspection:
         What the cells were taken from: cycles of three edges are cells, unless edges are left over and the entries
         suggest others. These are what :func:`unassemble.recover` begins with; it solves, holds the result against the
         entries, and changes cells where that asks for it. Empty where there is no mesh.
+    element : str
+        Of scalar matrices whose rows form cells of other elements than linear triangles: ``"P2"``, ``"Q1"``, ...
+    n_quads : int
+        Quadrilaterals, beside `n_triangles`; the number of cells of such a mesh is that of both.
     """
 
     n_rows: int
@@ -104,6 +108,8 @@ class Inspection:
     n_polygons: int = 0
     n_vanished_sides: int = 0
     cells_from: str = ""
+    element: str = ""
+    n_quads: int = 0
 
     @property
     def operator(self) -> str:
@@ -115,6 +121,9 @@ class Inspection:
         if self.n_nodes:
             kind = "elasticity, if the material is isotropic" if self.coupled else "laplacian in each direction"
             return f"vector-valued, {self.block_size} components, {self.numbering}: {kind}"
+        if self.element:
+            diagonal = "" if self.n_zero_sums == self._n_rows_used else ", plus a diagonal"
+            return f"laplacian, {element_text(self)}{diagonal}"
         if self.obstacle:
             return "none that this version knows"
         if self.mixed_signs:
@@ -134,6 +143,11 @@ class Inspection:
             )
         if self.n_nodes:
             return "what each direction's scalar matrix holds"
+        if self.element:
+            return (
+                f"{mesh_text(self)} on {self.n_rows - self.n_isolated:,} points, up to position, rotation, size and "
+                f"mirror image, {_IF}"
+            )
         if not self.planar:
             return "nothing: the graph is not that of a mesh in the plane"
         if self.obstacle:
@@ -184,6 +198,9 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
     """
     matrix = A if isinstance(A, OperatorMatrix) else load(A, variable=variable, drop_zeros=drop_zeros)
     facts = matrix_facts(matrix)
+    crowded = len(matrix.edges) > 3 * matrix.n
+    if crowded and (shown := element_facts(matrix)):
+        return Inspection(**facts, planar=False, **shown)
     vector = vector_valued(matrix)
     if vector is not None:
         return Inspection(**facts, planar=False, obstacle=vector.why, **nodes_facts(matrix, vector))
@@ -197,6 +214,8 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
         except (NotPlanarError, TopologyError) as error:
             planar = not isinstance(error, NotPlanarError)
             if not (planar and topology.pieces):
+                if shown := element_facts(matrix):
+                    return Inspection(**facts, planar=planar, **shown)
                 return Inspection(**facts, planar=planar, obstacle=str(error), witness=getattr(error, "witness", ()))
         else:
             if not topology.pieces:
