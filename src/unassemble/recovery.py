@@ -148,7 +148,7 @@ class Recovery:
     @property
     def element(self) -> str | None:
         """``P1`` to ``P3``, ``Q1``, ``Q2`` or ``S2`` (serendipity), or ``mixed``; None where it is not known."""
-        kinds = {_ELEMENTS[kind] for kind in self.cells if kind in _ELEMENTS}
+        kinds = {ELEMENT_NAMES[kind] for kind in self.cells if kind in ELEMENT_NAMES}
         return "mixed" if len(kinds) > 1 else next(iter(kinds), None)
 
     @property
@@ -415,7 +415,7 @@ class Structure(Mechanical):
         return None
 
 
-_ELEMENTS = {
+ELEMENT_NAMES = {
     **dict.fromkeys(("triangle", "tetra"), "P1"),
     **dict.fromkeys(("triangle6", "tetra10"), "P2"),
     "triangle10": "P3",

@@ -15,7 +15,7 @@ import numpy as np
 from ._version import __version__
 from .errors import OutputError, UnassembleError
 from .files import check_target, whole_file
-from .recovery import Body, Mechanical, PlanarMesh, Recovery, Surface
+from .recovery import Body, ConformingMesh, Mechanical, PlanarMesh, Recovery, Surface
 
 
 def build_report(recovery: Recovery) -> dict[str, Any]:
@@ -26,8 +26,8 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
     ``n_components``, ``n_holes`` (null but for planar meshes), ``scale`` (one for each piece), ``backward_error``,
     ``timings`` (seconds by stage), ``warnings``; further ``n_polygons`` (cells that the matrix leaves undivided),
     ``n_hinges``, ``n_undetermined``, ``n_boundary_edges``, ``worst_entries`` (``row``, ``column``, ``misfit``, worst
-    first), ``version``, and those of :func:`_planar_facts`, :func:`_surface_facts`, :func:`_vector_facts` and
-    :func:`_mechanical_facts`.
+    first), ``version``, ``quadrature`` (of elements other than linear triangles), and those of :func:`_planar_facts`,
+    :func:`_surface_facts`, :func:`_vector_facts` and :func:`_mechanical_facts`.
     """
     return _plain(
         {
@@ -54,6 +54,7 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
             ],
             **(_planar_facts(recovery) if isinstance(recovery, PlanarMesh) else {}),
             **(_surface_facts(recovery) if isinstance(recovery, Surface) else {}),
+            **({"quadrature": recovery.quadrature} if isinstance(recovery, ConformingMesh) else {}),
             **(_vector_facts(recovery) if recovery.vector_valued else {}),
             **(_mechanical_facts(recovery) if isinstance(recovery, Mechanical) else {}),
             "timings": recovery.timings,

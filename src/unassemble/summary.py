@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .recovery import Body, Mechanical, PlanarMesh, Recovery, Surface
+from .recovery import Body, ConformingMesh, Mechanical, PlanarMesh, Recovery, Surface
 from .tolerances import CERTIFIED, SUSPICIOUS
 from .words import count_of, kind_text
 
@@ -65,6 +65,7 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
         *([("chosen since", recovery.choice)] if recovery.choice else []),
         ("points", _points(recovery)),
         *_cell_rows(recovery),
+        *_element_rows(recovery),
         ("pieces", _pieces(recovery)),
     ]
     if isinstance(recovery, PlanarMesh):
@@ -130,6 +131,13 @@ def _cell_rows(recovery: Recovery) -> list[tuple[str, str]]:
         (several + more, f"{count:,}" if count or several != "cells" else "none recognised")
         for (_, several), more, count in _cell_counts(recovery)
     ]
+
+
+def _element_rows(recovery: Recovery) -> list[tuple[str, str]]:
+    if not isinstance(recovery, ConformingMesh):
+        return []
+    curved = "" if recovery.straight else ", with curved sides"
+    return [("element", f"{recovery.element}{curved}"), ("quadrature", recovery.quadrature)]
 
 
 def _noise_rows(mesh: PlanarMesh) -> list[tuple[str, str]]:

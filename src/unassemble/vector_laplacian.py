@@ -15,7 +15,7 @@ from .matrix import OperatorMatrix, check_matrix
 from .nodes.anchoring import checked_anchors
 from .nodes.nodal import NodalMatrix
 from .nodes.numbering import Numbering
-from .recovery import PlanarMesh
+from .recovery import ConformingMesh, PlanarMesh
 from .tolerances import ROUNDED
 
 Scalar = Callable[[OperatorMatrix, Sequence[Any]], PlanarMesh]
@@ -107,6 +107,8 @@ def _among_all_nodes(mesh: PlanarMesh, nodes: NDArray[np.int64], rows: NDArray[n
     """
     points, component, status = np.full((n, 2), np.nan), np.full(n, -1), np.ones(n, np.int8)
     points[nodes], component[nodes], status[nodes] = mesh.points, mesh.component, mesh.node_status
+    if isinstance(mesh, ConformingMesh):
+        mesh = replace(mesh, quads=nodes[mesh.quads], mid_nodes=nodes[mesh.mid_nodes])
     return replace(
         mesh,
         points=points,

@@ -66,8 +66,8 @@ class Fitted:
 
     @property
     def freedom(self) -> int:
-        """Entries less unknowns, c among these."""
-        return len(self.misfit) - (2 * self.entries.n - 3)
+        """Entries less unknowns, c among these; that others vanish was supposed."""
+        return int(np.count_nonzero(self.weights)) - (2 * self.entries.n - 3)
 
     @property
     def size(self) -> float:

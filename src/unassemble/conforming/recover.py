@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cells import SEARCHED_ROWS, Alternative
 from ..certify import Certificate
 from ..certify_elements import certify_elements
 from ..clock import Clock
@@ -55,21 +57,48 @@ def recover_conforming(
         If the entries fit none that they form.
     """
     task = Task(options=options, placement=placement, noise=Noise.known(stored, options.noise))
-    nearest: ConformingMesh | None = None
     failure: Exception = TopologyError("no sets of rows that are coupled to each other are cells of any known element")
+    best: ConformingMesh | None = None
+    small = stored.n <= SEARCHED_ROWS
     for cells in shown:
+        if best is not None and best.certified and not small:
+            break
         try:
             found = _recovered(stored, cells, clock, task)
         except (TopologyError, GeometryError, SolverError) as error:
             failure = error
             continue
-        if found.certified:
-            return found
-        if nearest is None or found.backward_error < nearest.backward_error:
-            nearest = found
-    if nearest is None:
+        if best is not None and best.certified and found.certified:
+            return _ambiguous(best, found)
+        if best is None or (not best.certified and (found.certified or found.backward_error < best.backward_error)):
+            best = found
+        if best.uniqueness == "proved":
+            break
+    if best is None:
         raise failure
-    return nearest
+    if best.uniqueness == "searched" and not small:
+        note = f"other meshes were looked for in matrices of up to {SEARCHED_ROWS:,} rows only"
+        return replace(best, warnings=(*best.warnings, note))
+    return best
+
+
+def _ambiguous(one: ConformingMesh, other: ConformingMesh) -> ConformingMesh:
+    """A mesh beside which another fits."""
+    cells = [{tuple(cell) for some in mesh.cells.values() for cell in some.tolist()} for mesh in (one, other)]
+    rows = [{frozenset(cell): cell for cell in some} for some in cells]
+    differ = [
+        tuple(mine[key] for key in sorted(mine, key=sorted) if key not in theirs) for mine, theirs in (rows, rows[::-1])
+    ]
+    if not any(differ):  # the same sets in other orders
+        differ = [tuple(sorted(mine)) for mine in cells]
+    reason = f"{one.reason}, but another mesh does so as well: the matrix does not tell which sides its cells have"
+    return replace(
+        one,
+        status="ambiguous",
+        uniqueness="ambiguous",
+        reason=reason,
+        alternatives=(Alternative(differ[0], differ[1]),),
+    )
 
 
 def shown_cells(stored: OperatorMatrix) -> Iterator[Cells]:

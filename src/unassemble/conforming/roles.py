@@ -84,14 +84,13 @@ def ordered_cells(matrix: OperatorMatrix, found: NodeSets) -> Iterator[Cells]:
     first = 0
     for sets in found.sets:
         kind = kind_of_size(sets.shape[1])
-        entries = ElementEntries(matrix, sets, every)
         per_cell = sides.per_cell[first : first + len(sets)]
-        blocks[kind], others[kind] = _ordered(matrix.n, kind, sets, sides, per_cell, size, entries)
+        blocks[kind], others[kind] = _ordered(matrix, kind, sets, sides, per_cell, size, every)
         first += len(sets)
-    told = found.order == 1 and not any(len(other.which) for other in others.values())
+    told = found.told and not any(len(other.which) for other in others.values())
     yield Cells(blocks, told)
     for kind, other in others.items():
-        if kind.corners == 4 and kind.degree == 1 and len(sets) <= _FEW:
+        if kind.corners == 4 and kind.degree == 1 and len(blocks[kind]) <= _FEW:
             doubtful = np.argsort(-other.likeness, kind="stable")[:_DOUBTFUL]
             for turned in product((False, True), repeat=len(doubtful)):
                 if any(turned):
@@ -133,19 +132,53 @@ def _sides_between(n: int, found: NodeSets, size: NDArray) -> _Sides:
 
 
 def _ordered(
-    n: int,
+    matrix: OperatorMatrix,
     kind: Kind,
     sets: NDArray[np.int64],
     sides: _Sides,
     per_cell: NDArray[np.int64],
     size: NDArray,
-    entries: ElementEntries,
+    every: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], _Second]:
     """Cells of one kind, and what else they could be."""
     corners, inner, open_rows, n_open = _parted(kind, sets, sides, size)
-    best = np.full(len(sets), np.inf)
     order, other = np.zeros(sets.shape, np.int64), np.zeros(sets.shape, np.int64)
-    second = best.copy()
+    trials = list(_trials(matrix.n, kind, sets, sides, per_cell, (corners, inner, open_rows, n_open)))
+    count = np.zeros(len(sets), np.int64)
+    for some, trial in trials:
+        order[some] = trial
+        count[some] += 1
+    if not count.all():
+        raise TopologyError(f"row {int(sets[np.argmin(count)][0])} is in a cell whose sides do not close")
+    doubtful = np.flatnonzero(count > 1)
+    entries = ElementEntries(matrix, sets[doubtful], every)
+    best, second = np.full((2, len(doubtful)), np.inf)
+    for some, trial in trials:
+        several = count[some] > 1
+        some, trial = some[several], trial[several]
+        at = np.searchsorted(doubtful, some)
+        misfit = entries.misfit(kind, at, trial)
+        better, close = misfit < best[at], misfit < second[at]
+        close &= ~better
+        second[at[better]], other[some[better]] = best[at[better]], order[some[better]]
+        best[at[better]], order[some[better]] = misfit[better], trial[better]
+        second[at[close]], other[some[close]] = misfit[close], trial[close]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        likeness = np.nan_to_num(best / second, nan=1.0)
+    left = _Second(doubtful, np.take_along_axis(sets, other, axis=1)[doubtful], likeness)
+    return np.take_along_axis(sets, order, axis=1), left
+
+
+def _trials(
+    n: int,
+    kind: Kind,
+    sets: NDArray[np.int64],
+    sides: _Sides,
+    per_cell: NDArray[np.int64],
+    parted: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]],
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Which cells, increasing, and places of their nodes in an order that the graph allows."""
+    corners, inner, open_rows, n_open = parted
     for ring in _RINGS[kind.corners]:
         around = np.take_along_axis(corners, np.broadcast_to(ring, corners.shape), axis=1)
         ends = np.take_along_axis(sets, around, axis=1)
@@ -158,20 +191,7 @@ def _ordered(
             between = sides.between[place[some]] if none.size and len(sides.keys) else none
             local = _local(sets[some], between)
             for fill in _fillings(kind, known[some[0]]):
-                trial = _filled(kind, around[some], local, open_rows[some], inner[some], fill)
-                misfit = entries.misfit(kind, some, trial)
-                better = misfit < best[some]
-                second[some[better]], other[some[better]] = best[some[better]], order[some[better]]
-                best[some[better]], order[some[better]] = misfit[better], trial[better]
-                next_best = ~better & (misfit < second[some])
-                second[some[next_best]], other[some[next_best]] = misfit[next_best], trial[next_best]
-    if not np.isfinite(best).all():
-        raise TopologyError(f"row {int(sets[np.argmax(~np.isfinite(best))][0])} is in a cell whose sides do not close")
-    doubtful = np.flatnonzero(np.isfinite(second))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        likeness = np.nan_to_num(best[doubtful] / second[doubtful], nan=1.0)
-    left = _Second(doubtful, np.take_along_axis(sets, other, axis=1)[doubtful], likeness)
-    return np.take_along_axis(sets, order, axis=1), left
+                yield some, _filled(kind, around[some], local, open_rows[some], inner[some], fill)
 
 
 def _parted(

@@ -20,6 +20,8 @@ _AT_ONCE = 10_000_000  # products in one go
 _ABSENT = {4: 0, 6: 3, 8: 4, 9: 6, 10: 9}
 """Pairs that a cell of so many nodes may lack, because the entry vanishes and is not stored."""
 
+_MANY, _SAMPLE = 10_000, 1_000  # pairs, and of more than so many the sample that must hold a cell
+
 
 @dataclass(frozen=True, eq=False)
 class NodeSets:
@@ -31,12 +33,13 @@ class NodeSets:
         Polynomial degree along a side, which has order + 1 nodes.
     sets : tuple of (m, k) int64
         One for each number of nodes; rows increase within a cell.
-    common : Common
+    told : bool
+        Whether no other sets would do as well.
     """
 
     order: int
     sets: tuple[NDArray[np.int64], ...]
-    common: Common
+    told: bool = False
 
 
 class Common:
@@ -73,19 +76,23 @@ class Common:
             found.append(common.data[common.indices > row])
         return np.concatenate(found).astype(np.int64)
 
-    def of(self, keys: NDArray) -> NDArray[np.int64]:
-        """Of some pairs; 0 for those without an entry."""
-        place = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
-        return np.where(self.keys[place] == keys, self.count[place], 0)
-
     def sets(self, k: int) -> NDArray[np.int64]:
         """(m, k) rows that two of them have in common, nearly all coupled to each other."""
         keys = self.keys[self.count == k]
+        if len(keys) > _MANY and not len(self._in_common(keys[:: len(keys) // _SAMPLE], k)):
+            return np.empty((0, k), np.int64)
+        return once(self._in_common(keys, k))
+
+    def _in_common(self, keys: NDArray[np.int64], k: int) -> NDArray[np.int64]:
+        """The rows that pairs have in common, where all or nearly all others of these are coupled too."""
         if not len(keys):
             return np.empty((0, k), np.int64)
-        both = sp.csr_array(self.closed[keys // self.n].multiply(self.closed[keys % self.n]))
+        i, j = keys // self.n, keys % self.n
+        both = sp.csr_array(self.closed[i].multiply(self.closed[j]))
         both.sort_indices()
-        return self._coupled(once(both.indices.reshape(-1, k).astype(np.int64)))
+        rows = both.indices.reshape(-1, k).astype(np.int64)
+        rest = rows[(rows != i[:, None]) & (rows != j[:, None])].reshape(-1, k - 2)
+        return rows[self._absent(rest) <= _ABSENT[k]]
 
     def quadratic_triangles(self, found: NDArray[np.int64]) -> NDArray[np.int64]:
         """(m, 6) quadratic triangles that are no cliques, beside those found already, and these.
@@ -116,12 +123,14 @@ class Common:
 
     def _coupled(self, rows: NDArray[np.int64], more: int = 0) -> NDArray[np.int64]:
         """Sets (m, k) of which nearly all are coupled to each other."""
-        k = rows.shape[1]
+        return rows[self._absent(rows) <= _ABSENT[rows.shape[1]] + more]
+
+    def _absent(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(m,) pairs of each set that are not coupled."""
         absent = np.zeros(len(rows), np.int64)
-        for a in range(k):
-            for b in range(a + 1, k):
-                absent += ~contains(self.keys, rows[:, a] * self.n + rows[:, b])
-        return rows[absent <= _ABSENT[k] + more]
+        for a, b in combinations(range(rows.shape[1]), 2):
+            absent += ~contains(self.keys, rows[:, a] * self.n + rows[:, b])
+        return absent
 
 
 def _paths(graph: Graph) -> NDArray[np.int64]:
@@ -154,17 +163,18 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
     for order, k in ((3, 10), (2, 9), (2, 8), (2, 6)):
         found = common.sets(k)
         if _cover(common, [found]):
-            yield NodeSets(order, (found,), common)
-    for quads in _choices(common, common.sets(4)):
+            yield NodeSets(order, (found,))
+    choices = list(_choices(common, common.sets(4)))
+    for quads in choices:
         if _cover(common, [quads]):
-            yield NodeSets(1, (quads,), common)
+            yield NodeSets(1, (quads,), len(choices) == 1)
         triangles = _beside(common, quads)
         if len(triangles) and _cover(common, [triangles, quads]):
-            yield NodeSets(1, (triangles, quads), common)
+            yield NodeSets(1, (triangles, quads), len(choices) == 1)
     if not _cover(common, [found]):
         found = common.quadratic_triangles(found)
         if _cover(common, [found]):
-            yield NodeSets(2, (found,), common)
+            yield NodeSets(2, (found,))
 
 
 def _choices(common: Common, quads: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..scalar.solving import Task
 from ..scalar.verdict import Held
 from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE, SUSPICIOUS
@@ -65,8 +63,7 @@ def _obstacle(fits: Sequence[Fitted], near: Held, task: Task) -> str:
     if len(certificate.flipped):
         return count_of(len(certificate.flipped), "cell is", "cells are") + f" flat, not convex or turned over{because}"
     known = task.scale is not None
-    # Entries that vanish were supposed to.
-    loose = [fit for fit in fits if np.count_nonzero(fit.weights) - 2 * fit.entries.n + 3 + known <= 0]
+    loose = [fit for fit in fits if fit.freedom + known <= 0]
     if loose:
         row = int(loose[0].part.piece.vertices.min())
         return f"the part of row {row} has no more entries than unknowns, so that it fits proves nothing"

@@ -9,10 +9,13 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from ..errors import GeometryError, RecoveryError
+from ..conforming.parts import parts_of
+from ..conforming.recover import shown_cells
+from ..errors import GeometryError, RecoveryError, TopologyError
 from ..matrix import OperatorMatrix
 from ..operators import VectorReading
 from ..planar.conformal import estimate_scale
+from ..recovery import ELEMENT_NAMES as _NAMES
 from ..tolerances import ROUNDED, SUMMED
 from ..topology import Piece, Topology
 from ..words import kind_text
@@ -60,6 +63,27 @@ def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]
         "numbering": words.get(found.kind, found.kind),
         "coupled": not uncoupled(nodal),
         "structure": "" if uncoupled(nodal) or bars_of(nodal) is None else "truss",
+    }
+
+
+def element_facts(matrix: OperatorMatrix) -> dict[str, Any]:
+    """Of a scalar matrix whose rows form cells of other elements than linear triangles; empty where they form none."""
+    try:
+        cells = next(shown_cells(matrix), None)
+        parts = [] if cells is None else parts_of(matrix.n, cells.blocks)
+    except TopologyError:
+        return {}
+    if cells is None:
+        return {}
+    names = [_NAMES[kind.name] for kind in cells.blocks]
+    return {
+        "element": names[0] if len(names) == 1 else "mixed",
+        "n_triangles": sum(len(some) for kind, some in cells.blocks.items() if kind.simplex),
+        "n_quads": sum(len(some) for kind, some in cells.blocks.items() if not kind.simplex),
+        "n_holes": sum(part.n_holes for part in parts),
+        "n_boundary_edges": sum(len(part.piece.boundary) for part in parts),
+        "n_pieces": len(parts),
+        "cells_from": "graph" if cells.told else "entries",
     }
 
 

@@ -16,8 +16,8 @@ from ..operators import VectorReading, second_reading, vector_valued
 from ..quiet import quiet_libraries
 from ..topology import Topology, recognise, surfaces
 from ..words import count_of
-from .facts import matrix_facts, mesh_facts, nodes_facts, surface_facts
-from .text import lines_of, mesh_text
+from .facts import element_facts, matrix_facts, mesh_facts, nodes_facts, surface_facts
+from .text import element_text, lines_of, mesh_text
 
 _IF = "if the entries agree, which recovery tells"
 
@@ -85,6 +85,10 @@ class Inspection:
         What to do next; empty where recovery is.
     surface : str
         What kind of surface the graph is that of, where that is none in the plane.
+    element : str
+        Of scalar matrices whose rows form cells of other elements than linear triangles: ``"P2"``, ``"Q1"``, ...
+    n_quads : int
+        Quadrilaterals, beside `n_triangles`; the number of cells of such a mesh is that of both.
     """
 
     n_rows: int
@@ -121,6 +125,8 @@ class Inspection:
     evidence: tuple[str, ...] = ()
     advice: str = ""
     surface: str = ""
+    element: str = ""
+    n_quads: int = 0
 
     @property
     def operator(self) -> str:
@@ -132,11 +138,12 @@ class Inspection:
         if self.n_nodes:
             kind = "elasticity, if the material is isotropic" if self.coupled else "laplacian in each direction"
             return f"vector-valued, {self.block_size} components, {self.numbering}: {kind}"
+        if self.element:
+            return f"laplacian, {element_text(self)}{self._diagonal}"
         if self.surface:
-            diagonal = "" if self.n_zero_sums == self.n_rows - self.n_isolated else ", plus a diagonal"
             sphere = self.surface.startswith("closed, 0 handles")  # whose graph is planar
             other = "; or of a mesh in the plane whose outline has three edges" if sphere else ""
-            return f"laplacian of a surface in space, linear triangles{diagonal}{other}"
+            return f"laplacian of a surface in space, linear triangles{self._diagonal}{other}"
         if self.kind != PLANAR:
             return self.name
         if self.obstacle:
@@ -144,6 +151,10 @@ class Inspection:
         if self.mixed_signs:
             return "not a Laplacian: its diagonal has one sign, and the off-diagonal sums here have both"
         return "laplacian, linear triangles" + self.name.removeprefix(LINEAR)
+
+    @property
+    def _diagonal(self) -> str:
+        return "" if self.n_zero_sums == self.n_rows - self.n_isolated else ", plus a diagonal"
 
     @property
     def recoverable(self) -> str:
@@ -160,6 +171,11 @@ class Inspection:
             return "what each direction's scalar matrix holds"
         if self.surface:
             return f"lengths of {count_of(self.n_edges, 'edge')} up to size; {_IF}"
+        if self.element:
+            return (
+                f"{mesh_text(self)} on {self.n_rows - self.n_isolated:,} points, up to position, rotation, size and "
+                f"mirror image, {_IF}"
+            )
         if self.kind != PLANAR:
             return f"nothing: {self.advice}"
         if self.obstacle:
@@ -211,13 +227,16 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
 
 def _inspected(matrix: OperatorMatrix) -> Inspection:
     facts = matrix_facts(matrix)
+    crowded = len(matrix.edges) > 3 * matrix.n
+    if crowded and (shown := element_facts(matrix)):
+        return Inspection(**facts, **_diagnosis(matrix, planar=False), planar=False, **shown)
     vector = vector_valued(matrix)
     if vector is not None:
         return _vector_valued(matrix, facts, vector)
     topology = surfaces(matrix.n, matrix.edges)
     read = matrix
     if not topology.pieces and (curved := surface_facts(matrix)):
-        return Inspection(**facts, planar=False, **curved)
+        return Inspection(**facts, **_diagnosis(matrix, planar=False), planar=False, **curved)
     if _left_over(matrix, topology):
         read, topology = guessed(matrix, topology)
     if not topology.pieces or _left_over(read, topology):
@@ -226,6 +245,8 @@ def _inspected(matrix: OperatorMatrix) -> Inspection:
         except (NotPlanarError, TopologyError) as error:
             planar = not isinstance(error, NotPlanarError)
             if not (planar and topology.pieces):
+                if shown := element_facts(matrix):
+                    return Inspection(**facts, **_diagnosis(matrix, planar=planar), planar=planar, **shown)
                 vector = second_reading(matrix)  # as recovery does
                 if vector is not None:
                     return _vector_valued(matrix, facts, vector)

@@ -28,6 +28,13 @@ def lines_of(facts: Inspection) -> list[tuple[str, str]]:
         lines.append(("nodes", nodes))
     if facts.surface:
         lines += [("mesh", mesh_text(facts)), ("pieces", _pieces(facts))]
+    elif facts.element:
+        lines += [
+            ("element", f"{facts.element}, {element_text(facts)}"),
+            ("mesh", f"{mesh_text(facts)}, {count_of(facts.n_boundary_edges, 'side')} on the boundary"),
+            ("holes", f"{facts.n_holes:,}"),
+            ("pieces", f"{facts.n_pieces:,}"),
+        ]
     elif not facts.obstacle:
         lines += [
             ("mesh", _mesh(facts)),
@@ -71,6 +78,8 @@ def _row_sums(facts: Inspection) -> str:
 def _planar(facts: Inspection) -> str:
     if facts.planar:
         return "yes"
+    if facts.element:
+        return "no, but rows that are all coupled to each other form cells"
     if facts.n_nodes:
         return "not looked for, since the rows form nodes of several unknowns"
     return "no"
@@ -79,11 +88,29 @@ def _planar(facts: Inspection) -> str:
 def mesh_text(facts: Inspection) -> str:
     """The cells; likely ones where they are not the graph's triangles."""
     cells = []
-    if facts.n_triangles or not facts.n_polygons:
+    if facts.n_triangles or not (facts.n_polygons or facts.n_quads):
         cells.append(count_of(facts.n_triangles, "triangle"))
+    if facts.n_quads:
+        cells.append(count_of(facts.n_quads, "quadrilateral"))
     if facts.n_polygons:
         cells.append(f"{count_of(facts.n_polygons, 'cell')} of more than three vertices")
-    return ("likely " if facts.cells_from == "entries" else "") + " and ".join(cells)
+    likely = facts.cells_from == "entries" and not facts.element
+    return ("likely " if likely else "") + " and ".join(cells)
+
+
+_ELEMENTS = {
+    "P2": "quadratic triangles",
+    "P3": "cubic triangles",
+    "Q1": "bilinear quadrilaterals",
+    "Q2": "biquadratic quadrilaterals",
+    "S2": "serendipity quadrilaterals of eight nodes",
+    "mixed": "linear triangles and bilinear quadrilaterals",
+}
+
+
+def element_text(facts: Inspection) -> str:
+    """The element of a scalar matrix in words."""
+    return _ELEMENTS[facts.element]
 
 
 def _cells(facts: Inspection) -> str:

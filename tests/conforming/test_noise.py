@@ -1,0 +1,71 @@
+"""Noise and few digits: the chi-square test, and errors at the bound of Cramer and Rao."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from skfem import MeshTri
+
+from conforming.assembled import assembled, cell_sets, quadrilaterals
+from meshes import random_mesh
+from unassemble import recover
+
+SIGMA = 1e-6
+
+
+def triangles(n=100, seed=0):
+    points, cells = random_mesh(n, seed)
+    return MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
+
+
+def noisy(matrix, sigma, seed):
+    upper = sp.triu(matrix, 1).tocoo()
+    stored = np.abs(upper.data) > 1e-12
+    upper.data[stored] += sigma * np.random.default_rng(seed).standard_normal(int(stored.sum()))
+    return (upper + upper.T).tocsr()
+
+
+def known_of(element):
+    return assembled(element, triangles() if element == "P2" else quadrilaterals(7, 6), zeros=False)
+
+
+@pytest.mark.parametrize("element", ["P2", "Q1"])
+def test_errors_are_as_large_as_the_bars_say(element):
+    known = known_of(element)
+    bars = recover(noisy(known.matrix, SIGMA, 99), noise=SIGMA, standard_deviations=True).standard_deviations
+    ratios, statistics = [], []
+    for seed in range(12):
+        found = recover(noisy(known.matrix, SIGMA, seed), noise=SIGMA)
+        assert found.status == "certified", found.reason
+        assert cell_sets(found) == known.cells
+        ratios.append(np.sum(np.abs(errors(found.points, known.points)) ** 2) / np.sum(bars**2))
+        statistics.append(found.chi_square["statistic"] / found.chi_square["degrees_of_freedom"])
+    assert np.sqrt(np.mean(ratios)) == pytest.approx(1, abs=0.25)
+    assert np.mean(statistics) == pytest.approx(1, abs=0.15)
+
+
+def errors(found, true):
+    """What the best similarity, mirrored or not, leaves, in the frame of what was found."""
+    z = found @ [1, 1j]
+    left = []
+    for w in (true @ [1, 1j], true @ [1, -1j]):
+        w = w - w.mean()
+        left.append(np.vdot(w, z) / np.vdot(w, w) * w - z)
+    return min(left, key=lambda one: np.abs(one).max())
+
+
+@pytest.mark.parametrize("element", ["P2", "Q1"])
+def test_noise_ten_times_as_large_as_told_is_noticed(element):
+    known = known_of(element)
+    assert recover(noisy(known.matrix, 10 * SIGMA, 0), noise=SIGMA).status == "uncertified"
+
+
+@pytest.mark.parametrize("digits", [6, 9])
+@pytest.mark.parametrize("element", ["P2", "Q1"])
+def test_rounded_entries(element, digits):
+    known = known_of(element)
+    matrix = known.matrix.tocsr(copy=True)
+    matrix.data = np.array([float(f"{value:.{digits - 1}e}") for value in matrix.data])
+    found = recover(matrix)
+    assert found.status == "certified", found.reason
+    assert cell_sets(found) == known.cells
+    assert found.chi_square is not None
