@@ -17,6 +17,7 @@ from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, li
 from .outputs import PlanarMesh, Recovery
 from .scalar import recover_scalar
 from .scalar.placement import Placement
+from .with_mass import recover_with_mass
 
 
 def recover(
@@ -205,7 +206,11 @@ class _Task:
         if scale is not None:
             _check_proportion(scale, float(np.abs(part.entries).max()))
         placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
-        return recover_scalar(part, placement, self.clock, self.planar)
+
+        def plain(matrix: OperatorMatrix) -> PlanarMesh:
+            return recover_scalar(matrix, placement, self.clock, self.planar)
+
+        return recover_with_mass(part, plain, self.clock, frame.tensor)
 
     def _as_vector(self, reading: VectorReading) -> Recovery:
         from .vector import recover_vector

@@ -1,0 +1,164 @@
+"""Scalar matrices that have a mass term: A = c L + s M, M consistent or lumped.
+
+Areas are taken off the matrix, what is left is a Laplacian and recovered as one, and the whole is assembled again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .certify import Certificate, Mass, certify
+from .clock import Clock
+from .errors import RecoveryError
+from .linalg import factorisation
+from .matrix import OperatorMatrix
+from .planar.conformal import conformal_map
+from .planar.cotangent import edge_weights
+from .reaction import MetricFit, Skeleton, fit_metric
+from .recovery import PlanarMesh
+from .tolerances import CERTIFIED, SUMMED
+from .topology import Topology, surfaces
+
+_ALIKE = 1e-6
+"""Relative difference up to which row sums are areas, and entries those of a Laplacian, at first sight."""
+
+
+def recover_with_mass(
+    matrix: OperatorMatrix,
+    plain: Callable[[OperatorMatrix], PlanarMesh],
+    clock: Clock,
+    tensor: tuple[float, float, float] | None = None,
+) -> PlanarMesh:
+    """The mesh of a scalar matrix, with what its row sums tell of a mass term.
+
+    Parameters
+    ----------
+    matrix : OperatorMatrix
+    plain : callable
+        Recovers a matrix c L + D.
+    clock : Clock
+    tensor : (kxx, kxy, kyy), optional
+    """
+    sums = _row_sums(matrix)
+    if not _of_one_sign(matrix, sums):
+        return plain(matrix)
+    with clock("topology"):
+        topology = surfaces(matrix.n, matrix.edges)
+    if not topology.pieces or len(topology.bare_edges) or not topology.multiplicity.all():
+        return plain(matrix)
+    with clock("conformal"):
+        laplacian = _is_laplacian(matrix, topology)
+    if laplacian:
+        return _with_lumped_mass(matrix, plain(matrix), sums, tensor)
+    with clock("metric"):
+        skeleton = Skeleton.of(matrix.n, matrix.edges, topology.pieces)
+        sign = float(np.sign(sums[0]))
+        fit = fit_metric(skeleton, sign * matrix.entries, sign * sums)
+    if fit is None or not fit.residual < _ALIKE:
+        return plain(matrix)
+    try:
+        found = plain(_without_mass(matrix, sign, fit))
+    except RecoveryError:
+        return plain(matrix)
+    total = sign * float(fit.metric.areas.sum())
+    with clock("certify"):
+        mass = Mass(total / _area(found), matrix.diagonal)
+        certificate = _certificate(matrix, found, mass, tensor)
+    return _certified_again(found, mass, certificate)
+
+
+def _row_sums(matrix: OperatorMatrix) -> NDArray[np.float64]:
+    """(n,) A 1: the integrals of s times the basis functions."""
+    i, j = matrix.edges.T
+    return matrix.diagonal + np.bincount(i, matrix.entries, matrix.n) + np.bincount(j, matrix.entries, matrix.n)
+
+
+def _of_one_sign(matrix: OperatorMatrix, sums: NDArray) -> bool:
+    """Whether all row sums are beyond rounding, and of one sign, as areas are."""
+    return bool((np.abs(sums) > SUMMED * matrix.row_size).all() and np.ptp(np.sign(sums)) == 0)
+
+
+def _is_laplacian(matrix: OperatorMatrix, topology: Topology) -> bool:
+    """Whether the conformal map fits all entries off the diagonal, whatever stands on it."""
+    for piece in topology.pieces:
+        weights = -matrix.entries[piece.edge_rows]
+        try:
+            found = conformal_map(piece, weights, sharp=False, analyse=factorisation)
+        except RecoveryError:
+            return False
+        with np.errstate(all="ignore"):
+            left = np.abs(weights - found.scale * edge_weights(piece, found.z))
+        if not np.median(left) <= _ALIKE * np.median(np.abs(weights)):
+            return False
+    return True
+
+
+def _without_mass(matrix: OperatorMatrix, sign: float, fit: MetricFit) -> OperatorMatrix:
+    """The Laplacian that is left."""
+    skeleton, areas = fit.metric.skeleton, sign * fit.metric.areas
+    return replace(
+        matrix,
+        entries=matrix.entries - skeleton.at_edges @ areas / 12,
+        diagonal=matrix.diagonal - skeleton.at_vertices @ areas / 6,
+    )
+
+
+def _with_lumped_mass(
+    matrix: OperatorMatrix, found: PlanarMesh, sums: NDArray, tensor: tuple[float, float, float] | None
+) -> PlanarMesh:
+    """A mesh of c L + D; if D is proportional to the areas about its vertices that is a lumped mass matrix."""
+    if not found.certified or found.n_polygons:
+        return found
+    reaction = float(sums.sum()) / _area(found)
+    share = np.zeros(matrix.n)
+    np.add.at(share, found.triangles, _areas(found)[:, None] / 3)
+    mass = Mass(reaction, matrix.diagonal, lumped=True)
+    if not np.abs(sums - reaction * share).max() <= _ALIKE * np.abs(reaction * share).min():
+        return found
+    certificate = _certificate(matrix, found, mass, tensor)
+    return _certified_again(found, mass, certificate) if certificate.backward_error <= CERTIFIED else found
+
+
+def _areas(mesh: PlanarMesh) -> NDArray[np.float64]:
+    a, b, c = mesh.points[mesh.triangles].transpose(1, 2, 0)
+    (ux, uy), (wx, wy) = b - a, c - a
+    return np.asarray((ux * wy - uy * wx) / 2)
+
+
+def _area(mesh: PlanarMesh) -> float:
+    return float(_areas(mesh).sum())
+
+
+def _certificate(
+    matrix: OperatorMatrix, mesh: PlanarMesh, mass: Mass, tensor: tuple[float, float, float] | None
+) -> Certificate:
+    factor = mesh.scale[mesh.component[mesh.triangles].max(axis=1)]
+    return certify(matrix.edges, matrix.entries, mesh.points, mesh.triangles, factor, tensor, mass)
+
+
+def _certified_again(found: PlanarMesh, mass: Mass, certificate: Certificate) -> PlanarMesh:
+    """The mesh of the Laplacian as that of the whole matrix, its mass included."""
+    error = certificate.backward_error
+    good = error <= CERTIFIED and not len(certificate.flipped)
+    kind = "lumped" if mass.lumped else "consistent"
+    fits = f"c L + s M, M the {kind} mass matrix, re-assembled on this mesh gives the matrix back to {error:.1e}"
+    size = (
+        f"the mesh has a size: if the factor of the mass matrix is s, lengths are those given here times "
+        f"sqrt({mass.reaction:.12g} / s)"
+    )
+    worst, misfits = certificate.worst(0 if good else 10)
+    return replace(
+        found,
+        reaction=mass.reaction,
+        status=found.status if good else "uncertified",
+        uniqueness=found.uniqueness if good else None,
+        reason=(fits if found.certified else f"{fits}, but {found.reason}") if good else f"{fits} only",
+        backward_error=error,
+        warnings=(*found.warnings, size),
+        worst_entries=worst,
+        worst_misfits=misfits,
+    )
