@@ -6,7 +6,7 @@ Areas are taken off the matrix, what is left is a Laplacian and recovered as one
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from .planar.conformal import conformal_map
 from .planar.cotangent import edge_weights
 from .reaction import MetricFit, Skeleton, fit_metric
 from .recovery import PlanarMesh
-from .tolerances import CERTIFIED, SUMMED
+from .tolerances import CERTIFIED, ROUNDED, SIGMAS
 from .topology import Topology, surfaces
 
 _ALIKE = 1e-6
@@ -43,8 +43,8 @@ def recover_with_mass(
     clock : Clock
     tensor : (kxx, kxy, kyy), optional
     """
-    sums = _row_sums(matrix)
-    if not _of_one_sign(matrix, sums):
+    sums = _Sums.of(matrix)
+    if not sums.sign:
         return plain(matrix)
     with clock("topology"):
         topology = surfaces(matrix.n, matrix.edges)
@@ -53,33 +53,63 @@ def recover_with_mass(
     with clock("conformal"):
         laplacian = _is_laplacian(matrix, topology)
     if laplacian:
-        return _with_lumped_mass(matrix, plain(matrix), sums, tensor)
+        return _with_lumped_mass(matrix, plain(matrix), sums.values, tensor)
     with clock("metric"):
         skeleton = Skeleton.of(matrix.n, matrix.edges, topology.pieces)
-        sign = float(np.sign(sums[0]))
-        fit = fit_metric(skeleton, sign * matrix.entries, sign * sums)
+        fit = fit_metric(skeleton, sums.sign * matrix.entries, sums.positive(), sums.trust())
     if fit is None or not fit.residual < _ALIKE:
         return plain(matrix)
     try:
-        found = plain(_without_mass(matrix, sign, fit))
+        found = plain(_without_mass(matrix, sums.sign, fit))
     except RecoveryError:
         return plain(matrix)
-    total = sign * float(fit.metric.areas.sum())
+    total = sums.sign * float(fit.metric.areas.sum())
     with clock("certify"):
         mass = Mass(total / _area(found), matrix.diagonal)
         certificate = _certificate(matrix, found, mass, tensor)
     return _certified_again(found, mass, certificate)
 
 
-def _row_sums(matrix: OperatorMatrix) -> NDArray[np.float64]:
-    """(n,) A 1: the integrals of s times the basis functions."""
-    i, j = matrix.edges.T
-    return matrix.diagonal + np.bincount(i, matrix.entries, matrix.n) + np.bincount(j, matrix.entries, matrix.n)
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Row sums, the integrals of s times the basis functions.
 
+    Attributes
+    ----------
+    values : (n,) float64
+        A 1.
+    rounding : (n,) float64
+        About their errors.
+    """
 
-def _of_one_sign(matrix: OperatorMatrix, sums: NDArray) -> bool:
-    """Whether all row sums are beyond rounding, and of one sign, as areas are."""
-    return bool((np.abs(sums) > SUMMED * matrix.row_size).all() and np.ptp(np.sign(sums)) == 0)
+    values: NDArray[np.float64]
+    rounding: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, matrix: OperatorMatrix) -> _Sums:
+        def summed(diagonal: NDArray, entries: NDArray) -> NDArray:
+            return diagonal + sum(np.bincount(end, entries, matrix.n) for end in matrix.edges.T)
+
+        total = summed(np.abs(matrix.diagonal), np.abs(matrix.entries))
+        return cls(summed(matrix.diagonal, matrix.entries), 4 * np.finfo(float).eps * total)
+
+    @property
+    def sign(self) -> int:
+        """Of all that are beyond rounding, if these are the most and have one sign; else 0.
+
+        Small triangles of graded meshes have integrals that may be lost.
+        """
+        there = np.abs(self.values) > SIGMAS * self.rounding
+        signs = np.sign(self.values[there])
+        return int(signs[0]) if 2 * there.sum() > len(there) and np.ptp(signs) == 0 else 0
+
+    def positive(self) -> NDArray[np.float64]:
+        """(n,) their sizes, at least those of rounding."""
+        return np.maximum(np.abs(self.values), self.rounding)
+
+    def trust(self) -> NDArray[np.float64]:
+        """(n,) weights that make rounding alike."""
+        return np.minimum(1.0, ROUNDED * self.positive() / self.rounding)
 
 
 def _is_laplacian(matrix: OperatorMatrix, topology: Topology) -> bool:

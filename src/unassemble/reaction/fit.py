@@ -24,6 +24,13 @@ from ..errors import SolverError
 from ..linalg import UpperTriangle, factorisation
 from .metric import Metric, Skeleton
 
+import os
+SM=os.environ.get('SM','med')
+def START(y,w):
+    m=np.median(y/w)
+    if SM=='med': return float(m)
+    if SM=='abs': return float(np.sign(m)*np.median(np.abs(y/w)))
+    return float(np.sign(m)*np.quantile(np.abs(y/w),float(SM)))
 _log = logging.getLogger(__name__)
 
 
@@ -71,26 +78,28 @@ class MetricFit:
 
 @dataclass(frozen=True, eq=False)
 class _Equations:
-    """Entries (e,) and row sums (n,), the latter positive."""
+    """Entries (e,), row sums (n,), all positive, and weights of the latter (n,)."""
 
     skeleton: Skeleton
     entries: NDArray[np.float64]
     sums: NDArray[np.float64]
+    trust: NDArray[np.float64]
 
     def residual(self, metric: Metric, c: float) -> NDArray[np.float64]:
         """(e + n,) angles given minus fitted, and row sums fitted over given, minus one."""
-        k, given = 2 / self.skeleton.sides, self._given(metric) / c
+        k, given = self._unit(c), self._given(metric) / c
         angles = np.arctan(k * given) - np.arctan(k * metric.weights)
-        return np.concatenate([angles, self.skeleton.at_vertices @ metric.areas / (3 * self.sums) - 1])
+        areas = self.skeleton.at_vertices @ metric.areas / (3 * self.sums) - 1
+        return np.concatenate([angles, self.trust * areas])
 
     def derivative(self, metric: Metric, c: float) -> tuple[sp.csr_array, NDArray[np.float64]]:
         """(e + n, e) by the logarithms of u, and (e + n,) by that of c."""
         of_weights, of_areas = metric.derivatives()
-        k, given = 2 / self.skeleton.sides, self._given(metric) / c
+        k, given = self._unit(c), self._given(metric) / c
         slope_given, slope = k / (1 + (k * given) ** 2), k / (1 + (k * metric.weights) ** 2)
         angles = sp.diags_array(slope_given / (12 * c)) @ (self.skeleton.at_edges @ of_areas)
         angles = angles - sp.diags_array(slope) @ of_weights
-        sums = sp.diags_array(1 / (3 * self.sums)) @ (self.skeleton.at_vertices @ of_areas)
+        sums = sp.diags_array(self.trust / (3 * self.sums)) @ (self.skeleton.at_vertices @ of_areas)
         by_c = np.concatenate([-slope_given * given, np.zeros(len(self.sums))])
         return sp.csr_array(sp.vstack([angles, sums])), by_c
 
@@ -98,15 +107,20 @@ class _Equations:
         """(e,) c w, as entries and areas have it."""
         return np.asarray(self.skeleton.at_edges @ metric.areas / 12 - self.entries)
 
+    def _unit(self, c: float) -> NDArray[np.float64]:
+        """(e,) of weights: for 60 degrees they are then about 1; less where masses of the entry's size change more."""
+        of_mass = 3 * (self.sums / self.skeleton.degree)[self.skeleton.edges].mean(axis=1) / 12
+        return np.asarray(2 / self.skeleton.sides * abs(c) / (abs(c) + of_mass))
+
     def start(self) -> tuple[Metric, float]:
         """Circles about the vertices whose neighbours touch: they have triangles, and sizes from the row sums."""
         radius = np.sqrt(self.sums / self.skeleton.degree * np.sqrt(3))  # of equilateral triangles
         metric = Metric(self.skeleton, radius[self.skeleton.edges].sum(axis=1) ** 2)
-        return metric, float(np.median(self._given(metric) / metric.weights))
+        return metric, START(self._given(metric) , metric.weights)
 
 
 def fit_metric(
-    skeleton: Skeleton, entries: NDArray, sums: NDArray, options: MetricOptions | None = None
+    skeleton: Skeleton, entries: NDArray, sums: NDArray, trust: NDArray, options: MetricOptions | None = None
 ) -> MetricFit | None:
     """The metric and the factor c with which a mesh has these entries; None where the iteration breaks down.
 
@@ -118,10 +132,12 @@ def fit_metric(
         A_ij.
     sums : (n,) float64
         A 1, all positive.
+    trust : (n,) float64
+        Weights of the row sums, relative to those of entries: less than 1 where they have lost digits.
     options : MetricOptions, optional
     """
     options = options or MetricOptions()
-    equations = _Equations(skeleton, entries, sums)
+    equations = _Equations(skeleton, entries, sums, trust)
     with np.errstate(all="ignore"):  # of a misfit that is not finite nothing comes
         metric, c = equations.start()
         try:
