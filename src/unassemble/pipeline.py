@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .clock import Clock
 from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
@@ -207,8 +208,8 @@ class _Task:
             _check_proportion(scale, float(np.abs(part.entries).max()))
         placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
 
-        def plain(matrix: OperatorMatrix) -> PlanarMesh:
-            return recover_scalar(matrix, placement, self.clock, self.planar)
+        def plain(matrix: OperatorMatrix, squared_lengths: NDArray | None = None) -> PlanarMesh:
+            return recover_scalar(matrix, placement, self.clock, self.planar, squared_lengths)
 
         return recover_with_mass(part, plain, self.clock, frame.tensor)
 

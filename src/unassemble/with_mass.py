@@ -23,13 +23,15 @@ from .recovery import PlanarMesh
 from .tolerances import CERTIFIED, ROUNDED, SIGMAS
 from .topology import Topology, surfaces
 
+Plain = Callable[..., PlanarMesh]
+
 _ALIKE = 1e-6
 """Relative difference up to which row sums are areas, and entries those of a Laplacian, at first sight."""
 
 
 def recover_with_mass(
     matrix: OperatorMatrix,
-    plain: Callable[[OperatorMatrix], PlanarMesh],
+    plain: Plain,
     clock: Clock,
     tensor: tuple[float, float, float] | None = None,
 ) -> PlanarMesh:
@@ -39,7 +41,7 @@ def recover_with_mass(
     ----------
     matrix : OperatorMatrix
     plain : callable
-        Recovers a matrix c L + D.
+        Recovers a matrix c L + D; knows relative sizes of its pieces if told the squared lengths of edges.
     clock : Clock
     tensor : (kxx, kxy, kyy), optional
     """
@@ -60,7 +62,7 @@ def recover_with_mass(
     if fit is None or not fit.residual < _ALIKE:
         return plain(matrix)
     try:
-        found = plain(_without_mass(matrix, sums.sign, fit))
+        found = plain(_without_mass(matrix, sums.sign, fit), fit.metric.u)
     except RecoveryError:
         return plain(matrix)
     total = sums.sign * float(fit.metric.areas.sum())
@@ -109,7 +111,7 @@ class _Sums:
 
     def trust(self) -> NDArray[np.float64]:
         """(n,) weights that make rounding alike."""
-        return np.minimum(1.0, ROUNDED * self.positive() / self.rounding)
+        return np.minimum(1.0, CERTIFIED * self.positive() / self.rounding)
 
 
 def _is_laplacian(matrix: OperatorMatrix, topology: Topology) -> bool:

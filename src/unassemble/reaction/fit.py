@@ -5,10 +5,10 @@ In units of length in which s = 1, with w the weights of the Laplacian and a the
     -A_ij = c w_ij - (sum of a over the triangles of ij) / 12,      (A 1)_i = (sum of a over the triangles at i) / 3.
 
 These are e + n equations for e + 1 unknowns, and local: row sums tell sizes where they stand, so that no smooth
-deformation of the whole mesh has to be found, and about seven steps do at any number of vertices. The weights of a
-triangle with small angles are inversely proportional to its area; their inverse tangents, for a single triangle the
-angle itself, are compared instead, in which steps are longest. Positions follow from the metric by the linear solve
-of the Laplacian.
+deformation of the whole mesh has to be found, and some seven steps do at any number of vertices. The weights of a
+triangle with small angles are inversely proportional to its area; what is compared is 2 w / sqrt(1 + 4 w^2), for a
+single triangle the cosine of the angle, which is linear in the square of the side that faces it: no step overshoots
+there. Positions follow from the metric by the linear solve of the Laplacian.
 """
 
 from __future__ import annotations
@@ -24,13 +24,6 @@ from ..errors import SolverError
 from ..linalg import UpperTriangle, factorisation
 from .metric import Metric, Skeleton
 
-import os
-SM=os.environ.get('SM','med')
-def START(y,w):
-    m=np.median(y/w)
-    if SM=='med': return float(m)
-    if SM=='abs': return float(np.sign(m)*np.median(np.abs(y/w)))
-    return float(np.sign(m)*np.quantile(np.abs(y/w),float(SM)))
 _log = logging.getLogger(__name__)
 
 
@@ -66,7 +59,7 @@ class MetricFit:
     scale : float
         c.
     residual : float
-        Root mean square of the equations' residuals: angles, and relative areas.
+        Root mean square of the equations' residuals: cosines, and relative areas.
     steps : int
     """
 
@@ -76,8 +69,18 @@ class MetricFit:
     steps: int
 
 
+def _cosine(x: NDArray) -> NDArray[np.float64]:
+    """Of the angle with cotangent x."""
+    return np.asarray(x / np.sqrt(1 + x * x))
+
+
+def _slope(x: NDArray) -> NDArray[np.float64]:
+    """Its derivative."""
+    return np.asarray((1 + x * x) ** -1.5)
+
+
 @dataclass(frozen=True, eq=False)
-class _Equations:
+class Equations:
     """Entries (e,), row sums (n,), all positive, and weights of the latter (n,)."""
 
     skeleton: Skeleton
@@ -86,22 +89,22 @@ class _Equations:
     trust: NDArray[np.float64]
 
     def residual(self, metric: Metric, c: float) -> NDArray[np.float64]:
-        """(e + n,) angles given minus fitted, and row sums fitted over given, minus one."""
+        """(e + n,) cosines given minus fitted, and row sums fitted over given, minus one."""
         k, given = self._unit(c), self._given(metric) / c
-        angles = np.arctan(k * given) - np.arctan(k * metric.weights)
+        cosines = _cosine(k * given) - _cosine(k * metric.weights)
         areas = self.skeleton.at_vertices @ metric.areas / (3 * self.sums) - 1
-        return np.concatenate([angles, self.trust * areas])
+        return np.concatenate([cosines, self.trust * areas])
 
     def derivative(self, metric: Metric, c: float) -> tuple[sp.csr_array, NDArray[np.float64]]:
         """(e + n, e) by the logarithms of u, and (e + n,) by that of c."""
         of_weights, of_areas = metric.derivatives()
         k, given = self._unit(c), self._given(metric) / c
-        slope_given, slope = k / (1 + (k * given) ** 2), k / (1 + (k * metric.weights) ** 2)
-        angles = sp.diags_array(slope_given / (12 * c)) @ (self.skeleton.at_edges @ of_areas)
-        angles = angles - sp.diags_array(slope) @ of_weights
+        slope_given, slope = k * _slope(k * given), k * _slope(k * metric.weights)
+        cosines = sp.diags_array(slope_given / (12 * c)) @ (self.skeleton.at_edges @ of_areas)
+        cosines = cosines - sp.diags_array(slope) @ of_weights
         sums = sp.diags_array(self.trust / (3 * self.sums)) @ (self.skeleton.at_vertices @ of_areas)
         by_c = np.concatenate([-slope_given * given, np.zeros(len(self.sums))])
-        return sp.csr_array(sp.vstack([angles, sums])), by_c
+        return sp.csr_array(sp.vstack([cosines, sums])), by_c
 
     def _given(self, metric: Metric) -> NDArray[np.float64]:
         """(e,) c w, as entries and areas have it."""
@@ -116,7 +119,8 @@ class _Equations:
         """Circles about the vertices whose neighbours touch: they have triangles, and sizes from the row sums."""
         radius = np.sqrt(self.sums / self.skeleton.degree * np.sqrt(3))  # of equilateral triangles
         metric = Metric(self.skeleton, radius[self.skeleton.edges].sum(axis=1) ** 2)
-        return metric, START(self._given(metric) , metric.weights)
+        ratio = self._given(metric) / metric.weights
+        return metric, float(np.sign(np.median(ratio)) * np.median(np.abs(ratio)))
 
 
 def fit_metric(
@@ -137,7 +141,7 @@ def fit_metric(
     options : MetricOptions, optional
     """
     options = options or MetricOptions()
-    equations = _Equations(skeleton, entries, sums, trust)
+    equations = Equations(skeleton, entries, sums, trust)
     with np.errstate(all="ignore"):  # of a misfit that is not finite nothing comes
         metric, c = equations.start()
         try:
@@ -146,7 +150,7 @@ def fit_metric(
             return None
 
 
-def _descended(equations: _Equations, metric: Metric, c: float, options: MetricOptions) -> MetricFit:
+def _descended(equations: Equations, metric: Metric, c: float, options: MetricOptions) -> MetricFit:
     residual = equations.residual(metric, c)
     root = float(np.sqrt(len(residual)))
     damping, step = options.damping, 0
@@ -191,7 +195,7 @@ def _solved(derivative: sp.csr_array, by_c: NDArray, residual: NDArray, damping:
 
 
 def _shortened(
-    equations: _Equations, metric: Metric, c: float, change: NDArray, log_c: float, reach: float, before: float
+    equations: Equations, metric: Metric, c: float, change: NDArray, log_c: float, reach: float, before: float
 ) -> tuple[Metric, float, NDArray] | None:
     """The longest of a step and some shorter ones that lowers the residual."""
     for _ in range(5):
