@@ -20,22 +20,25 @@ _RANK = 1e-9  # singular values, in units of angles over mean lengths
 
 
 @dataclass(frozen=True, eq=False)
-class Mass:
-    """The mass term of an operator c L + s M.
+class Terms:
+    """What a matrix S (c L + s M) S has besides c L, and nothing else on its diagonal.
 
     Attributes
     ----------
-    reaction : float
-        s.
     diagonal : (n,) float64
         A_ii of the matrix.
+    reaction : float
+        s.
     lumped : bool
         Whether M is diagonal: a third of its area from each triangle to each of its corners.
+    scaling : (n,) float64 or None
+        S; the identity by default.
     """
 
-    reaction: float
     diagonal: NDArray[np.float64]
+    reaction: float = 0.0
     lumped: bool = False
+    scaling: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +51,7 @@ class Certificate:
         Largest difference between an off-diagonal entry and the re-assembled one, relative to the largest
         off-diagonal entry of its row.
     pairs : (k, 2) int64
-        Rows and columns of all entries of either, upper triangle; with a mass term the diagonal as well.
+        Rows and columns of all entries of either, upper triangle; with further terms the diagonal as well.
     misfits : (k,) float64
         Their differences, relative in the same way.
     differences : (k,) float64
@@ -89,11 +92,11 @@ def certify(
     triangles: NDArray,
     factor: NDArray,
     tensor: tuple[float, float, float] | None = None,
-    mass: Mass | None = None,
+    terms: Terms | None = None,
 ) -> Certificate:
     """Re-assemble factor * div(K grad) with P1 elements and compare off-diagonal entries.
 
-    With a mass term, and so nothing else on the diagonal, the diagonal as well.
+    With further terms the diagonal as well.
 
     Parameters
     ----------
@@ -107,14 +110,16 @@ def certify(
         The factor c of each triangle's piece.
     tensor : (kxx, kxy, kyy), optional
         K; the identity by default.
-    mass : Mass, optional
+    terms : Terms, optional
     """
     n = len(points)
-    key, value = _assemble(points, triangles, factor, tensor, mass)
+    key, value = _assemble(points, triangles, factor, tensor, terms)
+    if terms is not None and terms.scaling is not None:
+        value = value * terms.scaling[key // n] * terms.scaling[key % n]
     given = edges[:, 0] * n + edges[:, 1]
-    if mass is not None:
+    if terms is not None:
         given, order = np.unique(np.concatenate([given, np.arange(n) * (n + 1)]), return_index=True)
-        edges, entries = np.column_stack([given // n, given % n]), np.concatenate([entries, mass.diagonal])[order]
+        edges, entries = np.column_stack([given // n, given % n]), np.concatenate([entries, terms.diagonal])[order]
     if np.array_equal(key, given):
         pairs, difference = edges, value - entries
     else:
@@ -146,11 +151,11 @@ def _assemble(
     triangles: NDArray,
     factor: NDArray,
     tensor: tuple[float, float, float] | None,
-    mass: Mass | None,
+    terms: Terms | None,
 ) -> tuple[NDArray, NDArray]:
     """Off-diagonal entries: int K grad(phi_i) . grad(phi_j) over triangles, areas taken positive.
 
-    With a mass term those on the diagonal too, and int s phi_i phi_j: s area (1 + delta_ij) / 12.
+    With further terms those on the diagonal too, and int s phi_i phi_j: s area (1 + delta_ij) / 12.
 
     With side s_i facing corner i turned by a right angle, grad(phi_i) = s_i / (2 area), and the
     turned tensor is the adjugate of K: the entry is s_i' adj(K) s_j / (4 area).
@@ -164,20 +169,20 @@ def _assemble(
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a flat triangle certifies nothing
         double = np.abs(sides[0][0] * sides[1][1] - sides[0][1] * sides[1][0])
         weight = factor / (2 * double)
-        for i, j in ((0, 1), (1, 2), (2, 0), *(((0, 0), (1, 1), (2, 2)) if mass else ())):
+        for i, j in ((0, 1), (1, 2), (2, 0), *(((0, 0), (1, 1), (2, 2)) if terms else ())):
             (xi, yi), (xj, yj) = sides[i], sides[j]
             product = kyy * (xi * xj) - kxy * (xi * yj + yi * xj) + kxx * (yi * yj)
             ends.append((np.minimum(corners[i], corners[j]), np.maximum(corners[i], corners[j])))
-            values.append(weight * product if mass is None else weight * product + _share(mass, i == j) * double)
+            values.append(weight * product if terms is None else weight * product + _share(terms, i == j) * double)
     rows, columns = (np.concatenate(part) for part in zip(*ends, strict=True))
     summed = sp.coo_array((np.concatenate(values), (rows, columns)), shape=(n, n)).tocsr()
     summed.sort_indices()
     return np.repeat(np.arange(n), np.diff(summed.indptr)) * n + summed.indices, summed.data
 
 
-def _share(mass: Mass, own: bool) -> float:
+def _share(terms: Terms, own: bool) -> float:
     """What a triangle adds to an entry of s M, over twice its area."""
-    return mass.reaction / (6 if own else np.inf) if mass.lumped else mass.reaction / (12 if own else 24)
+    return terms.reaction / (6 if own else np.inf) if terms.lumped else terms.reaction / (12 if own else 24)
 
 
 def without_spare_equations(

@@ -41,8 +41,9 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
     """Write a recovered mesh, whole or not at all; the extension names the format.
 
     ``.npz`` holds ``points``, cells (``triangles``, ``quads``, ``tetrahedra``, ``hexahedra``, ``mid_nodes``, ``lines``,
-    ``polygons_offsets`` and ``polygons_data``), ``component``, ``hinges``, ``scale``, ``node_status`` and, of
-    vector-valued matrices, ``node_of_row`` and ``direction_of_row``.
+    ``polygons_offsets`` and ``polygons_data``), ``areas`` in place of ``points`` for a mass matrix, ``row_scaling``
+    where rows were scaled, ``component``, ``hinges``, ``scale``, ``node_status`` and, of vector-valued matrices,
+    ``node_of_row`` and ``direction_of_row``.
     Other formats are those of meshio (:mod:`unassemble.formats`); of these ``.vtu`` holds polygons, the others get
     them divided into triangles.
 
@@ -75,8 +76,14 @@ def arrays(recovery: Recovery) -> dict[str, Any]:
         cells = getattr(recovery, name, None)  # each kind of result has its own
         if cells is not None and cells.size:
             content[name] = cells
-    if isinstance(recovery, PlanarMesh) and recovery.n_polygons:
-        content |= {"polygons_offsets": recovery.polygons_offsets, "polygons_data": recovery.polygons_data}
+    if isinstance(recovery, PlanarMesh):
+        if recovery.n_polygons:
+            content |= {"polygons_offsets": recovery.polygons_offsets, "polygons_data": recovery.polygons_data}
+        if recovery.row_scaling is not None:
+            content["row_scaling"] = recovery.row_scaling
+        if recovery.areas is not None:
+            content["areas"] = recovery.areas
+            del content["points"]
     content |= {"component": recovery.component, "hinges": recovery.hinges, "scale": recovery.scale}
     content["node_status"] = recovery.node_status
     if recovery.vector_valued:
@@ -166,6 +173,8 @@ def _boundary_flag(recovery: Recovery) -> NDArray[np.int64]:
 def _check_content(recovery: Recovery, suffix: str, mesh_format: MeshFormat) -> None:
     if not mesh_format.name:
         return
+    if isinstance(recovery, PlanarMesh) and recovery.areas is not None:
+        raise FormatError(f"the format {suffix} holds points, and a mass matrix tells areas only: write .npz")
     kinds = set(_cells(recovery)) - mesh_format.cells
     if kinds:
         what = "nodes without cells" if kinds == {"vertex"} else f"cells of kind {', '.join(sorted(kinds))}"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .clock import Clock
 from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
+from .further_terms import recover_with_terms
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
 from .operators import VectorReading, about_translations, asked_for, second_reading, vector_valued
@@ -18,7 +19,6 @@ from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, li
 from .outputs import PlanarMesh, Recovery
 from .scalar import recover_scalar
 from .scalar.placement import Placement
-from .with_mass import recover_with_mass
 
 
 def recover(
@@ -211,7 +211,7 @@ class _Task:
         def plain(matrix: OperatorMatrix, squared_lengths: NDArray | None = None) -> PlanarMesh:
             return recover_scalar(matrix, placement, self.clock, self.planar, squared_lengths)
 
-        return recover_with_mass(part, plain, self.clock, frame.tensor)
+        return recover_with_terms(part, plain, self.clock, frame.tensor)
 
     def _as_vector(self, reading: VectorReading) -> Recovery:
         from .vector import recover_vector

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import FormatError
 from ..recovery import Body, Mechanical, PlanarMesh, Recovery
 from ..summary import counted_cells, scale_text
 from ..words import count_of
@@ -38,9 +39,13 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     ------
     OutputError
         If the file cannot be written.
+    FormatError
+        If there are no positions: of a mass matrix.
     """
     if path is not None:
         check_plot(path)
+    if isinstance(recovery, PlanarMesh) and recovery.areas is not None:
+        raise FormatError("a mass matrix tells areas only, and there is no shape to draw")
     figure, handles = planar_mesh(recovery) if isinstance(recovery, PlanarMesh) else plot_body(recovery)
     header(figure, recovery.status, details(recovery), style.STATUS.get(recovery.status, style.TEXT))
     footer(figure, handles)
