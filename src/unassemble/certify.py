@@ -19,6 +19,28 @@ _DENSE = 400  # triangles of a piece whose equations are counted by their rank
 
 
 @dataclass(frozen=True, eq=False)
+class Terms:
+    """What a matrix S (c L + s M) S has besides c L, and nothing else on its diagonal.
+
+    Attributes
+    ----------
+    diagonal : (n,) float64
+        A_ii of the matrix.
+    reaction : float
+        s.
+    lumped : bool
+        Whether M is diagonal: a third of its area from each triangle to each of its corners.
+    scaling : (n,) float64 or None
+        S; the identity by default.
+    """
+
+    diagonal: NDArray[np.float64]
+    reaction: float = 0.0
+    lumped: bool = False
+    scaling: NDArray[np.float64] | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Certificate:
     """How well a mesh explains a matrix.
 
@@ -28,7 +50,7 @@ class Certificate:
         Largest difference between an off-diagonal entry and the re-assembled one, relative to the largest
         off-diagonal entry of its row.
     pairs : (k, 2) int64
-        Rows and columns of all entries of either, upper triangle.
+        Rows and columns of all entries of either, upper triangle; with further terms the diagonal as well.
     misfits : (k,) float64
         Their differences, relative in the same way.
     differences : (k,) float64
@@ -69,8 +91,11 @@ def certify(
     triangles: NDArray,
     factor: NDArray,
     tensor: tuple[float, float, float] | None = None,
+    terms: Terms | None = None,
 ) -> Certificate:
     """Re-assemble factor * div(K grad) with P1 elements and compare off-diagonal entries.
+
+    With further terms the diagonal as well.
 
     Parameters
     ----------
@@ -84,14 +109,28 @@ def certify(
         The factor c of each triangle's piece.
     tensor : (kxx, kxy, kyy), optional
         K; the identity by default.
+    terms : Terms, optional
     """
-    key, value = _assemble(points, triangles, factor, tensor)
-    return compared(len(points), edges, entries, key, value, _flipped(points, triangles))
+    key, value = _assemble(points, triangles, factor, tensor, terms)
+    return compared(len(points), edges, entries, key, value, _flipped(points, triangles), terms)
 
 
-def compared(n: int, edges: NDArray, entries: NDArray, key: NDArray, value: NDArray, flipped: NDArray) -> Certificate:
+def compared(
+    n: int,
+    edges: NDArray,
+    entries: NDArray,
+    key: NDArray,
+    value: NDArray,
+    flipped: NDArray,
+    terms: Terms | None = None,
+) -> Certificate:
     """The entries of a mesh of n points, at increasing keys i n + j, against those of a matrix."""
+    if terms is not None and terms.scaling is not None:
+        value = value * terms.scaling[key // n] * terms.scaling[key % n]
     given = edges[:, 0] * n + edges[:, 1]
+    if terms is not None:
+        given, order = np.unique(np.concatenate([given, np.arange(n) * (n + 1)]), return_index=True)
+        edges, entries = np.column_stack([given // n, given % n]), np.concatenate([entries, terms.diagonal])[order]
     if np.array_equal(key, given):
         pairs, difference = edges, value - entries
     else:
@@ -102,8 +141,9 @@ def compared(n: int, edges: NDArray, entries: NDArray, key: NDArray, value: NDAr
         difference[np.searchsorted(union, given)] -= entries
         pairs = np.column_stack([union // n, union % n])
     size = np.zeros(n)
-    for end in edges.T:
-        np.maximum.at(size, end, np.abs(entries))
+    apart = edges[:, 0] != edges[:, 1]
+    for end in edges[apart].T:
+        np.maximum.at(size, end, np.abs(entries[apart]))
     reference = np.minimum(size[pairs[:, 0]], size[pairs[:, 1]])
     misfits = _relative(difference, reference)
     return Certificate(float(misfits.max(initial=0.0)), pairs, misfits, difference, flipped)
@@ -210,9 +250,15 @@ def _flipped(points: NDArray, triangles: NDArray) -> NDArray[np.int64]:
 
 
 def _assemble(
-    points: NDArray, triangles: NDArray, factor: NDArray, tensor: tuple[float, float, float] | None
+    points: NDArray,
+    triangles: NDArray,
+    factor: NDArray,
+    tensor: tuple[float, float, float] | None,
+    terms: Terms | None,
 ) -> tuple[NDArray, NDArray]:
     """Off-diagonal entries: int K grad(phi_i) . grad(phi_j) over triangles, areas taken positive.
+
+    With further terms those on the diagonal too, and int s phi_i phi_j: s area (1 + delta_ij) / 12.
 
     With side s_i facing corner i turned by a right angle, grad(phi_i) = s_i / (2 area), and the
     turned tensor is the adjugate of K: the entry is s_i' adj(K) s_j / (4 area).
@@ -224,16 +270,22 @@ def _assemble(
     sides = [(b - a).T for a, b in (at[1:], at[2::-2], at[:2])]
     ends, values = [], []
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a flat triangle certifies nothing
-        weight = factor / (2 * np.abs(sides[0][0] * sides[1][1] - sides[0][1] * sides[1][0]))
-        for i, j in ((0, 1), (1, 2), (2, 0)):
+        double = np.abs(sides[0][0] * sides[1][1] - sides[0][1] * sides[1][0])
+        weight = factor / (2 * double)
+        for i, j in ((0, 1), (1, 2), (2, 0), *(((0, 0), (1, 1), (2, 2)) if terms else ())):
             (xi, yi), (xj, yj) = sides[i], sides[j]
             product = kyy * (xi * xj) - kxy * (xi * yj + yi * xj) + kxx * (yi * yj)
             ends.append((np.minimum(corners[i], corners[j]), np.maximum(corners[i], corners[j])))
-            values.append(weight * product)
+            values.append(weight * product if terms is None else weight * product + _share(terms, i == j) * double)
     rows, columns = (np.concatenate(part) for part in zip(*ends, strict=True))
     summed = sp.coo_array((np.concatenate(values), (rows, columns)), shape=(n, n)).tocsr()
     summed.sort_indices()
     return np.repeat(np.arange(n), np.diff(summed.indptr)) * n + summed.indices, summed.data
+
+
+def _share(terms: Terms, own: bool) -> float:
+    """What a triangle adds to an entry of s M, over twice its area."""
+    return terms.reaction / (6 if own else np.inf) if terms.lumped else terms.reaction / (12 if own else 24)
 
 
 def without_spare_equations(

@@ -44,9 +44,10 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
 
     ``.npz`` holds ``points``, cells (``triangles``, ``quads``, ``tetrahedra``, ``hexahedra``, ``mid_nodes``, ``lines``,
     ``polygons_offsets`` and ``polygons_data``), ``eliminated_points`` if any, of surfaces ``edges``, ``edge_lengths``
-    and ``curvature``, and no ``points`` unless there are coordinates, ``component``, ``hinges``, ``scale``,
-    ``node_status``, of vector-valued matrices ``node_of_row`` and ``direction_of_row``, and what the mesh is worth:
-    ``status``, ``uniqueness`` and ``backward_error``, which ``.vtu`` holds as field data, with ``scale``.
+    and ``curvature``, and no ``points`` unless there are coordinates, ``areas`` in place of ``points`` for a mass
+    matrix, ``row_scaling`` where rows were scaled, ``component``, ``hinges``, ``scale``, ``node_status``, of
+    vector-valued matrices ``node_of_row`` and ``direction_of_row``, and what the mesh is worth: ``status``,
+    ``uniqueness`` and ``backward_error``, which ``.vtu`` holds as field data, with ``scale``.
     Other formats are those of meshio (:mod:`unassemble.formats`); of these ``.vtu`` holds polygons, the others get
     them divided into triangles.
 
@@ -81,10 +82,10 @@ def arrays(recovery: Recovery) -> dict[str, Any]:
         cells = getattr(recovery, name, None)  # each kind of result has its own
         if cells is not None and cells.size:
             content[name] = cells
-    if isinstance(recovery, PlanarMesh) and recovery.n_polygons:
-        content |= {"polygons_offsets": recovery.polygons_offsets, "polygons_data": recovery.polygons_data}
-    if isinstance(recovery, PlanarMesh) and len(recovery.eliminated_points):
-        content["eliminated_points"] = recovery.eliminated_points
+    if isinstance(recovery, PlanarMesh):
+        content |= _planar_arrays(recovery)
+        if recovery.areas is not None:
+            del content["points"]
     if isinstance(recovery, Surface):
         content |= {"edges": recovery.edges, "edge_lengths": recovery.edge_lengths, "curvature": recovery.curvature}
     content |= {"component": recovery.component, "hinges": recovery.hinges, "scale": recovery.scale}
@@ -92,6 +93,20 @@ def arrays(recovery: Recovery) -> dict[str, Any]:
     if recovery.vector_valued:
         content |= {"node_of_row": recovery.node_of_row, "direction_of_row": recovery.direction_of_row}
     return content | worth(recovery)
+
+
+def _planar_arrays(mesh: PlanarMesh) -> dict[str, NDArray]:
+    """What some planar meshes have and others have not."""
+    content: dict[str, NDArray] = {}
+    if mesh.n_polygons:
+        content |= {"polygons_offsets": mesh.polygons_offsets, "polygons_data": mesh.polygons_data}
+    if len(mesh.eliminated_points):
+        content["eliminated_points"] = mesh.eliminated_points
+    if mesh.row_scaling is not None:
+        content["row_scaling"] = mesh.row_scaling
+    if mesh.areas is not None:
+        content["areas"] = mesh.areas
+    return content
 
 
 def worth(recovery: Recovery) -> dict[str, NDArray]:
@@ -197,6 +212,8 @@ def _check_content(recovery: Recovery, suffix: str, mesh_format: MeshFormat) -> 
             f"the format {suffix} holds coordinates, and the matrix of a surface tells edge lengths only: write .npz, "
             "or ask for coordinates with `realise=True`"
         )
+    if isinstance(recovery, PlanarMesh) and recovery.areas is not None:
+        raise FormatError(f"the format {suffix} holds points, and a mass matrix tells areas only: write .npz")
     kinds = set(_cells(recovery)) - mesh_format.cells
     if kinds:
         what = "nodes without cells" if kinds == {"vertex"} else f"cells of kind {', '.join(sorted(kinds))}"

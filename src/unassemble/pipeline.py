@@ -10,6 +10,7 @@ from itertools import chain, islice
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .boundaries import recover_lattice, recover_partial
 from .clock import Clock
@@ -17,6 +18,7 @@ from .conforming.recover import recover_conforming, shown_cells
 from .conforming.roles import Cells
 from .diagnosis import explained, judged
 from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
+from .further_terms import recover_with_terms
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
 from .operators import VectorReading, about_translations, asked_for, second_reading, vector_valued
@@ -256,8 +258,11 @@ class _Task:
         def partial() -> PlanarMesh | None:
             return recover_partial(part, whole, placement, self.clock, self.planar)
 
+        def plain(matrix: OperatorMatrix, squared_lengths: NDArray | None = None) -> PlanarMesh:
+            return recover_scalar(matrix, placement, self.clock, self.planar, squared_lengths)
+
         def linear() -> PlanarMesh:
-            return recover_scalar(part, placement, self.clock, self.planar)
+            return recover_with_terms(part, plain, self.clock, self.frame.tensor)
 
         order = sorted(
             [(0, lattice), (2, linear), (1 if _crowded(part) else 3, others), (1 if shown else 3, partial)],

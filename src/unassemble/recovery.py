@@ -58,9 +58,9 @@ class Recovery:
     reason, advice : str
         Why, in one sentence or two; what to do next, where the mesh is not certified.
     operator : str
-        ``"laplacian"``, or ``"anisotropic laplacian"`` where a tensor was undone; ``"elasticity"``, or ``"vector
-        laplacian"`` where the directions of a vector-valued matrix are not coupled; ``"frame or shell"``, ``"plane
-        frame"`` or ``"plate"`` where nodes have rotations too; ``"truss"``.
+        ``"laplacian"``, or ``"anisotropic laplacian"`` where a tensor was undone; ``"mass"``; ``"elasticity"``, or
+        ``"vector laplacian"`` where the directions of a vector-valued matrix are not coupled; ``"frame or shell"``,
+        ``"plane frame"`` or ``"plate"`` where nodes have rotations too; ``"truss"``.
     reaction : float
         The factor s of the mass matrix in the operator, 0 if none.
     backward_error : float
@@ -188,6 +188,10 @@ class PlanarMesh(Recovery):
         Standard deviation of independent errors of the entries that would leave the misfit; None where it is no noise.
     suspects : (k, 2) int64
         Entries that the mesh would fit the others far better without, the gravest first.
+    areas : (m,) float64 or None
+        Of a mass matrix, which tells no shape: s times the areas of the triangles; `points` are NaN.
+    row_scaling : (n,) float64 or None
+        The diagonal matrix S, of geometric mean 1, where the matrix is S c L S.
     alternatives : tuple of Alternative
         Cells in doubt where other meshes fit as well, and what these have instead.
     n_entries, n_fitting : int
@@ -203,6 +207,8 @@ class PlanarMesh(Recovery):
     chi_square: Mapping[str, float] | None = None
     estimated_noise: float | None = None
     suspects: NDArray[np.int64] = field(default_factory=_none(2))
+    areas: NDArray[np.float64] | None = None
+    row_scaling: NDArray[np.float64] | None = None
     alternatives: tuple[Alternative, ...] = ()
     n_entries: int = 0
     n_fitting: int = 0

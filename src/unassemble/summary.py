@@ -70,6 +70,7 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
     ]
     if isinstance(recovery, PlanarMesh):
         rows += [("holes", f"{recovery.n_holes:,}"), ("scale c", scale_text(recovery))]
+        rows += [("reaction s", f"{recovery.reaction:.10g}")] if recovery.reaction else []
     if isinstance(recovery, Surface):
         rows += _surface_rows(recovery)
     if isinstance(recovery, Mechanical):

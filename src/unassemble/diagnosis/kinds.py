@@ -13,7 +13,7 @@ UNREAD: Mapping[str, str] = {
     "tetrahedra": "scalar matrices of meshes in space are not read yet, but elasticity matrices of such meshes are",
     "hexahedra": "scalar matrices of meshes in space are not read yet, but elasticity matrices of such meshes are",
     "grid in space": "scalar matrices of meshes in space are not read yet, but elasticity matrices of such meshes are",
-    "mass": "pass the stiffness matrix of the same mesh: a mass matrix is not read yet",
+    "mass": "pass the stiffness matrix of the same mesh: a mass matrix tells areas, and of linear triangles only",
     "graph": "a graph without weights has no coordinates: a layout of the graph may draw it",
     "segments": "the length of each segment is the reciprocal of its entry, with nothing left to solve",
 }

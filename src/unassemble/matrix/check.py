@@ -36,16 +36,17 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
     Returns
     -------
     OperatorMatrix
-        The mean of both triangles; what was changed on the way is in its ``warnings``.
+        The mean of both triangles, of complex matrices of their real part; what was changed on the way is in its
+        ``warnings``.
 
     Raises
     ------
     InputError
         If `drop_zeros` or `noise` is out of range.
     MatrixError
-        If the matrix is not square, empty, without numbers, complex, not finite, diagonal, not symmetric, or
-        has far more rows than entries, or connected rows out of all proportion. Both triangles may differ by
-        1e-10 of the largest off-diagonal entry of the two rows.
+        If the matrix is not square, empty, without numbers, not finite, diagonal, not symmetric, or has far more
+        rows than entries, or connected rows out of all proportion. Both triangles may differ by 1e-10 of the largest
+        off-diagonal entry of the two rows, or by a convection: an antisymmetric part whose rows add up to zero.
 
     Examples
     --------
@@ -57,9 +58,8 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
     A = _as_sparse(A)
     _check_shape(A.shape)
     csr = canonical(_with_numbers(A))
-    if csr.dtype.kind == "c" and not csr.data.imag.any():  # as solvers with complex types write real matrices
-        csr = csr.real
     _check_entries(csr)
+    csr, notes = _real(csr)
     pairs = triangles(csr)
     if not len(pairs.edges):
         raise MatrixError("the matrix is diagonal: it has no off-diagonal entry, and so no mesh edge")
@@ -68,7 +68,7 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
     warnings += kept
     if not entries.any():
         raise MatrixError("every stored off-diagonal entry is zero: the matrix says nothing about the shape of a mesh")
-    edges = pairs.edges
+    edges, warnings = pairs.edges, (*notes, *warnings)
     if drop_zeros is not None:
         edges, entries, dropped = _without_zeros(csr.shape[0], edges, entries, drop_zeros)
         warnings += dropped
@@ -130,8 +130,6 @@ def _with_numbers(A: Any) -> Any:
 
 
 def _check_entries(csr: sp.csr_array) -> None:
-    if csr.dtype.kind == "c":
-        raise _complex(csr)
     finite = np.isfinite(csr.data)
     if not finite.all():
         k = int(np.argmin(finite))
@@ -143,13 +141,17 @@ def _check_entries(csr: sp.csr_array) -> None:
         )
 
 
-def _complex(csr: sp.csr_array) -> MatrixError:
-    k = int(np.argmax(csr.data.imag != 0))
-    i, j = place(csr, k)
-    return MatrixError(
-        f"the matrix is complex: the entry at row {i}, column {j} is {csr.data[k]}; take the real part, A.real, if the "
-        "imaginary parts mean nothing"
-    )
+def _real(csr: sp.csr_array) -> tuple[sp.csr_array, tuple[str, ...]]:
+    """The real part of a matrix, and that others were left out: absorption, say, or the frequency's part."""
+    if csr.dtype.kind != "c":
+        return csr, ()
+    imaginary = csr.data.imag != 0
+    real = sp.csr_array((csr.data.real.copy(), csr.indices, csr.indptr), shape=csr.shape)
+    if not imaginary.any():
+        return real, ()
+    i, j = place(csr, int(np.argmax(imaginary)))
+    note = f"the matrix is complex, and its real part was taken: row {i}, column {j}, for one, is {csr[i, j]:.6g}"
+    return real, (note,)
 
 
 def _check_proportions(n: int, edges: NDArray[np.int64], entries: NDArray[np.float64]) -> None:

@@ -53,7 +53,7 @@ def triangles(A: sp.csr_array) -> Triangles:
 def symmetric_entries(
     A: sp.csr_array, pairs: Triangles, noise: float | None
 ) -> tuple[NDArray[np.float64], float, tuple[str, ...]]:
-    """Average both triangles where they differ at rounding level.
+    """Average both triangles where they differ at rounding level, or by a convection.
 
     Returns
     -------
@@ -81,6 +81,9 @@ def symmetric_entries(
         tolerance = np.maximum(SUMMED * size, SIGMAS * (noise or 0.0))
         relative = difference / size
     if (difference > tolerance).any():
+        turning = _turning(A, pairs)
+        if turning:
+            return 0.5 * pairs.upper + 0.5 * pairs.lower, 0.0, (*warnings, turning)
         worst = int(np.argmax(np.where(difference > tolerance, difference, -1.0)))
         raise _not_symmetric(A, pairs, int(i[worst]), int(j[worst]), noise)
     entries = pairs.upper.copy()
@@ -93,6 +96,28 @@ def symmetric_entries(
         f"{relative[worst]:.1e} of the largest off-diagonal entry of the rows ({i[worst]} and {j[worst]})"
     )
     return entries, float(relative[worst]), (*warnings, average)
+
+
+def _turning(A: sp.csr_array, pairs: Triangles) -> str:
+    """That the antisymmetric part is a convection without flow through the boundary; empty where it is none.
+
+    Its rows then add up to zero, since constants are not carried anywhere, and the symmetric part is the rest of the
+    operator: int v b . grad(u) changes its sign as u and v change places.
+    """
+    if pairs.one_sided:
+        return ""
+    with np.errstate(over="ignore", invalid="ignore"):
+        part = 0.5 * pairs.upper - 0.5 * pairs.lower
+        i, j = pairs.edges.T
+        n = A.shape[0]
+        sums = np.bincount(i, part, n) - np.bincount(j, part, n)
+        size = row_sizes(n, pairs.edges, np.abs(part))
+        if not (np.abs(sums) <= SUMMED * np.maximum(size, ROUNDED * size.max())).all():
+            return ""
+    return (
+        "the matrix is not symmetric, and its symmetric part was taken: the rows of the antisymmetric part add up to "
+        "zero, as those of a convection do"
+    )
 
 
 def _with_transposed_pattern(A: sp.csr_array) -> sp.csr_array:
@@ -137,7 +162,8 @@ def _not_symmetric(A: sp.csr_array, pairs: Triangles, i: int, j: int, noise: flo
     remedy = "" if noise is not None else " (if the entries are measured, give their `noise`)"
     return MatrixError(
         f"the matrix is not symmetric, most at row {i}, column {j}: that entry is {here} and its transpose, row {j}, "
-        f"column {i}, is {there}. Both must be the same number{remedy}"
+        f"column {i}, is {there}. Both must be the same number{remedy}, or differ by a convection, whose rows add up "
+        "to zero"
     )
 
 

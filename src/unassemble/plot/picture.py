@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..clock import Clock
+from ..errors import FormatError
 from ..metric import realised
 from ..recovery import Body, ConformingMesh, Mechanical, PlanarMesh, Recovery, Surface
 from ..summary import counted_cells, scale_text
@@ -44,9 +45,13 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     ------
     OutputError
         If the file cannot be written.
+    FormatError
+        If there are no positions: of a mass matrix.
     """
     if path is not None:
         check_plot(path)
+    if isinstance(recovery, PlanarMesh) and recovery.areas is not None:
+        raise FormatError("a mass matrix tells areas only, and there is no shape to draw")
     if isinstance(recovery, Surface) and recovery.realisation is None:
         recovery = realised(recovery, Clock())  # edge lengths cannot be drawn
     if isinstance(recovery, PlanarMesh) and not isinstance(recovery, ConformingMesh):

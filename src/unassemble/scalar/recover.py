@@ -42,9 +42,26 @@ class _Placed:
     notes: list[str]
 
 
-def recover_scalar(stored: OperatorMatrix, placement: Placement, clock: Clock, options: ScalarOptions) -> PlanarMesh:
-    """The mesh of a checked scalar matrix."""
-    task = Task(options=options, placement=placement, noise=Noise.known(stored, options.noise))
+def recover_scalar(
+    stored: OperatorMatrix,
+    placement: Placement,
+    clock: Clock,
+    options: ScalarOptions,
+    squared_lengths: NDArray | None = None,
+) -> PlanarMesh:
+    """The mesh of a checked scalar matrix.
+
+    Parameters
+    ----------
+    stored : OperatorMatrix
+    placement : Placement
+    clock : Clock
+    options : ScalarOptions
+    squared_lengths : (e,) float64, optional
+        Of the edges, where they are known from elsewhere: they give pieces their relative sizes.
+    """
+    noise = Noise.known(stored, options.noise)
+    task = Task(options=options, placement=placement, noise=noise, squared_lengths=squared_lengths)
     found = _by_digits(stored, clock, task)
     if options.scale is None or found.status != "uncertified":
         return found
@@ -116,10 +133,11 @@ def _place(solved: Solved, task: Task) -> _Placed:
     """Every piece in its final frame, relative to its origin, hinges joined; and what is to be said about it."""
     topology, placement = solved.topology, task.placement
     origins = placement.origins(topology)
+    sizes = np.ones(len(topology.pieces)) if task.squared_lengths is None else _sizes(solved, task.squared_lengths)
     placed, remarks = [], []
     for label, (piece, mesh) in enumerate(zip(topology.pieces, solved.meshes, strict=True)):
         z, more = placement.apply(piece, mesh.z, origins[label])
-        placed.append(z)
+        placed.append(z if placement.known_positions(piece) >= 2 else sizes[label] * z)
         remarks.append((*mesh.notes, *more))
     known = np.array([placement.known_positions(piece) for piece in topology.pieces])
     placed = join(topology, placed, known)
@@ -129,6 +147,12 @@ def _place(solved: Solved, task: Task) -> _Placed:
     joined = JoinedMesh.of(topology, placed, solved.scales / task.stretch)
     shift = origins[joined.component]
     return _Placed(placed, joined, origins, joined.points + np.column_stack([shift.real, shift.imag]), notes)
+
+
+def _sizes(solved: Solved, squared_lengths: NDArray) -> NDArray[np.float64]:
+    """(pieces,) mean edge length of each piece; over all edges 1."""
+    lengths = [np.sqrt(squared_lengths[piece.edge_rows]) for piece in solved.topology.pieces]
+    return np.array([own.mean() for own in lengths]) / np.concatenate(lengths).mean()
 
 
 def _held_against(stored: OperatorMatrix, solved: Solved, mesh: JoinedMesh, points: NDArray, task: Task) -> Held:

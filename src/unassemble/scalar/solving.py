@@ -39,11 +39,14 @@ class Task:
     placement : Placement
     noise : Noise or None
         Errors of the entries, where they are not those of assembly.
+    squared_lengths : (e,) float64 or None
+        Of the edges of the matrix, where they are known from elsewhere.
     """
 
     options: ScalarOptions
     placement: Placement
     noise: Noise | None
+    squared_lengths: NDArray[np.float64] | None = None
 
     @property
     def stretch(self) -> float:

@@ -1,0 +1,113 @@
+"""A = c L + s M with M consistent or lumped, and s M alone.
+
+Areas are taken off the matrix, what is left is a Laplacian and recovered as one, and the whole is assembled again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..certify import Terms
+from ..clock import Clock
+from ..matrix import OperatorMatrix
+from ..reaction import MetricFit, Skeleton, areas_of_mass, fit_metric
+from ..recovery import PlanarMesh
+from ..tolerances import CERTIFIED
+from ..topology import Topology
+from .again import ALIKE, Held, Plain, areas_of
+from .row_sums import RowSums
+
+_NO_SHAPE = "a mass matrix has no shape: it depends on the areas of the triangles alone, and any that have them will do"
+_OTHER = (
+    "that no other areas, with another c, fit as well is not proved: the fit of edge lengths was started once, and at "
+    "its end the equations determine all of them"
+)
+
+
+def mass_alone(held: Held, topology: Topology, skeleton: Skeleton, sums: RowSums) -> PlanarMesh | None:
+    """Triangles and areas of a mass matrix; None where areas do not explain the matrix.
+
+    There are e + n equations for m areas, and triangles that are none, holes of three edges, come out with area zero.
+    """
+    matrix = held.matrix
+    if not (sums.sign * matrix.entries > 0).all():
+        return None
+    areas = areas_of_mass(skeleton, matrix.entries, matrix.diagonal)
+    if areas is None:
+        return None
+    hole = np.abs(areas) <= CERTIFIED * (np.abs(skeleton.at_vertices.T @ sums.values))
+    areas, triangles = areas[~hole], skeleton.triangles[~hole]
+    rows = np.concatenate([skeleton.at_edges[:, ~hole] @ areas / 12, skeleton.at_vertices[:, ~hole] @ areas / 6])
+    error = float(np.abs(rows / np.concatenate([matrix.entries, matrix.diagonal]) - 1).max())
+    if not (error <= CERTIFIED and (sums.sign * areas > 0).all()):
+        return None
+    component = np.full(matrix.n, -1)
+    for label in reversed(range(len(topology.pieces))):
+        component[topology.pieces[label].vertices] = label
+    return PlanarMesh(
+        points=np.full((matrix.n, 2), np.nan),
+        triangles=triangles,
+        component=component,
+        hinges=topology.hinges,
+        scale=np.zeros(len(topology.pieces)),
+        node_status=np.ones(matrix.n, dtype=np.int8),
+        status="certified",
+        uniqueness="proved",
+        reason=f"the mass matrix of triangles with these areas is the given one to {error:.1e}; {_NO_SHAPE}",
+        operator="mass",
+        backward_error=error,
+        n_holes=topology.n_holes + int(hole.sum()),
+        reaction=1.0,
+        areas=areas,
+        warnings=("the areas are those times s, if the factor of the mass matrix is s",),
+    )
+
+
+def with_consistent_mass(
+    held: Held, skeleton: Skeleton, sums: RowSums, plain: Plain, clock: Clock
+) -> PlanarMesh | None:
+    """The mesh of c L + s M; None where the fit of edge lengths does not come near the entries."""
+    with clock("metric"):
+        fit = fit_metric(skeleton, sums.sign * held.matrix.entries, sums.positive(), sums.trust())
+    if fit is None or not fit.residual < ALIKE:
+        return None
+    found = plain(_without_mass(held.matrix, sums.sign, fit), fit.metric.u)
+    reaction = sums.sign * float(fit.metric.areas.sum() / areas_of(found).sum())
+    found = replace(found, uniqueness="searched" if found.uniqueness == "proved" else found.uniqueness)
+    terms = Terms(held.matrix.diagonal, reaction)
+    operator = "c L + s M, M the consistent mass matrix,"
+    return held.with_terms(found, terms, operator, _size(reaction), *((_OTHER,) if found.certified else ()))
+
+
+def _without_mass(matrix: OperatorMatrix, sign: int, fit: MetricFit) -> OperatorMatrix:
+    """The Laplacian that is left."""
+    skeleton, areas = fit.metric.skeleton, sign * fit.metric.areas
+    return replace(
+        matrix,
+        entries=matrix.entries - skeleton.at_edges @ areas / 12,
+        diagonal=matrix.diagonal - skeleton.at_vertices @ areas / 6,
+    )
+
+
+def with_lumped_mass(held: Held, found: PlanarMesh, sums: RowSums) -> PlanarMesh:
+    """A mesh of c L + D; if D is proportional to the areas about its vertices that is a lumped mass matrix."""
+    if not found.certified:
+        return found
+    areas, share = areas_of(found), np.zeros(held.matrix.n)
+    np.add.at(share, found.divided()[0], areas[:, None] / 3)
+    reaction = float(sums.values.sum() / areas.sum())
+    allowed = ALIKE * np.abs(reaction * share) + sums.rounding
+    if not (np.abs(sums.values - reaction * share) <= allowed).all():
+        return found
+    terms = Terms(held.matrix.diagonal, reaction, lumped=True)
+    again = held.with_terms(found, terms, "c L + s M, M the lumped mass matrix,", _size(reaction))
+    return again if again.certified else found
+
+
+def _size(reaction: float) -> str:
+    return (
+        "the mesh has a size: if the factor of the mass matrix is s, lengths are those given here times "
+        f"sqrt({reaction:.12g} / s)"
+    )

@@ -1,0 +1,208 @@
+"""Squared lengths of all edges, and c, from the entries of c L + s M: Levenberg-Marquardt, one edge an unknown.
+
+In units of length in which s = 1, with w the weights of the Laplacian and a the areas,
+
+    -A_ij = c w_ij - (sum of a over the triangles of ij) / 12,      (A 1)_i = (sum of a over the triangles at i) / 3.
+
+These are e + n equations for e + 1 unknowns, and local: row sums tell sizes where they stand, so that no smooth
+deformation of the whole mesh has to be found, and some seven steps do at any number of vertices. The weights of a
+triangle with small angles are inversely proportional to its area; what is compared is 2 w / sqrt(1 + 4 w^2), for a
+single triangle the cosine of the angle, which is linear in the square of the side that faces it: no step overshoots
+there. Positions follow from the metric by the linear solve of the Laplacian.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..errors import SolverError
+from ..linalg import UpperTriangle, factorisation
+from .metric import Metric, Skeleton
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class MetricOptions:
+    """Settings of the iteration.
+
+    Attributes
+    ----------
+    steps : int
+    damping : float
+        The first; relative to the diagonal of the normal equations.
+    nearly : float
+        Share of the way to the first flat triangle that a step may go.
+    tolerance : float
+        Root mean square of the equations' residuals at which nothing but rounding is left.
+    """
+
+    steps: int = 100
+    damping: float = 1e-2
+    nearly: float = 0.9
+    tolerance: float = 1e-15
+
+
+@dataclass(frozen=True, eq=False)
+class MetricFit:
+    """Result of :func:`fit_metric`.
+
+    Attributes
+    ----------
+    metric : Metric
+        In units of length in which s = 1.
+    scale : float
+        c.
+    residual : float
+        Root mean square of the equations' residuals: cosines, and relative areas.
+    steps : int
+    """
+
+    metric: Metric
+    scale: float
+    residual: float
+    steps: int
+
+
+def _cosine(x: NDArray) -> NDArray[np.float64]:
+    """Of the angle with cotangent x."""
+    return np.asarray(x / np.sqrt(1 + x * x))
+
+
+def _slope(x: NDArray) -> NDArray[np.float64]:
+    """Its derivative."""
+    return np.asarray((1 + x * x) ** -1.5)
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """Entries (e,), row sums (n,), all positive, and weights of the latter (n,)."""
+
+    skeleton: Skeleton
+    entries: NDArray[np.float64]
+    sums: NDArray[np.float64]
+    trust: NDArray[np.float64]
+
+    def residual(self, metric: Metric, c: float) -> NDArray[np.float64]:
+        """(e + n,) cosines given minus fitted, and row sums fitted over given, minus one."""
+        k, given = self._unit(c), self._given(metric) / c
+        cosines = _cosine(k * given) - _cosine(k * metric.weights)
+        areas = self.skeleton.at_vertices @ metric.areas / (3 * self.sums) - 1
+        return np.concatenate([cosines, self.trust * areas])
+
+    def derivative(self, metric: Metric, c: float) -> tuple[sp.csr_array, NDArray[np.float64]]:
+        """(e + n, e) by the logarithms of u, and (e + n,) by that of c."""
+        of_weights, of_areas = metric.derivatives()
+        k, given = self._unit(c), self._given(metric) / c
+        slope_given, slope = k * _slope(k * given), k * _slope(k * metric.weights)
+        cosines = sp.diags_array(slope_given / (12 * c)) @ (self.skeleton.at_edges @ of_areas)
+        cosines = cosines - sp.diags_array(slope) @ of_weights
+        sums = sp.diags_array(self.trust / (3 * self.sums)) @ (self.skeleton.at_vertices @ of_areas)
+        by_c = np.concatenate([-slope_given * given, np.zeros(len(self.sums))])
+        return sp.csr_array(sp.vstack([cosines, sums])), by_c
+
+    def _given(self, metric: Metric) -> NDArray[np.float64]:
+        """(e,) c w, as entries and areas have it."""
+        return np.asarray(self.skeleton.at_edges @ metric.areas / 12 - self.entries)
+
+    def _unit(self, c: float) -> NDArray[np.float64]:
+        """(e,) of weights: for 60 degrees they are then about 1; less where masses of the entry's size change more."""
+        of_mass = 3 * (self.sums / self.skeleton.degree)[self.skeleton.edges].mean(axis=1) / 12
+        return np.asarray(2 / self.skeleton.sides * abs(c) / (abs(c) + of_mass))
+
+    def start(self) -> tuple[Metric, float]:
+        """Circles about the vertices whose neighbours touch: they have triangles, and sizes from the row sums."""
+        radius = np.sqrt(self.sums / self.skeleton.degree * np.sqrt(3))  # of equilateral triangles
+        metric = Metric(self.skeleton, radius[self.skeleton.edges].sum(axis=1) ** 2)
+        ratio = self._given(metric) / metric.weights
+        return metric, float(np.sign(np.median(ratio)) * np.median(np.abs(ratio)))
+
+
+def fit_metric(
+    skeleton: Skeleton, entries: NDArray, sums: NDArray, trust: NDArray, options: MetricOptions | None = None
+) -> MetricFit | None:
+    """The metric and the factor c with which a mesh has these entries; None where the iteration breaks down.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        All edges at triangles.
+    entries : (e,) float64
+        A_ij.
+    sums : (n,) float64
+        A 1, all positive.
+    trust : (n,) float64
+        Weights of the row sums, relative to those of entries: less than 1 where they have lost digits.
+    options : MetricOptions, optional
+    """
+    options = options or MetricOptions()
+    equations = Equations(skeleton, entries, sums, trust)
+    with np.errstate(all="ignore"):  # of a misfit that is not finite nothing comes
+        metric, c = equations.start()
+        try:
+            return _descended(equations, metric, c, options) if c else None
+        except SolverError:
+            return None
+
+
+def _descended(equations: Equations, metric: Metric, c: float, options: MetricOptions) -> MetricFit:
+    residual = equations.residual(metric, c)
+    root = float(np.sqrt(len(residual)))
+    damping, step = options.damping, 0
+    for step in range(1, options.steps + 1):
+        before = float(np.linalg.norm(residual))
+        derivative, by_c = equations.derivative(metric, c)
+        moved = None
+        while moved is None and damping < 1e8:
+            change, change_c = _solved(derivative, by_c, residual, damping)
+            reach = min(1.0, options.nearly * metric.farthest(change * metric.u))
+            moved = _shortened(equations, metric, c, change * metric.u, change_c, reach, before)
+            damping = damping * 8 if moved is None else damping
+        if moved is None:
+            break
+        metric, c, residual = moved
+        # A step that went to its end calls for less damping; one that triangles stopped, for a little more.
+        damping = max(damping / 10, 1e-14) if reach == 1 else damping * 1.5
+        left = float(np.linalg.norm(residual))
+        _log.debug("metric step %d: residual %.1e, reach %.2g, c %.6g", step, left / root, reach, c)
+        settled = reach == 1 and left > 0.5 * before and left < 1e-9 * root
+        if left < options.tolerance * root or settled:
+            break
+    return MetricFit(metric, c, float(np.linalg.norm(residual)) / root, step)
+
+
+def _solved(derivative: sp.csr_array, by_c: NDArray, residual: NDArray, damping: float) -> tuple[NDArray, float]:
+    """Damped step of the logarithms of u (e,) and of c; c, which every equation may have, is eliminated."""
+    transposed = derivative.T.tocsr()
+    normal = sp.csr_array(transposed @ derivative)
+    normal = sp.csr_array(normal + sp.diags_array(damping * np.maximum(normal.diagonal(), 1e-8)))
+    matrix = UpperTriangle.of(normal)
+    factor = factorisation(matrix, definite=True)
+    try:
+        factor.factorise(matrix)
+        coupling = transposed @ by_c
+        by_residual, by_scale = factor.solve(np.column_stack([transposed @ residual, coupling])).T
+    finally:
+        factor.release()
+    rest = (1 + damping) * (by_c @ by_c) - coupling @ by_scale
+    log_c = -float((by_c @ residual - coupling @ by_residual) / rest)
+    return -by_residual - log_c * by_scale, log_c
+
+
+def _shortened(
+    equations: Equations, metric: Metric, c: float, change: NDArray, log_c: float, reach: float, before: float
+) -> tuple[Metric, float, NDArray] | None:
+    """The longest of a step and some shorter ones that lowers the residual."""
+    for _ in range(5):
+        trial = Metric(metric.skeleton, metric.u + reach * change)
+        factor = c * np.exp(np.clip(reach * log_c, -2, 2))
+        residual = equations.residual(trial, factor)
+        if np.linalg.norm(residual) < before:
+            return trial, factor, residual
+        reach *= 0.4
+    return None

@@ -1,0 +1,125 @@
+"""Triangles that know the squared lengths of their sides, and nothing of where they lie.
+
+For squared sides u_0, u_1, u_2 of a triangle of area a, and g_k half the cotangent of the angle that faces side k,
+
+    16 a^2 = (u_0 + u_1 + u_2)^2 - 2 (u_0^2 + u_1^2 + u_2^2),
+    g_k = (u_0 + u_1 + u_2 - 2 u_k) / 8 a,   da / du_k = g_k / 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..topology import Piece
+from ..topology.together import Together
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """Triangles glued along edges; no orientation or planarity is needed.
+
+    Attributes
+    ----------
+    n : int
+        Number of vertices.
+    edges : (e, 2) int64
+    triangles : (m, 3) int64
+        Vertices.
+    opposite : (m, 3) int64
+        The edge that faces each corner.
+    """
+
+    n: int
+    edges: NDArray[np.int64]
+    triangles: NDArray[np.int64]
+    opposite: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, n: int, edges: NDArray, pieces: Sequence[Piece]) -> Skeleton:
+        """Pieces of a graph, in its numbering."""
+        union = Together(pieces)
+        return cls(n, edges, union.vertices[union.triangles], union.edge_rows[union.opposite])
+
+    @cached_property
+    def sides(self) -> NDArray[np.int64]:
+        """(e,) number of triangles at each edge."""
+        return np.bincount(self.opposite.ravel(), minlength=len(self.edges))
+
+    @cached_property
+    def degree(self) -> NDArray[np.int64]:
+        """(n,) number of triangles at each vertex."""
+        return np.bincount(self.triangles.ravel(), minlength=self.n)
+
+    @cached_property
+    def at_edges(self) -> sp.csr_array:
+        """(e, m) sums over the triangles of each edge."""
+        return self._incidence(self.opposite, len(self.edges))
+
+    @cached_property
+    def at_vertices(self) -> sp.csr_array:
+        """(n, m) sums over the triangles of each vertex."""
+        return self._incidence(self.triangles, self.n)
+
+    def _incidence(self, of: NDArray, count: int) -> sp.csr_array:
+        m = len(of)
+        return sp.coo_array((np.ones(3 * m), (of.ravel(), np.repeat(np.arange(m), 3))), shape=(count, m)).tocsr()
+
+
+@dataclass(frozen=True, eq=False)
+class Metric:
+    """Squared lengths u (e,) of the edges of a skeleton.
+
+    Every triangle has an area: see :meth:`farthest`.
+    """
+
+    skeleton: Skeleton
+    u: NDArray[np.float64]
+
+    @cached_property
+    def areas(self) -> NDArray[np.float64]:
+        """(m,)."""
+        u = self.u[self.skeleton.opposite]
+        return np.asarray(np.sqrt(u.sum(axis=1) ** 2 - 2 * (u * u).sum(axis=1)) / 4)
+
+    @cached_property
+    def halves(self) -> NDArray[np.float64]:
+        """(m, 3) half the cotangent of each angle."""
+        u = self.u[self.skeleton.opposite]
+        return np.asarray((u.sum(axis=1, keepdims=True) - 2 * u) / (8 * self.areas[:, None]))
+
+    @cached_property
+    def weights(self) -> NDArray[np.float64]:
+        """(e,) those of the Laplacian, w."""
+        place, count = self.skeleton.opposite.ravel(), len(self.skeleton.edges)
+        return np.asarray(np.bincount(place, self.halves.ravel(), count), dtype=np.float64)
+
+    def derivatives(self) -> tuple[sp.csr_array, sp.csr_array]:
+        """(e, e) of the weights and (m, e) of the areas, by the logarithms of u."""
+        opposite, m, e = self.skeleton.opposite, len(self.areas), len(self.u)
+        u, g = self.u[opposite][:, None, :], self.halves
+        signs = np.ones((3, 3)) - 2 * np.eye(3)
+        change = u * (signs - 4 * g[:, :, None] * g[:, None, :]) / (8 * self.areas[:, None, None])
+        place = np.repeat(opposite, 3, axis=1).ravel(), np.tile(opposite, (1, 3)).ravel()
+        weights = sp.coo_array((change.ravel(), place), shape=(e, e)).tocsr()
+        place = np.repeat(np.arange(m), 3), opposite.ravel()
+        return weights, sp.coo_array(((u[:, 0] * g / 2).ravel(), place), shape=(m, e)).tocsr()
+
+    def farthest(self, change: NDArray) -> float:
+        """How far along u + t change (e,) all triangles keep an area, and all edges a length: the least positive root.
+
+        The square of each area is a quadratic in t.
+        """
+        u, d = self.u[self.skeleton.opposite], change[self.skeleton.opposite]
+        a = d.sum(axis=1) ** 2 - 2 * (d * d).sum(axis=1)
+        b = u.sum(axis=1) * d.sum(axis=1) - 2 * (u * d).sum(axis=1)
+        c = u.sum(axis=1) ** 2 - 2 * (u * u).sum(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            root = np.sqrt(b * b - a * c)  # not a number where the area never vanishes
+            ends = np.concatenate([c / (root - b), c / (-root - b), (-self.u / change)])
+        return float(ends[ends > 0].min(initial=np.inf))
