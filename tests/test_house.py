@@ -11,7 +11,7 @@ import unassemble
 
 ROOT = Path(unassemble.__file__).parent
 MOST_NUMBERS = 150
-MOST_LINES = 400
+MOST_LINES = 350
 WITHOUT = "paper"  # the paper of 2002 as it is, with its own numbers
 
 

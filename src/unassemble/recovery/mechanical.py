@@ -1,0 +1,105 @@
+"""Bodies and structures, whose matrices have several rows per node."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .base import Recovery, none_of, occurring, with_mid_nodes
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How uniquely the matrix determines a piece of a body or structure.
+
+    Attributes
+    ----------
+    null_dimension : int
+        Independent fields that satisfy all valid identities, nodes that stay loose left out. 4 in space, 3 in the
+        plane: translations and scale. One less where no field but translations is exact.
+    residual : float
+        Singular value of the coordinates: norm of the residual over the norm of the centred field.
+    gap : float
+        Singular value of the best field that is none of these; an upper bound on large bodies.
+    rows : int
+        Nodes with valid identities.
+    settled : bool
+        Whether the residual is that small beside the gap that no other field has a part in the coordinates.
+    """
+
+    null_dimension: int
+    residual: float
+    gap: float
+    rows: int
+    settled: bool = False
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Mechanical(Recovery):
+    """What bodies and structures share: positions that solve linear identities.
+
+    Attributes
+    ----------
+    evidence : tuple of Evidence
+        The null space of each piece's identities.
+    quads : (m, 4) int64
+        Cells of four corners, counter-clockwise in the plane.
+    """
+
+    evidence: tuple[Evidence, ...] = ()
+    quads: NDArray[np.int64] = field(default_factory=none_of(4))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Body(Mechanical):
+    """An elastic body in the plane or in space.
+
+    Attributes
+    ----------
+    tetrahedra, hexahedra : (m, 4), (m, 8) int64
+        Further cells, in meshio's order and positively oriented. Of quadratic cells, as in `triangles` and `quads`,
+        these are the corners.
+    mid_nodes : (m, k) int64
+        Quadratic cells: the nodes that each has besides its corners, in meshio's order; else empty.
+    poisson_ratio : float or None
+        Where it is one number; that of plane strain in the plane.
+    lame : (n_cells, 2) float64
+        Lambda and mu of each cell, as in `scale`.
+    """
+
+    tetrahedra: NDArray[np.int64] = field(default_factory=none_of(4))
+    hexahedra: NDArray[np.int64] = field(default_factory=none_of(8))
+    mid_nodes: NDArray[np.int64] = field(default_factory=none_of(0))
+    poisson_ratio: float | None = None
+    lame: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+
+    @property
+    def cells(self) -> dict[str, NDArray[np.int64]]:
+        """Cells of each kind that occurs, all their nodes, by meshio's names."""
+        corners = occurring(triangle=self.triangles, quad=self.quads, tetra=self.tetrahedra, hexahedron=self.hexahedra)
+        return with_mid_nodes(corners, self.mid_nodes)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Structure(Mechanical):
+    """A frame, shell, plate or truss.
+
+    Attributes
+    ----------
+    lines : (m, 2) int64
+        Members.
+    """
+
+    lines: NDArray[np.int64] = field(default_factory=none_of(2))
+
+    @property
+    def cells(self) -> dict[str, NDArray[np.int64]]:
+        """Members and shell cells, each kind that occurs, by meshio's names."""
+        return occurring(line=self.lines, triangle=self.triangles, quad=self.quads)
+
+    @property
+    def element(self) -> None:
+        """None: members and shell cells are read off the graph, and what they are is not looked for."""
+        return None
