@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain, islice
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .boundaries import recover_lattice, recover_partial
 from .clock import Clock
-from .conforming.recover import recover_conforming, shown_cells
-from .conforming.roles import Cells
 from .diagnosis import explained, judged
 from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
-from .further_terms import recover_with_terms
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
 from .operators import VectorReading, about_translations, asked_for, second_reading, vector_valued
@@ -26,9 +20,8 @@ from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, li
 from .outputs import ConformingMesh, PlanarMesh, Recovery, Surface
 from .progress import StageDisplay
 from .quiet import quiet_libraries
-from .scalar import recover_scalar
+from .readings import ScalarReadings
 from .scalar.placement import Placement
-from .tolerances import LITTLE
 
 
 def recover(
@@ -196,16 +189,12 @@ class _Task:
             except RecoveryError as error:
                 raise explained(error, self.matrix) from error
         # Nodes of several unknowns overlap in more rows than the nodes of scalar elements do.
-        shows_elements = _crowded(self.matrix) and self._shown[0]
-        at_sight = None if shows_elements else vector_valued(self.matrix)
+        at_sight = None if self._readings.shows_elements else vector_valued(self.matrix)
         return self._first_that_fits() if at_sight is None else self._as_vector(at_sight)
 
     @cached_property
-    def _shown(self) -> tuple[list[Cells], Iterator[Cells]]:
-        """Cells of scalar elements that the matrix may have: the likeliest, if there are any, and the rest."""
-        shown = shown_cells(self.matrix)
-        with self.clock("cells"):
-            return list(islice(shown, 1)), shown
+    def _readings(self) -> ScalarReadings:
+        return ScalarReadings(self.matrix, self.clock, self.planar)
 
     def _first_that_fits(self) -> Recovery:
         """A planar mesh; or a surface in space; or nodes of several unknowns where rows belong to no mesh.
@@ -237,58 +226,9 @@ class _Task:
         frame = self.frame
         self._check_scale(part)
         placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
-        if self.planar.method != "conformal":
-            return recover_scalar(part, placement, self.clock, self.planar)
-        return self._likeliest(part, placement)
-
-    def _likeliest(self, part: OperatorMatrix, placement: Placement) -> PlanarMesh:
-        """The first reading that fits: linear triangles of a whole mesh, other elements, or what is left of a mesh.
-
-        Each comes before linear triangles where the matrix shows it at first sight, and after them where it does not.
-        """
-        whole = None if part.replaced is None else np.asarray(~part.replaced[part.edges].all(axis=1))
-        shown = part.replaced is not None or part.incomplete_rows.any()
-
-        def lattice() -> PlanarMesh | None:
-            return recover_lattice(part, placement, self.clock, self.planar)
-
-        def others() -> PlanarMesh | None:
-            return self._of_other_elements(part, placement)
-
-        def partial() -> PlanarMesh | None:
-            return recover_partial(part, whole, placement, self.clock, self.planar)
-
-        def plain(matrix: OperatorMatrix, squared_lengths: NDArray | None = None) -> PlanarMesh:
-            return recover_scalar(matrix, placement, self.clock, self.planar, squared_lengths)
-
-        def linear() -> PlanarMesh:
-            return recover_with_terms(part, plain, self.clock, self.frame.tensor)
-
-        order = sorted(
-            [(0, lattice), (2, linear), (1 if _crowded(part) else 3, others), (1 if shown else 3, partial)],
-            key=lambda one: one[0],
-        )
-        nearest: PlanarMesh | None = None
-        failure: RecoveryError | None = None
-        for _, reading in order:
-            try:
-                found = reading()
-            except RecoveryError as error:
-                failure = error if reading is linear else failure or error
-                continue
-            if found is not None and found.status != "uncertified":
-                return found
-            nearest = nearest or found
-        if nearest is None:
-            raise failure or GeometryError("the matrix belongs to no mesh")
-        return nearest
-
-    def _of_other_elements(self, part: OperatorMatrix, placement: Placement) -> PlanarMesh | None:
-        """A mesh of other elements than linear triangles; None where none is near."""
-        known = part is self.matrix and _crowded(part)
-        cells = chain(*self._shown) if known else shown_cells(part)
-        found = recover_conforming(part, cells, placement, self.clock, self.planar)
-        return found if found.certified or found.backward_error < LITTLE else None
+        whole = part is self.matrix
+        readings = self._readings if whole else ScalarReadings(part, self.clock, self.planar)
+        return readings.likeliest(placement)
 
     def _as_surface(self) -> Surface:
         """A surface in space, with coordinates on demand; a flat one with those of the planar mesh that it is."""
@@ -347,11 +287,6 @@ class _Task:
                 f"`{self.given[0]}` is for scalar matrices, and this one is read as vector-valued: leave it out, or "
                 "choose `operator='laplacian'`"
             )
-
-
-def _crowded(matrix: OperatorMatrix) -> bool:
-    """Whether a graph has more edges than a planar one can have."""
-    return len(matrix.edges) > 3 * matrix.n
 
 
 def _check_proportion(scale: float, largest: float) -> None:

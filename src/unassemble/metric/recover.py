@@ -8,7 +8,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certify import MetricCertificate, certify_metric
+from ..certify_metric import MetricCertificate, certify_metric
 from ..clock import Clock
 from ..errors import GeometryError, TopologyError
 from ..matrix import OperatorMatrix

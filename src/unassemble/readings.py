@@ -1,0 +1,113 @@
+"""What a scalar matrix may be that of, from the likeliest on: the first that fits is the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain, islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .boundaries import recover_lattice, recover_partial
+from .clock import Clock
+from .conforming.recover import recover_conforming, shown_cells
+from .conforming.roles import Cells
+from .errors import GeometryError, RecoveryError
+from .further_terms import recover_with_terms
+from .matrix import OperatorMatrix
+from .options import ScalarOptions
+from .recovery import PlanarMesh
+from .scalar import recover_scalar
+from .scalar.placement import Placement
+from .tolerances import LITTLE
+
+
+@dataclass(frozen=True, eq=False)
+class ScalarReadings:
+    """Readings of a scalar matrix as one of a mesh in the plane.
+
+    Each comes before that of linear triangles where the matrix shows it at first sight, and after it where it does not.
+    """
+
+    matrix: OperatorMatrix
+    clock: Clock
+    options: ScalarOptions
+
+    @property
+    def shows_elements(self) -> bool:
+        """Whether rows overlap as those of elements other than linear triangles do."""
+        return self._crowded and bool(self._cells[0])
+
+    def likeliest(self, placement: Placement) -> PlanarMesh:
+        """The mesh of the first reading that fits, or else of the first that comes near.
+
+        Raises
+        ------
+        RecoveryError
+            If there is none.
+        """
+        if self.options.method != "conformal":
+            return self._plain(placement, self.matrix)
+        matrix = self.matrix
+        cut = matrix.replaced is not None or matrix.incomplete_rows.any()
+        order = [
+            (0, self._lattice),
+            (1 if self._crowded else 3, self._other_elements),
+            (1 if cut else 3, self._partial),
+            (2, self._linear),
+        ]
+        nearest: PlanarMesh | None = None
+        failure: RecoveryError | None = None
+        for _, reading in sorted(order, key=lambda one: one[0]):
+            try:
+                found = reading(placement)
+            except RecoveryError as error:
+                failure = error if reading == self._linear else failure or error
+                continue
+            if found is not None and found.status != "uncertified":
+                return found
+            nearest = nearest or found
+        if nearest is None:
+            raise failure or GeometryError("the matrix belongs to no mesh")
+        return nearest
+
+    @property
+    def _crowded(self) -> bool:
+        """Whether the graph has more edges than a planar one can have."""
+        return len(self.matrix.edges) > 3 * self.matrix.n
+
+    @cached_property
+    def _cells(self) -> tuple[list[Cells], Iterator[Cells]]:
+        """Cells of elements that the matrix may have: the likeliest, if there are any, and the rest."""
+        shown = shown_cells(self.matrix)
+        with self.clock("cells"):
+            return list(islice(shown, 1)), shown
+
+    def _lattice(self, placement: Placement) -> PlanarMesh | None:
+        return recover_lattice(self.matrix, placement, self.clock, self.options)
+
+    def _partial(self, placement: Placement) -> PlanarMesh | None:
+        replaced = self.matrix.replaced
+        whole = None if replaced is None else np.asarray(~replaced[self.matrix.edges].all(axis=1))
+        return recover_partial(self.matrix, whole, placement, self.clock, self.options)
+
+    def _other_elements(self, placement: Placement) -> PlanarMesh | None:
+        """None where none is near."""
+        found = recover_conforming(self.matrix, chain(*self._cells), placement, self.clock, self.options)
+        return found if found.certified or found.backward_error < LITTLE else None
+
+    def _linear(self, placement: Placement) -> PlanarMesh:
+        def plain(matrix: OperatorMatrix, squared_lengths: NDArray | None = None) -> PlanarMesh:
+            return self._plain(placement, matrix, squared_lengths)
+
+        tensor = placement.tensor
+        return recover_with_terms(
+            self.matrix, plain, self.clock, (tensor.kxx, tensor.kxy, tensor.kyy) if tensor else None
+        )
+
+    def _plain(
+        self, placement: Placement, matrix: OperatorMatrix, squared_lengths: NDArray | None = None
+    ) -> PlanarMesh:
+        return recover_scalar(matrix, placement, self.clock, self.options, squared_lengths)
