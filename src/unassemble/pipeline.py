@@ -211,21 +211,30 @@ class _Task:
 
     def _with_boundary_conditions(self, part: OperatorMatrix, placement: Placement) -> PlanarMesh:
         """The whole mesh; or what is determined where unknowns were taken out, or boundary edges have other terms."""
-        shown = part.replaced is not None or part.incomplete_rows.any()
         whole = None if part.replaced is None else np.asarray(~part.replaced[part.edges].all(axis=1))
-        found = recover_partial(part, whole, placement, self.clock, self.planar) if shown else None
-        if found is not None:
+
+        def partly() -> PlanarMesh | None:
+            return recover_partial(part, whole, placement, self.clock, self.planar)
+
+        if whole is not None:
+            found = partly()
+            if found is None:
+                raise GeometryError(
+                    "the entries that boundary conditions left determine no mesh; assemble the matrix without them"
+                )
+            return found
+        lost, last = part.incomplete_rows.any(), part.adds_up.all()  # nothing was taken out of rows that add up
+        if lost and (found := partly()) is not None:
             return found
         try:
             linear = recover_scalar(part, placement, self.clock, self.planar)
         except RecoveryError:
-            found = None if shown else recover_partial(part, whole, placement, self.clock, self.planar)
-            if found is None:
+            if lost or last or (found := partly()) is None:
                 raise
             return found
-        if linear.status != "uncertified" or shown:
+        if lost or last or linear.status != "uncertified":
             return linear
-        return recover_partial(part, whole, placement, self.clock, self.planar) or linear
+        return partly() or linear
 
     def _as_vector(self, reading: VectorReading) -> Recovery:
         from .vector import recover_vector

@@ -64,8 +64,10 @@ class InsideMesh:
     ----------
     z : (n,) complex128
     scale : float
+    given : (e,) bool
+        Entries that were said to be whole.
     entries : (e,) bool
-        Whole ones that determine and check vertices.
+        Those that determine and check vertices.
     exact : bool
         Whether all that were fitted fit.
     determined : (n,) bool
@@ -75,6 +77,7 @@ class InsideMesh:
 
     z: NDArray[np.complex128]
     scale: float
+    given: NDArray[np.bool_]
     entries: NDArray[np.bool_]
     exact: bool
     determined: NDArray[np.bool_]
@@ -147,7 +150,7 @@ def fit_inside(
     known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(whole)
     if exact:
         known, entries = determined(piece, fit.z, whole, known_scale=scale is not None)
-    return InsideMesh(fit.z, fit.scale * unit, entries, exact, known, work)
+    return InsideMesh(fit.z, fit.scale * unit, given, entries, exact, known, work)
 
 
 def _shrunk(

@@ -60,7 +60,7 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
     pairs = triangles(csr)
     if not len(pairs.edges):
         raise MatrixError("the matrix is diagonal: it has no off-diagonal entry, and so no mesh edge")
-    pairs, replaced, kept = from_columns(csr.shape[0], pairs)
+    pairs, replaced, kept = from_columns(csr.diagonal(), pairs)
     entries, asymmetry, warnings = symmetric_entries(csr, pairs, noise)
     warnings += kept
     if not entries.any():
