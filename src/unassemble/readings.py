@@ -50,14 +50,12 @@ class ScalarReadings:
         """
         if self.options.method != "conformal":
             return self._plain(placement, self.matrix)
-        matrix = self.matrix
-        cut = matrix.replaced is not None or matrix.incomplete_rows.any()
-        order = [
-            (0, self._lattice),
-            (1 if self._crowded else 3, self._other_elements),
-            (1 if cut else 3, self._partial),
-            (2, self._linear),
-        ]
+        order = [(0, self._lattice)]
+        replaced, incomplete = self.matrix.replaced is not None, self.matrix.incomplete_rows.any()
+        if replaced or not self.matrix.adds_up.all():  # else nothing was taken out
+            order.append((1 if replaced or incomplete else 3, self._partial))
+        if not replaced:
+            order += [(1 if self._crowded else 3, self._other_elements), (2, self._linear)]
         nearest: PlanarMesh | None = None
         failure: RecoveryError | None = None
         for _, reading in sorted(order, key=lambda one: one[0]):
@@ -70,7 +68,9 @@ class ScalarReadings:
                 return found
             nearest = nearest or found
         if nearest is None:
-            raise failure or GeometryError("the matrix belongs to no mesh")
+            raise failure or GeometryError(
+                "the entries that boundary conditions left determine no mesh: assemble the matrix without them"
+            )
         return nearest
 
     @property

@@ -31,8 +31,6 @@ from .shape import ShapePrior
 
 _log = logging.getLogger(__name__)
 
-_GUESS, _MOST_GUESS = 10.0, 0.3  # weight of a guessed entry, in units of the prior's, and beside whole entries
-
 
 @dataclass(frozen=True)
 class FitOptions:
@@ -52,6 +50,8 @@ class FitOptions:
         To begin with, in units of the diagonal of the normal matrix.
     trials : int
         Of a step, each with ten times the damping.
+    guess, most_guess : float
+        Weight of a guessed entry: in units of the prior's, and at most, beside 1 of whole entries.
     """
 
     steps: int = 12
@@ -60,6 +60,8 @@ class FitOptions:
     exact: float = 1e-13
     damping: float = 1e-6
     trials: int = 12
+    guess: float = 10.0
+    most_guess: float = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +175,7 @@ class WholeEntries:
         return replace(found, factorisations=work)
 
     def _trust(self, whole: NDArray, mu: float) -> NDArray[np.float64]:
-        return np.where(whole, 1.0, min(_GUESS * mu, _MOST_GUESS) * self.guessed)
+        return np.where(whole, 1.0, min(FitOptions.guess * mu, FitOptions.most_guess) * self.guessed)
 
     def _residuals(
         self, z: NDArray, scale: float, whole: NDArray, prior: ShapePrior, mu: float

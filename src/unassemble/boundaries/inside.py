@@ -20,12 +20,6 @@ from .rim import Rim
 
 _log = logging.getLogger(__name__)
 
-_UNKNOWN = 0.5  # guess of the weight of a boundary edge, in units of typical ones of whole edges
-
-# Weights of the prior, one after the other: from the start, with fewer vertices, with more again.
-_FADING, _AGAIN, _GROWN = (0.01, 1e-3, 0.0), (0.03, 1e-3, 0.0), (1e-3, 0.0)
-_SLOWLY = (0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
-
 
 @dataclass(frozen=True)
 class InsideOptions:
@@ -33,6 +27,11 @@ class InsideOptions:
 
     Attributes
     ----------
+    fading, slowly, again, regrowing : tuple of float
+        Weights of the prior, one after the other: from the start, from the start once more, with fewer vertices at the
+        rim, with more of them.
+    unknown : float
+        Guess of the weight of an edge that has no guess, in units of typical ones.
     outlines : int
         Boundary loops, the longest ones, that are tried as the outer one.
     steepest : float
@@ -45,6 +44,11 @@ class InsideOptions:
         Root mean square misfit of whole entries that is none, in units of typical ones.
     """
 
+    fading: tuple[float, ...] = (0.1, 0.01, 1e-3, 0.0)
+    slowly: tuple[float, ...] = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
+    again: tuple[float, ...] = (0.03, 1e-3, 0.0)
+    regrowing: tuple[float, ...] = (1e-3, 0.0)
+    unknown: float = 0.5
     outlines: int = 4
     steepest: float = 3.0
     rounds: int = 15
@@ -60,8 +64,10 @@ class InsideMesh:
     ----------
     z : (n,) complex128
     scale : float
+    given : (e,) bool
+        Entries that were said to be whole.
     entries : (e,) bool
-        Whole ones that determine and check vertices.
+        Those that determine and check vertices.
     exact : bool
         Whether all that were fitted fit.
     determined : (n,) bool
@@ -71,6 +77,7 @@ class InsideMesh:
 
     z: NDArray[np.complex128]
     scale: float
+    given: NDArray[np.bool_]
     entries: NDArray[np.bool_]
     exact: bool
     determined: NDArray[np.bool_]
@@ -112,11 +119,11 @@ def fit_inside(
     likely = (halved > 0) & (halved < options.steepest)  # others have terms of another kind
     problem = WholeEntries(piece, halved, given | (shared & likely), None if scale is None else scale / unit)
     try:
-        for weight, fading, conformal in ((0.1, _FADING, True), (0.3, _SLOWLY, False)):
-            first = _start(problem, start, weight, options, conformal=conformal)
+        for fading, conformal in ((options.fading, True), (options.slowly, False)):
+            first = _start(problem, start, fading[0], options, conformal=conformal)
             if first is None:
                 continue
-            core, rim, done = _shrunk(problem, start, first, fading, options)
+            core, rim, done = _shrunk(problem, start, first, fading[1:], options)
             work += done
             if core.misfit <= options.exact:
                 break
@@ -128,7 +135,7 @@ def fit_inside(
         if exact:
             grown = Rim(piece, given, np.ones(len(piece.triangles), dtype=bool))
             for _ in range(options.grown):
-                tried = problem.faded(core.z, core.scale, grown.whole, _GROWN)
+                tried = problem.faded(core.z, core.scale, grown.whole, options.regrowing)
                 work += tried.factorisations
                 _log.debug("grown to %d whole entries: misfit %.1e", grown.whole.sum(), tried.misfit)
                 if tried.misfit <= options.exact:
@@ -143,7 +150,7 @@ def fit_inside(
     known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(whole)
     if exact:
         known, entries = determined(piece, fit.z, whole, known_scale=scale is not None)
-    return InsideMesh(fit.z, fit.scale * unit, entries, exact, known, work)
+    return InsideMesh(fit.z, fit.scale * unit, given, entries, exact, known, work)
 
 
 def _shrunk(
@@ -152,7 +159,7 @@ def _shrunk(
     """Fits with fewer vertices at the rim each, until one has all whole entries."""
     work = fit.factorisations
     for turn in range(options.rounds):
-        fit = problem.faded(fit.z, fit.scale, rim.whole, _AGAIN if turn else fading)
+        fit = problem.faded(fit.z, fit.scale, rim.whole, options.again if turn else fading)
         work += fit.factorisations
         _log.debug("%d whole entries: misfit %.1e after %d factorisations", rim.whole.sum(), fit.misfit, work)
         peeled = None if fit.misfit <= options.exact else rim.peeled(np.abs(problem.misfits(fit.z, fit.scale)))
@@ -188,7 +195,7 @@ def _start(problem: WholeEntries, rim: Rim, weight: float, options: InsideOption
 def _conformal(problem: WholeEntries) -> NDArray[np.complex128]:
     """The conformal map of entries that are whole or guessed, its triangles of mean area 1/2; 0 where there is none."""
     piece = problem.piece
-    weights = np.where(problem.guessed, problem.weights, _UNKNOWN)
+    weights = np.where(problem.guessed, problem.weights, InsideOptions.unknown)
     try:
         z = conformal_map(piece, weights, scale=problem.known_scale, sharp=False).z
     except (GeometryError, SolverError):

@@ -25,12 +25,32 @@ from ..planar.cotangent import edge_weights, weight_gradient
 from ..topology import Piece
 from .fit import jacobian_rows
 
-_SHIFT = 1e-14  # of the normal matrix, relative to its typical diagonal entry
-_SOFT = 1e-12  # eigenvalue, relative likewise, below which a displacement counts as free: entries know it to 1e-10
-_MOVES = 1e-9  # of the length of edges: what a null vector of length 1 may move a vertex that is determined
-_UNCHECKED = 1e-6  # what is left of a standard normal number at an entry that nothing checks
-_SOLVES, _PROBES = 4, 8
-_MOST = 256  # null vectors
+
+@dataclass(frozen=True)
+class JudgeOptions:
+    """What counts as known; squares of singular values are relative to the typical diagonal entry of J'J.
+
+    Attributes
+    ----------
+    shift : float
+        Of J'J, to make it definite.
+    soft : float
+        Eigenvalue below which a displacement counts as free: entries know it to 1e-10 of the length of edges.
+    moves : float
+        Part of the length of edges by which a null vector of length 1 may move a vertex that is determined.
+    unchecked : float
+        What is left of a standard normal number at an entry that nothing checks.
+    solves, probes, most : int
+        Inverse iterations, random vectors, and null vectors at most.
+    """
+
+    shift: float = 1e-14
+    soft: float = 1e-12
+    moves: float = 1e-9
+    unchecked: float = 1e-6
+    solves: int = 4
+    probes: int = 8
+    most: int = 256
 
 
 def determined(
@@ -107,7 +127,7 @@ class _Linearised:
         product = UpperTriangle.of(self.jacobian.T.tobsr() @ self.jacobian)
         data, start = product.data.copy(), product.indptr[:-1]
         typical = float(np.median(np.diagonal(data[start][self.held], axis1=1, axis2=2)))
-        data[start] += np.where(self.held, _SHIFT, 1.0)[:, None, None] * typical * np.eye(2)
+        data[start] += np.where(self.held, JudgeOptions.shift, 1.0)[:, None, None] * typical * np.eye(2)
         matrix = product.with_data(data)
         solver = factorisation(matrix, definite=True)
         try:
@@ -133,11 +153,11 @@ class _Linearised:
         """(e,) entries that others say something about."""
 
         def use(inverse: Callable[[NDArray], NDArray], typical: float) -> NDArray:
-            y = np.random.default_rng(1).standard_normal((len(self.slope), _PROBES)) * self.entries[:, None]
+            y = np.random.default_rng(1).standard_normal((len(self.slope), JudgeOptions.probes)) * self.entries[:, None]
             for _ in range(3):  # what the shift leaves, and rounding
                 y = self._without_slope(y)
                 y = y - self._without_slope(self.jacobian @ inverse(self.jacobian.T @ y))
-            return np.asarray(np.abs(y).max(axis=1) > _UNCHECKED)
+            return np.asarray(np.abs(y).max(axis=1) > JudgeOptions.unchecked)
 
         found = self._with_inverse(use)
         assert found is not None
@@ -149,13 +169,13 @@ class _Linearised:
         def use(inverse: Callable[[NDArray], NDArray], typical: float) -> NDArray | None:
             rng, block, count = np.random.default_rng(0), np.empty((2 * len(self.held), 0)), 16
             own = np.repeat(self.held, 2)
-            while count <= min(_MOST, int(own.sum())):
+            while count <= min(JudgeOptions.most, int(own.sum())):
                 more = rng.standard_normal((len(own), count - block.shape[1])) * own[:, None]
                 block = np.linalg.qr(np.hstack([block, more]))[0]
-                for _ in range(_SOLVES):
+                for _ in range(JudgeOptions.solves):
                     block = np.linalg.qr(inverse(block))[0]
                 _, values, turn = np.linalg.svd(self._without_slope(self.jacobian @ block), full_matrices=False)
-                null = values**2 <= _SOFT * typical
+                null = values**2 <= JudgeOptions.soft * typical
                 if not null.all():
                     return np.ascontiguousarray((block @ turn[null].T).T).view(np.complex128).T
                 count *= 2
@@ -178,7 +198,7 @@ def _moving_alike(piece: Piece, z: NDArray, free: NDArray, size: NDArray, held: 
     while True:
         fit = np.linalg.lstsq(basis[alike], free[alike], rcond=None)[0]
         moves = np.abs(free - basis @ fit).max(axis=1, initial=0.0)
-        now = held & (moves <= _MOVES * size)
+        now = held & (moves <= JudgeOptions.moves * size)
         if now.sum() <= alike.sum():
             return now & alike if (alike & ~now).any() else now
         alike = now

@@ -73,7 +73,8 @@ def recover_partial(
             )
             for piece, own in zip(topology.pieces, given, strict=True)
         ]
-    if not any(mesh is not None and mesh.determined.any() for mesh in meshes):
+    found = [mesh for mesh in meshes if mesh is not None]
+    if not all(mesh.exact for mesh in found) or not any(mesh.determined.any() for mesh in found):
         return None
     with clock("place"):
         placed = _Placed.of(topology, meshes, placement, stretch)
@@ -151,11 +152,14 @@ class _Judged:
         Their number.
     spare : int
         What is left of it, in the piece where least is, beyond unknowns.
+    nothing_gone : bool
+        Whether the matrix has the diagonal of the mesh: then entries that do not fit are wrong ones.
     """
 
     backward_error: float
     entries: int
     spare: int
+    nothing_gone: bool
 
     @classmethod
     def of(cls, matrix: OperatorMatrix, placed: _Placed, placement: Placement, *, known_scale: bool) -> _Judged:
@@ -167,20 +171,26 @@ class _Judged:
         rows, spare = [], []
         for piece, inside in zip(placed.topology.pieces, placed.meshes, strict=True):
             if inside.determined.any():
-                rows.append(piece.edge_rows[inside.entries])
+                among = inside.given & inside.determined[piece.stencil].all(axis=0)  # fitted or not
+                rows.append(piece.edge_rows[among])
                 unknowns = 2 * max(int(inside.determined.sum()), 2) - (4 if known_scale else 3)  # one has no entry
                 spare.append(int(inside.entries.sum()) - unknowns)
         pairs = matrix.edges[np.concatenate(rows)]
         key = found.pairs @ [matrix.n, 1]
         misfit = found.misfits[np.searchsorted(key, pairs @ [matrix.n, 1])]
         flipped = (placed.status[mesh.triangles[found.flipped]] == 0).all(axis=1).any()
-        return cls(np.inf if flipped else float(misfit.max(initial=0.0)), len(pairs), min(spare))
+        sums = matrix.diagonal.copy()
+        for ends, values in ((matrix.edges, matrix.entries), (found.pairs, found.differences)):
+            for end in ends.T:
+                sums += np.bincount(end, values, matrix.n)
+        gone = (np.abs(sums) > CERTIFIED * matrix.row_size) | (placed.status > 0)
+        return cls(np.inf if flipped else float(misfit.max(initial=0.0)), len(pairs), min(spare), not gone.any())
 
 
 def _report(
     matrix: OperatorMatrix, placed: _Placed, judged: _Judged, placement: Placement, clock: Clock
 ) -> PlanarMesh | None:
-    if not (judged.backward_error <= CERTIFIED and judged.spare > 0):
+    if not (judged.backward_error <= CERTIFIED and judged.spare > 0) or judged.nothing_gone:
         return None
     known, mesh, topology = int((placed.status == 0).sum()), placed.mesh, placed.topology
     notes = [*matrix.warnings, *placed.notes]

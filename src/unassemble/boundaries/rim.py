@@ -18,8 +18,25 @@ from scipy.sparse import csgraph
 
 from ..topology import Piece
 
-_ROW = 4  # vertices of the rim that are taken off together
-_PEAKS, _APART, _REACH = 0.25, 4, 6  # of the largest misfit; distances in edges
+
+@dataclass(frozen=True)
+class RimOptions:
+    """What is taken off.
+
+    Attributes
+    ----------
+    row : int
+        Vertices of the rim in a row that are looked at together.
+    peaks : float
+        Part of the largest misfit above which there are other places to peel.
+    apart, reach : int
+        Distances in edges: of such places from each other, and of vertices of the rim from them.
+    """
+
+    row: int = 4
+    peaks: float = 0.25
+    apart: int = 4
+    reach: int = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,15 +119,17 @@ class Rim:
         opened[edges[self._open]] = True
         graph = sp.coo_array((np.ones(len(edges), np.int8), edges.T), shape=(n, n)).tocsr()
         rest = np.where(self.whole, misfit, 0.0)
-        least, gone = _PEAKS * rest.max(), np.zeros(n, dtype=bool)
+        least, gone = RimOptions.peaks * rest.max(), np.zeros(n, dtype=bool)
         for _ in range(max(3, n // 300)):
             if rest.max() < least or not rest.max():
                 break
             ends = edges[rest.argmax()]
-            far = csgraph.dijkstra(graph, directed=False, unweighted=True, indices=ends, limit=_REACH, min_only=True)
-            rest[(far[edges] <= _APART).any(axis=1)] = 0
+            far = csgraph.dijkstra(
+                graph, directed=False, unweighted=True, indices=ends, limit=RimOptions.reach, min_only=True
+            )
+            rest[(far[edges] <= RimOptions.apart).any(axis=1)] = 0
             near = far[opened]
-            if near.min(initial=np.inf) <= _REACH:
+            if near.min(initial=np.inf) <= RimOptions.reach:
                 gone |= opened & (far <= near.min())
         stay = False if keep is None else keep
         left = self.left & (~gone[self.piece.triangles].any(axis=1) | stay)
@@ -125,6 +144,6 @@ def _rows(v: int, along: dict[int, list[int]]) -> Iterator[list[int]]:
         while True:
             yield row
             onward = [w for w in along[row[-1]] if w not in row]
-            if len(row) == _ROW or len(onward) != 1:
+            if len(row) == RimOptions.row or len(onward) != 1:
                 break
             row = [*row, onward[0]]

@@ -53,18 +53,23 @@ class OperatorMatrix:
         return row_sizes(self.n, self.edges, np.abs(self.entries))
 
     @property
+    def adds_up(self) -> NDArray[np.bool_]:
+        """(n,) rows that add up to zero, as those of a Laplacian do."""
+        size, sums = np.abs(self.diagonal), self.diagonal.copy()
+        for end in self.edges.T:
+            sums += np.bincount(end, self.entries, self.n)
+            size += np.bincount(end, np.abs(self.entries), self.n)
+        return np.asarray(np.abs(sums) <= SUMMED * size)
+
+    @property
     def incomplete_rows(self) -> NDArray[np.bool_]:
         """(n,) rows that do not add up to zero, if any others do; none otherwise.
 
         A mass matrix that was added leaves none. How many there are is no matter: of small grids most rows are next to
         the boundary.
         """
-        size, sums = np.abs(self.diagonal), self.diagonal.copy()
-        for end in self.edges.T:
-            sums += np.bincount(end, self.entries, self.n)
-            size += np.bincount(end, np.abs(self.entries), self.n)
-        incomplete = np.abs(sums) > SUMMED * size
-        return np.asarray(incomplete & ~incomplete.all())
+        complete = self.adds_up
+        return np.asarray(~complete & complete.any())
 
     def without(self, gone: NDArray[np.bool_]) -> OperatorMatrix:
         """The same with some entries, (e,) bool, not stored."""
