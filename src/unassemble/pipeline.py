@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain, islice
 from typing import Any
 
 import numpy as np
 
 from .clock import Clock
 from .conforming.recover import recover_conforming, shown_cells
-from .conforming.roles import Cells
 from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
@@ -176,17 +175,19 @@ class _Task:
             return self._as_vector(reading)
         if self.about.operator == "laplacian":
             return self._as_scalar(self.matrix, self.frame.anchors)
-        # Nodes of several unknowns overlap in more rows than the nodes of scalar elements do.
-        shows_elements = _crowded(self.matrix) and self._shown[0]
-        at_sight = None if shows_elements else vector_valued(self.matrix)
+        if _crowded(self.matrix):
+            # Unknowns of one node overlap in more rows than nodes of scalar elements do: this takes no time from them.
+            with suppress(InputError, RecoveryError):  # options may be for vector-valued matrices only
+                found = self._as_other_elements
+                if found is not None and found.certified:
+                    return found
+        at_sight = vector_valued(self.matrix)
         return self._first_that_fits() if at_sight is None else self._as_vector(at_sight)
 
     @cached_property
-    def _shown(self) -> tuple[list[Cells], Iterator[Cells]]:
-        """Cells of scalar elements that the matrix may have: the likeliest, if there are any, and the rest."""
-        shown = shown_cells(self.matrix)
-        with self.clock("cells"):
-            return list(islice(shown, 1)), shown
+    def _as_other_elements(self) -> PlanarMesh | None:
+        """The whole matrix as that of scalar elements other than linear triangles."""
+        return self._of_other_elements(self.matrix, self._placement(self.matrix, self.frame.anchors))
 
     def _first_that_fits(self) -> Recovery:
         """A planar mesh; or nodes of several unknowns where rows belong to no mesh.
@@ -215,15 +216,19 @@ class _Task:
         except (RecoveryError, InputError):  # options may be for scalar matrices only
             return None
 
-    def _as_scalar(self, part: OperatorMatrix, anchors: Sequence[Any]) -> PlanarMesh:
+    def _placement(self, part: OperatorMatrix, anchors: Sequence[Any]) -> Placement:
         frame, scale = self.frame, self.planar.scale
         if scale is not None:
             _check_proportion(scale, float(np.abs(part.entries).max()))
-        placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
+        return Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
+
+    def _as_scalar(self, part: OperatorMatrix, anchors: Sequence[Any]) -> PlanarMesh:
+        placement = self._placement(part, anchors)
         if self.planar.method != "conformal":
             return recover_scalar(part, placement, self.clock, self.planar)
         if _crowded(part):
-            return self._of_other_elements(part, placement) or recover_scalar(part, placement, self.clock, self.planar)
+            found = self._as_other_elements if part is self.matrix else self._of_other_elements(part, placement)
+            return found or recover_scalar(part, placement, self.clock, self.planar)
         try:
             linear = recover_scalar(part, placement, self.clock, self.planar)
         except RecoveryError:
@@ -238,10 +243,8 @@ class _Task:
 
     def _of_other_elements(self, part: OperatorMatrix, placement: Placement) -> PlanarMesh | None:
         """A mesh of other elements than linear triangles; None where none is near."""
-        known = part is self.matrix and _crowded(part)
-        cells = chain(*self._shown) if known else shown_cells(part)
         try:
-            found = recover_conforming(part, cells, placement, self.clock, self.planar)
+            found = recover_conforming(part, shown_cells(part), placement, self.clock, self.planar)
         except RecoveryError:
             return None
         return found if found.certified or found.backward_error < _NEAR else None
