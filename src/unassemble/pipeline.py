@@ -188,8 +188,13 @@ class _Task:
                 return judged(self._as_scalar(self.matrix, self.frame.anchors), self.matrix)
             except RecoveryError as error:
                 raise explained(error, self.matrix) from error
-        # Nodes of several unknowns overlap in more rows than the nodes of scalar elements do.
-        at_sight = None if self._readings.shows_elements else vector_valued(self.matrix)
+        if self._readings.crowded:
+            # Unknowns of one node overlap in more rows than nodes of scalar elements do: this takes no time from them.
+            with suppress(InputError, RecoveryError):  # options may be for vector-valued matrices only
+                found = self._readings.other_elements(self._placement(self.matrix, self.frame.anchors))
+                if found is not None and found.certified:
+                    return found
+        at_sight = vector_valued(self.matrix)
         return self._first_that_fits() if at_sight is None else self._as_vector(at_sight)
 
     @cached_property
@@ -222,10 +227,13 @@ class _Task:
         except (RecoveryError, InputError):  # options may be for scalar matrices only
             return None
 
-    def _as_scalar(self, part: OperatorMatrix, anchors: Sequence[Any]) -> PlanarMesh:
+    def _placement(self, part: OperatorMatrix, anchors: Sequence[Any]) -> Placement:
         frame = self.frame
         self._check_scale(part)
-        placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
+        return Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
+
+    def _as_scalar(self, part: OperatorMatrix, anchors: Sequence[Any]) -> PlanarMesh:
+        placement = self._placement(part, anchors)
         whole = part is self.matrix
         readings = self._readings if whole else ScalarReadings(part, self.clock, self.planar)
         return readings.likeliest(placement)

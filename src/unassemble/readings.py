@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
-from itertools import chain, islice
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +10,6 @@ from numpy.typing import NDArray
 from .boundaries import recover_lattice, recover_partial
 from .clock import Clock
 from .conforming.recover import recover_conforming, shown_cells
-from .conforming.roles import Cells
 from .errors import GeometryError, RecoveryError
 from .further_terms import recover_with_terms
 from .matrix import OperatorMatrix
@@ -34,11 +30,26 @@ class ScalarReadings:
     matrix: OperatorMatrix
     clock: Clock
     options: ScalarOptions
+    _kept: dict[str, PlanarMesh | None] = field(default_factory=dict)  # what was read before, for one placement
 
     @property
-    def shows_elements(self) -> bool:
-        """Whether rows overlap as those of elements other than linear triangles do."""
-        return self._crowded and bool(self._cells[0])
+    def crowded(self) -> bool:
+        """Whether the graph has more edges than a planar one can have."""
+        return len(self.matrix.edges) > 3 * self.matrix.n
+
+    def other_elements(self, placement: Placement) -> PlanarMesh | None:
+        """A mesh of other elements than linear triangles; None where none is near.
+
+        Raises
+        ------
+        RecoveryError
+            If no cells show.
+        """
+        if "found" not in self._kept:
+            cells = shown_cells(self.matrix)
+            found = recover_conforming(self.matrix, cells, placement, self.clock, self.options)
+            self._kept["found"] = found if found.certified or found.backward_error < LITTLE else None
+        return self._kept["found"]
 
     def likeliest(self, placement: Placement) -> PlanarMesh:
         """The mesh of the first reading that fits, or else of the first that comes near.
@@ -55,7 +66,7 @@ class ScalarReadings:
         if replaced or not self.matrix.adds_up.all():  # else nothing was taken out
             order.append((1 if replaced or incomplete else 3, self._partial))
         if not replaced:
-            order += [(1 if self._crowded else 3, self._other_elements), (2, self._linear)]
+            order += [(1 if self.crowded else 3, self.other_elements), (2, self._linear)]
         nearest: PlanarMesh | None = None
         failure: RecoveryError | None = None
         for _, reading in sorted(order, key=lambda one: one[0]):
@@ -73,18 +84,6 @@ class ScalarReadings:
             )
         return nearest
 
-    @property
-    def _crowded(self) -> bool:
-        """Whether the graph has more edges than a planar one can have."""
-        return len(self.matrix.edges) > 3 * self.matrix.n
-
-    @cached_property
-    def _cells(self) -> tuple[list[Cells], Iterator[Cells]]:
-        """Cells of elements that the matrix may have: the likeliest, if there are any, and the rest."""
-        shown = shown_cells(self.matrix)
-        with self.clock("cells"):
-            return list(islice(shown, 1)), shown
-
     def _lattice(self, placement: Placement) -> PlanarMesh | None:
         return recover_lattice(self.matrix, placement, self.clock, self.options)
 
@@ -92,11 +91,6 @@ class ScalarReadings:
         replaced = self.matrix.replaced
         whole = None if replaced is None else np.asarray(~replaced[self.matrix.edges].all(axis=1))
         return recover_partial(self.matrix, whole, placement, self.clock, self.options)
-
-    def _other_elements(self, placement: Placement) -> PlanarMesh | None:
-        """None where none is near."""
-        found = recover_conforming(self.matrix, chain(*self._cells), placement, self.clock, self.options)
-        return found if found.certified or found.backward_error < LITTLE else None
 
     def _linear(self, placement: Placement) -> PlanarMesh:
         def plain(matrix: OperatorMatrix, squared_lengths: NDArray | None = None) -> PlanarMesh:

@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from skfem import Basis, BilinearForm, ElementQuad1, ElementVector, MeshQuad, MeshTri
 from skfem.helpers import ddot, sym_grad, trace
 
-from conforming.assembled import assembled, cell_sets, largest_error, quadrilaterals
+from conforming.assembled import assembled, cell_sets, laplace, largest_error, quadrilaterals
 from meshes import random_mesh
 from unassemble import RecoveryError, recover
 
@@ -96,6 +96,12 @@ def test_random_entries_on_the_graph_of_a_mesh(element):
     upper.data = -np.random.default_rng(0).uniform(0.5, 1.5, len(upper.data))
     matrix = (upper + upper.T).tocsr()
     assert status(matrix - sp.diags_array(matrix.sum(axis=1))) != "certified"
+
+
+def test_one_point_quadrature_does_not_determine_the_mesh():
+    rule = np.full((2, 1), 0.5), np.ones(1)
+    matrix = laplace.assemble(Basis(quadrilaterals(6, 7), ElementQuad1(), quadrature=rule))
+    assert status(matrix) != "certified"
 
 
 def test_traces_of_an_elasticity_matrix():

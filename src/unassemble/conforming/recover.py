@@ -121,7 +121,7 @@ def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -
         held = [_held(stored, mesh, mesh.points + shift, fits, task) for shift in (0.0, _shift(origins, mesh))]
     with clock("deviations"):
         bars = deviations_of(stored.n, fits, placed, task) if task.options.standard_deviations else None
-    found = verdict(fits, held, task, told=cells.told)
+    found = verdict(stored, fits, held, task, told=cells.told)
     certificate = held[1].certificate
     noise = task.noise.at(certificate.pairs, stored) if task.noise else None
     worst, misfits = certificate.worst(10 if found.status == "uncertified" else 0, noise=noise)

@@ -20,6 +20,7 @@ _AT_ONCE = 10_000_000  # products in one go
 _ABSENT = {4: 0, 6: 3, 8: 4, 9: 6, 10: 9}
 """Pairs that a cell of so many nodes may lack, because the entry vanishes and is not stored."""
 
+_DENSEST = 10  # entries above the diagonal, of a row in the mean: cubic triangles and biquadratic cells have eight
 _MANY, _SAMPLE = 10_000, 1_000  # pairs, and of more than so many the sample that must hold a cell
 
 
@@ -157,9 +158,9 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
 
     Linear ones are quadrilaterals only: triangles beside them follow once diagonals are known.
     """
-    common = Common(matrix)
-    if not len(common.keys):
+    if not 0 < len(matrix.edges) <= _DENSEST * matrix.n:
         return
+    common = Common(matrix)
     for order, k in ((3, 10), (2, 9), (2, 8), (2, 6)):
         found = common.sets(k)
         if _cover(common, [found]):

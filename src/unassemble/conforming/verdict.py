@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from ..matrix import OperatorMatrix
 from ..scalar.solving import Task
 from ..scalar.verdict import Held
 from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE, SUSPICIOUS
+from ..topology.keys import pair_keys
 from ..words import count_of
 from .fit import Fitted
 
@@ -23,11 +27,12 @@ class Verdict:
     reason: str
 
 
-def verdict(fits: Sequence[Fitted], held: Sequence[Held], task: Task, *, told: bool) -> Verdict:
+def verdict(stored: OperatorMatrix, fits: Sequence[Fitted], held: Sequence[Held], task: Task, *, told: bool) -> Verdict:
     """The status of a mesh.
 
     Parameters
     ----------
+    stored : OperatorMatrix
     fits : sequence of Fitted
         Its parts.
     held : (Held, Held)
@@ -37,7 +42,7 @@ def verdict(fits: Sequence[Fitted], held: Sequence[Held], task: Task, *, told: b
         Whether the graph alone tells the cells.
     """
     near, written = held
-    reason = _obstacle(fits, near, task)
+    reason = _obstacle(fits, near, task) or _bare(stored, fits)
     if reason:
         return Verdict("uncertified", None, reason)
     uniqueness = "proved" if told else "searched"
@@ -88,3 +93,13 @@ def _obstacle(fits: Sequence[Fitted], near: Held, task: Task) -> str:
             i, j = fit.part.piece.vertices[fit.part.edges[int(squares.argmax())]]
             return f"the entry of rows {i} and {j} stands out, next to others that fit to rounding level"
     return ""
+
+
+def _bare(stored: OperatorMatrix, fits: Sequence[Fitted]) -> str:
+    """A stored entry of no cell; empty if there is none."""
+    covered = [pair_keys(stored.n, *fit.part.piece.vertices[fit.part.edges].T) for fit in fits]
+    bare = np.flatnonzero(~np.isin(stored.edges @ [stored.n, 1], np.concatenate(covered)))
+    if not len(bare):
+        return ""
+    i, j = stored.edges[bare[0]]
+    return f"the mesh gives the matrix back, but the stored zero of rows {i} and {j} belongs to no cell"

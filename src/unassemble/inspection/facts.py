@@ -73,7 +73,7 @@ def element_facts(matrix: OperatorMatrix) -> dict[str, Any]:
         parts = [] if cells is None else parts_of(matrix.n, cells.blocks)
     except TopologyError:
         return {}
-    if cells is None:
+    if cells is None or sum(map(len, cells.blocks.values())) < 2:  # any rows that are all coupled could be one cell
         return {}
     names = [_NAMES[kind.name] for kind in cells.blocks]
     return {
