@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from ..budget import SAMPLE
 from ..errors import InputError
-from ..nodes.grouping import by_first_row, same_pattern
+from ..nodes.grouping import by_first_row
 from ..nodes.orders import ORDERS, regular
 from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE
 from .layouts import LAYOUTS, SPACE, Layout
+from .runs import shortest_runs
 
 # On regular meshes some of a solid's rows annihilate whatever is asked; read as what it is it has more of them.
 _SOLIDS = (Layout("solid", 3, (0, 1, 2), ()), Layout("solid", 2, (0, 1), ()))
@@ -76,7 +77,7 @@ def find_structure(
         if matrix.shape[0] % b == 0 and matrix.shape[0] >= 2 * b
     }
     best = _best(matrix, usual, block_size)
-    if best is None and kind != "by component":
+    if best is None and kind != "by component" and matrix.diagonal().all():
         best = _best(matrix, {(b, "interleaved"): _with_gaps(matrix, b) for b in (3, 6)}, block_size)
     return best if best is not None and best.layout.rotations else None
 
@@ -153,10 +154,8 @@ def _share(matrix: sp.csr_array, layout: Layout, direction: NDArray) -> float:
     return 0.0 if layout.rotations and own[turning].mean() > (LITTLE + layout.twisting) * share else share
 
 
-def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
-    """Nodes of rows that stand node by node, where some nodes lack unknowns; None if the pattern shows no nodes.
-
-    The rows of a node couple to the same columns, zeros being stored, as assembly leaves them.
+def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Nodes of rows that stand node by node, where some nodes lack unknowns.
 
     Parameters
     ----------
@@ -168,15 +167,8 @@ def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray
     -------
     node : (N,) int64
     direction : (N,) int64
-        -1 for rows of nodes that lack unknowns: which ones, the pattern does not tell.
+        -1 for rows of nodes that lack unknowns: which ones, is not told.
     """
-    order = matrix.shape[0]
-    first = np.flatnonzero(np.append(True, np.diff(same_pattern(matrix)) != 0))
-    length = np.diff(np.append(first, order))
-    if (length % b)[length > b].any() or 2 * length[length % b == 0].sum() < order:
-        return None
-    # Neighbours in the numbering may couple to the same columns all by chance: such a run is several nodes.
-    within = np.arange(order) - np.repeat(first, length)
-    whole = np.repeat(length % b == 0, length)
-    node = np.cumsum((within == 0) | (whole & (within % b == 0))) - 1
-    return node, np.where(whole, within % b, -1)
+    node = shortest_runs(matrix, b)
+    within = np.arange(len(node)) - np.searchsorted(node, node)
+    return node, np.where(np.bincount(node)[node] == b, within, -1)
