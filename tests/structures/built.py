@@ -181,10 +181,10 @@ def shell(shape=curved, counts=(9, 7), thickness: float = 0.02) -> Built:
     return assembled(model, points)
 
 
-def plate(counts=(9, 8), seed: int = 0) -> Built:
+def plate(counts=(9, 8), seed: int = 0, off: float = 0.2) -> Built:
     """A flat plate that only bends: one displacement and two rotations."""
     u, v = (part.ravel() for part in np.meshgrid(*(np.arange(k, dtype=float) for k in counts), indexing="ij"))
-    points = np.column_stack([u, v]) + np.random.default_rng(seed).uniform(-0.2, 0.2, (len(u), 2))
+    points = np.column_stack([u, v]) + np.random.default_rng(seed).uniform(-off, off, (len(u), 2))
     model = model_on(points)
     for k, corners in enumerate(cells_of(counts)):
         model.add_quad(str(k), *map(str, corners), 0.2, "steel")

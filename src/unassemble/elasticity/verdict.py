@@ -74,7 +74,10 @@ def of_few_digits(
     doubt = SIGMAS * max(one.residual / one.gap if one.gap > 0 else np.inf for one in solution.evidence)
     holds = f"the entries are rounded to {rounding.name}, and the identities hold to {error:.1e}"
     if not error <= max(rounding.spread, CERTIFIED):
-        return "uncertified", f"{holds}, which is more than that leaves: positions may be off by {doubt:.0e} of the size"
+        return (
+            "uncertified",
+            f"{holds}, which is more than that leaves: positions may be off by {doubt:.0e} of the size",
+        )
     known = f"{holds}, which is what that leaves, so that positions are known to {doubt:.0e} of the size"
     return ("certified" if doubt <= ALIKE else "uncertified"), known
 
@@ -125,9 +128,7 @@ def _softest(solution: Solution) -> float:
     return min((one.gap for one in solution.evidence if one.gap > 0 and not one.settled), default=1.0)
 
 
-def _to_positions(
-    nodal: NodalMatrix, solution: Solution, numbering: Numbering, *, exact: bool = True
-) -> str:
+def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, *, exact: bool = True) -> str:
     """Why positions may be wrong whatever elements say; empty where nothing is to be said.
 
     Entries that are rounded have no `exact` null vector.

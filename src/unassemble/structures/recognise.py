@@ -17,9 +17,10 @@ from ..budget import SAMPLE
 from ..errors import InputError
 from ..nodes.grouping import by_first_row
 from ..nodes.orders import ORDERS, regular
-from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE
+from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST
 from .layouts import LAYOUTS, SPACE, Layout
 from .runs import shortest_runs
+from .straight import shown_by_members
 
 # On regular meshes some of a solid's rows annihilate whatever is asked; read as what it is it has more of them.
 _SOLIDS = (Layout("solid", 3, (0, 1, 2), ()), Layout("solid", 2, (0, 1), ()))
@@ -77,8 +78,9 @@ def find_structure(
         if matrix.shape[0] % b == 0 and matrix.shape[0] >= 2 * b
     }
     best = _best(matrix, usual, block_size)
-    if best is None and kind != "by component" and matrix.diagonal().all():
-        best = _best(matrix, {(b, "interleaved"): _with_gaps(matrix, b) for b in (3, 6)}, block_size)
+    if (best is None or best.share < MOST) and kind != "by component" and matrix.diagonal().all():
+        other = _best(matrix, {(b, "interleaved"): _with_gaps(matrix, b) for b in (3, 6)}, block_size)
+        best = max((one for one in (best, other) if one is not None), key=_rows_told, default=None)
     return best if best is not None and best.layout.rotations else None
 
 
@@ -93,10 +95,15 @@ def _best(
         for (b, name), numbering in numberings.items():
             if numbering is None or layout.block_size != b or block_size not in (None, b):
                 continue
-            share = _share(matrix, layout, numbering[1])
-            if share > most:
-                best, most = StructuralNumbering(layout, *numbering, name, share), share
+            one = StructuralNumbering(layout, *numbering, name, _share(matrix, layout, numbering[1]))
+            if _rows_told(one) > most:
+                best, most = one, _rows_told(one)
     return best
+
+
+def _rows_told(one: StructuralNumbering) -> float:
+    """Share of all rows whose direction is known and that annihilate translations."""
+    return float(one.share * np.mean(one.direction_of_row >= 0))
 
 
 def given_structure(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> StructuralNumbering | None:
@@ -169,6 +176,7 @@ def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray
     direction : (N,) int64
         -1 for rows of nodes that lack unknowns: which ones, is not told.
     """
-    node = shortest_runs(matrix, b)
+    shown = [shown_by_members(matrix, layout) for layout in LAYOUTS if layout.block_size == b]
+    node = shortest_runs(matrix, b, np.any(shown, axis=0))
     within = np.arange(len(node)) - np.searchsorted(node, node)
     return node, np.where(np.bincount(node)[node] == b, within, -1)
