@@ -7,7 +7,7 @@ all the same and without displacements, bend everything. This tells the layouts 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..budget import SAMPLE
 from ..errors import InputError
 from ..nodes.grouping import by_first_row
+from ..nodes.likeness import pattern_of
 from ..nodes.orders import ORDERS, regular
 from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST
 from .layouts import LAYOUTS, SPACE, Layout
@@ -81,6 +82,8 @@ def find_structure(
     if (best is None or best.share < MOST) and kind != "by component" and matrix.diagonal().all():
         other = _best(matrix, {(b, "interleaved"): _with_gaps(matrix, b) for b in (3, 6)}, block_size)
         best = max((one for one in (best, other) if one is not None), key=_rows_told, default=None)
+        if best is other and best is not None and best.layout.rotations:
+            best = _continued(matrix, best)
     return best if best is not None and best.layout.rotations else None
 
 
@@ -180,3 +183,39 @@ def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray
     node = shortest_runs(matrix, b, np.any(shown, axis=0))
     within = np.arange(len(node)) - np.searchsorted(node, node)
     return node, np.where(np.bincount(node)[node] == b, within, -1)
+
+
+def _continued(matrix: sp.csr_array, one: StructuralNumbering) -> StructuralNumbering:
+    """The same where rows between whole nodes are as many as other nodes have, and sums show that they are such nodes.
+
+    Rows of a node that couple to different nodes, as directions do along the axes of flat parts, were cut apart. Each
+    of its displacements has to complete the sums of some row; and all of its cuts to meet more than half of its
+    neighbours, as those of two nodes do not.
+    """
+    b, node, given = one.block_size, one.node_of_row, one.direction_of_row
+    moves = len(one.layout.displacements)
+    open_row = np.append(given < 0, False)
+    first = np.flatnonzero(open_row & ~np.append(False, open_row[:-1]))
+    last = np.flatnonzero(~open_row & np.append(False, open_row[:-1]))
+    stretches = [(a, z) for a, z in zip(first, last, strict=True) if (z - a) % b == 0]
+    starts = np.array([start for a, z in stretches for start in range(a, z, b)], dtype=np.int64)
+    rows = starts[:, None] + np.arange(b)
+    joined = node.copy()
+    joined[rows] = node[rows[:, :1]]
+    pattern = pattern_of(matrix)
+    onto, whole = (sp.csr_array((np.ones(len(given), np.float32), (np.arange(len(given)), k))) for k in (node, joined))
+    met, all_met = (np.diff(sp.csr_array(of.T @ pattern @ whole).indptr) for of in (onto, whole))
+    rows = rows[(2 * met[node[rows]] > all_met[joined[rows]]).all(axis=1)]
+    while len(rows):
+        direction = given.copy()
+        direction[rows] = np.arange(b)
+        labels = (direction[:, None] == np.arange(moves)).astype(float)
+        size = abs(matrix) @ labels
+        good = (np.abs(matrix @ labels) <= CANCELLED * size).all(axis=1)
+        shown = (good.astype(float) @ pattern)[rows[:, :moves]].all(axis=1)
+        if shown.all():
+            joined = node.copy()
+            joined[rows] = node[rows[:, :1]]
+            return replace(one, node_of_row=by_first_row(joined), direction_of_row=direction)
+        rows = rows[shown]
+    return one
