@@ -57,7 +57,7 @@ def serve_structure(
     """
     layout = numbering.layout
     node, direction = numbering.node_of_row, numbering.direction_of_row
-    known = checked_anchors(anchors, node, layout.dim)
+    known = checked_anchors(anchors, node, layout.space)
     whole, rounding = with_exact_sums(matrix.csr())
     nodes = nodes_of(whole, layout, node, direction)
     with clock("solve"), blas_threads(1):
@@ -82,10 +82,11 @@ def serve_structure(
     elif status == "certified":
         reason += f": {covered(used, abs(whole[used]).sum(axis=0) > 0)}"
     notes = list(found.notes)
+    placed = np.pad(found.points, ((0, 0), (0, layout.space - layout.dim)))
     fields: dict[str, Any] = {}
     if cells and error < ALIKE:
         with clock("members"):
-            fields = members_and_cells(nodes, found.points)
+            fields = members_and_cells(nodes, placed)
         notes.append("members and cells were read off the graph; what is certified is the coordinates")
     if not valid[:, len(layout.displacements) :].any():
         notes.append("moments are not used alone: springs between rotations and the ground, as against drilling, would "
@@ -97,8 +98,8 @@ def serve_structure(
     if (found.component < 0).any():
         notes.append(f"{(found.component < 0).sum()} of {count_of(nodes.n, 'node')} cannot be determined: at supports, "
                      "or tied to these only")  # fmt: skip
-    points, factor, more = anchored(found.points, found.component, len(found.evidence), known, sized=True)
-    lost = digits_lost(points, found.points, found.component, factor) / _edge_length(nodes, found)
+    points, factor, more = anchored(placed, found.component, len(found.evidence), known, sized=True)
+    lost = digits_lost(points, placed, found.component, factor) / _edge_length(nodes, found)
     status, reason = near_enough(status, reason, lost)
     return Structure(
         **fields,

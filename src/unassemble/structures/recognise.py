@@ -117,14 +117,16 @@ def given_structure(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> 
     Raises
     ------
     InputError
-        If there are four or five directions, or rows do not fit the matrix.
+        If there are five directions, or rows do not fit the matrix.
     """
     node, direction = np.asarray(node, dtype=np.int64), np.asarray(direction, dtype=np.int64)
     if node.shape != direction.shape or node.shape != matrix.shape[:1] or not len(node) or direction.min() < 0:
         return None  # elasticity says what is wrong
     size = int(direction.max()) + 1
-    if size in (4, 5):
-        raise InputError(f"nodes with {size} unknowns are not known: frames and shells have 6, solids 2 or 3")
+    if size == 5:
+        raise InputError(
+            f"nodes with {size} unknowns are not known: frames and shells have 6, beams in space 4, solids 2 or 3"
+        )
     node = by_first_row(node)
     if len(np.unique(node * size + direction)) < len(node):
         return None
