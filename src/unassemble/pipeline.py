@@ -84,8 +84,9 @@ def recover(
     triangulate : bool
         Divide cells of more than three vertices into triangles; the vertices lie on a circle, so that every division
         is a Delaunay triangulation and the matrix does not prefer one.
-    block_size : {2, 3, 6}, optional
-        Vector-valued matrices: unknowns per node; found where it is not given. Six are displacements and rotations.
+    block_size : {2, 3, 4, 6}, optional
+        Vector-valued matrices: unknowns per node; found where it is not given. Four, of straight beams, and six are
+        displacements and rotations.
     numbering : {"interleaved", "by component"} or (node_of_row, direction_of_row), optional
         Vector-valued matrices: how the unknowns stand; found where it is not given.
     cells : bool
