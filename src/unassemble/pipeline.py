@@ -175,7 +175,7 @@ class _Task:
         return self._first_that_fits() if at_sight is None else self._as_vector(at_sight)
 
     def _first_that_fits(self) -> Recovery:
-        """A planar mesh; or nodes of several unknowns where rows belong to no mesh.
+        """A planar mesh; or nodes of several unknowns where rows belong to no mesh, or fewer of them do.
 
         A straight beam's rows, for one, fall apart into planar graphs.
         """
@@ -191,7 +191,8 @@ class _Task:
         if found.certified or not found.node_status.any():
             return found
         other = self._as_second_reading()
-        return other if other is not None and other.certified else found
+        better = other is not None and (other.certified or other.node_status.mean() < found.node_status.mean())
+        return other if other is not None and better else found
 
     def _as_second_reading(self) -> Recovery | None:
         """The matrix as a vector-valued one, if anything speaks for that."""

@@ -23,6 +23,8 @@ from ..tolerances import LAST_DIGITS, SUMMED
 from .layouts import Layout
 from .nodes import Nodes
 
+_ANY_SIZE = np.errstate(over="ignore", invalid="ignore")  # entries may be of no member, and of any size
+
 
 @dataclass(frozen=True, eq=False)
 class Straight:
@@ -56,6 +58,7 @@ def straight_members(nodes: Nodes) -> Straight:
     return Straight(ends[good], vectors[good], blocks[good])
 
 
+@_ANY_SIZE
 def told_by_blocks(blocks: NDArray[np.float64], layout: Layout) -> NDArray[np.float64]:
     """(m, dim) position of the first node less that of the second, as V = U D / 2 has it; zero where it tells nothing.
 
@@ -65,6 +68,8 @@ def told_by_blocks(blocks: NDArray[np.float64], layout: Layout) -> NDArray[np.fl
     layout : Layout
     """
     moves = len(layout.displacements)
+    size = np.abs(blocks).max(axis=(1, 2), initial=0, keepdims=True)
+    blocks = blocks / np.where(size > 0, size, 1)
     one = layout.rigid_motions(np.eye(layout.dim))[:, :moves, moves:]
     sides = np.einsum("mac,kct->matk", blocks[:, :moves, :moves], one)
     sides = sides.reshape(len(blocks), moves * (layout.block_size - moves), layout.dim)
@@ -72,10 +77,11 @@ def told_by_blocks(blocks: NDArray[np.float64], layout: Layout) -> NDArray[np.fl
     return np.asarray(np.einsum("mkr,mr->mk", np.linalg.pinv(sides, rcond=LAST_DIGITS), right))
 
 
+@_ANY_SIZE
 def misfits(blocks: NDArray[np.float64], vectors: NDArray[np.float64], layout: Layout) -> NDArray[np.float64]:
     """(m,) how far blocks are from those of members along given vectors, relative to the size of each part.
 
-    Infinite where a block does not couple displacements to rotations, or the vector vanishes.
+    Infinite, or no number, where a block does not couple displacements to rotations, or the vector vanishes.
 
     Parameters
     ----------
