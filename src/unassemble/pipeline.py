@@ -93,8 +93,9 @@ def recover(
     triangulate : bool
         Divide cells of more than three vertices into triangles; the vertices lie on a circle, so that every division
         is a Delaunay triangulation and the matrix does not prefer one.
-    block_size : {2, 3, 6}, optional
-        Vector-valued matrices: unknowns per node; found where it is not given. Six are displacements and rotations.
+    block_size : {2, 3, 4, 6}, optional
+        Vector-valued matrices: unknowns per node; found where it is not given. Four, of straight beams, and six are
+        displacements and rotations.
     numbering : {"interleaved", "by component"} or (node_of_row, direction_of_row), optional
         Vector-valued matrices: how the unknowns stand; found where it is not given.
     cells : bool
@@ -202,7 +203,7 @@ class _Task:
         return ScalarReadings(self.matrix, self.clock, self.planar)
 
     def _first_that_fits(self) -> Recovery:
-        """A planar mesh; or a surface in space; or nodes of several unknowns where rows belong to no mesh.
+        """A planar mesh; or a surface in space; or nodes of several unknowns where rows, or more of them, belong to these.
 
         A straight beam's rows, for one, fall apart into planar graphs.
         """
@@ -217,7 +218,8 @@ class _Task:
         if found.certified or not (found.node_status.any() or isinstance(found, ConformingMesh)):
             return judged(found, self.matrix)
         other = self._as_certified_surface() or self._as_second_reading()
-        return other if other is not None and other.certified else judged(found, self.matrix)
+        better = other is not None and (other.certified or other.node_status.mean() < found.node_status.mean())
+        return other if other is not None and better else judged(found, self.matrix)
 
     def _as_second_reading(self) -> Recovery | None:
         """The matrix as a vector-valued one, if anything speaks for that."""

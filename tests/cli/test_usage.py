@@ -25,7 +25,7 @@ BAD = [
     (["--anchor", "3,1,2,3,4"], "not of the form ROW,X,Y"),
     (["--anchor", "3,1,2,3"], "three coordinates"),
     (["--operator", "laplacian", "--block-size", "2"], "vector-valued"),
-    (["--block-size", "4"], "'4'"),
+    (["--block-size", "5"], "'5'"),
     (["--numbering", "random"], "'random'"),
     (["--operator", "elasticity", "--method", "angles"], "--method is for scalar matrices"),
     (["--operator", "elasticity", "--scale", "2"], "--scale is for scalar matrices"),

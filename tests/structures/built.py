@@ -10,6 +10,8 @@ import scipy.sparse as sp
 from Pynite import FEModel3D
 from scipy.spatial import Delaunay
 
+from unassemble import RecoveryError, recover
+
 SPACE, PLANE, PLATE = range(6), (0, 1, 5), (2, 3, 4)
 
 
@@ -181,10 +183,10 @@ def shell(shape=curved, counts=(9, 7), thickness: float = 0.02) -> Built:
     return assembled(model, points)
 
 
-def plate(counts=(9, 8), seed: int = 0) -> Built:
+def plate(counts=(9, 8), seed: int = 0, off: float = 0.2) -> Built:
     """A flat plate that only bends: one displacement and two rotations."""
     u, v = (part.ravel() for part in np.meshgrid(*(np.arange(k, dtype=float) for k in counts), indexing="ij"))
-    points = np.column_stack([u, v]) + np.random.default_rng(seed).uniform(-0.2, 0.2, (len(u), 2))
+    points = np.column_stack([u, v]) + np.random.default_rng(seed).uniform(-off, off, (len(u), 2))
     model = model_on(points)
     for k, corners in enumerate(cells_of(counts)):
         model.add_quad(str(k), *map(str, corners), 0.2, "steel")
@@ -203,3 +205,22 @@ def error(found, true, *, scaled: bool = False) -> float:
     x, y = found[known] - found[known].mean(axis=0), true[known] - true[known].mean(axis=0)
     factor = (x * y).sum() / (x * x).sum() if scaled else 1.0
     return float(np.linalg.norm(factor * x - y, axis=1).max() / np.linalg.norm(np.ptp(true, axis=0)))
+
+
+def sound(matrix, true, **options) -> bool:
+    """Whether a certificate is given; if so, rows of displacements are where they say, piece by piece."""
+    try:
+        found = recover(matrix, **options)
+    except RecoveryError:
+        return False
+    if not found.certified:
+        return False
+    rows = np.flatnonzero(np.isin(found.direction_of_row, range({"plate": 1, "plane frame": 2}.get(found.operator, 3))))
+    points, piece = found.points[found.node_of_row[rows]], found.component[found.node_of_row[rows]]
+    for one in range(found.n_components):
+        assert error(points[piece == one], true[rows][piece == one], scaled=found.operator == "truss") < 1e-6
+    return True
+
+
+def rows_per_node(given) -> np.ndarray:
+    return np.repeat(given.points, given.block, axis=0)

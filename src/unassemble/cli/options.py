@@ -47,7 +47,7 @@ def nodes_options(command: _Command) -> _Command:
         ),
         click.option(
             "--block-size",
-            type=click.Choice(["2", "3", "6"]),
+            type=click.Choice(["2", "3", "4", "6"]),
             callback=lambda ctx, param, value: value and int(value),
             help="Vector-valued matrices: unknowns per node; found where it is not given.",
         ),

@@ -54,7 +54,7 @@ def described(
     backward = found.backward_error if found.certified else error
     status, reason = verdict(nodal, solution, error, found, numbering)
     if rounding and near and not any(solution.freedoms):
-        status, reason = "uncertified", of_few_digits(rounding, error)
+        status, reason = of_few_digits(nodal, solution, error, numbering, rounding)
     elif rounding:
         reason = f"{reason}; the entries are rounded to {rounding.name}, which may hide what rows lack"
     withheld = np.zeros(nodal.n, dtype=bool)

@@ -10,7 +10,7 @@ from ..nodes.nodal import NodalMatrix, without_trace
 from ..nodes.numbering import Numbering
 from ..nodes.rounded import Rounding
 from ..nodes.shape import SOFT
-from ..tolerances import CERTIFIED
+from ..tolerances import ALIKE, CERTIFIED, SIGMAS
 from ..words import count_of
 from .materials.cells import Cells
 from .nullspace.solution import Solution
@@ -58,12 +58,28 @@ def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solu
     return ""
 
 
-def of_few_digits(rounding: Rounding, error: float) -> str:
-    """Why a matrix whose entries are rounded is not certified though all is well."""
-    return (
-        f"the entries are rounded to {rounding.name}, and the identities hold to {error:.1e}, which is what that "
-        "leaves; rows away from supports were made to annihilate translations exactly"
-    )
+def of_few_digits(
+    nodal: NodalMatrix, solution: Solution, error: float, numbering: Numbering, rounding: Rounding
+) -> tuple[str, str]:
+    """Status and reason where the entries are rounded, which is an error bar.
+
+    Rounding moves the null vector by what it adds to the equations over the singular value of the next field; the
+    residual that is left shows how much that is, but for the few parts in which the null vector could follow.
+    """
+    objection = _to_positions(nodal, solution, numbering, exact=False) or _to_identities(nodal, solution, numbering)
+    if objection:
+        return "uncertified", f"{objection}; the entries are rounded to {rounding.name}, which may hide what rows lack"
+    if np.isnan(error):
+        return "uncertified", NOTHING_LEFT
+    doubt = SIGMAS * max(one.residual / one.gap if one.gap > 0 else np.inf for one in solution.evidence)
+    holds = f"the entries are rounded to {rounding.name}, and the identities hold to {error:.1e}"
+    if not error <= max(rounding.spread, CERTIFIED):
+        return (
+            "uncertified",
+            f"{holds}, which is more than that leaves: positions may be off by {doubt:.0e} of the size",
+        )
+    known = f"{holds}, which is what that leaves, so that positions are known to {doubt:.0e} of the size"
+    return ("certified" if doubt <= ALIKE else "uncertified"), known
 
 
 _FREEDOMS = {
@@ -112,13 +128,16 @@ def _softest(solution: Solution) -> float:
     return min((one.gap for one in solution.evidence if one.gap > 0 and not one.settled), default=1.0)
 
 
-def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering) -> str:
-    """Why positions may be wrong whatever elements say; empty where nothing is to be said."""
+def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, *, exact: bool = True) -> str:
+    """Why positions may be wrong whatever elements say; empty where nothing is to be said.
+
+    Entries that are rounded have no `exact` null vector.
+    """
     remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
     if remaining:
         unless = f". Or rows belong to other nodes than was inferred{_GIVE}" if numbering.inferred else ""
         return f"the null space is larger than it should be: {remaining[0]}{unless}"
-    if not solution.exact:
+    if exact and not solution.exact:
         worst = max(solution.evidence, key=lambda one: one.residual)
         return (
             f"no exact null vector exists (singular value {worst.residual:.1e}, that of the next field "

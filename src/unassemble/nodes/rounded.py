@@ -19,7 +19,7 @@ from ..tolerances import CANCELLED, HARDLY_ANY, LAST_DIGITS, SIGMAS
 from .orders import ORDERS, regular
 from .searching import directions_in_order, live_part
 
-_LAYOUTS = {3: (3, 2, 1), 2: (2,), 6: (3,)}  # unknowns of a node, and how many of these may be displacements
+_LAYOUTS = {3: (3, 2, 1), 2: (2,), 6: (3,), 4: (2,)}  # unknowns of a node, and how many of these may be displacements
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..nodes.nodal import determined
 from .layouts import Layout
+from .straight import Straight, misfits
 
 
 def forces(
@@ -51,3 +52,20 @@ def forces(
     touched = abs(matrix) @ (~known[node_of_row]).astype(float) > 0
     used = counted & (~touched & (size > 0))[:, None]
     return (force / np.where(size > 0, size, 1)[:, None])[used], used.any(axis=1)
+
+
+def members_misfits(
+    members: Straight, layout: Layout, points: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """How far the blocks of straight members are from those of members between the points.
+
+    Returns
+    -------
+    ends : (k, 2) int64
+        Of members both of whose nodes have coordinates.
+    misfit : (k,) float64
+        Relative to the size of each part of the block.
+    """
+    some = determined(points)[members.ends].all(axis=1)
+    ends = members.ends[some]
+    return ends, misfits(members.blocks[some], points[ends[:, 0]] - points[ends[:, 1]], layout)

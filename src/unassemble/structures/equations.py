@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..tolerances import CANCELLED
 from .nodes import Nodes
+from .straight import Straight
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,9 +35,9 @@ class Equations:
     lever : (m,) float64
         Sum of the terms of the right-hand side, without signs.
     row : (m,) int64
-        Row ``i b + k`` of direction k of node i; -1 for differences of two rows.
+        Row ``i b + k`` of direction k of node i; -1 for differences of two rows, and for what members tell.
     rotation : (m,) int64
-        Which of the layout's rotations it is.
+        Which of the layout's rotations it is; -1 for what members tell.
     """
 
     operator: sp.csr_array
@@ -81,8 +82,22 @@ def equations(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool) -> Equat
                 one.rotation,
             )
         )
-    joined = [[getattr(part, one.name) for part in parts] for one in fields(Equations)]
-    return _relative(Equations(sp.vstack(joined[0], format="csr"), *map(np.concatenate, joined[1:])))
+    return _relative(joined(*parts))
+
+
+def joined(*parts: Equations) -> Equations:
+    """All of these equations."""
+    first, *rest = [[getattr(part, one.name) for part in parts] for one in fields(Equations)]
+    return Equations(sp.csr_array(sp.vstack(first)), *map(np.concatenate, rest))
+
+
+def told_by(members: Straight, nodes: Nodes) -> Equations:
+    """What straight members tell: one position less the other."""
+    d, m = nodes.layout.dim, members.vectors.size
+    place = (members.ends[:, :, None] * d + np.arange(d)).transpose(0, 2, 1).reshape(m, 2)
+    half = np.tile([0.5, -0.5], m), (np.repeat(np.arange(m), 2), place.ravel())
+    right, unknown = members.vectors.ravel() / 2, np.full(m, -1)
+    return Equations(sp.csr_array(half, shape=(m, nodes.n * d)), right, np.ones(m), np.abs(right), unknown, unknown)
 
 
 def _relative(given: Equations) -> Equations:

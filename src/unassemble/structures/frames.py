@@ -16,11 +16,12 @@ from ..nodes.rounded import Rounding, with_exact_sums
 from ..recovery import Structure
 from ..tolerances import ALIKE, CERTIFIED
 from ..words import count_of
-from .certificate import forces
+from .certificate import forces, members_misfits
 from .members import members_and_cells, mispaired
 from .nodes import Nodes, nodes_of
 from .placed import Placed, covered
 from .recognise import StructuralNumbering
+from .straight import straight_members
 from .turning import turning_positions
 
 
@@ -56,17 +57,20 @@ def serve_structure(
     """
     layout = numbering.layout
     node, direction = numbering.node_of_row, numbering.direction_of_row
-    known = checked_anchors(anchors, node, layout.dim)
+    known = checked_anchors(anchors, node, layout.space)
     whole, rounding = with_exact_sums(matrix.csr())
     nodes = nodes_of(whole, layout, node, direction)
     with clock("solve"), blas_threads(1):
-        found, valid = turning_positions(nodes)
+        members = straight_members(nodes)
+        found, valid = turning_positions(nodes, members)
     with clock("certify"):
         counted = np.zeros((len(node), len(layout.rotations)), dtype=bool)
         counted[nodes.row_of[nodes.present]] = valid[nodes.present]
         force, used = forces(whole, layout, node, direction, found.points, counted)
-        error = float(force.max()) if len(force) else float("inf")
-        status, reason = _verdict(error, found, rounding)
+        ends, misfit = members_misfits(members, layout, found.points)
+        used |= np.isin(node, ends)
+        error = float(np.concatenate([force, misfit]).max()) if used.any() else float("inf")
+        status, reason = _verdict(error, found, rounding, len(misfit))
         pair = mispaired(nodes, found.points) if status == "certified" and numbering.kind != "given" else None
     if pair is not None:
         first, second = (np.flatnonzero(node == one)[0] for one in pair)
@@ -78,10 +82,11 @@ def serve_structure(
     elif status == "certified":
         reason += f": {covered(used, abs(whole[used]).sum(axis=0) > 0)}"
     notes = list(found.notes)
+    placed = np.pad(found.points, ((0, 0), (0, layout.space - layout.dim)))
     fields: dict[str, Any] = {}
     if cells and error < ALIKE:
         with clock("members"):
-            fields = members_and_cells(nodes, found.points)
+            fields = members_and_cells(nodes, placed)
         notes.append("members and cells were read off the graph; what is certified is the coordinates")
     if not valid[:, len(layout.displacements) :].any():
         notes.append("moments are not used alone: springs between rotations and the ground, as against drilling, would "
@@ -93,8 +98,8 @@ def serve_structure(
     if (found.component < 0).any():
         notes.append(f"{(found.component < 0).sum()} of {count_of(nodes.n, 'node')} cannot be determined: at supports, "
                      "or tied to these only")  # fmt: skip
-    points, factor, more = anchored(found.points, found.component, len(found.evidence), known, sized=True)
-    lost = digits_lost(points, found.points, found.component, factor) / _edge_length(nodes, found)
+    points, factor, more = anchored(placed, found.component, len(found.evidence), known, sized=True)
+    lost = digits_lost(points, placed, found.component, factor) / _edge_length(nodes, found)
     status, reason = near_enough(status, reason, lost)
     return Structure(
         **fields,
@@ -118,7 +123,7 @@ def _edge_length(nodes: Nodes, found: Placed) -> float:
     return float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
 
 
-def _verdict(error: float, found: Placed, rounding: Rounding | None) -> tuple[str, str]:
+def _verdict(error: float, found: Placed, rounding: Rounding | None, members: int) -> tuple[str, str]:
     d = found.points.shape[1]
     if found.null_dimension > d:
         return "uncertified", (
@@ -140,9 +145,10 @@ def _verdict(error: float, found: Placed, rounding: Rounding | None) -> tuple[st
         return "uncertified", (
             f"{count} no other to check against, so that springs would go unnoticed: too few whole rows are left"
         )
+    blocks = f", {count_of(members, 'block is that', 'blocks are those')} of straight members" if members else ""
     if rounding:
         return "certified", (
-            f"rigid rotations of the nodes cause no more forces than entries rounded to {rounding.name} leave, so that "
-            f"positions are known to {doubt:.0e} of the size"
+            f"rigid rotations of the nodes cause no more forces than entries rounded to {rounding.name} leave{blocks}, "
+            f"so that positions are known to {doubt:.0e} of the size"
         )
-    return "certified", "rigid rotations of the nodes cause no forces, and only translations change nothing"
+    return "certified", f"rigid rotations of the nodes cause no forces{blocks}, and only translations change nothing"

@@ -15,8 +15,8 @@ class Layout:
     Attributes
     ----------
     name : str
-    dim : {2, 3}
-        Coordinates of a node.
+    dim : {1, 2, 3}
+        Coordinates of a node that the matrix tells.
     displacements : tuple of int
         Axis of each displacement; direction k of a node is ``displacements[k]``.
     rotations : tuple of int
@@ -37,6 +37,11 @@ class Layout:
     def block_size(self) -> int:
         """Unknowns per node."""
         return len(self.displacements) + len(self.rotations)
+
+    @property
+    def space(self) -> int:
+        """Coordinates of a node: those that the matrix does not tell are zero."""
+        return self.dim if self.dim > 1 else 3
 
     @property
     def twisting(self) -> float:
@@ -73,7 +78,8 @@ class Layout:
 SPACE = Layout("frame or shell", 3, (0, 1, 2), (0, 1, 2))
 PLANE = Layout("plane frame", 2, (0, 1), (2,))
 PLATE = Layout("plate", 2, (2,), (0, 1))
-LAYOUTS = (SPACE, PLANE, PLATE)
+BEAM = Layout("beam", 1, (1, 2), (1, 2))  # straight along x, bending in two planes that do not know of each other
+LAYOUTS = (SPACE, PLANE, PLATE, BEAM)
 
 
 def layout_named(name: str) -> Layout | None:

@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..elements.shells import graph_of, shell_cells
+from ..nodes.constants import row_sizes
 from ..nodes.nodal import determined
 from ..tolerances import CANCELLED
 from .layouts import PLANE
@@ -59,8 +60,8 @@ def mispaired(nodes: Nodes, points: NDArray[np.float64]) -> tuple[int, int] | No
         NaN where not determined.
     """
     n, b = nodes.n, nodes.layout.block_size
-    coo, diagonal = nodes.matrix.tocoo(), np.abs(nodes.matrix.diagonal())
-    real = np.abs(coo.data) > CANCELLED * np.sqrt(diagonal[coo.row] * diagonal[coo.col])
+    coo, size = nodes.matrix.tocoo(), np.minimum(np.abs(nodes.matrix.diagonal()), row_sizes(nodes.matrix))
+    real = np.abs(coo.data) > CANCELLED * np.sqrt(size[coo.row] * size[coo.col])  # penalties are no measure
     (i, one), (j, other) = np.divmod(coo.row[real], b), np.divmod(coo.col[real], b)
     near, meeting = _counts(i, j, n), _counts(i[one == other], j[one == other], n)
     first, second = sp.triu(near, 1).nonzero()

@@ -7,7 +7,7 @@ all the same and without displacements, bend everything. This tells the layouts 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,10 +15,13 @@ from numpy.typing import NDArray
 
 from ..budget import SAMPLE
 from ..errors import InputError
-from ..nodes.grouping import by_first_row, same_pattern
+from ..nodes.grouping import by_first_row
+from ..nodes.likeness import pattern_of
 from ..nodes.orders import ORDERS, regular
-from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE
+from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST
 from .layouts import LAYOUTS, SPACE, Layout
+from .runs import shortest_runs
+from .straight import shown_by_members
 
 # On regular meshes some of a solid's rows annihilate whatever is asked; read as what it is it has more of them.
 _SOLIDS = (Layout("solid", 3, (0, 1, 2), ()), Layout("solid", 2, (0, 1), ()))
@@ -76,8 +79,11 @@ def find_structure(
         if matrix.shape[0] % b == 0 and matrix.shape[0] >= 2 * b
     }
     best = _best(matrix, usual, block_size)
-    if best is None and kind != "by component":
-        best = _best(matrix, {(b, "interleaved"): _with_gaps(matrix, b) for b in (3, 6)}, block_size)
+    if (best is None or best.share < MOST) and kind != "by component" and matrix.diagonal().all():
+        other = _best(matrix, {(b, "interleaved"): _with_gaps(matrix, b) for b in (3, 6)}, block_size)
+        best = max((one for one in (best, other) if one is not None), key=_rows_told, default=None)
+        if best is other and best is not None and best.layout.rotations:
+            best = _continued(matrix, best)
     return best if best is not None and best.layout.rotations else None
 
 
@@ -92,10 +98,15 @@ def _best(
         for (b, name), numbering in numberings.items():
             if numbering is None or layout.block_size != b or block_size not in (None, b):
                 continue
-            share = _share(matrix, layout, numbering[1])
-            if share > most:
-                best, most = StructuralNumbering(layout, *numbering, name, share), share
+            one = StructuralNumbering(layout, *numbering, name, _share(matrix, layout, numbering[1]))
+            if _rows_told(one) > most:
+                best, most = one, _rows_told(one)
     return best
+
+
+def _rows_told(one: StructuralNumbering) -> float:
+    """Share of all rows whose direction is known and that annihilate translations."""
+    return float(one.share * np.mean(one.direction_of_row >= 0))
 
 
 def given_structure(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> StructuralNumbering | None:
@@ -106,14 +117,16 @@ def given_structure(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> 
     Raises
     ------
     InputError
-        If there are four or five directions, or rows do not fit the matrix.
+        If there are five directions, or rows do not fit the matrix.
     """
     node, direction = np.asarray(node, dtype=np.int64), np.asarray(direction, dtype=np.int64)
     if node.shape != direction.shape or node.shape != matrix.shape[:1] or not len(node) or direction.min() < 0:
         return None  # elasticity says what is wrong
     size = int(direction.max()) + 1
-    if size in (4, 5):
-        raise InputError(f"nodes with {size} unknowns are not known: frames and shells have 6, solids 2 or 3")
+    if size == 5:
+        raise InputError(
+            f"nodes with {size} unknowns are not known: frames and shells have 6, beams in space 4, solids 2 or 3"
+        )
     node = by_first_row(node)
     if len(np.unique(node * size + direction)) < len(node):
         return None
@@ -153,10 +166,8 @@ def _share(matrix: sp.csr_array, layout: Layout, direction: NDArray) -> float:
     return 0.0 if layout.rotations and own[turning].mean() > (LITTLE + layout.twisting) * share else share
 
 
-def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
-    """Nodes of rows that stand node by node, where some nodes lack unknowns; None if the pattern shows no nodes.
-
-    The rows of a node couple to the same columns, zeros being stored, as assembly leaves them.
+def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Nodes of rows that stand node by node, where some nodes lack unknowns.
 
     Parameters
     ----------
@@ -168,15 +179,45 @@ def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray
     -------
     node : (N,) int64
     direction : (N,) int64
-        -1 for rows of nodes that lack unknowns: which ones, the pattern does not tell.
+        -1 for rows of nodes that lack unknowns: which ones, is not told.
     """
-    order = matrix.shape[0]
-    first = np.flatnonzero(np.append(True, np.diff(same_pattern(matrix)) != 0))
-    length = np.diff(np.append(first, order))
-    if (length % b)[length > b].any() or 2 * length[length % b == 0].sum() < order:
-        return None
-    # Neighbours in the numbering may couple to the same columns all by chance: such a run is several nodes.
-    within = np.arange(order) - np.repeat(first, length)
-    whole = np.repeat(length % b == 0, length)
-    node = np.cumsum((within == 0) | (whole & (within % b == 0))) - 1
-    return node, np.where(whole, within % b, -1)
+    shown = [shown_by_members(matrix, layout) for layout in LAYOUTS if layout.block_size == b]
+    node = shortest_runs(matrix, b, np.any(shown, axis=0))
+    within = np.arange(len(node)) - np.searchsorted(node, node)
+    return node, np.where(np.bincount(node)[node] == b, within, -1)
+
+
+def _continued(matrix: sp.csr_array, one: StructuralNumbering) -> StructuralNumbering:
+    """The same where rows between whole nodes are as many as other nodes have, and sums show that they are such nodes.
+
+    Rows of a node that couple to different nodes, as directions do along the axes of flat parts, were cut apart. Each
+    of its displacements has to complete the sums of some row; and all of its cuts to meet more than half of its
+    neighbours, as those of two nodes do not.
+    """
+    b, node, given = one.block_size, one.node_of_row, one.direction_of_row
+    moves = len(one.layout.displacements)
+    open_row = np.append(given < 0, False)
+    first = np.flatnonzero(open_row & ~np.append(False, open_row[:-1]))
+    last = np.flatnonzero(~open_row & np.append(False, open_row[:-1]))
+    stretches = [(a, z) for a, z in zip(first, last, strict=True) if (z - a) % b == 0]
+    starts = np.array([start for a, z in stretches for start in range(a, z, b)], dtype=np.int64)
+    rows = starts[:, None] + np.arange(b)
+    joined = node.copy()
+    joined[rows] = node[rows[:, :1]]
+    pattern = pattern_of(matrix)
+    onto, whole = (sp.csr_array((np.ones(len(given), np.float32), (np.arange(len(given)), k))) for k in (node, joined))
+    met, all_met = (np.diff(sp.csr_array(of.T @ pattern @ whole).indptr) for of in (onto, whole))
+    rows = rows[(2 * met[node[rows]] > all_met[joined[rows]]).all(axis=1)]
+    while len(rows):
+        direction = given.copy()
+        direction[rows] = np.arange(b)
+        labels = (direction[:, None] == np.arange(moves)).astype(float)
+        size = abs(matrix) @ labels
+        good = (np.abs(matrix @ labels) <= CANCELLED * size).all(axis=1)
+        shown = (good.astype(float) @ pattern)[rows[:, :moves]].all(axis=1)
+        if shown.all():
+            joined = node.copy()
+            joined[rows] = node[rows[:, :1]]
+            return replace(one, node_of_row=by_first_row(joined), direction_of_row=direction)
+        rows = rows[shown]
+    return one

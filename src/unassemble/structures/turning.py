@@ -13,16 +13,19 @@ from ..errors import GeometryError
 from ..nodes.shape import set_aside
 from ..recovery import Evidence
 from ..tolerances import CANCELLED, CERTIFIED, SINGULAR
-from .equations import Equations, equations
+from .equations import Equations, equations, joined, told_by
 from .layouts import Layout
 from .nodes import Nodes
 from .placed import Piece, Placed, Positions, placed
 from .positions import least_squares
 from .redundancy import unnoticed
+from .straight import Straight
 
 
-def turning_positions(nodes: Nodes) -> tuple[Placed, NDArray[np.bool_]]:
+def turning_positions(nodes: Nodes, members: Straight) -> tuple[Placed, NDArray[np.bool_]]:
     """Positions from all rows; where these contradict or do not check each other, from those that no spring spoils.
+
+    What `members` tell by themselves comes on top.
 
     Returns
     -------
@@ -40,7 +43,7 @@ def turning_positions(nodes: Nodes) -> tuple[Placed, NDArray[np.bool_]]:
     layout, valid = nodes.layout, nodes.whole()
     edges = np.column_stack(sp.triu(nodes.moving, 1).nonzero())
     for springs in (False, True):
-        given, counted = equations(nodes, valid, springs=springs), valid.copy()
+        given, counted = joined(equations(nodes, valid, springs=springs), told_by(members, nodes)), valid.copy()
         if springs:
             counted[:, len(layout.displacements) :] = False
         try:
@@ -90,7 +93,7 @@ def _positions(given: Equations, layout: Layout, piece: Piece) -> Positions:
         piece.nodes[np.minimum(place, n - 1)] == part.row // b
     )  # a row may not depend on its own node
     local = replace(part, operator=piece.operator, row=np.where(own, place * b + part.row % b, -1))
-    blind = unnoticed(local, residuals[:, 1:], layout, x, piece.edges)
+    blind = unnoticed(local, residuals[:, 1:], layout, x, piece.edges) & (part.rotation >= 0)
     residual = float(np.abs(residuals[:, 0]).max()) / span
     evidence = Evidence(null.shape[2], residual, float(gap[0]) if len(gap) else float("inf"), m)
     return Positions(np.where(loose[:, None], np.nan, x - x[~loose].mean(axis=0)), evidence, blind)

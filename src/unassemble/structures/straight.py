@@ -1,0 +1,150 @@
+"""Straight members, each of which the block of its two nodes tells by itself, next to supports as well.
+
+A member that bends without shear has a block of few numbers. With U, V, W and T its parts of displacements and
+rotations at node i and at node j, and D the displacements that rotations about node j bring to node i,
+
+    V = U D / 2,    W = - V^T,    T = - D^T U D / 6 + g e e^T,    U e = h e,
+
+where e points along the member, g is its torsion and h its stretching (the cubic Hermite element in either plane; e.g.
+Przemieniecki, Theory of Matrix Structural Analysis, 1968, section 5.6). The first equation determines x_i - x_j, and
+the others contradict it where the block is not a member's: it has nine entries in the plane for four numbers, and 36 in
+space for eight. No sum over neighbours is involved, so that supports and springs to the ground do not matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..tolerances import LAST_DIGITS, SUMMED
+from .layouts import Layout
+from .nodes import Nodes
+
+_ANY_SIZE = np.errstate(over="ignore", invalid="ignore")  # entries may be of no member, and of any size
+
+
+@dataclass(frozen=True, eq=False)
+class Straight:
+    """Members that their blocks tell.
+
+    Attributes
+    ----------
+    ends : (m, 2) int64
+        Nodes, the lesser first.
+    vectors : (m, dim) float64
+        Position of the first less that of the second.
+    blocks : (m, b, b) float64
+    """
+
+    ends: NDArray[np.int64]
+    vectors: NDArray[np.float64]
+    blocks: NDArray[np.float64]
+
+
+def straight_members(nodes: Nodes) -> Straight:
+    """Members between two nodes that have all their unknowns."""
+    b = nodes.layout.block_size
+    whole: NDArray[np.bool_] = np.asarray(nodes.present.all(axis=1))
+    bsr = nodes.matrix.tobsr((b, b))
+    i = np.repeat(np.arange(nodes.n), np.diff(bsr.indptr))
+    j = bsr.indices.astype(np.int64)
+    upper = (i < j) & whole[i] & whole[j]
+    ends, blocks = np.column_stack([i[upper], j[upper]]), bsr.data[upper]
+    vectors = told_by_blocks(blocks, nodes.layout)
+    good = np.flatnonzero(misfits(blocks, vectors, nodes.layout) <= SUMMED)
+    return Straight(ends[good], vectors[good], blocks[good])
+
+
+@_ANY_SIZE
+def told_by_blocks(blocks: NDArray[np.float64], layout: Layout) -> NDArray[np.float64]:
+    """(m, dim) position of the first node less that of the second, as V = U D / 2 has it; zero where it tells nothing.
+
+    Parameters
+    ----------
+    blocks : (m, b, b) float64
+    layout : Layout
+    """
+    moves = len(layout.displacements)
+    size = np.abs(blocks).max(axis=(1, 2), initial=0, keepdims=True)
+    blocks = blocks / np.where(size > 0, size, 1)
+    one = layout.rigid_motions(np.eye(layout.dim))[:, :moves, moves:]
+    sides = np.einsum("mac,kct->matk", blocks[:, :moves, :moves], one)
+    sides = sides.reshape(len(blocks), moves * (layout.block_size - moves), layout.dim)
+    right = 2 * blocks[:, :moves, moves:].reshape(sides.shape[:2])
+    return np.asarray(np.einsum("mkr,mr->mk", np.linalg.pinv(sides, rcond=LAST_DIGITS), right))
+
+
+@_ANY_SIZE
+def misfits(blocks: NDArray[np.float64], vectors: NDArray[np.float64], layout: Layout) -> NDArray[np.float64]:
+    """(m,) how far blocks are from those of members along given vectors, relative to the size of each part.
+
+    Infinite, or no number, where a block does not couple displacements to rotations, or the vector vanishes.
+
+    Parameters
+    ----------
+    blocks : (m, b, b) float64
+    vectors : (m, dim) float64
+    layout : Layout
+    """
+    moves = len(layout.displacements)
+    lever = layout.rigid_motions(vectors)[:, :moves, moves:]
+    push, turn = blocks[:, :moves, :moves], blocks[:, :moves, moves:]
+    back, twist = blocks[:, moves:, :moves], blocks[:, moves:, moves:]
+    off = [_relative(push - np.swapaxes(push, 1, 2), push), _relative(back + np.swapaxes(turn, 1, 2), turn)]
+    if max(layout.displacements) < layout.dim:  # stretching apart from bending, which may be far softer
+        along = _along(vectors)
+        across = np.eye(moves) - along
+        bending = across @ push @ across
+        off.append(_relative(push - bending - along @ push @ along, push))
+        push = bending
+    bent = -np.swapaxes(lever, 1, 2) @ push @ lever / 6
+    axis = np.stack([vectors[:, k] if k < layout.dim else np.zeros(len(vectors)) for k in layout.rotations], axis=1)
+    torsion = _along(axis)
+    off.append(_relative(turn - push @ lever / 2, turn))
+    off.append(_relative(twist - bent - torsion @ (twist - bent) @ torsion, bent))
+    return np.max(off, axis=0)
+
+
+def _along(vectors: NDArray) -> NDArray:
+    """(m, k, k) projections on vectors (m, k)."""
+    size = np.linalg.norm(vectors, axis=1, keepdims=True)
+    unit = vectors / np.where(size > 0, size, 1)
+    return np.asarray(unit[:, :, None] * unit[:, None, :])
+
+
+def _relative(off: NDArray, part: NDArray) -> NDArray[np.float64]:
+    size = np.abs(part).max(axis=(1, 2))
+    return np.asarray(np.where(size > 0, np.abs(off).max(axis=(1, 2)) / np.where(size > 0, size, 1), np.inf))
+
+
+def shown_by_members(matrix: sp.csr_array, layout: Layout) -> NDArray[np.bool_]:
+    """(N,) rows with which a node begins whose unknowns stand in order: those of members show it.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+    layout : Layout
+    """
+    order, b = matrix.shape[0], layout.block_size
+    entry = matrix.tocoo()
+    some = (entry.col >= entry.row + b) & (entry.col <= order - b) & (entry.data < 0)
+    i, j = entry.row[some].astype(np.int64), entry.col[some].astype(np.int64)
+    for k in range(1, len(layout.displacements)):
+        some = _entries(matrix, i + k, j + k) < 0
+        i, j = i[some], j[some]
+    every = np.arange(b)
+    rows, columns = i[:, None, None] + every[:, None], j[:, None, None] + every
+    shape = (len(i), b, b)
+    blocks = _entries(matrix, np.broadcast_to(rows, shape).ravel(), np.broadcast_to(columns, shape).ravel())
+    blocks = blocks.reshape(shape)
+    good = misfits(blocks, told_by_blocks(blocks, layout), layout) <= SUMMED
+    begins = np.zeros(order, dtype=bool)
+    begins[i[good]] = begins[j[good]] = True
+    return begins
+
+
+def _entries(matrix: sp.csr_array, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.float64]:
+    return np.asarray(sp.coo_array(matrix[i, j]).toarray()).ravel() if len(i) else np.empty(0)

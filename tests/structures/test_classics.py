@@ -1,0 +1,89 @@
+"""Famous matrices of structures, whose meshes no collection has: what is certified of them, and what they look like."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from unassemble import recover
+
+CLASSICS = Path(__file__).resolve().parents[3] / "shared" / "classics"
+
+# Operator, nodes with coordinates and all nodes, share of the rows that say so.
+CERTIFIED = {
+    "bcsstk01": ("frame or shell", 8, 8, 100),
+    "bcsstk03": ("beam", 24, 28, 61),
+    "bcsstk04": ("frame or shell", 22, 22, 100),
+    "bcsstk05": ("truss", 51, 51, 100),
+    "bcsstk06": ("frame or shell", 60, 104, 57),
+    "bcsstk14": ("frame or shell", 257, 301, 77),
+    "bcsstk19": ("plane frame", 271, 273, 100),
+    "bcsstk20": ("plane frame", 159, 165, 98),
+    "nos1": ("plane frame", 79, 79, 65),
+    "nos2": ("plane frame", 319, 319, 66),
+    "nos4": ("truss", 50, 50, 100),
+    "nos5": ("frame or shell", 78, 78, 100),
+    "LF10": ("plane frame", 10, 10, 89),
+    "LFAT5": ("plane frame", 5, 5, 43),
+    "s1rmq4m1": ("frame or shell", 870, 959, 86),
+    "s1rmt3m1": ("frame or shell", 869, 960, 86),
+    "s3rmt3m3": ("frame or shell", 844, 937, 86),
+}
+
+
+def read(name):
+    path = CLASSICS / f"{name}.mtx.gz"
+    if not path.exists():
+        pytest.skip("the classics are not here")
+    return recover(path)
+
+
+@pytest.mark.parametrize("name", CERTIFIED)
+def test_what_is_certified(name):
+    operator, placed, nodes, share = CERTIFIED[name]
+    found = read(name)
+    assert found.certified, found.reason
+    assert found.operator == operator
+    assert (int(np.count_nonzero(found.node_status == 0)), found.n_points) == (placed, nodes)
+    assert f"{share}% of the rows say so" in found.reason
+
+
+def test_a_plate_of_eight_digits():
+    """Its entries are rounded, and its nodes form a grid of equal rectangles."""
+    found = read("nos3")
+    assert found.certified
+    assert "rounded to 8 digits" in found.reason
+    x, y = (np.unique(np.round(part / np.ptp(found.points), 6)) for part in found.points.T)
+    assert (len(x), len(y)) == (24, 20)
+    assert np.ptp(np.diff(x)) < 3e-6
+    assert np.ptp(np.diff(y)) < 3e-6
+
+
+@pytest.mark.parametrize(("name", "off"), [("s1rmq4m1", 1e-9), ("s1rmt3m1", 1e-9), ("s3rmt3m3", 1e-2)])
+def test_the_shells_are_cylinders(name, off):
+    """No equation knows it: all nodes have one distance from an axis, the one across which distances vary least."""
+    points = read(name).points
+    points = points[np.isfinite(points).all(axis=1)]
+    spread = []
+    for axis in range(3):
+        across = np.delete(points, axis, axis=1)
+        centre = np.linalg.lstsq(np.column_stack([2 * across, np.ones(len(across))]), (across**2).sum(axis=1))[0][:2]
+        radius = np.linalg.norm(across - centre, axis=1)
+        spread.append(np.ptp(radius) / radius.mean())
+    assert min(spread) < off  # the nodes of the last lie between an arc and its chords
+
+
+def test_a_bridge_is_its_own_mirror_image():
+    """Part of a suspension bridge, the collection says: pylons, a deck and stays, read from two phases of numbering."""
+    found = read("bcsstk19")
+    points = found.points[np.isfinite(found.points).all(axis=1)]
+    other = points * [-1, 1] + [points[:, 0].min() + points[:, 0].max(), 0]
+    distance = np.linalg.norm(points[:, None] - other[None], axis=2).min(axis=1)
+    assert np.mean(distance < 1e-6 * np.ptp(points)) > 0.9
+
+
+@pytest.mark.parametrize("name", ["bcsstk09", "bcsstk10", "bcsstk26"])
+def test_what_is_not_certified(name):
+    found = read(name)
+    assert found.status == "uncertified"
+    assert found.operator in ("plate", "frame or shell")
