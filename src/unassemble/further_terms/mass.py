@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..certify import Terms
 from ..clock import Clock
@@ -19,6 +20,10 @@ from ..topology import Topology
 from .again import ALIKE, Held, Plain, areas_of
 from .row_sums import RowSums
 
+_HOLES = 8
+"""Holes of three edges that are looked for, each for the price of a fit."""
+_CLEAR = 5.0
+"""Excess of a hole's area, relative to that about its corners, over the root mean square of all residuals."""
 _NO_SHAPE = "a mass matrix has no shape: it depends on the areas of the triangles alone, and any that have them will do"
 _OTHER = (
     "that no other areas, with another c, fit as well is not proved: the fit of edge lengths was started once, and at "
@@ -70,8 +75,8 @@ def with_consistent_mass(
 ) -> PlanarMesh | None:
     """The mesh of c L + s M; None where the fit of edge lengths does not come near the entries."""
     with clock("metric"):
-        fit = fit_metric(skeleton, sums.sign * held.matrix.entries, sums.positive(), sums.trust())
-    if fit is None or not fit.residual < ALIKE:
+        fit = _fit(skeleton, sums.sign * held.matrix.entries, sums)
+    if fit is None:
         return None
     found = plain(_without_mass(held.matrix, sums.sign, fit), fit.metric.u)
     reaction = sums.sign * float(fit.metric.areas.sum() / areas_of(found).sum())
@@ -79,6 +84,26 @@ def with_consistent_mass(
     terms = Terms(held.matrix.diagonal, reaction)
     operator = "c L + s M, M the consistent mass matrix,"
     return held.with_terms(found, terms, operator, _size(reaction), *((_OTHER,) if found.certified else ()))
+
+
+def _fit(skeleton: Skeleton, entries: NDArray, sums: RowSums) -> MetricFit | None:
+    """The metric; where a hole of three edges was taken for a triangle, without it.
+
+    Such a triangle has too much area for all three of its corners, as no misfit of another kind has.
+    """
+    for _ in range(_HOLES + 1):
+        fit = fit_metric(skeleton, entries, sums.positive(), sums.trust())
+        if fit is None or fit.residual < ALIKE:
+            return fit
+        excess = skeleton.at_vertices @ fit.metric.areas / (3 * sums.positive()) - 1
+        least = np.where(
+            (skeleton.sides[skeleton.opposite] == 2).all(axis=1), excess[skeleton.triangles].min(axis=1), 0
+        )
+        worst = int(np.argmax(least))
+        if not least[worst] > _CLEAR * fit.residual:
+            return None
+        skeleton = skeleton.without(worst)
+    return None
 
 
 def _without_mass(matrix: OperatorMatrix, sign: int, fit: MetricFit) -> OperatorMatrix:

@@ -1,8 +1,8 @@
 """S c L S with an unknown positive diagonal matrix S, as Jacobi scaling and equilibration leave it.
 
 L annihilates constants, so that S c L S annihilates 1 / S: where nothing else stands on the diagonal a positive null
-vector gives S, up to a factor that only c could tell it from. With an unknown D there is no such vector, and S is not
-determined: every S would leave some D.
+vector gives S, up to a factor that only c could tell it from. With an unknown D there is no such vector, and fewer
+entries off the diagonal than coordinates and factors.
 """
 
 from __future__ import annotations

@@ -33,7 +33,8 @@ class MetricOptions:
 
     Attributes
     ----------
-    steps : int
+    steps, patience : int
+        The iteration ends after so many steps, or when as many as the second have not lowered the residual by a fifth.
     damping : float
         The first; relative to the diagonal of the normal equations.
     nearly : float
@@ -42,7 +43,8 @@ class MetricOptions:
         Root mean square of the equations' residuals at which nothing but rounding is left.
     """
 
-    steps: int = 100
+    steps: int = 400
+    patience: int = 25
     damping: float = 1e-2
     nearly: float = 0.9
     tolerance: float = 1e-15
@@ -153,7 +155,7 @@ def fit_metric(
 def _descended(equations: Equations, metric: Metric, c: float, options: MetricOptions) -> MetricFit:
     residual = equations.residual(metric, c)
     root = float(np.sqrt(len(residual)))
-    damping, step = options.damping, 0
+    damping, step, history = options.damping, 0, [float(np.linalg.norm(residual))]
     for step in range(1, options.steps + 1):
         before = float(np.linalg.norm(residual))
         derivative, by_c = equations.derivative(metric, c)
@@ -170,6 +172,9 @@ def _descended(equations: Equations, metric: Metric, c: float, options: MetricOp
         damping = max(damping / 10, 1e-14) if reach == 1 else damping * 1.5
         left = float(np.linalg.norm(residual))
         _log.debug("metric step %d: residual %.1e, reach %.2g, c %.6g", step, left / root, reach, c)
+        history.append(left)
+        if step > options.patience and left > 0.8 * history[-1 - options.patience]:
+            break
         settled = reach == 1 and left > 0.5 * before and left < 1e-9 * root
         if left < options.tolerance * root or settled:
             break
