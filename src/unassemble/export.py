@@ -80,6 +80,8 @@ def arrays(recovery: Recovery) -> dict[str, Any]:
         content |= {"polygons_offsets": recovery.polygons_offsets, "polygons_data": recovery.polygons_data}
     if isinstance(recovery, Surface):
         content |= {"edges": recovery.edges, "edge_lengths": recovery.edge_lengths, "curvature": recovery.curvature}
+        if recovery.length_deviations is not None:
+            content["length_deviations"] = recovery.length_deviations
     content |= {"component": recovery.component, "hinges": recovery.hinges, "scale": recovery.scale}
     content["node_status"] = recovery.node_status
     if recovery.vector_valued:

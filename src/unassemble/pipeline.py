@@ -18,6 +18,7 @@ from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, li
 from .outputs import PlanarMesh, Recovery, Surface
 from .scalar import recover_scalar
 from .scalar.placement import Placement
+from .tolerances import LARGEST_NOISE
 
 
 def recover(
@@ -196,9 +197,19 @@ class _Task:
             if isinstance(error, NotPlanarError) and (why := about_translations(self.matrix)):
                 raise NotPlanarError(f"the graph of the matrix is not planar; {why}", error.witness) from error
             raise
-        if found.certified or not found.node_status.any():
+        if found.certified:
             return found
-        other = self._as_certified_surface() or self._as_second_reading()
+        curved = self._as_certified_surface() if found.status == "uncertified" else None
+        if curved is not None:
+            noise, little = found.estimated_noise, LARGEST_NOISE * np.abs(found.scale).min()
+            if noise is None or noise > little:
+                return curved
+            # Errors of entries bend a flat mesh, too, if the diagonal makes up for them.
+            note = "a surface in space, bent a little, has exactly these entries: see `operator='surface'`"
+            found = replace(found, warnings=(*found.warnings, note))
+        if not found.node_status.any():
+            return found
+        other = self._as_second_reading()
         return other if other is not None and other.certified else found
 
     def _as_second_reading(self) -> Recovery | None:
@@ -241,7 +252,8 @@ class _Task:
     def _lengths(self) -> Surface:
         from .metric import recover_surface
 
-        unfit = [name for name in self.given if name != "scale"] + ["anchors"] * bool(self.frame.anchors)
+        fit = ("scale", "noise", "standard_deviations")
+        unfit = [name for name in self.given if name not in fit] + ["anchors"] * bool(self.frame.anchors)
         if unfit:
             raise InputError(
                 f"`{unfit[0]}` is not for surfaces in space: leave it out, or choose `operator='laplacian'`"

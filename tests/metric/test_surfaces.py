@@ -72,6 +72,16 @@ def test_auto_on_planar_graphs():
     assert "no mesh in the plane" in found.choice
 
 
+@needs_shared
+def test_auto_on_a_bent_disc():
+    mesh = np.load(SHARED / "corpus" / "surface" / "gc_cat_head.npz")
+    known = surface(mesh["points"], mesh["triangles"], c=2.0)
+    found = recover(known.matrix)
+    assert isinstance(found, Surface)
+    assert found.certified
+    assert found.loops.tolist() == [1]
+
+
 def test_curvature_is_that_of_the_surface():
     points, triangles = sphere(2000)
     points /= np.linalg.norm(points, axis=1)[:, None]
