@@ -18,7 +18,7 @@ from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, li
 from .outputs import PlanarMesh, Recovery, Surface
 from .scalar import recover_scalar
 from .scalar.placement import Placement
-from .tolerances import LARGEST_NOISE
+from .tolerances import LARGEST_NOISE, ROUNDED
 
 
 def recover(
@@ -240,6 +240,9 @@ class _Task:
         """The matrix as that of a surface that is bent, if it is one without doubt."""
         from .metric import could_be_planar, realised
 
+        entries = self.matrix.entries
+        if np.ptp(entries) <= ROUNDED * np.abs(entries).max(initial=0.0):
+            return None  # the Laplacian of a graph, most likely
         try:
             found = self._lengths()
         except (RecoveryError, InputError):  # options may be for planar meshes only
