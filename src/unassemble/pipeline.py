@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .clock import Clock
 from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
@@ -228,12 +229,22 @@ class _Task:
 
     def _as_surface(self) -> Surface:
         """A surface in space, with coordinates on demand; a flat one with those of the planar mesh that it is."""
-        from .metric import could_be_planar, flattened, realised
+        from .metric import flattened, perhaps_planar, realised
 
-        found = self._lengths()
-        if could_be_planar(found):
-            with suppress(RecoveryError):  # it may overlap itself
-                found = flattened(found, self._as_scalar(self.matrix, ()))
+        found: Surface | GeometryError
+        try:
+            found = self._lengths()
+        except GeometryError as error:
+            found = error
+        if isinstance(found, GeometryError) or perhaps_planar(found):
+            with suppress(RecoveryError):
+                planar = self._as_scalar(self.matrix, ())
+                triangles = planar.divided()[0]
+                if planar.certified and (isinstance(found, GeometryError) or len(triangles) < len(found.triangles)):
+                    found = self._lengths(triangles)  # holes of three edges, that were taken for triangles
+                found = found if isinstance(found, GeometryError) else flattened(found, planar)
+        if isinstance(found, GeometryError):
+            raise found
         return realised(found, self.clock) if self.realise and found.dim == 3 else found
 
     def _as_certified_surface(self) -> Surface | None:
@@ -252,7 +263,7 @@ class _Task:
         chosen = replace(found, choice="no mesh in the plane has these entries")
         return realised(chosen, self.clock) if self.realise else chosen
 
-    def _lengths(self) -> Surface:
+    def _lengths(self, triangles: NDArray[np.int64] | None = None) -> Surface:
         from .metric import recover_surface
 
         fit = ("scale", "noise", "standard_deviations")
@@ -262,7 +273,7 @@ class _Task:
                 f"`{unfit[0]}` is not for surfaces in space: leave it out, or choose `operator='laplacian'`"
             )
         self._check_scale(self.matrix)
-        return recover_surface(self.matrix, self.clock, self.planar)
+        return recover_surface(self.matrix, self.clock, self.planar, triangles)
 
     def _as_vector(self, reading: VectorReading) -> Recovery:
         from .vector import recover_vector

@@ -42,8 +42,10 @@ class _Found:
         return not self.failures and held.backward_error <= CERTIFIED and not len(held.flipped)
 
 
-def recover_surface(matrix: OperatorMatrix, clock: Clock, options: ScalarOptions) -> Surface:
-    """The triangles and edge lengths of a surface from its Laplacian, A = c L + D.
+def recover_surface(
+    matrix: OperatorMatrix, clock: Clock, options: ScalarOptions, triangles: NDArray[np.int64] | None = None
+) -> Surface:
+    """The triangles and edge lengths of a surface from its Laplacian, A = c L + D; on given triangles if there are any.
 
     Raises
     ------
@@ -55,7 +57,10 @@ def recover_surface(matrix: OperatorMatrix, clock: Clock, options: ScalarOptions
     with clock("topology"):
         used, notes = _used(matrix)
         cycles = Cycles.of(used.n, used.edges)
-        readings = list(islice(surface_readings(cycles), _READINGS + 1))
+        if triangles is None:
+            readings = list(islice(surface_readings(cycles), _READINGS + 1))
+        else:
+            readings = [cycles.among(triangles)]
         solid = in_four_cliques(cycles)
     found = [_solved(used, SurfaceMesh.of(cycles, chosen), clock, options) for chosen in readings[:_READINGS]]
     fitting = [one for one in found if one.fits]
