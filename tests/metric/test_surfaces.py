@@ -204,7 +204,7 @@ def _spread(found: Surface, ratio: np.ndarray) -> float:
 
 def test_planar_meshes_with_holes_of_three_edges():
     """In the hole's place a triangle would have lengths as well, and the rows sum to zero."""
-    points, triangles = random_mesh(300, seed=1)
+    points, triangles = random_mesh(300, seed=0)
     known = specimen(points, np.delete(triangles, len(triangles) // 2, axis=0))
     found = recover(known.matrix, operator="surface")
     assert found.certified

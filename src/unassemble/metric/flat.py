@@ -38,12 +38,14 @@ def perhaps_planar(surface: Surface) -> bool:
     """
     if not (surface.orientable & (surface.genus == 0)).all():
         return False
-    bent = float(surface.curvature[surface.triangles].sum(axis=1).max())
+    inside = surface.curvature.copy()
+    inside[surface.boundary] = 0  # boundaries bend as they like
+    bent = float(inside[surface.triangles].sum(axis=1).max())
     return could_be_planar(surface) or bent > (_BENT if surface.loops.all() else _CLOSED)
 
 
 # Radians at the corners of a triangle that is none.
-_BENT = 1.5  # 1.7 to 3.8 in the place of a hole
+_BENT = 1.5  # 2.2 to 3.8 in the place of a hole
 _CLOSED = (
     8.0  # 14.5 in the place of the outside, where all of the 4 pi have to be; at most 4.2 on other closed surfaces
 )
