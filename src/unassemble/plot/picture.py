@@ -45,7 +45,7 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     if path is not None:
         check_plot(path)
     if isinstance(recovery, Surface) and recovery.realisation is None:
-        recovery = realised(recovery, Clock())  # edge lengths cannot be drawn
+        recovery = realised(recovery, Clock(), starts=1)  # edge lengths cannot be drawn
     figure, handles = planar_mesh(recovery) if isinstance(recovery, PlanarMesh) else plot_body(recovery)
     about = "edge lengths " if isinstance(recovery, Surface) and recovery.dim == 3 else ""
     header(figure, about + recovery.status, details(recovery), style.STATUS.get(recovery.status, style.TEXT))
