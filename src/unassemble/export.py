@@ -88,6 +88,8 @@ def arrays(recovery: Recovery) -> dict[str, Any]:
             del content["points"]
     if isinstance(recovery, Surface):
         content |= {"edges": recovery.edges, "edge_lengths": recovery.edge_lengths, "curvature": recovery.curvature}
+        if recovery.length_deviations is not None:
+            content["length_deviations"] = recovery.length_deviations
     content |= {"component": recovery.component, "hinges": recovery.hinges, "scale": recovery.scale}
     content["node_status"] = recovery.node_status
     if recovery.vector_valued:

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .clock import Clock
 from .diagnosis import explained, judged
@@ -22,6 +23,7 @@ from .progress import StageDisplay
 from .quiet import quiet_libraries
 from .readings import ScalarReadings
 from .scalar.placement import Placement
+from .tolerances import LARGEST_NOISE, ROUNDED
 
 
 def recover(
@@ -203,7 +205,7 @@ class _Task:
         return ScalarReadings(self.matrix, self.clock, self.planar)
 
     def _first_that_fits(self) -> Recovery:
-        """A planar mesh; or a surface in space; or nodes of several unknowns where rows, or more of them, belong to these.
+        """A planar mesh; or a surface in space; or nodes of several unknowns where no rows, or fewer, belong to these.
 
         A straight beam's rows, for one, fall apart into planar graphs.
         """
@@ -215,9 +217,19 @@ class _Task:
                 return other
             nodes = about_translations(self.matrix) if isinstance(error, NotPlanarError) else ""
             raise explained(error, self.matrix, nodes) from error
-        if found.certified or not (found.node_status.any() or isinstance(found, ConformingMesh)):
+        if found.certified:
+            return found
+        curved = self._as_certified_surface() if found.status == "uncertified" else None
+        if curved is not None:
+            noise, little = found.estimated_noise, LARGEST_NOISE * np.abs(found.scale).min()
+            if noise is None or noise > little:
+                return curved
+            # Errors of entries bend a flat mesh, too, if the diagonal makes up for them.
+            note = "a surface in space, bent a little, has exactly these entries: see `operator='surface'`"
+            found = replace(found, warnings=(*found.warnings, note))
+        if not (found.node_status.any() or isinstance(found, ConformingMesh)):
             return judged(found, self.matrix)
-        other = self._as_certified_surface() or self._as_second_reading()
+        other = self._as_second_reading()
         better = other is not None and (other.certified or other.node_status.mean() < found.node_status.mean())
         return other if other is not None and better else judged(found, self.matrix)
 
@@ -242,18 +254,31 @@ class _Task:
 
     def _as_surface(self) -> Surface:
         """A surface in space, with coordinates on demand; a flat one with those of the planar mesh that it is."""
-        from .metric import could_be_planar, flattened, realised
+        from .metric import flattened, perhaps_planar, realised
 
-        found = self._lengths()
-        if could_be_planar(found):
-            with suppress(RecoveryError):  # it may overlap itself
-                found = flattened(found, self._as_scalar(self.matrix, ()))
+        found: Surface | GeometryError
+        try:
+            found = self._lengths()
+        except GeometryError as error:
+            found = error
+        if isinstance(found, GeometryError) or perhaps_planar(found):
+            with suppress(RecoveryError):
+                planar = self._as_scalar(self.matrix, ())
+                triangles = planar.divided()[0]
+                if planar.certified and (isinstance(found, GeometryError) or len(triangles) < len(found.triangles)):
+                    found = self._lengths(triangles)  # holes of three edges, that were taken for triangles
+                found = found if isinstance(found, GeometryError) else flattened(found, planar)
+        if isinstance(found, GeometryError):
+            raise found
         return realised(found, self.clock) if self.realise and found.dim == 3 else found
 
     def _as_certified_surface(self) -> Surface | None:
         """The matrix as that of a surface that is bent, if it is one without doubt."""
         from .metric import could_be_planar, realised
 
+        entries = self.matrix.entries
+        if np.ptp(entries) <= ROUNDED * np.abs(entries).max(initial=0.0):
+            return None  # the Laplacian of a graph, most likely
         try:
             found = self._lengths()
         except (RecoveryError, InputError):  # options may be for planar meshes only
@@ -263,16 +288,17 @@ class _Task:
         chosen = replace(found, choice="no mesh in the plane has these entries")
         return realised(chosen, self.clock) if self.realise else chosen
 
-    def _lengths(self) -> Surface:
+    def _lengths(self, triangles: NDArray[np.int64] | None = None) -> Surface:
         from .metric import recover_surface
 
-        unfit = [name for name in self.given if name != "scale"] + ["anchors"] * bool(self.frame.anchors)
+        fit = ("scale", "noise", "standard_deviations")
+        unfit = [name for name in self.given if name not in fit] + ["anchors"] * bool(self.frame.anchors)
         if unfit:
             raise InputError(
                 f"`{unfit[0]}` is not for surfaces in space: leave it out, or choose `operator='laplacian'`"
             )
         self._check_scale(self.matrix)
-        return recover_surface(self.matrix, self.clock, self.planar)
+        return recover_surface(self.matrix, self.clock, self.planar, triangles)
 
     def _as_vector(self, reading: VectorReading) -> Recovery:
         from .vector import recover_vector

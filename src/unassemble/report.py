@@ -87,7 +87,8 @@ def _surface_facts(surface: Surface) -> dict[str, Any]:
 
     One for each piece: ``euler_characteristic``, ``orientable``, ``genus`` (of pieces that are not orientable the
     number of cross-caps), ``n_boundary_loops`` and ``total_curvature``, over 2 pi, which is the Euler characteristic by
-    the theorem of Gauss and Bonnet; ``n_edges``; ``realisation``, if coordinates were asked for: ``misfit``,
+    the theorem of Gauss and Bonnet; ``n_edges``; ``chi_square``, ``largest_standard_deviation`` of a length, with
+    noise; ``realisation``, if coordinates were asked for: ``misfit``,
     ``largest`` and ``misfits``.
     """
     return {
@@ -97,6 +98,10 @@ def _surface_facts(surface: Surface) -> dict[str, Any]:
         "genus": surface.genus,
         "n_boundary_loops": surface.loops,
         "largest_curvature": float(np.nanmax(np.abs(surface.curvature))),
+        "chi_square": surface.chi_square,
+        "largest_standard_deviation": None
+        if surface.length_deviations is None
+        else float(np.nanmax(surface.length_deviations)),
         "realisation": surface.realisation,
     }
 

@@ -29,6 +29,28 @@ def could_be_planar(surface: Surface) -> bool:
     return bool((np.abs(np.abs(turns) - 1) < 1e-3).all() and (outer == 1).all())
 
 
+def perhaps_planar(surface: Surface) -> bool:
+    """Whether a planar mesh may have the same matrix: it is flat, or a hole may have been taken for a triangle.
+
+    A planar mesh with a hole of three edges that is taken for a triangle mostly has lengths as well, and bends about
+    that triangle; and so does one with three edges outside. Whether it is one the planar mesh tells, which has entries
+    to spare.
+    """
+    if not (surface.orientable & (surface.genus == 0)).all():
+        return False
+    inside = surface.curvature.copy()
+    inside[surface.boundary] = 0  # boundaries bend as they like
+    bent = float(inside[surface.triangles].sum(axis=1).max())
+    return could_be_planar(surface) or bent > (_BENT if surface.loops.all() else _CLOSED)
+
+
+# Radians at the corners of a triangle that is none.
+_BENT = 1.5  # 2.2 to 3.8 in the place of a hole
+_CLOSED = (
+    8.0  # 14.5 in the place of the outside, where all of the 4 pi have to be; at most 4.2 on other closed surfaces
+)
+
+
 def flattened(surface: Surface, planar: PlanarMesh) -> Surface:
     """A flat surface with the coordinates of the planar mesh that the same matrix gives, and with its certificate.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
+from ..topology.keys import Grouped
 from ..topology.manifold import Cycles
+from ..topology.numbering import local_numbering
 from ..topology.orientation import glue, orient
 
 
@@ -79,6 +82,26 @@ class SurfaceMesh:
         label = np.empty(len(self.edges), np.int64)
         label[self.opposite] = self.piece[:, None]
         return label
+
+    def pieces(self) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+        """Each piece by itself, its edges in an order in which neighbours are near each other.
+
+        Yields
+        ------
+        rows : (k,) int64
+            Of `edges`.
+        opposite : (m, 3) int64
+            For each triangle the places in `rows` of the edges that face its corners.
+        """
+        edges, triangles = Grouped(self.piece_of_edge, self.n_pieces), Grouped(self.piece, self.n_pieces)
+        place = np.empty(len(self.edges), np.int64)
+        for label in range(self.n_pieces):
+            rows = edges.order[edges.start[label] : edges.start[label + 1]]
+            vertices, local = np.unique(self.edges[rows], return_inverse=True)
+            rows = rows[local_numbering(len(vertices), local.reshape(-1, 2)).edge_rows]
+            place[rows] = np.arange(len(rows))
+            opposite = place[self.opposite[triangles.order[triangles.start[label] : triangles.start[label + 1]]]]
+            yield rows, opposite[np.argsort(opposite.min(axis=1), kind="stable")]
 
     @property
     def euler(self) -> NDArray[np.int64]:

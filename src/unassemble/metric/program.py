@@ -69,7 +69,7 @@ class Metric:
     history: tuple[float, ...]
 
 
-class _Normal:
+class Normal:
     """Sparse symmetric matrices (e, e) that add up 3 x 3 blocks of triangles; one pattern, analysed once."""
 
     def __init__(self, opposite: NDArray, size: int):
@@ -120,7 +120,7 @@ def solve_metric(
     unit = weights / np.abs(weights).max()
     if not np.isfinite(unit).all():
         raise GeometryError("all entries of a piece vanish")
-    normal = _Normal(opposite, len(weights))
+    normal = Normal(opposite, len(weights))
     try:
         with np.errstate(all="ignore"):  # what is not finite is refused
             u, count = _central_path(unit, opposite, normal, options)
@@ -132,18 +132,19 @@ def solve_metric(
     finally:
         normal.release()
     _, cotangents = areas_cotangents(u[opposite])
-    own = _summed(opposite, cotangents / 2, len(u))
+    own = summed(opposite, cotangents / 2, len(u))
     return Metric(u / u.mean(), float((weights @ u) / (own @ u)), tuple(history))
 
 
 _NONE = "no edge lengths were found that have these entries: the triangles that come nearest have no area"
 
 
-def _summed(opposite: NDArray, values: NDArray, size: int) -> NDArray[np.float64]:
+def summed(opposite: NDArray, values: NDArray, size: int) -> NDArray[np.float64]:
+    """(size,) sums over the corners that face each edge."""
     return np.asarray(np.bincount(opposite.ravel(), values.ravel(), size), np.float64)
 
 
-def _central_path(w: NDArray, opposite: NDArray, normal: _Normal, options: MetricOptions) -> tuple[NDArray, int]:
+def _central_path(w: NDArray, opposite: NDArray, normal: Normal, options: MetricOptions) -> tuple[NDArray, int]:
     """From equilateral triangles to lengths right to about the last barrier, and the number of steps.
 
     The barrier is relative to the triangle's area at the last centre, so that grading by many orders does no harm.
@@ -159,8 +160,8 @@ def _central_path(w: NDArray, opposite: NDArray, normal: _Normal, options: Metri
         root = np.sqrt(1 + ratio**2)
         first = root + ratio  # phi'(S), and below S phi''(S)
         second = -ratio * first / root
-        gradient = _summed(opposite, first[:, None] * cotangents / 4, len(u))
-        blocks = _blocks(sides, area, cotangents, first, second - first)
+        gradient = summed(opposite, first[:, None] * cotangents / 4, len(u))
+        blocks = blocks_of(sides, area, cotangents, first, second - first)
         scaled = normal.factorised(blocks).solve(np.column_stack([gradient * u, w * u]))
         solved = u[:, None] * scaled
         change = solved[:, 0] - (w @ solved[:, 0]) / (w @ solved[:, 1]) * solved[:, 1]
@@ -175,7 +176,7 @@ def _central_path(w: NDArray, opposite: NDArray, normal: _Normal, options: Metri
     raise GeometryError(_NONE)
 
 
-def _blocks(sides: NDArray, area: NDArray, cotangents: NDArray, first: NDArray, outer: NDArray) -> NDArray:
+def blocks_of(sides: NDArray, area: NDArray, cotangents: NDArray, first: NDArray, outer: NDArray) -> NDArray:
     """(m, 3, 3) minus second derivatives of phi(S), in units of the sides.
 
     S'' = (signs - cot cot') / 16 S, S' = cot / 4; `outer` is S phi'' - phi'.
@@ -186,7 +187,7 @@ def _blocks(sides: NDArray, area: NDArray, cotangents: NDArray, first: NDArray, 
     return np.asarray(-second - outer[:, None, None] * (flat[:, :, None] * flat[:, None, :]))
 
 
-def _newton(w: NDArray, opposite: NDArray, normal: _Normal, u: NDArray, steps: int) -> tuple[NDArray, list[float]]:
+def _newton(w: NDArray, opposite: NDArray, normal: Normal, u: NDArray, steps: int) -> tuple[NDArray, list[float]]:
     """Newton's method for w(u) = w / c, until the misfit no longer falls.
 
     The matrix has the null vector u, to which the misfit is orthogonal if c is chosen so: a shift next to rounding
@@ -197,7 +198,7 @@ def _newton(w: NDArray, opposite: NDArray, normal: _Normal, u: NDArray, steps: i
     for _ in range(max(steps, 1)):
         sides = u[opposite]
         area, cotangents = areas_cotangents(sides)
-        own = _summed(opposite, cotangents / 2, len(u))
+        own = summed(opposite, cotangents / 2, len(u))
         misfit = own - w * ((own @ u) / (w @ u))
         history.append(float(np.linalg.norm(misfit) / np.linalg.norm(own)))
         if not np.isfinite(history[-1]):
@@ -207,7 +208,7 @@ def _newton(w: NDArray, opposite: NDArray, normal: _Normal, u: NDArray, steps: i
         if len(history) > 1 and history[-1] < 1e-9 and history[-1] > 0.1 * history[-2]:
             break
         ones = np.ones(len(area))
-        blocks = 2 * _blocks(sides, area, cotangents, ones, -ones)
+        blocks = 2 * blocks_of(sides, area, cotangents, ones, -ones)
         change = u * normal.factorised(blocks, 1e-10).solve(misfit * u)
         change -= u * ((own @ change) / (own @ u))
         u = u + min(1.0, 0.9 * longest_step(sides, change[opposite])) * change

@@ -20,7 +20,7 @@ _STEPS = 80
 _LANDMARKS = 60
 
 
-def realised(surface: Surface, clock: Clock) -> Surface:
+def realised(surface: Surface, clock: Clock, starts: int = _STARTS) -> Surface:
     """The surface with coordinates that minimise the misfit of squared edge lengths, and with what is left of it.
 
     Lengths do not determine a shape: surfaces that are open mostly bend, and those that do not may have several shapes,
@@ -34,12 +34,12 @@ def realised(surface: Surface, clock: Clock) -> Surface:
         ).tocsr()
         known = np.isfinite(surface.edge_lengths)
         _, part = csgraph.connected_components(graph, directed=False)
-        per_start: NDArray[np.float64] = np.zeros((_STARTS, len(surface.edges)))
+        per_start: NDArray[np.float64] = np.zeros((starts, len(surface.edges)))
         for label in np.unique(part[surface.edges[known, 0]]):
             rows = np.flatnonzero(known & (part[surface.edges[:, 0]] == label))
             vertices, local = np.unique(surface.edges[rows], return_inverse=True)
             edges, lengths = local.reshape(-1, 2), surface.edge_lengths[rows]
-            shapes = [_fitted(start, edges, lengths) for start in _starts(len(vertices), edges, lengths)]
+            shapes = [_fitted(start, edges, lengths) for start in _starts(len(vertices), edges, lengths, starts)]
             left = [_lengths(shape, edges) - lengths for shape in shapes]
             per_start[:, rows] = left
             misfits = np.linalg.norm(left, axis=1) / np.linalg.norm(lengths)
@@ -65,7 +65,7 @@ def _in_axes(points: NDArray) -> NDArray[np.float64]:
     return np.asarray(centred @ np.linalg.svd(centred, full_matrices=False)[2].T)
 
 
-def _starts(n: int, edges: NDArray, lengths: NDArray) -> list[NDArray[np.float64]]:
+def _starts(n: int, edges: NDArray, lengths: NDArray, count: int) -> list[NDArray[np.float64]]:
     """Landmark multidimensional scaling of distances along edges, and the same with distances bent and noise.
 
     Distances along a surface are longer than those through space, the more so the longer they are.
@@ -81,7 +81,7 @@ def _starts(n: int, edges: NDArray, lengths: NDArray) -> list[NDArray[np.float64
         marks.append(int(np.argmax(far)))
     table = np.array(distances)
     starts = []
-    for k in range(_STARTS):
+    for k in range(count):
         bent = table ** (1 - 0.15 * k)
         square = bent**2
         own = square[:, marks[: len(table)]]

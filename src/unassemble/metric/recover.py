@@ -14,12 +14,12 @@ from ..errors import GeometryError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..recovery import Surface
-from ..tolerances import CERTIFIED
-from ..topology import local_numbering
+from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE
 from ..topology.manifold import Cycles, in_four_cliques, surface_readings
 from ..words import count_of, words_of
 from .curvature import curvatures
 from .mesh import SurfaceMesh
+from .noise import length_deviations, row_sum_test, scale_deviation
 from .program import Metric, solve_metric
 
 _READINGS = 16  # as many choices of triangles as are tried one by one
@@ -34,6 +34,7 @@ class _Found:
     scale: NDArray[np.float64]
     certificate: MetricCertificate
     failures: tuple[str, ...]
+    sums: dict[str, float] | None = None
 
     @property
     def fits(self) -> bool:
@@ -41,8 +42,10 @@ class _Found:
         return not self.failures and held.backward_error <= CERTIFIED and not len(held.flipped)
 
 
-def recover_surface(matrix: OperatorMatrix, clock: Clock, options: ScalarOptions) -> Surface:
-    """The triangles and edge lengths of a surface from its Laplacian, A = c L + D.
+def recover_surface(
+    matrix: OperatorMatrix, clock: Clock, options: ScalarOptions, triangles: NDArray[np.int64] | None = None
+) -> Surface:
+    """The triangles and edge lengths of a surface from its Laplacian, A = c L + D; on given triangles if there are any.
 
     Raises
     ------
@@ -54,7 +57,10 @@ def recover_surface(matrix: OperatorMatrix, clock: Clock, options: ScalarOptions
     with clock("topology"):
         used, notes = _used(matrix)
         cycles = Cycles.of(used.n, used.edges)
-        readings = list(islice(surface_readings(cycles), _READINGS + 1))
+        if triangles is None:
+            readings = list(islice(surface_readings(cycles), _READINGS + 1))
+        else:
+            readings = [cycles.among(triangles)]
         solid = in_four_cliques(cycles)
     found = [_solved(used, SurfaceMesh.of(cycles, chosen), clock, options) for chosen in readings[:_READINGS]]
     fitting = [one for one in found if one.fits]
@@ -62,7 +68,19 @@ def recover_surface(matrix: OperatorMatrix, clock: Clock, options: ScalarOptions
     if not np.isfinite(best.scale).any():
         raise GeometryError(best.failures[0])
     verdict = _verdict(best, len(fitting), len(readings), solid, options, len(cycles.triangles))
-    return _report(used, best, verdict, notes, clock)
+    deviations = None
+    if options.noise is not None and options.standard_deviations:
+        with clock("deviations"):
+            deviations = _deviations(best, options.noise)
+    return _report(used, best, verdict, notes, clock, deviations)
+
+
+def _deviations(found: _Found, sigma: float) -> NDArray[np.float64]:
+    deviations = np.full(len(found.squared), np.nan)
+    for scale, (rows, opposite) in zip(found.scale, found.mesh.pieces(), strict=True):
+        if np.isfinite(scale):
+            deviations[rows] = sigma / abs(scale) * length_deviations(found.squared[rows], opposite)
+    return deviations
 
 
 def _used(matrix: OperatorMatrix) -> tuple[OperatorMatrix, list[str]]:
@@ -81,39 +99,28 @@ def _solved(matrix: OperatorMatrix, mesh: SurfaceMesh, clock: Clock, options: Sc
     squared = np.full(len(mesh.edges), np.nan)
     scale = np.full(mesh.n_pieces, np.nan)
     failures = []
-    of_edges = mesh.piece_of_edge
-    for label in range(mesh.n_pieces):
-        rows = np.flatnonzero(of_edges == label)
-        own = np.flatnonzero(mesh.piece == label)
+    for label, (order, opposite) in enumerate(mesh.pieces()):
         with clock("metric"):
-            order, opposite = _near_each_other(mesh, rows, own)
             entries = matrix.entries[order]
             sign = -1.0 if entries.sum() > 0 else 1.0
             try:
                 metric: Metric = solve_metric(-sign * entries, opposite, polish=options.refine)
             except GeometryError as error:
-                vertex = mesh.triangles[own].min()
+                vertex = mesh.triangles[mesh.piece == label].min()
                 failures.append(f"{error} (piece of row {vertex})")
                 continue
         lengths = np.sqrt(metric.squared)
         squared[order] = metric.squared / lengths.mean() ** 2
         scale[label] = sign * metric.scale
     with clock("certify"):
-        factor = scale if options.scale is None else np.where(np.isfinite(scale), options.scale, np.nan)
+        # Entries with errors tell a scale with an error, which is tested by itself.
+        told = options.scale if options.noise is None else None
+        factor = scale if told is None else np.where(np.isfinite(scale), told, np.nan)
         certificate = certify_metric(
             mesh.edges, matrix.entries, matrix.diagonal, np.sqrt(squared), mesh.triangles, factor[mesh.piece]
         )
-    return _Found(mesh, squared, factor, certificate, tuple(failures))
-
-
-def _near_each_other(mesh: SurfaceMesh, rows: NDArray, own: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Edges of a piece in an order in which neighbours are near each other, and the edges facing corners in it."""
-    numbering = local_numbering(mesh.n, mesh.edges[rows])
-    order = rows[numbering.edge_rows]
-    place = np.empty(len(mesh.edges), np.int64)
-    place[order] = np.arange(len(order))
-    opposite = place[mesh.opposite[own]]
-    return order, opposite[np.argsort(opposite.min(axis=1), kind="stable")]
+    sums = None if options.noise is None else row_sum_test(matrix, options.noise)
+    return _Found(mesh, squared, factor, certificate, tuple(failures), sums)
 
 
 @dataclass(frozen=True)
@@ -153,6 +160,8 @@ def _verdict(
         return _Verdict("ambiguous", "ambiguous", "other choices of triangles have lengths that fit as well")
     kept = "proved" if n_cycles == len(found.mesh.triangles) else "searched"
     fits = "the lengths give every entry back, and no others do on these triangles"
+    if options.noise is not None:
+        return _with_noise(found, kept, fits, options.noise, options.scale)
     if options.scale is not None:
         return _Verdict("certified", kept, f"{fits}; the scale is the given one")
     off = held.row_misfits > CERTIFIED
@@ -167,6 +176,23 @@ def _verdict(
     return _Verdict("uncertified", kept, reason)
 
 
+def _with_noise(found: _Found, kept: str, fits: str, sigma: float, scale: float | None) -> _Verdict:
+    """Lengths fit noisy entries as well as exact ones: what is tested is the row sums, or the scale."""
+    if sigma > LARGEST_NOISE * np.abs(found.scale).min():
+        return _Verdict("uncertified", None, "the noise is too large: angles are known to no more than a few degrees")
+    if scale is not None:
+        error = [sigma * scale_deviation(found.squared[rows], place) for rows, place in found.mesh.pieces()]
+        off = float((np.abs(found.scale - scale) / error).max())
+        if off <= _OFF:
+            return _Verdict("certified", kept, f"{fits}; the scale is the given one up to noise")
+        return _Verdict("uncertified", kept, f"the entries tell another scale, off by {off:.1f} standard deviations")
+    test = found.sums or {}
+    if min(test["p_value"], test["largest_p_value"]) >= CONFIDENCE:
+        return _Verdict("certified", kept, f"{fits}; rows sum to zero up to noise")
+    return _Verdict("uncertified", kept, "rows do not sum to zero, by more than noise, and no entries are to spare")
+
+
+_OFF = 3.3  # standard deviations: one right scale in a thousand is refused
 _SUMS = {
     "zero": "rows sum to zero",
     "constant": "rows sum to one number",
@@ -174,7 +200,14 @@ _SUMS = {
 }
 
 
-def _report(matrix: OperatorMatrix, found: _Found, verdict: _Verdict, notes: list[str], clock: Clock) -> Surface:
+def _report(
+    matrix: OperatorMatrix,
+    found: _Found,
+    verdict: _Verdict,
+    notes: list[str],
+    clock: Clock,
+    deviations: NDArray | None,
+) -> Surface:
     mesh = found.mesh
     worst, misfits = found.certificate.entries.worst(10 if verdict.uniqueness is None else 0)
     curvature = curvatures(mesh, found.squared)
@@ -205,4 +238,6 @@ def _report(matrix: OperatorMatrix, found: _Found, verdict: _Verdict, notes: lis
         euler=mesh.euler,
         orientable=mesh.orientable,
         loops=mesh.loops,
+        chi_square=found.sums,
+        length_deviations=deviations,
     )

@@ -2,36 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SolverError
+from ..linalg.responses import SamplingOptions, noise_blocks
 from ..topology import Piece
 from .cotangent import edge_weights
 from .normal import Jacobian, NormalEquations, WeightJacobian, distant_pair
 from .side_by_side import SideBySide
-
-
-@dataclass(frozen=True)
-class SamplingOptions:
-    """How responses to the errors of entries are added up.
-
-    Attributes
-    ----------
-    exact_up_to : int
-        Edges whose responses are computed one by one; above, random sign patterns stand in for them.
-    samples : int
-        Of these patterns: the relative standard error of a standard deviation is 1 / sqrt(2 samples).
-    block : int
-        Right-hand sides that are solved for together.
-    """
-
-    exact_up_to: int = 3000
-    samples: int = 400
-    block: int = 64
 
 
 def coordinate_covariances(
@@ -111,7 +92,7 @@ def covariances(
     gauge = _gauge(z)
     root = np.eye(2) if stretch is None else stretch
     total = np.zeros((len(z), 2, 2))
-    for noise in _noise_blocks(len(weights), options or SamplingOptions()):
+    for noise in noise_blocks(len(weights), options or SamplingOptions()):
         y = equations.solve(np.column_stack([jacobian.transpose(column) for column in noise.T]))
         if beside is not None and complement > 0:
             along = (weights @ noise - np.real(slope.conj() @ y)) / complement
@@ -182,18 +163,3 @@ def _gauge(z: NDArray) -> NDArray:
     fields = (one + 0j, 1j * one, d, 1j * d)
     columns = [np.stack([f.real, f.imag], axis=1).ravel() for f in fields]
     return np.linalg.qr(np.column_stack(columns))[0]
-
-
-def _noise_blocks(n_edges: int, options: SamplingOptions) -> Iterator[NDArray[np.float64]]:
-    """Columns r with sum r r' = I, exactly or in the mean."""
-    if n_edges <= options.exact_up_to:
-        for start in range(0, n_edges, options.block):
-            width = min(options.block, n_edges - start)
-            block = np.zeros((n_edges, width))
-            block[start + np.arange(width), np.arange(width)] = 1
-            yield block
-        return
-    rng = np.random.default_rng(0)
-    for start in range(0, options.samples, options.block):
-        width = min(options.block, options.samples - start)
-        yield rng.choice([-1.0, 1.0], size=(n_edges, width)) / np.sqrt(options.samples)

@@ -53,7 +53,7 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     if isinstance(recovery, PlanarMesh) and recovery.areas is not None:
         raise FormatError("a mass matrix tells areas only, and there is no shape to draw")
     if isinstance(recovery, Surface) and recovery.realisation is None:
-        recovery = realised(recovery, Clock())  # edge lengths cannot be drawn
+        recovery = realised(recovery, Clock(), starts=1)  # edge lengths cannot be drawn
     if isinstance(recovery, PlanarMesh) and not isinstance(recovery, ConformingMesh):
         figure, handles = planar_mesh(recovery, ax)
     else:

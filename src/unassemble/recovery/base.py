@@ -53,7 +53,8 @@ class Recovery:
     operator : str
         ``"laplacian"``, or ``"anisotropic laplacian"`` where a tensor was undone; ``"mass"``; ``"elasticity"``, or
         ``"vector laplacian"`` where the directions of a vector-valued matrix are not coupled; ``"frame or shell"``,
-        ``"plane frame"``, ``"plate"`` or ``"beam"`` where nodes have rotations too; ``"truss"``.
+        ``"plane frame"``, ``"plate"`` or ``"beam"`` where nodes have rotations too; ``"truss"``; ``"surface
+        laplacian"``.
     reaction : float
         The factor s of the mass matrix in the operator, 0 if none.
     backward_error : float

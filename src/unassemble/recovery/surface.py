@@ -37,6 +37,10 @@ class Surface(Recovery):
     realisation : mapping or None
         Of coordinates in space: ``misfit``, the root mean square difference of edge lengths relative to their mean,
         ``largest``, the largest such difference, and ``misfits``, those of all starts.
+    chi_square : mapping or None
+        With noise: the test that rows sum to zero, as in :class:`PlanarMesh`.
+    length_deviations : (e,) float64 or None
+        With noise, on request: one standard deviation of each edge length.
     """
 
     edges: NDArray[np.int64]
@@ -46,6 +50,8 @@ class Surface(Recovery):
     orientable: NDArray[np.bool_]
     loops: NDArray[np.int64]
     realisation: Mapping[str, Any] | None = None
+    chi_square: Mapping[str, float] | None = None
+    length_deviations: NDArray[np.float64] | None = None
 
     @property
     def flat(self) -> bool:

@@ -46,6 +46,20 @@ class Cycles:
         """List them."""
         return cls(n, edges, *three_cycles(n, edges))
 
+    def among(self, triangles: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(m,) those that are some given triangles.
+
+        Raises
+        ------
+        TopologyError
+            If a triangle is no 3-cycle, or an edge is left over.
+        """
+        power = np.array([self.n**2, self.n, 1])
+        chosen = np.isin(np.sort(self.triangles, axis=1) @ power, np.sort(triangles, axis=1) @ power)
+        if chosen.sum() != len(triangles) or not self.at_edges(chosen).all():
+            raise TopologyError("the triangles given are not those of the graph")
+        return chosen
+
     def at_edges(self, some: NDArray | slice = slice(None)) -> NDArray[np.int64]:
         """(e,) how many of some of them lie on each edge."""
         return np.bincount(self.opposite[some].ravel(), minlength=len(self.edges))
