@@ -20,7 +20,6 @@ import skfem
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 from conforming.assembled import assembled, largest_error, quadrilaterals
-
 from unassemble import recover
 from unassemble.linalg import UpperTriangle, factorisation
 
