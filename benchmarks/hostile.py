@@ -19,6 +19,7 @@ import time
 import traceback
 import warnings
 from collections import Counter
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from itertools import count, islice, repeat
@@ -31,15 +32,24 @@ import skfem
 from click.testing import CliRunner
 from hostile_inputs import KINDS, Given, Piece, pieces_of
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 from skfem.models import laplace
 
-from unassemble import InputError, RecoveryError, recover
+from unassemble import ConformingMesh, InputError, RecoveryError, recover
 from unassemble.cli import main as command_line
 from unassemble.matrix import read_matrix
 
 SECONDS = 10.0  # of processor time that any answer may take
 HANGS = 60.0  # seconds after which a traceback is printed, and the answer waited for all the same
 MISFIT, DISTANCE = 1e-8, 1e-6  # of entries, relative to their rows; of points, relative to the diameter of a piece
+ELEMENTS = {
+    "triangle": (skfem.MeshTri, skfem.ElementTriP1, 3),
+    "triangle6": (skfem.MeshTri, skfem.ElementTriP2, 3),
+    "triangle10": (skfem.MeshTri, skfem.ElementTriP3, 3),
+    "quad": (skfem.MeshQuad, skfem.ElementQuad1, 4),
+    "quad8": (skfem.MeshQuad, skfem.ElementQuadS2, 4),
+    "quad9": (skfem.MeshQuad, skfem.ElementQuad2, 4),
+}
 OUTCOMES = ("right", "ambiguous", "uncertified", "refused", "SLOW", "WRONG", "CRASH")
 
 
@@ -65,25 +75,53 @@ def misplaced(x: NDArray, y: NDArray) -> float:
 
 
 def gives_back(found, matrix: Any) -> bool:
-    """Whether P1 elements on the triangles, one factor in each piece, give the entries of determined rows."""
-    triangles = found.divided()[0]
-    if len(triangles) == 0 or not np.isfinite(found.points[triangles]).all():
+    """Whether elements on the cells, one factor in each piece, give the entries of determined rows."""
+    linear = not isinstance(found, ConformingMesh)
+    cells = {"triangle": found.divided()[0]} if linear else found.cells
+    if not any(map(len, cells.values())) or not all(np.isfinite(found.points[some]).all() for some in cells.values()):
         return False
     given = sp.csr_array(matrix, dtype=np.float64)
     off = given / max(np.abs(given).max(), 1e-300)
     off = sp.csr_array(off - sp.diags_array(off.diagonal()))
-    label, total = pieces_of(triangles), sp.csr_array(off.shape)
-    for k in range(label.max() + 1):
-        rows, corners = np.unique(triangles[label == k], return_inverse=True)
-        piece = skfem.MeshTri(found.points[rows].T.copy(), corners.reshape(-1, 3).T.copy())
-        part = sp.coo_array(laplace.assemble(skfem.Basis(piece, skfem.ElementTriP1())))
-        part = sp.coo_array((part.data, (rows[part.row], rows[part.col])), shape=off.shape).tocsr()
+    total = sp.csr_array(off.shape)
+    for part in pieces_of_linear(found, cells["triangle"]) if linear else pieces_of_elements(found, cells):
         part = sp.csr_array(part - sp.diags_array(part.diagonal()))
         total = total + part * (part.multiply(off).sum() / part.multiply(part).sum())
     largest = np.maximum(np.abs(off).max(axis=1).toarray().ravel(), 1e-300)
     difference = sp.coo_array(off - total)
     row, column = difference.coords
     return bool((np.abs(difference.data) <= MISFIT * np.minimum(largest[row], largest[column])).all())
+
+
+def pieces_of_linear(found, triangles: NDArray) -> Iterator[sp.csr_array]:
+    """The matrix of each piece of a mesh of linear triangles."""
+    label = pieces_of(triangles)
+    for k in range(label.max() + 1):
+        rows, corners = np.unique(triangles[label == k], return_inverse=True)
+        mesh = skfem.MeshTri(found.points[rows].T.copy(), corners.reshape(-1, 3).T.copy())
+        yield assembled_on(mesh, skfem.ElementTriP1(), rows, found)
+
+
+def pieces_of_elements(found, cells: dict[str, NDArray]) -> Iterator[sp.csr_array]:
+    """The matrix of each piece of a mesh of other, straight elements; a hinge has the lowest label of its pieces."""
+    for k in range(found.n_components):
+        total = sp.csr_array((found.n_points, found.n_points))
+        for name, some in cells.items():
+            own = some[found.component[some].max(axis=1) == k]
+            if len(own):
+                kind, element, corners = ELEMENTS[name]
+                vertices, local = np.unique(own[:, :corners], return_inverse=True)
+                mesh = kind(found.points[vertices].T.copy(), local.reshape(-1, corners).T.copy())
+                total = total + assembled_on(mesh, element(), np.unique(own), found)
+        yield total
+
+
+def assembled_on(mesh, element, rows: NDArray, found) -> sp.csr_array:
+    """The Laplacian, nodes being the rows that lie where they do."""
+    basis = skfem.Basis(mesh, element)
+    place = rows[cKDTree(found.points[rows]).query(basis.doflocs.T)[1]]
+    part = sp.coo_array(laplace.assemble(basis))
+    return sp.coo_array((part.data, (place[part.row], place[part.col])), shape=2 * (found.n_points,)).tocsr()
 
 
 def judged(given: Given) -> str:

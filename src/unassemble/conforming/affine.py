@@ -7,6 +7,7 @@ and quadrilaterals that are no parallelograms, the right order is the one that f
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
@@ -17,6 +18,7 @@ from ..elements.reference import exact_rule, shape_gradients
 from ..matrix import OperatorMatrix
 from .sets import pairs_of
 
+_SAMPLE = 500  # cells
 _SHARED = 0.1  # weight of entries that other cells have a part in: split evenly, which is a guess
 
 
@@ -64,3 +66,14 @@ class ElementEntries:
         total = (weight * value**2).sum(axis=1)
         solution = np.linalg.solve(normal, right[..., None])[..., 0]
         return np.asarray(total - (right * solution).sum(axis=1)) / np.where(total > 0, total, 1.0)
+
+
+def typical_misfit(matrix: OperatorMatrix, blocks: Mapping[Kind, NDArray[np.int64]]) -> float:
+    """Median misfit of some cells in their order, 0 for affine ones and at most 1; of several kinds the largest."""
+    every = np.sort(np.concatenate([pairs_of(matrix.n, cells).ravel() for cells in blocks.values()]))
+    found = []
+    for kind, cells in blocks.items():
+        some = cells[:: len(cells) // _SAMPLE + 1]
+        order = np.broadcast_to(np.arange(kind.nodes), some.shape)
+        found.append(float(np.median(ElementEntries(matrix, some, every).misfit(kind, np.arange(len(some)), order))))
+    return max(found)

@@ -60,8 +60,13 @@ def recover_conforming(
     failure: Exception = TopologyError("no sets of rows that are coupled to each other are cells of any known element")
     best: ConformingMesh | None = None
     small = stored.n <= SEARCHED_ROWS
-    for cells in shown:
+    remaining = iter(shown)
+    while True:
         if best is not None and best.certified and not small:
+            break
+        with clock("cells"):
+            cells = next(remaining, None)
+        if cells is None:
             break
         try:
             found = _recovered(stored, cells, clock, task)
@@ -118,11 +123,13 @@ def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -
         placed, origins, notes = _placed(topology, fits, task)
         mesh = _Joined(parts, placed, stored.n)
     with clock("certify"):
-        held = [_held(stored, mesh, mesh.points + shift, fits, task) for shift in (0.0, _shift(origins, mesh))]
+        near = written = _held(stored, mesh, mesh.points, fits, task)
+        if origins.any():
+            written = _held(stored, mesh, mesh.points + _shift(origins, mesh), fits, task)
     with clock("deviations"):
         bars = deviations_of(stored.n, fits, placed, task) if task.options.standard_deviations else None
-    found = verdict(stored, fits, held, task, told=cells.told)
-    certificate = held[1].certificate
+    found = verdict(stored, fits, (near, written), task, told=cells.told)
+    certificate = written.certificate
     noise = task.noise.at(certificate.pairs, stored) if task.noise else None
     worst, misfits = certificate.worst(10 if found.status == "uncertified" else 0, noise=noise)
     freedom = sum(fit.freedom for fit in fits)
@@ -144,7 +151,7 @@ def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -
         worst_entries=worst,
         worst_misfits=misfits,
         standard_deviations=bars,
-        chi_square=held[1].test.figures if held[1].test else None,
+        chi_square=written.test.figures if written.test else None,
         estimated_noise=float(np.linalg.norm(certificate.differences) / np.sqrt(freedom)) if freedom > 0 else None,
         quadrature=", ".join(dict.fromkeys(rule for fit in fits for rule in fit.rule.values())),
         straight=all(fit.straight for fit in fits),

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
+from ..conforming.affine import typical_misfit
 from ..conforming.parts import parts_of
 from ..conforming.recover import shown_cells
 from ..errors import GeometryError, RecoveryError, TopologyError
@@ -19,6 +20,8 @@ from ..recovery import ELEMENT_NAMES as _NAMES
 from ..tolerances import ROUNDED, SUMMED
 from ..topology import Piece, Topology
 from ..words import kind_text
+
+_LIKE = 0.3  # misfit of cells that are nearly affine; of other matrices with rows that form cells it is nearer to 1
 
 
 def matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
@@ -73,7 +76,7 @@ def element_facts(matrix: OperatorMatrix) -> dict[str, Any]:
         parts = [] if cells is None else parts_of(matrix.n, cells.blocks)
     except TopologyError:
         return {}
-    if cells is None or sum(map(len, cells.blocks.values())) < 2:  # any rows that are all coupled could be one cell
+    if cells is None or typical_misfit(matrix, cells.blocks) > _LIKE:
         return {}
     names = [_NAMES[kind.name] for kind in cells.blocks]
     return {

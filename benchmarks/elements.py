@@ -1,0 +1,78 @@
+"""Scalar matrices of quadrilaterals and of quadratic triangles, in units of a direct solve with the same matrix.
+
+    python benchmarks/elements.py [--sizes 30000,100000,300000] [--elements Q1,P2]
+
+Processor time: c known, unknown, unknown and polished, all with the certificate; the exponents are fitted over the
+sizes. The last column is the largest error of the polished mesh, relative to the diameter.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+import skfem
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+
+from conforming.assembled import assembled, largest_error, quadrilaterals
+from unassemble import recover
+from unassemble.linalg import UpperTriangle, factorisation
+
+RUNS = ({"scale": 3.0, "refine": False}, {"refine": False}, {})
+
+
+def main() -> None:
+    """Print a table for each element."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sizes", default="30000,100000,300000")
+    parser.add_argument("--elements", default="Q1,P2")
+    arguments = parser.parse_args()
+    sizes = [int(size) for size in arguments.sizes.split(",")]
+    for element in arguments.elements.split(","):
+        print(f"{element:>4} {'rows':>9} {'solve, s':>9} {'c known':>8} {'unknown':>8} {'polished':>8} {'error':>9}")
+        table = np.array([row(element, size) for size in sizes])
+        if len(sizes) > 1:
+            growth = [np.polyfit(np.log(table[:, 0]), np.log(seconds), 1)[0] for seconds in table[:, 1:5].T]
+            print(f"{'growth':>14} " + " ".join(f"{power:8.2f}" for power in growth))
+
+
+def row(element: str, size: int) -> list[float]:
+    """Rows, seconds of a direct solve and of the three runs, and the error."""
+    if element == "Q1":
+        side = int(np.sqrt(size))
+        mesh = quadrilaterals(side, side)
+    else:
+        axis = np.arange(int(np.sqrt(size / 4)) + 1.0)
+        mesh = skfem.MeshTri.init_tensor(axis, axis)
+        mesh = skfem.MeshTri(mesh.p + np.random.default_rng(0).uniform(-0.2, 0.2, mesh.p.shape), mesh.t)
+    known = assembled(element, mesh, c=3.0)
+    seconds = [direct(known.matrix)]
+    for options in RUNS:
+        start = time.process_time()
+        found = recover(known.matrix, **options)
+        seconds.append(time.process_time() - start)
+        assert found.certified, found.reason
+    error = largest_error(found.points, known.points)
+    ratios = " ".join(f"{one / seconds[0]:8.1f}" for one in seconds[1:])
+    print(f"{'':4} {len(known.points):9,} {seconds[0]:9.2f} {ratios} {error:9.1e}", flush=True)
+    return [len(known.points), *seconds, error]
+
+
+def direct(matrix: sp.csr_array) -> float:
+    """Seconds of ordering, factorisation and one solution, the last row and column left out."""
+    upper = UpperTriangle.of(sp.csr_array(matrix[:-1][:, :-1]))
+    start = time.process_time()
+    factor = factorisation(upper, definite=True)
+    factor.factorise(upper)
+    factor.solve(np.ones(upper.n))
+    factor.release()
+    return time.process_time() - start
+
+
+if __name__ == "__main__":
+    main()
