@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .boundaries import recover_lattice, recover_partial
+from .boundaries import recover_lattice, recover_partial, with_boundary_edges
 from .clock import Clock
 from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
 from .linalg import threads as thread_limit
@@ -211,6 +211,7 @@ class _Task:
 
     def _with_boundary_conditions(self, part: OperatorMatrix, placement: Placement) -> PlanarMesh:
         """The whole mesh; or what is determined where unknowns were taken out, or boundary edges have other terms."""
+        part = with_boundary_edges(part)
         whole = None if part.replaced is None else np.asarray(~part.replaced[part.edges].all(axis=1))
 
         def partly() -> PlanarMesh | None:
