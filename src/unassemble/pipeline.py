@@ -233,7 +233,7 @@ class _Task:
             if lost or last or (found := partly()) is None:
                 raise
             return found
-        if lost or last or linear.status != "uncertified":
+        if lost or last or linear.status != "uncertified" or len(linear.suspects):  # entries that are wrong
             return linear
         return partly() or linear
 
