@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from .boundaries import recover_lattice, recover_partial
+from .boundaries import recover_lattice, recover_partial, with_boundary_edges
 from .clock import Clock
 from .conforming.recover import recover_conforming, shown_cells
 from .errors import GeometryError, RecoveryError
@@ -88,9 +88,9 @@ class ScalarReadings:
         return recover_lattice(self.matrix, placement, self.clock, self.options)
 
     def _partial(self, placement: Placement) -> PlanarMesh | None:
-        replaced = self.matrix.replaced
-        whole = None if replaced is None else np.asarray(~replaced[self.matrix.edges].all(axis=1))
-        return recover_partial(self.matrix, whole, placement, self.clock, self.options)
+        matrix = with_boundary_edges(self.matrix)
+        whole = None if matrix.replaced is None else np.asarray(~matrix.replaced[matrix.edges].all(axis=1))
+        return recover_partial(matrix, whole, placement, self.clock, self.options)
 
     def _linear(self, placement: Placement) -> PlanarMesh:
         def plain(matrix: OperatorMatrix, squared_lengths: NDArray | None = None) -> PlanarMesh:

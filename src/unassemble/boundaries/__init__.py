@@ -4,6 +4,7 @@ Entries next to them contain cells that are gone, so that each says less than th
 """
 
 from .lattices import recover_lattice
+from .missing import with_boundary_edges
 from .partial import recover_partial
 
-__all__ = ["recover_lattice", "recover_partial"]
+__all__ = ["recover_lattice", "recover_partial", "with_boundary_edges"]

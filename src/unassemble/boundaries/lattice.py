@@ -89,8 +89,6 @@ class Lattice:
     @classmethod
     def of(cls, matrix: OperatorMatrix) -> Lattice | None:
         """The lattice that a matrix may belong to; None where its graph is no grid, or rows inside differ."""
-        if not _alike(matrix):
-            return None
         grid = Grid.of(matrix.n, matrix.edges)
         if grid is None:
             return None
@@ -110,7 +108,7 @@ class Lattice:
         return cls(grid.neighbours, scale, z, number[cells[present]], shift)
 
 
-def _alike(matrix: OperatorMatrix) -> bool:
+def rows_alike(matrix: OperatorMatrix) -> bool:
     """Whether most rows with all their neighbours have entries of the same size, and some rows do not add up to zero.
 
     Next to no work, and no other matrix is a lattice that has lost rows.

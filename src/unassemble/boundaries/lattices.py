@@ -18,7 +18,7 @@ from ..topology import Polygons, Topology
 from ..topology.keys import with_sides
 from ..topology.pieces import planar_pieces
 from ..words import count_of
-from .lattice import Lattice
+from .lattice import Lattice, rows_alike
 from .witness import Witness
 
 
@@ -30,6 +30,8 @@ def recover_lattice(
     Its cells are continued by those whose vertices are gone, and the mesh of both has the rows of the matrix, entries
     and diagonal. That such a mesh exists is proved by this; but others may as well, with cells that are not alike.
     """
+    if not rows_alike(matrix):
+        return None
     with clock("lattice"):
         lattice = Lattice.of(matrix)
     if lattice is None or len(lattice.z) == matrix.n or lattice.neighbours == 8 or options.method != "conformal":
