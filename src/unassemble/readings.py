@@ -75,7 +75,7 @@ class ScalarReadings:
             except RecoveryError as error:
                 failure = error if reading == self._linear else failure or error
                 continue
-            if found is not None and found.status != "uncertified":
+            if found is not None and (found.status != "uncertified" or len(found.suspects)):  # entries that are wrong
                 return found
             nearest = nearest or found
         if nearest is None:

@@ -22,8 +22,6 @@ from .row_sums import RowSums
 
 _HOLES = 8
 """Holes of three edges that are looked for, each for the price of a fit."""
-_CLEAR = 5.0
-"""Excess of a hole's area, relative to that about its corners, over the root mean square of all residuals."""
 _NO_SHAPE = "a mass matrix has no shape: it depends on the areas of the triangles alone, and any that have them will do"
 _OTHER = (
     "that no other areas, with another c, fit as well is not proved: the fit of edge lengths was started once, and at "
@@ -91,6 +89,7 @@ def _fit(skeleton: Skeleton, entries: NDArray, sums: RowSums) -> MetricFit | Non
 
     Such a triangle has too much area for all three of its corners, as no misfit of another kind has.
     """
+    before = np.inf
     for _ in range(_HOLES + 1):
         fit = fit_metric(skeleton, entries, sums.positive(), sums.trust())
         if fit is None or fit.residual < ALIKE:
@@ -100,8 +99,9 @@ def _fit(skeleton: Skeleton, entries: NDArray, sums: RowSums) -> MetricFit | Non
             (skeleton.sides[skeleton.opposite] == 2).all(axis=1), excess[skeleton.triangles].min(axis=1), 0
         )
         worst = int(np.argmax(least))
-        if not least[worst] > _CLEAR * fit.residual:
+        if not (least[worst] > fit.residual and fit.residual < before):
             return None
+        before = fit.residual
         skeleton = skeleton.without(worst)
     return None
 

@@ -43,7 +43,7 @@ class Recovery:
     boundary_offsets : (loops + 1,) int64
         Loop k is ``boundary[boundary_offsets[k]:boundary_offsets[k + 1]]``.
     node_status : (n,) int8
-        0 determined, 1 not determined by the matrix.
+        0 determined, 1 not determined by the matrix, 2 plausible: a position that entries do not determine.
     status : {"certified", "ambiguous", "uncertified"}
         Whether the mesh gives the matrix back, and no other mesh is known that does.
     uniqueness : {"proved", "searched", "ambiguous", None}
