@@ -20,8 +20,9 @@ if TYPE_CHECKING:
         UnassembleError,
     )
     from .inspection import inspect_matrix
+    from .metric.result import Surface
     from .pipeline import recover
-    from .recovery import Body, PlanarMesh, Recovery, Structure, Surface
+    from .recovery import Body, PlanarMesh, Recovery, Structure
 
 # Imported on first use: the command line answers --help without loading scipy.
 _HOMES = {

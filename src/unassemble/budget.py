@@ -4,6 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+AT_ONCE = 1 << 22
+"""Numbers that array code makes in one go: 32 MB of them in double precision."""
+
+LARGE = 20_000
+"""Order beyond which what is far from linear, in time or in memory, is left out or replaced."""
+
+REFINEMENTS = 30
+"""Steps of iterative refinement at most; where it converges it takes far fewer."""
+
+SAMPLE = 2000
+"""Rows, cells or faces of which a share, a median or a fit is taken where all of them would tell the same."""
+
 
 @dataclass
 class Budget:

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 from scipy.special import chdtrc, ndtr
 
-from .tolerances import CERTIFIED
+from .tolerances import CERTIFIED, SINGULAR
 
 _DENSE = 400  # triangles of a piece whose equations are counted by their rank
-_RANK = 1e-9  # singular values, in units of angles over mean lengths
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,7 +304,7 @@ def _dependent(points: NDArray, triangles: NDArray, gone: NDArray) -> int:
             np.add.at(jacobian, (row[here[:, k], k], 2 * at), change.imag)
             np.add.at(jacobian, (row[here[:, k], k], 2 * at + 1), change.real)
     # Angles at both ends of a vanished side add up to pi: no sines are needed.
-    return len(gone) - int(np.linalg.matrix_rank(jacobian, tol=_RANK))
+    return len(gone) - int(np.linalg.matrix_rank(jacobian, tol=SINGULAR))  # in angles over mean lengths
 
 
 def chi_square_verdict(misfit: NDArray, freedom: int, sigma: float, *, repeats: float = 1.0) -> dict[str, float]:

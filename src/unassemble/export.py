@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from .errors import FormatError
 from .files import check_target, whole_file
 from .formats import MeshFormat, format_of
-from .recovery import PlanarMesh, Recovery, Surface
+from .metric.result import Surface
+from .recovery import PlanarMesh, Recovery
 
 if TYPE_CHECKING:
     import meshio
@@ -42,8 +43,8 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
 
     ``.npz`` holds ``points``, cells (``triangles``, ``quads``, ``tetrahedra``, ``hexahedra``, ``mid_nodes``, ``lines``,
     ``polygons_offsets`` and ``polygons_data``), of surfaces ``edges``, ``edge_lengths`` and ``curvature``, and no
-    ``points`` unless there are coordinates, ``component``, ``hinges``, ``scale``, ``node_status`` and, of
-    vector-valued matrices, ``node_of_row`` and ``direction_of_row``.
+    ``points`` unless there are coordinates, ``eliminated_points`` if any, ``component``, ``hinges``, ``scale``,
+    ``node_status`` and, of vector-valued matrices, ``node_of_row`` and ``direction_of_row``.
     Other formats are those of meshio (:mod:`unassemble.formats`); of these ``.vtu`` holds polygons, the others get
     them divided into triangles.
 
@@ -82,6 +83,8 @@ def arrays(recovery: Recovery) -> dict[str, Any]:
         content |= {"edges": recovery.edges, "edge_lengths": recovery.edge_lengths, "curvature": recovery.curvature}
         if recovery.length_deviations is not None:
             content["length_deviations"] = recovery.length_deviations
+    if isinstance(recovery, PlanarMesh) and len(recovery.eliminated_points):
+        content["eliminated_points"] = recovery.eliminated_points
     content |= {"component": recovery.component, "hinges": recovery.hinges, "scale": recovery.scale}
     content["node_status"] = recovery.node_status
     if recovery.vector_valued:

@@ -12,11 +12,12 @@ from .errors import GeometryError, InputError, RecoveryError
 from .matrix import OperatorMatrix
 from .matrix.digits import Digits
 from .tolerances import ROUNDED
+from .topology import components
 
 if TYPE_CHECKING:
     from .nodes import Numbering
     from .nodes.rounded import Rounding
-    from .structures import StructuralNumbering
+    from .structures import Beam, StructuralNumbering
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,9 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
     from .structures import find_structure, given_structure, truss_numbering
     from .structures.layouts import SPACE
 
+    beam = _beam(matrix) if numbering is None and block_size is None else None
+    if beam is not None:
+        return VectorReading(beam, "")
     whole, exact = _exact(matrix)
     if numbering is None or isinstance(numbering, str):
         if numbering not in (None, *ORDERS):
@@ -95,6 +99,9 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
 
     Costs next to nothing where the graph may be planar.
     """
+    beam = _beam(matrix)
+    if beam is not None:
+        return VectorReading(beam, "its rows form one line of nodes, whose blocks are those of members that bend")
     crowded = matrix.n >= 3 and len(matrix.edges) > 3 * matrix.n - 6
     if not crowded and not _twins_interleaved(matrix):
         return None
@@ -118,8 +125,9 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     from .nodes.unknowns import find_numbering
     from .structures import find_structure
 
-    # Every unknown of an elastic body has a stiffness, and no body has entries of one size: graphs have.
-    if not matrix.diagonal.all() or np.ptp(np.abs(matrix.entries)) <= ROUNDED * np.abs(matrix.entries).max(initial=0.0):
+    # Every unknown of an elastic body has a stiffness. Sums by direction vanish: entries of one sign couple none.
+    one_sign = matrix.entries.min(initial=0.0) >= 0 or matrix.entries.max(initial=0.0) <= 0
+    if not matrix.diagonal.all() or (one_sign and len(components(matrix.n, matrix.edges)) == 1):
         return None
     whole, exact = _exact(matrix)
     structure = find_structure(whole)
@@ -146,6 +154,14 @@ def about_translations(matrix: OperatorMatrix) -> str:
         f"its rows form {nodes[0]} nodes with {nodes[1]} unknowns each, as those of an elasticity matrix, but do not "
         f"annihilate translations: perhaps {MORE_THAN_STIFFNESS}{digits}"
     )
+
+
+def _beam(matrix: OperatorMatrix) -> Beam | None:
+    """The matrix of a straight beam, whose graph may be planar; costs next to nothing where rows have more entries."""
+    from .structures.beams import MOST, find_beam
+
+    full = np.bincount(matrix.edges[matrix.entries != 0].ravel(), minlength=1)
+    return find_beam(matrix.csr()) if full.max() <= MOST else None
 
 
 def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, tuple[sp.csr_array, Rounding] | None]:

@@ -6,8 +6,9 @@ from os import PathLike
 from typing import TYPE_CHECKING
 
 from .export import save, to_meshio
+from .metric.result import Surface
 from .modes import modes_of
-from .recovery import Body, PlanarMesh, Recovery, Structure, Surface
+from .recovery import Body, PlanarMesh, Recovery, Structure
 from .report import build_report
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .boundaries import recover_lattice
 from .clock import Clock
 from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
 from .linalg import threads as thread_limit
@@ -225,7 +226,8 @@ class _Task:
         frame = self.frame
         self._check_scale(part)
         placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
-        return recover_scalar(part, placement, self.clock, self.planar)
+        lattice = recover_lattice(part, placement, self.clock, self.planar)
+        return lattice or recover_scalar(part, placement, self.clock, self.planar)
 
     def _as_surface(self) -> Surface:
         """A surface in space, with coordinates on demand; a flat one with those of the planar mesh that it is."""

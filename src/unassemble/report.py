@@ -15,7 +15,8 @@ import numpy as np
 from ._version import __version__
 from .errors import OutputError, UnassembleError
 from .files import check_target, whole_file
-from .recovery import Body, Mechanical, PlanarMesh, Recovery, Surface
+from .metric.result import Surface
+from .recovery import Body, Mechanical, PlanarMesh, Recovery
 
 
 def build_report(recovery: Recovery) -> dict[str, Any]:

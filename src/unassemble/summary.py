@@ -7,7 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .recovery import Body, Mechanical, PlanarMesh, Recovery, Surface
+from .metric.result import Surface
+from .recovery import Body, Mechanical, PlanarMesh, Recovery
 from .tolerances import SUSPICIOUS
 from .words import count_of, kind_text
 

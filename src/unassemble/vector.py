@@ -12,7 +12,7 @@ from .matrix import OperatorMatrix
 from .nodes.nodal import nodal_matrix, uncoupled
 from .operators import VectorReading
 from .recovery import Recovery
-from .structures import StructuralNumbering, serve_structure
+from .structures import Beam, StructuralNumbering, serve_beam, serve_structure
 from .structures.bars import bars_of
 from .structures.trusses import serve_truss
 from .vector_laplacian import Scalar, parts_of, recover_directions
@@ -48,6 +48,8 @@ def recover_vector(
         If no piece is determined.
     """
     numbering, choice = reading.numbering, reading.why
+    if isinstance(numbering, Beam):
+        return serve_beam(matrix, numbering, clock, anchors=anchors, choice=choice)
     if isinstance(numbering, StructuralNumbering):
         return serve_structure(matrix, numbering, clock, anchors=anchors, choice=choice, cells=cells)
     with clock("numbering"):

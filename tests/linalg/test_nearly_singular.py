@@ -10,7 +10,7 @@ def test_unknowns_in_no_equation_do_not_set_the_shift():
     path = sp.diags_array([-np.ones(4), 2 * np.ones(5), -np.ones(4)], offsets=[-1, 0, 1])
     nothing = np.finfo(float).tiny * sp.eye_array(20)
     matrix = UpperTriangle.of(sp.csr_array(sp.block_diag([path, nothing])))
-    with nearly_singular(matrix, (1e-12,)) as solver:
+    with nearly_singular(matrix) as solver:
         solution = solver.solve(np.ones((25, 1)))
     assert np.isfinite(solution).all()
-    assert np.abs(solution).max() < 1e13
+    assert np.abs(solution).max() < 1e15

@@ -117,5 +117,5 @@ def test_a_frame_with_supports_is_no_solid_of_points_in_a_line():
         model.add_member(str(k), str(i), str(j), "steel", "all")
     given = assembled(model, points, ends).only((0, 1, 5), 2)
     kept = np.array([0, 1, 3, 4, 5, 7, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 22, 23, 24, 25, 26])
-    with pytest.raises(RecoveryError, match="too many unknowns are eliminated"):
+    with pytest.raises(RecoveryError):
         recover(given.matrix[kept][:, kept])

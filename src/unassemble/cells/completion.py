@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..errors import GeometryError, RecoveryError
 from ..matrix import OperatorMatrix
 from ..planar.piece import PieceMesh
+from ..tolerances import LITTLE
 from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar
 from ..topology.keys import contains, distinct, pair_keys
 from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained, with_pieces
@@ -19,8 +20,6 @@ from .eliminated import incomplete_rows, without_boundary
 from .judge.labelling import Labelling, add_differing_factors
 from .search.search import first_labelling, label_cells
 from .undivided import undivided
-
-_BETTER = 0.1  # a labelling that does not fit replaces the triangles only if its misfit is below this times theirs
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +124,7 @@ def _labelled(
     if labelling is not None and labelling.fits:
         return _part(matrix, numbering, labelling)
     before = _misfit_of_own(misfit_of_triangles(), numbering, own, attempt, scale)
-    if labelling is not None and labelling.size < _BETTER * before and labelling.misfit.max() < 1:
+    if labelling is not None and labelling.size < LITTLE * before and labelling.misfit.max() < 1:
         return _part(matrix, numbering, labelling)
     n, e = len(numbering.vertices), len(numbering.edges)
     if labelling is None or not own:

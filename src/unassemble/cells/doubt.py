@@ -13,17 +13,14 @@ from ..errors import RecoveryError, SolverError
 from ..matrix import OperatorMatrix
 from ..planar.cautious import cautious_polish
 from ..planar.piece import PieceMesh
-from ..planar.polish import PolishOptions, polish
+from ..planar.polish import SHORT, polish
+from ..tolerances import ALIKE, SMALL
 from ..topology import Numbering, Piece, Topology, components
 from ..topology.keys import Grouped
-from .agreement import SAME_SCALE
-from .judge.labelling import FITS, even, misfits
+from .judge.labelling import even, misfits
 
 _WIDE = 200  # rows of a matrix on which the misfit of a wrong cell stays near it
-SURE = 1e-3
-"""Misfit, even if spread evenly, that no wrong cell is known to leave."""
 
-_SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 
 Outcome = PieceMesh | RecoveryError
 """Positions of a piece, or why there are none."""
@@ -54,7 +51,7 @@ def in_doubt(
     solved = [(piece, mesh) for piece, mesh in solved if not doubtful[piece.vertices[0]]]
     rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
     misfit = misfits_of(matrix, solved)[rest]
-    wrong = misfit > FITS
+    wrong = misfit > ALIKE
     if not wrong.any() or _like_noise(misfit, matrix.n):
         return doubtful
     if _like_noise(
@@ -81,17 +78,20 @@ def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None) -> 
     telling = np.full(int(label.max()) + 1, -1)  # the piece that tells c: the largest of those with entries to spare
     telling[own[order]] = order
     with np.errstate(all="ignore"):
-        apart = ~(np.abs(c / (scale or c[telling[own]]) - 1) <= SAME_SCALE)
+        apart = ~(np.abs(c / (scale or c[telling[own]]) - 1) <= ALIKE)
     wrong, hopeless = np.zeros((2, len(telling)), dtype=bool)
     wrong[own[apart]] = True
     hopeless[own[apart & ~loose]] = True
-    hopeless[label[matrix.edges[misfits_of(matrix, solved) > FITS, 0]]] = True
+    hopeless[label[matrix.edges[misfits_of(matrix, solved) > ALIKE, 0]]] = True
     return np.asarray((wrong & ~hopeless)[label])
 
 
 def _like_noise(misfit: NDArray, n: int) -> bool:
-    """Whether a misfit is that of errors in the entries; small meshes spread that of a wrong cell as evenly."""
-    return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < SURE)
+    """Whether a misfit is that of errors in the entries; small meshes spread that of a wrong cell as evenly.
+
+    If less than next to nothing is left, it is noise there too: no wrong cell is known to leave so little.
+    """
+    return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < SMALL)
 
 
 def _shortly_polished(matrix: OperatorMatrix, solved: Solved, scale: float | None, *, small_steps: bool) -> Solved:
@@ -103,7 +103,7 @@ def _shortly_polished(matrix: OperatorMatrix, solved: Solved, scale: float | Non
             weights = -matrix.entries[piece.edge_rows]
             try:
                 step = cautious_polish(piece, weights, mesh.z, scale=scale) if small_steps else None
-                found = step or polish(piece, weights, mesh.z, scale=scale, options=_SHORT)
+                found = step or polish(piece, weights, mesh.z, scale=scale, options=SHORT)
                 outcome = PieceMesh(found.z, found.scale)
             except SolverError as error:
                 outcome = error

@@ -19,15 +19,14 @@ from ..planar.conformal import conformal_map
 from ..planar.cotangent import edge_weights
 from ..planar.inside import fit_inside
 from ..planar.piece import PieceMesh
-from ..planar.polish import PolishedMesh, PolishOptions, polish
+from ..planar.polish import SHORT, PolishedMesh, polish
 from ..planar.robust import ASIDE
+from ..tolerances import ALIKE, SUMMED
 from ..topology import Piece
 from ..words import count_of
-from .judge.labelling import FITS, Labelling
+from .judge.labelling import Labelling
 from .search.search import first_labelling
 
-_SUM = 1e-10  # sum of a row, relative to its entries, that is rounding
-_SHORT = PolishOptions(max_steps=20, max_factorisations=3)
 _NOTE = (
     "entries between rows that do not add up to zero, as next to unknowns that were eliminated, still contain cells "
     "that are gone"
@@ -45,7 +44,7 @@ def incomplete_rows(matrix: OperatorMatrix) -> NDArray[np.bool_]:
     for end in matrix.edges.T:
         sums += np.bincount(end, matrix.entries, matrix.n)
         size += np.bincount(end, np.abs(matrix.entries), matrix.n)
-    incomplete = np.abs(sums) > _SUM * size
+    incomplete = np.abs(sums) > SUMMED * size
     return incomplete & ~incomplete.all()
 
 
@@ -133,7 +132,7 @@ def _without(piece: Piece, weights: NDArray, aside: NDArray[np.int64], scale: fl
     spread[aside] = ASIDE
     with suppress(GeometryError, SolverError):
         start = conformal_map(piece, halved, sharp=False)
-        found = polish(piece, halved, start.z, scale=scale, spread=spread, options=_SHORT)
+        found = polish(piece, halved, start.z, scale=scale, spread=spread, options=SHORT)
         if np.delete(_fit(piece, weights, found), aside).all():
             return PieceMesh(found.z, found.scale, (_NOTE,), aside=aside)
     inner = fit_inside(piece, weights, aside, scale=scale)
@@ -149,7 +148,7 @@ def _without(piece: Piece, weights: NDArray, aside: NDArray[np.int64], scale: fl
 def _fit(piece: Piece, weights: NDArray, found: PolishedMesh) -> NDArray[np.bool_]:
     """(e,) entries that a mesh has."""
     given = weights / found.scale
-    return np.asarray(np.abs(edge_weights(piece, found.z) - given) <= FITS * np.abs(given).max())
+    return np.asarray(np.abs(edge_weights(piece, found.z) - given) <= ALIKE * np.abs(given).max())
 
 
 def _more(count: int) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from ..clock import Clock
 from ..nodes.nodal import NodalMatrix, determined
 from ..nodes.numbering import Numbering
 from ..nodes.rounded import Rounding
+from ..tolerances import ALIKE
 from .doubts import guessed_directions, unborne, unconfirmed
 from .materials.cells import no_cells, recognise_cells
 from .nullspace.certificate import largest_residual
@@ -16,9 +17,6 @@ from .nullspace.solution import Solution
 from .remarks import about_assumptions, about_cells, about_directions, about_nodes
 from .results import ElasticityRecovery
 from .verdict import NOTHING_SHOWN, RESTS_ON_PLANES, of_few_digits, verdict
-
-_SAME = 1e-6  # difference up to which Poisson's ratios of pieces are one
-_NEAR = 1e-6  # residual up to which positions are good enough to look for elements
 
 
 def described(
@@ -45,7 +43,7 @@ def described(
     """
     with clock("certify"):
         error = largest_residual(nodal, solution.valid, solution.points, solution.ratio)
-        near = not error >= max(_NEAR, rounding.spread if rounding else 0.0)  # NaN where only elements can tell
+        near = not error >= max(ALIKE, rounding.spread if rounding else 0.0)  # NaN where only elements can tell
         ratio = _lame_ratio(nodal, solution) if near else None
     found = no_cells()
     if (cells or solution.straight or solution.hanging is not None) and near:
@@ -110,4 +108,4 @@ def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
         if read is None:
             return None
         told.append(read)
-    return told[0] if np.ptp([poisson_ratio(one) for one in told]) < _SAME else None
+    return told[0] if np.ptp([poisson_ratio(one) for one in told]) < ALIKE else None

@@ -18,11 +18,10 @@ from ..nodes.nodal import NodalMatrix
 from ..nodes.numbering import Numbering
 from ..nodes.rounded import Rounding
 from ..recovery import Body
+from ..tolerances import LAST_DIGITS
 from .materials.cells import Cells
 from .recover import place_nodes
 from .results import ElasticityRecovery
-
-_THIN = 1e-14  # of the largest variance of the coordinates: rounding
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,7 @@ def _flat(found: ElasticityRecovery) -> bool:
     for piece in range(len(found.evidence)):
         x = found.points[found.component == piece]
         spread = np.linalg.eigvalsh(np.cov(x.T, bias=True)) if len(x) > d else np.zeros(d)
-        if spread[0] <= _THIN * max(spread[-1], 1.0):  # mean edges have length one: in a single point all is rounding
+        if spread[0] <= LAST_DIGITS * max(spread[-1], 1.0):  # mean edges have length one
             return True
     return False
 

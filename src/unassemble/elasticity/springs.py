@@ -15,8 +15,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..nodes.nodal import NodalMatrix, determined, valid_pairs
-
-_APART = 1e-7  # of the mean edge length, up to which two nodes lie in one place
+from ..tolerances import ALIKE
 
 
 def without_springs(nodal: NodalMatrix) -> NodalMatrix:
@@ -56,8 +55,8 @@ def drawn_together(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray
     i, j, present = nodal.node, nodal.indices, nodal.row_of >= 0
     live = (i != j) & (nodal.data != 0).any(axis=(1, 2))
     away = np.abs(points[i] - points[j]).max(axis=1)
-    near = live & (away <= _APART)
+    near = live & (away <= ALIKE)
     near &= (present[i] & present[j]).any(axis=1)  # those with no direction in common may be halves of one node
-    elsewhere = np.bincount(i, live & (away > _APART), nodal.n) > 0
+    elsewhere = np.bincount(i, live & (away > ALIKE), nodal.n) > 0
     own = valid.reshape(nodal.n, -1).all(axis=1) & elsewhere
     return np.asarray((np.bincount(i, near, nodal.n) > 0) & ~own & determined(points))

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..tolerances import MOST
 from .cliques import Graph, shared_cliques, simplices, straight_simplices
 from .kinds import KINDS, Kind
 from .ordering import ordered
 from .overlap import convex, unpierced, without_diagonals
 from .surface import contested
 
-_COVERED = 0.5  # of the nodes: what cells have to touch before they are tried
 _LINEAR = {
     2: 8,
     3: 20,
@@ -50,7 +50,7 @@ def candidates(graph: Graph, points: NDArray[np.float64]) -> Iterator[tuple[Bloc
         if kind.name == "triangle6":
             sets = np.unique(np.vstack([sets, straight_simplices(graph, points)]), axis=0)
         cells = ordered(sets, points, kind)
-        if len(np.unique(cells)) > _COVERED * known:
+        if len(np.unique(cells)) > MOST * known:
             yield (Block(kind, cells),)
         if kind.name == "quad":
             quads = Block(kind, cells[convex(cells, points, kind)])

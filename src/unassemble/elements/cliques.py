@@ -7,8 +7,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-_AT_ONCE = 10_000_000  # products in one go
-_STRAIGHT = 1e-6  # of a side's length: how far from its middle a node may be
+from ..budget import AT_ONCE
+from ..tolerances import ALIKE
 
 
 class Graph:
@@ -92,7 +92,7 @@ def shared_cliques(graph: Graph, k: int) -> NDArray[np.int64]:
     found = np.empty((0, k), np.int64)
     if not graph.n or degree.max() < k:
         return found
-    for rows in np.split(np.arange(graph.n), np.searchsorted(work, np.arange(_AT_ONCE, work[-1], _AT_ONCE))):
+    for rows in np.split(np.arange(graph.n), np.searchsorted(work, np.arange(AT_ONCE, work[-1], AT_ONCE))):
         if not len(rows):
             continue
         block = closed[rows]
@@ -119,7 +119,7 @@ def straight_simplices(graph: Graph, points: NDArray[np.float64]) -> NDArray[np.
     length = np.linalg.norm(points[i] - points[j], axis=1)
     away, nearest = cKDTree(points[known]).query((points[i] + points[j]) / 2)
     middle = known[nearest]
-    side = (away < _STRAIGHT * length) & graph.coupled(i, middle) & graph.coupled(j, middle)
+    side = (away < ALIKE * length) & graph.coupled(i, middle) & graph.coupled(j, middle)
     i, j, middle = i[side], j[side], middle[side]
     corners = simplices(Graph(_symmetric(i, j, graph.n)), d)
     key = i * graph.n + j  # increasing, as the graph's rows are

@@ -10,10 +10,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..tolerances import LAST_DIGITS
 from .kinds import Kind
 from .reference import Rule, shape_functions, shape_gradients
-
-_FLAT = 1e-14  # determinant relative to the size of a Jacobian that is singular up to rounding
 
 
 def mapped_gradients(
@@ -34,7 +33,7 @@ def mapped_gradients(
     local = shape_gradients(kind, at)
     jacobian = np.einsum("mke,qkr->mqer", points[cells], local, optimize=True)
     size = np.abs(np.linalg.det(jacobian))
-    jacobian[size <= _FLAT * np.linalg.norm(jacobian, axis=(2, 3)) ** kind.dim] = np.eye(kind.dim)
+    jacobian[size <= LAST_DIGITS * np.linalg.norm(jacobian, axis=(2, 3)) ** kind.dim] = np.eye(kind.dim)
     return np.einsum("qkr,mqre->mqke", local, np.linalg.inv(jacobian), optimize=True), size * weights
 
 

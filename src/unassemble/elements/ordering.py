@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from ..budget import AT_ONCE
+from ..tolerances import ALIKE
 from .kinds import Kind
 
-_EXACT = 1e-6  # of a cell's size: further nodes nearer to the middles of their corners than this lie on straight sides
-_FLAT = 1e-6  # determinant of a frame, for a cell of about unit size
 _NEAR = 0.25  # squared distance of a cell of about unit size from an affine box; wrong orders are three times as far
-_AT_ONCE = 20_000_000  # distances between nodes of a cell
 
 
 def ordered(sets: NDArray[np.int64], points: NDArray[np.float64], kind: Kind) -> NDArray[np.int64]:
@@ -23,8 +22,8 @@ def ordered(sets: NDArray[np.int64], points: NDArray[np.float64], kind: Kind) ->
     further nodes off the middles of straight sides, the nodes that are no middles of others are tried as corners.
     """
     cells, misfit = _arranged(sets, _outermost(sets, points, kind.corners), points, kind)
-    if kind.quadratic and (misfit > _EXACT).any():
-        poor = np.flatnonzero(misfit > _EXACT)
+    if kind.quadratic and (misfit > ALIKE).any():
+        poor = np.flatnonzero(misfit > ALIKE)
         corners = _no_middles(sets[poor], points, kind.corners)
         again = poor[corners.any(axis=1)]
         other, second = _arranged(sets[again], corners[corners.any(axis=1)], points, kind)
@@ -44,7 +43,7 @@ def _outermost(sets: NDArray, points: NDArray, corners: int) -> NDArray[np.bool_
 def _no_middles(sets: NDArray, points: NDArray, corners: int) -> NDArray[np.bool_]:
     """(m, k) nodes that are in the middle of no two others of their set; none where these are not the corners."""
     chosen = np.zeros(sets.shape, dtype=bool)
-    step = max(_AT_ONCE // sets.shape[1] ** 2, 1)
+    step = max(AT_ONCE // sets.shape[1] ** 2, 1)
     for start in range(0, len(sets), step):
         x = points[sets[start : start + step]]
         size = np.ptp(x, axis=1).max(axis=1)[:, None]
@@ -52,7 +51,7 @@ def _no_middles(sets: NDArray, points: NDArray, corners: int) -> NDArray[np.bool
             across = 2 * x[:, a : a + 1] - x  # where the other end would be
             distance = np.linalg.norm(across[:, :, None] - x[:, None], axis=3)
             distance[:, a, a] = np.inf
-            chosen[start : start + step, a] = (distance.min(axis=2) > _EXACT * size).all(axis=1)
+            chosen[start : start + step, a] = (distance.min(axis=2) > ALIKE * size).all(axis=1)
     chosen[chosen.sum(axis=1) != corners] = False
     return chosen
 
@@ -74,7 +73,7 @@ def _arranged(
     predicted = np.stack([x[:, list(some)].mean(axis=1) for some in kind.between], axis=1)
     order = np.empty(further.shape, np.int64)
     misfit = np.empty(m)
-    step = max(_AT_ONCE // further.shape[1] ** 2, 1)
+    step = max(AT_ONCE // further.shape[1] ** 2, 1)
     for start in range(0, m, step):
         part = slice(start, start + step)
         distance = np.linalg.norm(predicted[part][:, :, None] - y[part][:, None], axis=3)
@@ -117,7 +116,7 @@ def ordered_boxes(cells: NDArray[np.int64], points: NDArray[np.float64]) -> NDAr
         y = x[open_cells]
         corner = _corners_in(y[:, choice, :] - y[:, :1], y)
         found = design[corner]
-        moment = found.transpose(0, 2, 1) @ found + 1e-6 * np.eye(d + 1)
+        moment = found.transpose(0, 2, 1) @ found + ALIKE * np.eye(d + 1)
         corner = _corners_in(np.linalg.solve(moment, found.transpose(0, 2, 1) @ y)[:, 1:], y)
         trial = np.argsort(corner, axis=1)
         y = np.take_along_axis(y, trial[:, :, None], axis=1)
@@ -137,7 +136,7 @@ def ordered_boxes(cells: NDArray[np.int64], points: NDArray[np.float64]) -> NDAr
 def _corners_in(frame: NDArray, x: NDArray) -> NDArray[np.int64]:
     """(m, k) which corner of a box along the axes of a frame (m, d, d) each of the points (m, k, d) is nearest to."""
     d = x.shape[2]
-    frame = np.where((np.abs(np.linalg.det(frame)) < _FLAT)[:, None, None], np.eye(d), frame)
+    frame = np.where((np.abs(np.linalg.det(frame)) < ALIKE)[:, None, None], np.eye(d), frame)
     return ((x @ np.linalg.inv(frame) > 0) << np.arange(d)).sum(axis=2)
 
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..budget import AT_ONCE
 from ..tolerances import CANCELLED
 from .cliques import Graph
 from .kinds import KINDS, Kind
 from .reference import reference_nodes, shape_gradients
-
-_AT_ONCE = 2_000_000  # pairs of a corner and a neighbour
 
 
 def unpierced(cells: NDArray[np.int64], points: NDArray[np.float64], graph: Graph) -> NDArray[np.bool_]:
@@ -30,7 +29,7 @@ def unpierced(cells: NDArray[np.int64], points: NDArray[np.float64], graph: Grap
     if not len(cells):
         return whole
     per_cell = max(int(np.diff(graph.start)[cells[:, 0]].mean()), 1)
-    step = max(_AT_ONCE // per_cell, 1)
+    step = max(AT_ONCE // per_cell, 1)
     for start in range(0, len(cells), step):
         some = cells[start : start + step]
         for a in range(cells.shape[1]):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
@@ -13,17 +13,21 @@ from ..errors import GeometryError, SolverError
 from .factorisation import Factorisation, factorisation
 from .upper import UpperTriangle
 
+_SHIFTS = (1e-14, 1e-12, 1e-10)
+"""Of the typical diagonal: around the rounding of a normal matrix, and below every eigenvalue that is not zero."""
+
+STEPS = 3
+"""Of inverse iteration, each of which divides what is not wanted by its eigenvalue over the shift, 1e4 and more."""
+
 
 @contextmanager
-def nearly_singular(matrix: UpperTriangle, shifts: Sequence[float]) -> Iterator[Factorisation]:
+def nearly_singular(matrix: UpperTriangle) -> Iterator[Factorisation]:
     """Cholesky factor of a positive semidefinite matrix plus the least multiple of the identity that rounding allows.
 
     Parameters
     ----------
     matrix : UpperTriangle
         Real; a normal matrix, for example.
-    shifts : sequence of float
-        To be tried one after the other, in units of the median of the diagonal, without entries that are next to zero.
 
     Raises
     ------
@@ -37,7 +41,7 @@ def nearly_singular(matrix: UpperTriangle, shifts: Sequence[float]) -> Iterator[
     # Unknowns in no equation are stored with less.
     there = diagonal > np.finfo(float).eps ** 2 * diagonal.max(initial=0.0)
     typical = float(np.median(diagonal[there])) if there.any() else 1.0
-    for shift in shifts:
+    for shift in _SHIFTS:
         data = matrix.data.copy()
         data[start] = (own + shift * typical * np.eye(block)).reshape(data[start].shape)
         shifted = UpperTriangle(data, matrix.indices, matrix.indptr)

@@ -11,6 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..budget import SAMPLE
+from ..tolerances import LAST_DIGITS
+
 _DIGITS = range(3, 13)  # decimal ones to look for; fewer do not tell what is rounded from what is exact
 _SHORT, _NEARLY, _SINGLE = 12, 20, 24  # binary digits: of numbers exact by nature; of nearly all singles; of singles
 
@@ -34,8 +37,8 @@ class Digits:
     def of(cls, values: NDArray[np.float64]) -> Digits | None:
         """The precision of some numbers (k,); None where they have not been rounded, or not so that it shows."""
         size = np.abs(values)
-        size = size[size > 1e-14 * size.max(initial=0.0)]  # less is what cancelling leaves, in no few digits
-        sample = size[:: max(1, len(size) // 2000)]
+        size = size[size > LAST_DIGITS * size.max(initial=0.0)]  # less is what cancelling leaves, in no few digits
+        sample = size[:: max(1, len(size) // SAMPLE)]
         if not (_are_binary(sample, _SINGLE).all() or _have(sample, _DIGITS[-1]).all()):  # as in most matrices
             return None
         size = np.unique(size)

@@ -12,15 +12,11 @@ from scipy.sparse import csgraph
 from ..clock import Clock
 from ..errors import SolverError
 from ..linalg import UpperTriangle, factorisation
-from ..recovery import Surface
 from ..tolerances import CERTIFIED
-
-_STARTS = 4
-_STEPS = 80
-_LANDMARKS = 60
+from .result import Surface
 
 
-def realised(surface: Surface, clock: Clock, starts: int = _STARTS) -> Surface:
+def realised(surface: Surface, clock: Clock, starts: int = 4) -> Surface:
     """The surface with coordinates that minimise the misfit of squared edge lengths, and with what is left of it.
 
     Lengths do not determine a shape: surfaces that are open mostly bend, and those that do not may have several shapes,
@@ -75,7 +71,7 @@ def _starts(n: int, edges: NDArray, lengths: NDArray, count: int) -> list[NDArra
     marks = [0]
     far = np.full(n, np.inf)
     distances = []
-    for _ in range(min(n, _LANDMARKS)):
+    for _ in range(min(n, 60)):
         distances.append(csgraph.dijkstra(graph, directed=False, indices=marks[-1]))
         far = np.minimum(far, distances[-1])
         marks.append(int(np.argmax(far)))
@@ -107,7 +103,7 @@ def _fitted(start: NDArray, edges: NDArray, lengths: NDArray) -> NDArray[np.floa
         return side / lengths[:, None], ((side**2).sum(axis=1) - lengths**2) / (2 * lengths)
 
     side, left = residual(x)
-    for _ in range(_STEPS):
+    for _ in range(80):
         jacobian = sp.csr_array((np.hstack([side, -side]).ravel(), (rows, columns)), shape=(len(edges), x.size))
         normal = UpperTriangle.of(sp.csr_array(jacobian.T @ jacobian))
         data = normal.data.copy()

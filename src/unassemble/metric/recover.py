@@ -7,13 +7,13 @@ from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from ..certify import MetricCertificate, certify_metric
 from ..clock import Clock
 from ..errors import GeometryError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..recovery import Surface
 from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE
 from ..topology.manifold import Cycles, in_four_cliques, surface_readings
 from ..words import count_of, words_of
@@ -21,8 +21,7 @@ from .curvature import curvatures
 from .mesh import SurfaceMesh
 from .noise import length_deviations, row_sum_test, scale_deviation
 from .program import Metric, solve_metric
-
-_READINGS = 16  # as many choices of triangles as are tried one by one
+from .result import Surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +46,8 @@ def recover_surface(
 ) -> Surface:
     """The triangles and edge lengths of a surface from its Laplacian, A = c L + D; on given triangles if there are any.
 
+    Up to 16 choices of triangles are tried.
+
     Raises
     ------
     TopologyError
@@ -57,12 +58,9 @@ def recover_surface(
     with clock("topology"):
         used, notes = _used(matrix)
         cycles = Cycles.of(used.n, used.edges)
-        if triangles is None:
-            readings = list(islice(surface_readings(cycles), _READINGS + 1))
-        else:
-            readings = [cycles.among(triangles)]
+        readings = list(islice(surface_readings(cycles), 17)) if triangles is None else [cycles.among(triangles)]
         solid = in_four_cliques(cycles)
-    found = [_solved(used, SurfaceMesh.of(cycles, chosen), clock, options) for chosen in readings[:_READINGS]]
+    found = [_solved(used, SurfaceMesh.of(cycles, chosen), clock, options) for chosen in readings[:16]]
     fitting = [one for one in found if one.fits]
     best = (fitting or found)[0]
     if not np.isfinite(best.scale).any():
@@ -156,7 +154,7 @@ def _verdict(
         row = int(found.mesh.triangles[found.mesh.piece == np.argmax(bare)].min())
         reason = f"in the piece of row {row} every edge belongs to four rows that are all coupled, as in a solid"
         return _Verdict("ambiguous", "ambiguous", f"{reason}: tetrahedra fit as well")
-    if fitting > 1 or readings > _READINGS:
+    if fitting > 1 or readings > 16:
         return _Verdict("ambiguous", "ambiguous", "other choices of triangles have lengths that fit as well")
     kept = "proved" if n_cycles == len(found.mesh.triangles) else "searched"
     fits = "the lengths give every entry back, and no others do on these triangles"
@@ -183,7 +181,7 @@ def _with_noise(found: _Found, kept: str, fits: str, sigma: float, scale: float 
     if scale is not None:
         error = [sigma * scale_deviation(found.squared[rows], place) for rows, place in found.mesh.pieces()]
         off = float((np.abs(found.scale - scale) / error).max())
-        if off <= _OFF:
+        if 2 * ndtr(-off) >= CONFIDENCE:
             return _Verdict("certified", kept, f"{fits}; the scale is the given one up to noise")
         return _Verdict("uncertified", kept, f"the entries tell another scale, off by {off:.1f} standard deviations")
     test = found.sums or {}
@@ -192,7 +190,6 @@ def _with_noise(found: _Found, kept: str, fits: str, sigma: float, scale: float 
     return _Verdict("uncertified", kept, "rows do not sum to zero, by more than noise, and no entries are to spare")
 
 
-_OFF = 3.3  # standard deviations: one right scale in a thousand is refused
 _SUMS = {
     "zero": "rows sum to zero",
     "constant": "rows sum to one number",

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-
-_LOST = 1e-11  # rounding errors of coordinates, in edge lengths; entries of flat elements have a hundred times as much
+from ..tolerances import ALIKE, SUMMED
 
 Anchors = tuple[NDArray[np.int64], NDArray[np.float64]]
 
@@ -76,7 +75,7 @@ def anchored(
             points[body] *= size
         points[body] += wanted.mean(axis=0) - points[nodes[here]].mean(axis=0)
         misfit = float(np.linalg.norm(points[nodes[here]] - wanted, axis=1).max())
-        if here.sum() > 1 and misfit > 1e-6 * np.linalg.norm(y, axis=1).max():
+        if here.sum() > 1 and misfit > ALIKE * np.linalg.norm(y, axis=1).max():
             notes.append(f"the anchors do not fit the mesh: one is missed by {misfit:.3g}")
     return points, factor, notes
 
@@ -109,7 +108,7 @@ def near_enough(status: str, reason: str, lost: float) -> tuple[str, str]:
 
     `lost` is that of :func:`digits_lost`.
     """
-    if status != "certified" or lost <= _LOST:
+    if status != "certified" or lost <= SUMMED:
         return status, reason
     return "uncertified", (
         f"{reason}, but the anchors lie so far from the origin that coordinates have too few digits left: as "

@@ -6,7 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-ROUNDING = 1e-9  # of its size: what entries of a row add up to that make up zero; supports leave 1e-3 and more
+from ..tolerances import CANCELLED
+
 PENALTY = 1e3  # a diagonal entry this many times the rest of its row is a penalty
 
 
@@ -46,7 +47,7 @@ def without_penalties(matrix: sp.csr_array) -> sp.csr_array:
 
 def adding_up(matrix: sp.csr_array, size: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(N,) rows of given sizes that add up to zero over all directions together."""
-    return np.asarray(np.abs(np.asarray(matrix.sum(axis=1)).ravel()) <= ROUNDING * size)
+    return np.asarray(np.abs(np.asarray(matrix.sum(axis=1)).ravel()) <= CANCELLED * size)
 
 
 def annihilated_share(
@@ -64,10 +65,10 @@ def annihilated_share(
     ones = np.zeros((len(direction), d))
     ones[np.flatnonzero(live), direction[live]] = 1
     size = row_sizes(matrix)[live]
-    zero = np.abs(matrix @ ones)[live] <= ROUNDING * size[:, None]
+    zero = np.abs(matrix @ ones)[live] <= CANCELLED * size[:, None]
     own = zero[np.arange(len(size)), direction[live]]
     other = np.arange(d) != direction[live][:, None]
-    coupled = other & ((abs(matrix) @ ones)[live] > ROUNDING * size[:, None])
+    coupled = other & ((abs(matrix) @ ones)[live] > CANCELLED * size[:, None])
     if searched or coupled.any():
         own &= (zero & coupled).any(axis=1)
     return float((zero & own[:, None]).mean())
@@ -93,7 +94,7 @@ def proven_directions(
     """
     own = np.eye(d, dtype=bool)[direction]
     size = row_sizes(matrix)
-    least = ROUNDING * np.where(size > 0, size, np.inf)
+    least = CANCELLED * np.where(size > 0, size, np.inf)
     excused = own & with_penalty(matrix, size)[:, None]
     failing = np.zeros((int(group.max()) + 1, d))
     np.add.at(failing, group, (np.abs(matrix @ own.astype(float)) > least[:, None]) & ~excused)
@@ -132,7 +133,7 @@ def unaccounted(
     labels = np.zeros((order, d))
     labels[np.flatnonzero(live), direction[live]] = 1
     size = np.asarray(abs(matrix).sum(axis=1)).ravel()
-    missing = (np.abs(matrix @ labels) > ROUNDING * size[:, None]) & live[:, None]
+    missing = (np.abs(matrix @ labels) > CANCELLED * size[:, None]) & live[:, None]
     missing[np.arange(order), direction] &= ~with_penalty(matrix, row_sizes(matrix))
     pattern = sp.csr_array((np.ones(matrix.nnz, np.int8), matrix.indices, matrix.indptr), shape=matrix.shape)
     onto = sp.csr_array((np.ones(order, np.int32), (node, np.arange(order))), shape=(n, order))

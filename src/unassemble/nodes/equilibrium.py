@@ -16,14 +16,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..linalg import solved
-from .constants import ROUNDING, adding_up, row_sizes, with_penalty
+from ..tolerances import CANCELLED, NEARLY_ALL, SMALL
+from .constants import adding_up, row_sizes, with_penalty
 
-_SHIFT = 1e-3  # of the diagonal: keeps bodies that are held in one node only from turning
-_GROWTH = 0.4  # share of rows to add at a time
-_CLEAR = 0.8  # how far apart the values of a row's two best directions are where there is no doubt
 _SEEDS = (0.5, 0.4, 0.6, 0.3, 0.7, 0.15, 0.85)  # nodes to start from, as parts of the way through a body
-_ROUNDS = 6
-_SETTLED = 0.98  # share of the whole rows whose sums vanish in all directions: single ones may add up by chance
 
 
 def spread_directions(
@@ -63,10 +59,10 @@ class _Body:
         off.setdiag(0)
         off.eliminate_zeros()
         inferred = -np.asarray(off.sum(axis=1)).ravel()
-        own = np.where(penalised, np.maximum(inferred, 1e-3 * size), np.abs(own))
+        own = np.where(penalised, np.maximum(inferred, SMALL * size), np.abs(own))
         self._size, self._d = np.where(size > 0, size, np.inf), d
         self._whole = sp.csr_array(off + sp.diags_array(own))
-        self._shifted = sp.csr_array(off + sp.diags_array((1 + _SHIFT) * own))
+        self._shifted = sp.csr_array(off + sp.diags_array((1 + SMALL) * own))
         self._pattern = sp.csr_array((np.ones(off.nnz, np.int32), off.indices, off.indptr), shape=off.shape)
         adds_up = adding_up(self._whole, self._size)
         self.telling: NDArray[np.bool_] = np.asarray(adds_up & ~penalised)
@@ -84,7 +80,7 @@ class _Body:
         hope = int(self.telling.sum())
         for start in self._starts(given):
             known, before = start, -1
-            for _ in range(_ROUNDS):
+            while True:
                 direction = self._extended(known)
                 good = self._good(direction)
                 count = int(good.sum())
@@ -94,7 +90,7 @@ class _Body:
                 if count <= before or count == hope or not count:
                     break
                 before, known = count, np.where(self._vouched(good), direction, -1)
-            if most >= _SETTLED * hope:
+            if most >= NEARLY_ALL * hope:
                 break
         return best
 
@@ -123,8 +119,8 @@ class _Body:
             if not near.any():  # nothing is coupled to what is left
                 return direction
             best, margin = self._guessed(np.flatnonzero(near), direction)
-            count = int(np.clip(_GROWTH * (direction >= 0).sum(), min(self._d, near.sum()), near.sum()))
-            least = min(np.partition(margin[near], -count)[-count], _CLEAR)
+            count = min(max(int((direction >= 0).sum()) // 2, self._d), int(near.sum()))  # half as many as are known
+            least = np.partition(margin[near], -count)[-count]
             direction = np.where(near & (margin >= least), best, direction)
         return direction
 
@@ -152,13 +148,13 @@ class _Body:
     def _good(self, direction: NDArray[np.int64]) -> NDArray[np.bool_]:
         """(n,) rows whose entries add up to zero in each direction."""
         sums = self._whole @ np.eye(self._d)[direction]
-        return np.asarray(self.telling & (np.abs(sums) <= ROUNDING * self._size[:, None]).all(axis=1))
+        return np.asarray(self.telling & (np.abs(sums) <= CANCELLED * self._size[:, None]).all(axis=1))
 
     def _vouched(self, good: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(n,) rows of the largest domain tied together by good ones, which vouch for what they couple to."""
         n = len(good)
         entry = sp.coo_array(self._whole)
-        told = good[entry.row] & (np.abs(entry.data) > ROUNDING * self._size[entry.row])
+        told = good[entry.row] & (np.abs(entry.data) > CANCELLED * self._size[entry.row])
         link = sp.csr_array((np.ones(told.sum(), np.int8), (entry.row[told] + n, entry.col[told])), shape=(2 * n,) * 2)
         label = sp.csgraph.connected_components(link, directed=False)[1][:n]
         return np.asarray(label == np.argmax(np.bincount(label)))

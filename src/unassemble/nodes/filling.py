@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from .grouping import by_first_row, joined, same_pattern
 from .likeness import likest_pairs, pattern_of, reach
 
-_STEPS = 3  # of the graph
-
 
 def filled(matrix: sp.csr_array) -> sp.csr_array:
     """The matrix with zeros where rows that are likest each other have entries, and so on with these.
@@ -31,7 +29,7 @@ def filled(matrix: sp.csr_array) -> sp.csr_array:
     while True:
         pattern = pattern_of(matrix)
         near = sp.coo_array(sp.triu(pattern @ pattern, 1))
-        pairs = likest_pairs(reach(matrix, _STEPS), near.row, near.col)
+        pairs = likest_pairs(reach(matrix), near.row, near.col)
         more = _shared(matrix, joined(*pairs, matrix.shape[0]))
         if more.nnz == matrix.nnz:
             return matrix
@@ -58,7 +56,7 @@ def filled_by_direction(matrix: sp.csr_array, direction: NDArray[np.int64], d: i
         label[own] = own[same_pattern(sp.csr_array(matrix[own][:, own]))]
     matrix = _shared(matrix, label)
     while True:
-        pattern, reached = pattern_of(matrix), reach(matrix, _STEPS)
+        pattern, reached = pattern_of(matrix), reach(matrix)
         first, second = [np.arange(n)], [n + label]
         for c, b in combinations([own for own in rows if len(own)], 2):
             cross = pattern[c][:, b]

@@ -21,7 +21,6 @@ from .constants import proven_directions, row_sizes, without_penalties
 from .equilibrium import spread_directions
 
 _STEPS = 1000  # of the primal-dual method: a third of them names the same rows, three times as many no more
-_ROUNDS = 4  # after which directions hardly change
 
 
 def with_least_sums(
@@ -48,7 +47,7 @@ def with_least_sums(
     def total(one: NDArray[np.int64]) -> float:
         return float(np.abs(scaled @ np.eye(d)[one]).sum())
 
-    for _ in range(_ROUNDS):
+    while True:
         unnamed = ~proven_directions(matrix, direction, group, d)
         if not unnamed.any() or unnamed.all():  # if all rows had one direction, sums would be least
             break

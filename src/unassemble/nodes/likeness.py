@@ -10,10 +10,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-SAME = 1e-6  # single precision
-_AT_ONCE = 1 << 22  # entries to multiply at a time
-_NUMBERS = 64  # of a sketch: 1 - cosine comes out to 18 % or so
-_FACTOR = 3.0  # that 1 - cosine of a contender may be above the least, five times that error
+from ..budget import AT_ONCE
+from ..tolerances import ALIKE, SIGMAS
+
+_NUMBERS = 64  # of a sketch
 
 
 def pattern_of(matrix: sp.csr_array) -> sp.csr_array:
@@ -21,16 +21,14 @@ def pattern_of(matrix: sp.csr_array) -> sp.csr_array:
     return sp.csr_array((np.ones(matrix.nnz, np.float32), matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
-def reach(matrix: sp.csr_array, steps: int) -> sp.csr_array:
-    """(N, N) where the rows lead to over some steps of the graph, rows of norm one.
+def reach(matrix: sp.csr_array) -> sp.csr_array:
+    """(N, N) where the rows lead to over three steps of the graph, rows of norm one.
 
     Each step divides by the number of rows coupled to, half before and half after it.
     """
     weight = sp.diags_array(1 / np.sqrt(np.maximum(np.diff(matrix.indptr), 1)).astype(np.float32))
     step = sp.csr_array(weight @ pattern_of(matrix) @ weight)
-    reached = step
-    for _ in range(steps - 1):
-        reached = sp.csr_array(step @ reached)
+    reached = sp.csr_array(step @ step @ step)
     norm = np.sqrt(np.asarray(reached.power(2).sum(axis=1)).ravel())
     return sp.csr_array(sp.diags_array(1 / np.where(norm > 0, norm, 1).astype(np.float32)) @ reached)
 
@@ -53,25 +51,26 @@ def likest_pairs(
     sketch = reached @ np.random.default_rng(0).standard_normal((order, _NUMBERS), dtype=np.float32)
     sketch /= np.maximum(np.linalg.norm(sketch, axis=1, keepdims=True), np.finfo(np.float32).tiny)
     apart = np.empty(len(r), np.float32)
-    for k in range(0, len(r), _AT_ONCE // _NUMBERS):
-        some = slice(k, k + _AT_ONCE // _NUMBERS)
+    for k in range(0, len(r), AT_ONCE // _NUMBERS):
+        some = slice(k, k + AT_ONCE // _NUMBERS)
         apart[some] = 1 - np.einsum("ij,ij->i", sketch[r[some]], sketch[s[some]])
     least = np.full(order, np.inf, np.float32)
     for rows in (r, s):
         np.minimum.at(least, rows, apart)
-    close = np.maximum(SAME, np.maximum(least[r], least[s]))
-    contenders = np.flatnonzero(apart <= _FACTOR * close)
+    close = np.maximum(ALIKE, np.maximum(least[r], least[s]))
+    error = np.sqrt(2 / _NUMBERS)  # of 1 - cosine, relative
+    contenders = np.flatnonzero(apart <= (1 + SIGMAS * error) * close)
     r, s = r[contenders], s[contenders]
     value, best = _cosines(reached, r, s), np.zeros(order)
     for rows in (r, s):
         np.maximum.at(best, rows, value)
-    chosen = (value >= best[r] - SAME) & (value >= best[s] - SAME)
+    chosen = (value >= best[r] - ALIKE) & (value >= best[s] - ALIKE)
     return r[chosen], s[chosen]
 
 
 def _cosines(reached: sp.csr_array, r: NDArray[np.int64], s: NDArray[np.int64]) -> NDArray[np.float64]:
     """(k,) cosines between the reaches of rows r and s."""
-    step = max(_AT_ONCE * reached.shape[0] // max(reached.nnz, 1), 1)
+    step = max(AT_ONCE * reached.shape[0] // max(reached.nnz, 1), 1)
     parts = [reached[r[k : k + step]].multiply(reached[s[k : k + step]]) for k in range(0, len(r), step)]
     sums = [np.asarray(part.sum(axis=1), dtype=np.float64).ravel() for part in parts]
     return np.concatenate([np.empty(0), *sums])

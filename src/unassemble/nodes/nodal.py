@@ -8,7 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .constants import PENALTY, ROUNDING
+from ..tolerances import CANCELLED
+from .constants import PENALTY
 from .numbering import Numbering
 
 
@@ -186,7 +187,7 @@ def without_trace(nodal: NodalMatrix) -> NDArray[np.bool_]:
 def annihilating(nodal: NodalMatrix) -> NDArray[np.bool_]:
     """(n, d, d) rows of blocks that annihilate constants."""
     size = np.where(nodal.size > 0, nodal.size, np.inf)[:, None, None]
-    return np.asarray(np.abs(nodal.row_sums()) <= ROUNDING * size)
+    return np.asarray(np.abs(nodal.row_sums()) <= CANCELLED * size)
 
 
 def _with_penalty(nodal: NodalMatrix) -> NDArray[np.bool_]:

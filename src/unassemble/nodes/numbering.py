@@ -8,15 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..tolerances import HARDLY_ANY, MOST, NEARLY_ALL
 from .constants import annihilated_share, unaccounted, uncoupled_rows
 from .grouping import coupled_in_common
 from .orders import ORDERS, Reading
-
-_LIKELY = 0.6  # quality of nodes apart from the share of sums that vanish; made-up ones have half or less
-WHOLE = 0.5  # share of sums that vanish in most rows, supports apart
-_ALIKE = 0.9  # rows of one node couple to common nodes by so much, where unknowns stand by component
-_FILLED = 0.8  # quality apart from the share: two directions read as three fill two thirds of the nodes' places
-ANNIHILATED = 0.02  # share of rows and directions below which an orderly numbering calls for a search
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,14 +89,14 @@ class Numbering:
     @property
     def clear(self) -> bool:
         """Whether the unknowns stand in one of the usual orders, with no gaps: nothing else need be tried."""
-        alike = self.kind != "by component" or self.common >= _ALIKE
+        alike = self.kind != "by component" or self.common >= NEARLY_ALL
         whole = self.incomplete or not self.odd
-        return self.kind in ORDERS and self.share >= WHOLE and alike and whole
+        return self.kind in ORDERS and self.share >= MOST and alike and whole
 
     @property
     def sound(self) -> bool:
         """Whether its nodes look like nodes, however few of their rows annihilate constants."""
-        return self.share > ANNIHILATED and self.quality > _LIKELY * self.share
+        return self.share > HARDLY_ANY and self.quality > MOST * self.share
 
     @property
     def settled(self) -> bool:
@@ -110,7 +105,7 @@ class Numbering:
         They show where all rows of each couple to the same nodes, or nearly all do, sums vanish in most rows and hardly
         a node lacks any.
         """
-        shows = self.common == 1 or (self.share >= WHOLE and self.quality > _FILLED * self.share)
+        shows = self.common == 1 or (self.share >= MOST and self.quality > NEARLY_ALL * self.share)
         return self.sound and shows and not self.odd
 
 

@@ -14,11 +14,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .constants import ROUNDING, unaccounted
+from ..tolerances import CANCELLED, MOST
+from .constants import unaccounted
 from .grouping import by_direction, joined, without_doubles
 
 ORDERS = ("interleaved", "by component")
-_VOTES = 0.5  # share of the rows that add up to zero that has to vote for a cut: nearly all do, or a few by chance
 
 Pairs = tuple[NDArray[np.int64], NDArray[np.int64]]
 
@@ -39,7 +39,7 @@ def regular(order: int, b: int, kind: str) -> tuple[NDArray[np.int64], NDArray[n
 
 
 def directions_by_component(
-    matrix: sp.csr_array, d: int, rounding: float | NDArray[np.float64] = ROUNDING
+    matrix: sp.csr_array, d: int, rounding: float | NDArray[np.float64] = CANCELLED
 ) -> NDArray[np.int64] | None:
     """(N,) directions that increase; None where no cuts between them show.
 
@@ -66,7 +66,7 @@ def directions_by_component(
     cuts: list[int] = []
     for _ in range(d - 1):
         votes = np.cumsum(np.bincount(first, minlength=order + 2) - np.bincount(last, minlength=order + 2))
-        if votes.max() <= _VOTES * whole.sum():
+        if votes.max() <= MOST * whole.sum():
             return None
         best = np.flatnonzero(votes == votes.max())
         run = best[: int(np.argmax(np.append(np.diff(best) > 1, True))) + 1]

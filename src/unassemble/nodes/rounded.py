@@ -15,15 +15,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..matrix.digits import Digits
-from .constants import ROUNDING
+from ..tolerances import CANCELLED, HARDLY_ANY, LAST_DIGITS, SIGMAS
 from .orders import ORDERS, regular
 from .searching import directions_in_order, live_part
 
 _LAYOUTS = {3: (3, 2, 1), 2: (2,), 6: (3,)}  # unknowns of a node, and how many of these may be displacements
-_SPREADS = 20  # times the rounding of the entries: what an identity, or a sum of forces, may be off by
-_FULL = 1e-10  # rounding below which nothing needs to be set right
-_EXACT = 1e-14  # sums this small, beside the largest entry, are those of entries in full precision
-_LEAST = 0.05  # of the rows that have to annihilate all translations
 
 
 @dataclass(frozen=True)
@@ -44,7 +40,7 @@ class Rounding:
     @property
     def spread(self) -> float:
         """What an identity, or a sum of forces, may be off by, relative to what makes it up."""
-        return _SPREADS * self.level
+        return SIGMAS * self.level
 
 
 def with_exact_sums(matrix: sp.csr_array) -> tuple[sp.csr_array, Rounding | None]:
@@ -67,19 +63,17 @@ def with_exact_sums(matrix: sp.csr_array) -> tuple[sp.csr_array, Rounding | None
     error = sp.csr_array((digits.unit / 2, matrix.indices, matrix.indptr), shape=matrix.shape)
     size = abs(matrix)
     total, of_row = (np.asarray(part.sum(axis=1)).ravel() for part in (size, error))
-    off = np.maximum(of_row / np.where(total > 0, total, np.inf), ROUNDING)
+    off = of_row / np.where(total > 0, total, np.inf)
     rounding = Rounding(digits.name, float(np.median(off)))
-    if rounding.level <= _FULL:
-        return matrix, None
-    best, most = None, _LEAST
-    for direction, b in _readings(matrix, off):
+    best, most = None, HARDLY_ANY
+    for direction, b in _readings(matrix, np.maximum(off, CANCELLED)):
         labels = (direction[:, None] == np.arange(b)).astype(float)
         sums, sizes = matrix @ labels, size @ labels
-        zero = (np.abs(sums) <= error @ labels + _EXACT * total[:, None]) & (sizes > _EXACT * total[:, None])
+        zero = (np.abs(sums) <= error @ labels + LAST_DIGITS * total[:, None]) & (sizes > LAST_DIGITS * total[:, None])
         share = max(float(zero[:, :moves].all(axis=1).mean()) for moves in _LAYOUTS[b])
         if share > most:
             best, most = (direction, np.where(zero, sums, 0.0)), share
-    if best is None or np.abs(best[1]).max() <= _EXACT * size.max():  # dyadic numbers are exact, few digits or not
+    if best is None or np.abs(best[1]).max() <= LAST_DIGITS * size.max():  # dyadic numbers are exact, few digits or not
         return matrix, None
     return _without(matrix, *best), rounding
 

@@ -14,8 +14,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..budget import Budget
-from .constants import ROUNDING, adding_up, proven_directions, row_sizes, unaccounted, uncoupled_rows, with_penalty
+from ..budget import LARGE, Budget
+from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST, NEARLY_ALL
+from .constants import adding_up, proven_directions, row_sizes, unaccounted, uncoupled_rows, with_penalty
 from .equilibrium import spread_directions
 from .filling import filled, filled_by_direction
 from .grouping import by_direction, by_first_row, same_pattern
@@ -24,11 +25,7 @@ from .likeness import pattern_of
 from .numbering import Numbering, measured
 from .orders import Reading, directions_by_component, nodes_by_component, nodes_in_runs
 
-_LARGE = 20_000  # rows beyond which entries that vanished are not put back, which would take minutes
 _WORK = 2e10  # for directions: half a minute or so
-_IN_TURN = 0.1  # by which neighbouring rows have more in common than rows far apart, if they stand node by node
-_ANNIHILATED = 0.9  # share of whole rows that annihilate translations when directions are right
-_EVEN = 0.6  # share of rows, far from supports, in patterns with as many rows in each direction
 
 
 def searched(matrix: sp.csr_array, sizes: tuple[int, ...], *, as_stored: bool = False) -> list[Numbering]:
@@ -101,6 +98,9 @@ def _readings(inner: sp.csr_array, sizes: tuple[int, ...], as_stored: bool) -> I
     """Order, number of directions, and nodes; with entries as they are stored, then with those that vanished."""
     if inner.shape[0] < 2 * min(sizes) or not inner.diagonal().all():  # an elastic body resists every displacement
         return
+    size = row_sizes(inner)
+    if np.mean(adding_up(inner, size) | with_penalty(inner, size)) < HARDLY_ANY:  # sums tell no directions
+        return
     for d in sizes:
         direction = directions_by_component(inner, d)
         if direction is not None:
@@ -108,7 +108,7 @@ def _readings(inner: sp.csr_array, sizes: tuple[int, ...], as_stored: bool) -> I
     kind = "interleaved" if _in_turn(inner) else "pattern"
     if as_stored and kind == "pattern":
         return
-    large = inner.shape[0] > _LARGE
+    large = inner.shape[0] > LARGE
     for put_back in (False,) if as_stored or large else (False, True):
         whole = filled(inner) if put_back else inner
         group = same_pattern(whole)
@@ -127,7 +127,7 @@ def _in_turn(matrix: sp.csr_array) -> bool:
     for step in (1, half):
         common = pattern[:-step].multiply(pattern[step:]).sum(axis=1)
         shares.append(float(np.mean(common / (count[:-step] + count[step:] - common))))
-    return shares[0] > shares[1] + _IN_TURN
+    return shares[0] > shares[1] + LITTLE
 
 
 def _by_component(inner: sp.csr_array, direction: NDArray[np.int64], d: int) -> Reading:
@@ -136,7 +136,7 @@ def _by_component(inner: sp.csr_array, direction: NDArray[np.int64], d: int) -> 
     lost = _came_apart(inner, node, direction, d)
     if not (lost & ~open_row).any():
         return Reading(node, direction, open_row)
-    for k in range(2 if inner.shape[0] <= _LARGE else 1):
+    for k in range(2 if inner.shape[0] <= LARGE else 1):
         group = same_pattern(filled_by_direction(filled(inner) if k else inner, direction, d))
         node, open_row = nodes_by_component(group, direction, d)
         lost = _came_apart(inner, node, direction, d)
@@ -160,7 +160,7 @@ def _by_equilibrium(inner: sp.csr_array, whole: sp.csr_array, d: int, kind: str)
     known = _of_runs(group, d) if kind == "interleaved" else np.full(len(group), -1)
     direction = spread_directions(whole, group, d, known)
     direction = with_least_sums(whole, group, direction, d, Budget(_WORK))
-    if kind == "pattern" and _annihilated(whole, direction, d) <= _ANNIHILATED:
+    if kind == "pattern" and _annihilated(whole, direction, d) <= NEARLY_ALL:
         return None
     if whole is not inner:
         whole = filled_by_direction(whole, direction, d)
@@ -169,7 +169,7 @@ def _by_equilibrium(inner: sp.csr_array, whole: sp.csr_array, d: int, kind: str)
         node, open_row = nodes_in_runs(inner, group, direction, d), None
     else:
         node, open_row = _of_patterns(group, direction, d)
-        if _even(inner, group, direction, d) <= _EVEN:
+        if _even(inner, group, direction, d) <= MOST:
             return None
     return Reading(node, direction, open_row, ~proven_directions(whole, direction, group, d))
 
@@ -179,7 +179,7 @@ def _annihilated(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> 
     size = row_sizes(matrix)
     whole = adding_up(matrix, size) & ~with_penalty(matrix, size)
     sums = np.abs(matrix @ np.eye(d)[direction])
-    return float((sums <= ROUNDING * size[:, None]).all(axis=1)[whole].mean()) if whole.any() else 0.0
+    return float((sums <= CANCELLED * size[:, None]).all(axis=1)[whole].mean()) if whole.any() else 0.0
 
 
 def _even(matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], d: int) -> float:

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from ..errors import GeometryError
 from ..linalg import svd
+from ..tolerances import ALIKE, CANCELLED, SINGULAR
 
-EXACT = 1e-9  # singular values below this are zero; matrices are rounded to 1e-16, gaps are 1e-4 and more
 SOFT = 2e-7  # singular values at which entries rounded to 1e-15 still give coordinates to 1e-8
-_FEW = 0.25  # share of nodes that may be loose although rows of their own are valid
-_MOST = 0.75  # share of the nodes that no plane across an axis holds
-_LOOSE = 1e-7  # a field this small at most nodes leaves these alone
-_STILL = 1e-9  # of loose nodes: where they die out coordinates, of norm one as they are, are wrong by that much
+MOST_FIELDS = 256
+"""Fields of least misfit to look at, at most: what leaves more of them free is not placed."""
+_FEW = 0.25  # share of nodes that may be loose although rows of their own are valid, or may be out of one plane
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +71,8 @@ def shape(
     if k <= d:
         raise GeometryError(f"{n} nodes with valid rows are too few to tell their positions")
     common = d + 1  # translations and scale
-    exact = values[d] <= EXACT
-    count = int((values <= EXACT).sum()) if exact else d + 1
+    exact = values[d] <= SINGULAR
+    count = int((values <= SINGULAR).sum()) if exact else d + 1
     null, loose = fields[..., :count], np.zeros(n, dtype=bool)
     soft = int((values <= SOFT).sum()) if exact else count
     for some in dict.fromkeys((soft, count)):  # nodes that alone can move almost freely are as good as loose
@@ -104,9 +103,9 @@ def set_aside(null: NDArray, common: int) -> tuple[NDArray, NDArray[np.bool_]]:
     for share in (0.75, 0.5, 0.25, 0.12):
         some = calm[: max(int(share * n), min(n, common + 1))]
         _, s, v = svd(null[some].reshape(-1, k), full_matrices=False)
-        if (s > _LOOSE * s[0]).sum() == common:
-            own = np.einsum("nak,lk->nal", null, v[s <= _LOOSE * s[0]])
-            loose = np.abs(own).max(axis=(1, 2)) > _STILL
+        if (s > ALIKE * s[0]).sum() == common:
+            own = np.einsum("nak,lk->nal", null, v[s <= ALIKE * s[0]])
+            loose = np.abs(own).max(axis=(1, 2)) > CANCELLED
             if np.count_nonzero(~loose) * null.shape[1] < common:  # too few are left to carry what they share
                 break
             return _orthonormal(np.einsum("nak,lk->nal", null, v[:common]), ~loose), loose
@@ -126,7 +125,7 @@ def _without_translations(fields: NDArray) -> NDArray:
     n, d, k = fields.shape
     centred = (fields - fields.mean(axis=0)).reshape(n * d, k)
     u, s, _ = svd(centred, full_matrices=False)
-    return u[:, : k - d][:, s[: k - d] > 1e-6].reshape(n, d, -1)
+    return u[:, : k - d][:, s[: k - d] > ALIKE].reshape(n, d, -1)
 
 
 def _choose(moving: NDArray, *, exact: bool) -> tuple[NDArray, str]:
@@ -139,7 +138,7 @@ def _choose(moving: NDArray, *, exact: bool) -> tuple[NDArray, str]:
     if k == 0:
         raise GeometryError("no field but translations fits the valid rows; this is no isotropic elasticity matrix")
     single = [svd(moving[:, a], full_matrices=False) for a in range(d)]
-    ranks = [int((s > 1e-6).sum()) for _, s, _ in single]
+    ranks = [int((s > ALIKE).sum()) for _, s, _ in single]
     if k == d and ranks == [1] * d:
         return np.stack([u[:, 0] for u, _, _ in single], axis=1) / np.sqrt(d), "axes"
     if k == d * d and ranks == [d] * d:
@@ -152,10 +151,10 @@ def _choose(moving: NDArray, *, exact: bool) -> tuple[NDArray, str]:
 
 def _flat(points: NDArray) -> bool:
     """Whether most nodes lie in one plane across an axis, as no mesh does, whatever the others do."""
-    most = int(np.ceil(_MOST * len(points)))
+    most = int(np.ceil((1 - _FEW) * len(points)))
     ordered = np.sort(points, axis=0)
     spread = (ordered[most - 1 :] - ordered[: len(points) - most + 1]).min(axis=0)
-    return bool((spread <= _LOOSE * np.abs(points).max()).any()) and most > 2 ** points.shape[1]
+    return bool((spread <= ALIKE * np.abs(points).max()).any()) and most > 2 ** points.shape[1]
 
 
 def in_gauge(points: NDArray, graph: sp.csr_array) -> NDArray[np.float64]:
@@ -173,5 +172,5 @@ def in_gauge(points: NDArray, graph: sp.csr_array) -> NDArray[np.float64]:
     centred = (points - np.nanmean(points, axis=0)) / (mean if mean > 0 else 1.0)
     moments = np.nansum(centred**3, axis=0)
     spread = np.nansum(np.abs(centred) ** 3, axis=0)
-    decisive = np.flatnonzero(np.abs(moments) > 1e-6 * spread)
+    decisive = np.flatnonzero(np.abs(moments) > ALIKE * spread)
     return -centred if len(decisive) and moments[decisive[0]] < 0 else centred

@@ -16,14 +16,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError, RecoveryError
+from ..tolerances import NEARLY_ALL
 from .constants import annihilated_share, uncoupled_rows
 from .grouping import by_first_row, coupled_in_common, made_up, same_pattern
 from .numbering import Numbering
 from .orders import ORDERS, regular
 from .searching import same_cuts, searched
-
-_ORDERLY = 0.8  # rows of made-up nodes couple to common nodes less than this
-
 
 MORE_THAN_STIFFNESS = (
     "a mass matrix, a multiple of the identity or springs at all nodes were added, or unknowns are scaled one by one"
@@ -68,7 +66,7 @@ def numbering_at_sight(matrix: sp.csr_array) -> Numbering | None:
     best = _in_order(matrix, (3, 2))
     if best is not None and best.clear:
         return best
-    if best is None or best.common <= _ORDERLY:
+    if best is None or best.common <= NEARLY_ALL:
         group = same_pattern(matrix, uncoupled_rows(matrix))
         if 2 * np.count_nonzero(np.bincount(group)[group] > 1) <= len(group):  # several nodes may share a pattern
             return None
@@ -85,12 +83,12 @@ def nodes_of_pattern(matrix: sp.csr_array) -> tuple[int, int] | None:
     """
     order = matrix.shape[0]
     for d, kind in product((3, 2), ORDERS):
-        if order % d == 0 and coupled_in_common(matrix, regular(order, d, kind)[0]) > _ORDERLY:
+        if order % d == 0 and coupled_in_common(matrix, regular(order, d, kind)[0]) > NEARLY_ALL:
             return order // d, d
     group = same_pattern(matrix, uncoupled_rows(matrix))
     of_size = np.bincount(np.bincount(group)[group], minlength=4)
     d = 3 if of_size[3] > of_size[2] else 2
-    return (int(group.max()) + 1, d) if of_size[d] > _ORDERLY * order else None
+    return (int(group.max()) + 1, d) if of_size[d] > NEARLY_ALL * order else None
 
 
 def regular_numbering(matrix: sp.csr_array, kind: str, block_size: int | None = None) -> Numbering:

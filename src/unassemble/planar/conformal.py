@@ -24,21 +24,14 @@ from numpy.typing import NDArray
 
 from ..errors import GeometryError
 from ..linalg import Factorisation, UpperTriangle, factorisation
-from ..tolerances import SUMMED
+from ..tolerances import ALIKE, LITTLE, MOST, ROUNDED, SUMMED
 from ..topology import Piece
 from .krylov import ShiftedSearch
 from .pencil import ConformalPencil
 
-_LEAST_SUM = 1e-10  # of the weights at a vertex, in units of the scale; at a corner of angle gamma it is gamma / 2
-_STEEPEST = 1e12  # weight in units of the scale, beyond that of any triangle in double precision
-
 _log = logging.getLogger(__name__)
 
-_MOST = 0.7  # if that share of the triangles agree, that is c
-_MANY, _SHARE = 100, 0.2  # or that many, if they are such a share: mirrored neighbours among others
-
-_FARTHEST = 1e-6
-"""Least ratio of a scale to its estimate, or of the estimate to it."""
+_MANY = 100  # triangles that agree, if they are no small share: mirrored neighbours among others
 
 
 @dataclass(frozen=True)
@@ -150,7 +143,7 @@ def _common(values: NDArray[np.float64]) -> float | None:
     first = int(np.argmax(alike))
     count = int(alike[first])
     alike[first : first + count] = 0
-    if count < min(_MOST * len(values), max(_SHARE * len(values), _MANY)) or 2 * alike.max() > count:
+    if count < min(MOST * len(values), max(LITTLE * len(values), _MANY)) or 2 * alike.max() > count:
         return None
     return float(np.median(values[first : first + count]))
 
@@ -198,15 +191,13 @@ def conformal_map(
     unit = estimate.scale
     with np.errstate(over="ignore"):
         relative = weights / unit if unit else np.full_like(weights, np.inf)
-    if not np.abs(relative).max() < _STEEPEST or (
-        scale is not None and not _FARTHEST < abs(scale / unit) < 1 / _FARTHEST
-    ):
+    if not np.abs(relative).max() < 1 / ROUNDED or (scale is not None and not ALIKE < abs(scale / unit) < 1 / ALIKE):
         raise GeometryError(
             "the entries of a piece, or they and the given scale, differ by so many orders of magnitude "
             "that no triangles could have them"
         )
     sums = np.bincount(piece.edges.ravel(), np.repeat(relative, 2), piece.n_vertices)
-    if not (sums > _LEAST_SUM).all():
+    if not (sums > SUMMED).all():  # at a corner the sum is half its angle
         # The energy of a hat function; without it the pencil may be singular, which PARDISO does not survive.
         row = int(piece.vertices[np.argmin(sums)])
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
@@ -227,7 +218,7 @@ def conformal_map(
         z, c, spread = search.at(first, _smooth_start(piece))
         if c < first > options.first_shift:  # not all triangles are wrong in the same sense, but many may be
             z, c, spread = search.at(options.first_shift, _smooth_start(piece))
-        if c < _FARTHEST:
+        if c < ALIKE:
             raise GeometryError("some maps of positive area have no energy: the entries belong to no planar mesh")
     converged = near = False
     while search.factorisations < options.max_factorisations:

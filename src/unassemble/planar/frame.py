@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-_TIE = 1e-7  # moments nearer to a tie than this choose no axis that rounding would not change
+from ..tolerances import ALIKE
 
 
 @dataclass(frozen=True)
@@ -48,14 +48,14 @@ def canonical_frame(z: NDArray, edges: NDArray) -> tuple[Similarity, str | None]
     axis = np.exp(-0.5j * np.angle(second)) if abs(second) > 0 else 1.0
     x, y = (axis * d).real, (axis * d).imag
     third = [float((t * t * t).sum()) for t in (x, y)]  # a power would take ten times as long
-    sure = [abs(m) > _TIE * float((np.abs(t) ** 3).sum()) for m, t in zip(third, (x, y), strict=True)]
+    sure = [abs(m) > ALIKE * float((np.abs(t) ** 3).sum()) for m, t in zip(third, (x, y), strict=True)]
     flip_x, flip_y = third[0] < 0, third[1] < 0
     turn = axis / size * (-1 if flip_x else 1)
     mirror = flip_x != flip_y
     if mirror:  # conjugation turns y over after the half turn has set x
         turn = np.conj(turn)
     shift = -turn * (np.conj(centre) if mirror else centre)
-    return Similarity(complex(turn), complex(shift), mirror), _ambiguity(abs(second) > _TIE * spread, *sure)
+    return Similarity(complex(turn), complex(shift), mirror), _ambiguity(abs(second) > ALIKE * spread, *sure)
 
 
 def _ambiguity(axis: bool, x: bool, y: bool) -> str | None:

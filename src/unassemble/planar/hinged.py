@@ -9,11 +9,11 @@ import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
+from ..tolerances import SINGULAR
 from ..topology import Piece
 from ..topology.together import united
 from .normal import distant_pair
 
-_INDEPENDENT = 1e-9  # singular values of equations at hinges, over the largest, above which they are independent
 _MOST_PIECES = 300
 """Above this their equations at hinges, which are dense here, take too long."""
 
@@ -74,7 +74,7 @@ def _freedoms(owner: NDArray, local: NDArray, z: NDArray, n: int) -> tuple[NDArr
     equations[row, p], equations[row, q] = at, -at
     equations[row, n + p], equations[row, n + q] = 1, -1
     _, size, directions = np.linalg.svd(np.linalg.qr(equations, mode="r"))  # of many equations, no large left factor
-    rank = int((size > _INDEPENDENT * size[0]).sum())
+    rank = int((size > SINGULAR * size[0]).sum())
     return directions[rank:].conj().T, 2 * (len(one) - rank)
 
 

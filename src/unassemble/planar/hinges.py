@@ -8,14 +8,14 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from ..linalg import least_norm
+from ..tolerances import ALIKE, ROUNDED
 from ..topology import Topology
 
-CLOSED = 1e-6  # distance at shared vertices, relative to the largest piece, below which rings count as closed
 _DENSE = 100  # pieces; above, sparse linear algebra is faster, and none is turned over by itself
 
 
 def join(
-    topology: Topology, positions: list[NDArray], known: NDArray | None = None, closed: float = CLOSED
+    topology: Topology, positions: list[NDArray], known: NDArray | None = None, closed: float = ALIKE
 ) -> list[NDArray]:
     """Move pieces by similarities close to translations so that shared vertices coincide.
 
@@ -65,12 +65,12 @@ def free_images(topology: Topology, joined: list[NDArray]) -> NDArray[np.int64]:
     for piece in np.flatnonzero(~held & (np.array(shared) > 1)):
         turned = list(joined)
         turned[piece] = np.conj(turned[piece])
-        if _joined(topology, turned, held)[1] <= CLOSED:
+        if _joined(topology, turned, held)[1] <= ALIKE:
             free.append(piece)
     return np.array(free, dtype=np.int64)
 
 
-def gap(topology: Topology, positions: list[NDArray], closed: float = CLOSED) -> float:
+def gap(topology: Topology, positions: list[NDArray], closed: float = ALIKE) -> float:
     """How far apart the pieces stay at shared vertices when they are joined, relative to the largest piece.
 
     Rings count as closed below `closed`, where no other images are tried.
@@ -136,10 +136,10 @@ def _joined(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_
     extent = float(size.max())
     weight = np.r_[np.where(held, 0.0, 1.0), np.where(held, 0.0, 1e3 * extent)]
     system = coo_array((values * weight[columns], (rows, columns)), shape=(len(rhs), 2 * n)).tocsr()
-    solution = np.linalg.lstsq(system.toarray(), rhs, rcond=1e-12)[0] if n <= _DENSE else least_norm(system, rhs)
+    solution = np.linalg.lstsq(system.toarray(), rhs, rcond=ROUNDED)[0] if n <= _DENSE else least_norm(system, rhs)
     turn, shift = 1 + (weight * solution)[:n], (weight * solution)[n:]
     left = float(np.abs(system @ solution - rhs).max(initial=0.0) / extent)
-    if (np.abs(turn) * size <= CLOSED * extent).any():
+    if (np.abs(turn) * size <= ALIKE * extent).any():
         left = max(left, 1.0)
     return [turn[p] * z + shift[p] for p, z in enumerate(positions)], left
 

@@ -16,14 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..linalg import UpperTriangle, factorisation, upper_from_edges
+from ..tolerances import SINGULAR
 from ..topology import Piece
 from .cotangent import corner_gradients
 from .normal import WeightJacobian
 
 _log = logging.getLogger(__name__)
-
-_BELOW_ONE = 1 - 1e-8
-"""Factor of the signed area: keeps the similarity itself, which is projected out, from making the energy singular."""
 
 
 class IterativeNormalEquations:
@@ -115,7 +113,8 @@ def _weighted_energy(piece: Piece, z: NDArray, spread: NDArray) -> UpperTriangle
     weight = (gradients / spread[piece.opposite] ** 2).sum(axis=1) / 2 / trace
     # Each corner contributes to the edge that faces it, run through from tail to head.
     share = (weight[:, None] * cotangent / 4).ravel()
-    area = weight * _BELOW_ONE / 4
+    # The similarity itself, which is projected out, would make the energy singular.
+    area = weight * (1 - SINGULAR) / 4
     left, right = piece.facing.T
     real = share[left] + np.where(piece.inner, share[right], 0)
     turn = area[left // 3] - np.where(piece.inner, area[right // 3], 0)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..linalg import Factorisation, UpperTriangle
-from ..tolerances import LARGEST_NOISE, ROUNDED, SIGMAS
+from ..tolerances import LARGEST_NOISE, LAST_DIGITS, ROUNDED, SIGMAS
 from ..topology import Piece
 from .cautious import CautiousOptions, cautious_polish, count_flipped
 from .conformal import conformal_map
@@ -19,11 +19,6 @@ from .hinged import Hinged
 from .polish import PolishedMesh, polish
 from .robust import ASIDE
 from .side_by_side import SideBySide
-
-EXACT = 1e-3
-"""Standard deviation of entries without noise, relative to that of the others: next to none, and safe to divide by."""
-_LOST = 1e-14
-"""Edges of that length, relative to the extent, have hardly a digit left."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +121,7 @@ def refined(
     except SolverError as error:
         shortest = _shortest(piece, mesh.z)
         too_far = f"the start is too far off, with edges of {shortest:.0e} of its size"
-        return replace(mesh, notes=(*mesh.notes, f"no polish: {too_far if shortest < _LOST else error}"))
+        return replace(mesh, notes=(*mesh.notes, f"no polish: {too_far if shortest < LAST_DIGITS else error}"))
     if not (np.isfinite(found.z).all() and np.isfinite(found.scale)):
         return replace(mesh, notes=(*mesh.notes, "the polish did not stay finite and was left out"))
     if found.converged:

@@ -15,15 +15,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..tolerances import LAST_DIGITS
 from ..topology import Piece
 from .cotangent import edge_weights
 from .iterative import IterativeNormalEquations
 from .normal import NormalEquations, WeightJacobian, distant_pair
 
 _log = logging.getLogger(__name__)
-
-_CONFOUNDED = 1e-14
-"""Square of the part of the weights that displacements leave, below which rounding has made it up."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +51,10 @@ class PolishOptions:
     contraction: float = 0.2
     settled: float = 1e-3
     direct_limit: int = 1_500_000
+
+
+SHORT = PolishOptions(max_steps=8, max_factorisations=3)
+"""Where only the right cells, or the right entries set aside, are worth more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +200,7 @@ class Problem:
 
 def downhill(problem: Problem, fit: Fit, move: NDArray) -> Fit | None:
     """The longest of the step, its half, its quarter, ... that does not raise the misfit."""
-    rounding = 1e-14 * abs(fit.scale) * float(np.linalg.norm(fit.weights))
+    rounding = LAST_DIGITS * abs(fit.scale) * float(np.linalg.norm(fit.weights))
     for halvings in range(12):
         trial = problem.at(fit.z + move * 0.5**halvings)
         if trial.norm <= fit.norm + rounding:
@@ -229,7 +231,7 @@ class GaussNewton:
             self._response = equations.fitted(jacobian, weights)
             # What J cannot explain of w; nothing but rounding means that c and the shape are confounded.
             left = float(weights @ (weights - jacobian.forward(self._response)))
-            self._complement = left if left > _CONFOUNDED * float(weights @ weights) else 0.0
+            self._complement = left if left > LAST_DIGITS * float(weights @ weights) else 0.0
 
     def __call__(self, jacobian: WeightJacobian, misfit: NDArray) -> NDArray:
         """Displacement d (n,) complex; the scale follows from it by least squares."""

@@ -19,16 +19,13 @@ from ..errors import GeometryError, SolverError
 from ..topology import Piece
 from .conformal import conformal_map
 from .cotangent import edge_weights
-from .polish import PolishOptions, Problem, polish
+from .polish import SHORT, Problem, polish
 from .suspects import find_suspects
 
 _log = logging.getLogger(__name__)
 
 ASIDE = 1e6
 """Standard deviation of entries set aside, over that of the others: it counts where nothing else holds a vertex."""
-
-_SHORT = PolishOptions(max_steps=8, max_factorisations=3)
-_GAIN = 0.5  # part of the misfit to which another set of entries must lower it to be gone on with
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,14 +101,14 @@ def _matched(
     while True:
         rest = np.ones(len(weights), dtype=bool)
         rest[aside] = False
-        found = polish(piece, weights, z, scale=scale, spread=np.where(rest, size, ASIDE * size), options=_SHORT)
+        found = polish(piece, weights, z, scale=scale, spread=np.where(rest, size, ASIDE * size), options=SHORT)
         fit = Problem(piece, weights, size, found.scale).at(found.z)
         misfit = np.abs(fit.misfit * fit.scale)
         left = float(np.linalg.norm(misfit[rest]))
         _log.debug("%d entries set aside: misfit %.1e, then %.1e", len(aside), before, left)
         if settled(misfit[rest]):
             best = RobustFit(found.z, found.scale, aside)
-        elif best is not None or not left < _GAIN * before:
+        elif best is not None or not 2 * left < before:
             return best
         before, z = left, found.z
         aside = find_suspects(piece, weights, z, found.scale, size, free_scale=scale is None).edges
@@ -144,7 +141,7 @@ def differences_without(
     spread[aside] *= ASIDE
     try:
         with np.errstate(all="ignore"):
-            found = polish(piece, weights, z, scale=None if free_scale else scale, spread=spread, options=_SHORT)
+            found = polish(piece, weights, z, scale=None if free_scale else scale, spread=spread, options=SHORT)
             left = weights - found.scale * edge_weights(piece, found.z)
     except SolverError:
         return np.full(len(weights), np.inf)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..recovery import Body, Recovery, Structure, Surface
+from ..metric.result import Surface
+from ..recovery import Body, Recovery, Structure
 from . import style
 from .canvas import panels
 from .mesh import line_handle

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 
     from ..recovery import PlanarMesh
 
-# Above this many edges an image replaces lines: quicker, smaller, and it shows density where lines would be a blot.
-_MOST_LINES = 60_000
-
 
 def draw_mesh(ax: Axes, mesh: PlanarMesh, points: NDArray, outer: NDArray) -> list[Line2D]:
     """Draw a mesh; handles for a legend come back.
@@ -46,13 +43,12 @@ def draw_mesh(ax: Axes, mesh: PlanarMesh, points: NDArray, outer: NDArray) -> li
     rings = [points[mesh.boundary[a:b, 0]] for a, b in pairwise(mesh.boundary_offsets)]
     _fill(ax, rings)
     width = _line_width(ax, start, stop)
-    if len(start) > _MOST_LINES:
+    if len(start) > style.MOST_VECTOR:  # quicker, smaller, and it shows density where lines would be a blot
         _draw_ink(ax, start, stop, width)
     else:
         lines = LineCollection(
             list(np.stack([start, stop], axis=1)), colors=style.EDGE, linewidths=width, capstyle="round"
         )
-        lines.set_rasterized(len(start) > style.MOST_VECTOR)
         ax.add_collection(lines, autolim=False)
     for is_outer, colour in ((False, style.HOLE), (True, style.OUTER)):
         chosen = [np.vstack([ring, ring[:1]]) for ring, flag in zip(rings, outer, strict=True) if flag == is_outer]

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..clock import Clock
 from ..metric import realised
-from ..recovery import Body, Mechanical, PlanarMesh, Recovery, Surface
+from ..metric.result import Surface
+from ..recovery import Body, Mechanical, PlanarMesh, Recovery
 from ..summary import counted_cells, scale_text
 from ..words import count_of
 from . import style

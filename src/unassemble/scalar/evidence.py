@@ -14,15 +14,9 @@ from ..planar.cautious import CautiousOptions
 from ..planar.cotangent import edge_weights, weight_roundings
 from ..planar.robust import differences_without
 from ..planar.suspects import find_suspects
-from ..tolerances import CHANCE
+from ..tolerances import CHANCE, LITTLE, NOISY, SUMMED
 from .solving import Solved
 from .wrong_entries import settled
-
-_ROUNDING = 1e-11
-"""Misfits up to this, where errors are as large as rounding makes them, prove nothing."""
-_NEARLY_ALL = 0.01  # of the squared misfit
-_LESS = 0.1  # of the squared misfit that entries may leave which are blamed; derivatives promised less
-_NOISY = 2.0  # root mean square of a misfit, over the noise, that noise explains
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,10 +90,10 @@ def _suspects(solved: Solved, *, free_scale: bool) -> tuple[NDArray[np.int64], b
         if found is None or found.log_p >= np.log(CHANCE):
             explained = explained and _fitted(weights, before, own)
             continue
-        certain = certain or (found.left < _NEARLY_ALL and found.size > _ROUNDING)
+        certain = certain or (found.left < LITTLE**2 and found.size > SUMMED)
         explained = explained and not np.isin(piece.edge_rows[found.edges], topology.vanished).any()  # these are exact
         left = differences_without(piece, weights, mesh.z, mesh.scale, found.edges, free_scale=free_scale)
-        explained = explained and _fitted(weights, left, own) and bool(_norm(left) ** 2 < _LESS * _norm(before) ** 2)
+        explained = explained and _fitted(weights, left, own) and bool(_norm(left) ** 2 < LITTLE * _norm(before) ** 2)
         pairs.append(matrix.edges[piece.edge_rows[found.edges]])
     return (np.concatenate(pairs) if pairs and explained else NONE), certain
 
@@ -107,6 +101,6 @@ def _suspects(solved: Solved, *, free_scale: bool) -> tuple[NDArray[np.int64], b
 def _fitted(weights: NDArray, differences: NDArray, errors: NDArray | None) -> bool:
     """Whether differences are those of right cells: below what any wrong one leaves, or noise, known or not."""
     if errors is not None:
-        return bool(_norm(differences / errors) <= _NOISY * np.sqrt(len(differences)))
+        return bool(_norm(differences / errors) <= NOISY * np.sqrt(len(differences)))
     with np.errstate(over="ignore"):  # triangles that are nearly flat
         return settled(np.abs(differences) / (np.abs(weights) + np.median(np.abs(weights))))

@@ -10,15 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc, gammaincc, ndtr
 
-from ..cells.agreement import SAME_SCALE, SCALE_ERROR
 from ..cells.judge.within_errors import GAP
 from ..planar.cotangent import left_by_all
 from ..planar.deviations import factor_deviations
 from ..planar.hinged import Hinged
-from ..planar.hinges import CLOSED, groups, join, rings
+from ..planar.hinges import groups, join, rings
 from ..planar.piece import PieceMesh, refined_together
 from ..planar.polish import PolishOptions
-from ..tolerances import CHANCE, CONFIDENCE, LARGEST_NOISE, ROUNDED
+from ..tolerances import ALIKE, CHANCE, CONFIDENCE, LARGEST_NOISE, MAGNIFIED, ROUNDED
 from ..topology import Topology
 from .noise import Noise, with_vanished
 
@@ -152,7 +151,7 @@ def hinged(
     """A group of pieces joined at the vertices that they share, if rings of them hold each other."""
     pieces = [topology.pieces[p] for p in inside]
     some = replace(topology, pieces=tuple(pieces))
-    closed = max(CLOSED, error)
+    closed = max(ALIKE, error)
     return Hinged.of(pieces, join(some, positions, closed=closed)) if rings(some) > 0 else None
 
 
@@ -228,14 +227,14 @@ def discord(topology: Topology, factors: Factors, backward_error: float, noise: 
     """
     difference, together = factors.differences, factors.together
     # A null vector that is not polished may be off by more than the entries; noise has been asked how much it explains.
-    allowed = max(SAME_SCALE, 0.0 if noise else SCALE_ERROR * backward_error)
+    allowed = max(ALIKE, 0.0 if noise else MAGNIFIED * backward_error)
     apart = np.where(together, 0.0, difference)
     if apart.max() > allowed:
         more = f", more than {noise} explains" if noise else ""
         why = factors.apart.get(int(factors.first[apart.argmax()]))
         more = f"; errors of the entries explain that, but {why}" if why else more
         return f"pieces that share vertices have different factors c: {_named(topology, factors, apart)}{more}"
-    if not noise or not difference.max() > SAME_SCALE:
+    if not noise or not difference.max() > ALIKE:
         return None
     # The first piece of each group tells c, and others confirm it to within their errors; so do rings that close. What
     # may be something else has to agree itself: neither pieces that are beyond doubt nor other groups vouch for it.

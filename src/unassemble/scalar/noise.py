@@ -11,8 +11,7 @@ from ..certify import chi_square_verdict
 from ..matrix import OperatorMatrix
 from ..matrix.digits import Digits
 from ..matrix.operator import row_sizes
-from ..planar.piece import EXACT
-from ..tolerances import CHANCE, CONFIDENCE, LARGEST_NOISE
+from ..tolerances import CHANCE, CONFIDENCE, LARGEST_NOISE, SMALL
 from ..topology import Topology
 from ..topology.keys import pair_keys
 
@@ -55,7 +54,7 @@ class Noise:
         unit = digits.unit
         largest = row_sizes(matrix.n, matrix.edges, unit)[matrix.edges].min(axis=1)
         # An error between -u / 2 and u / 2, evenly distributed, has the standard deviation u / sqrt(12).
-        error = np.maximum(unit, EXACT * largest) / np.sqrt(12)
+        error = np.maximum(unit, SMALL * largest) / np.sqrt(12)
         rounded = unit > 0
         sigma = float(np.median(error[rounded]))
         count = np.unique(np.abs(matrix.entries[rounded]), return_counts=True)[1]
@@ -138,7 +137,7 @@ class NoiseTest:
 
 def with_vanished(topology: Topology, spread: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
     """(e',) standard deviations of all entries over a common factor; of those stored given, or of one size."""
-    result = np.full(len(topology.edges), EXACT)
+    result = np.full(len(topology.edges), SMALL)
     stored = np.ones(len(topology.edges), dtype=bool)
     stored[topology.vanished] = False
     result[stored] = 1.0 if spread is None else spread

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import Alternative
-from ..cells.judge import FITS
 from ..certify import Certificate
-from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE
+from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE, NEARLY_ALL
 from ..topology import Topology
 from ..words import count_of, words_of
 from .evidence import Evidence
@@ -20,7 +19,7 @@ from .noise import NoiseTest
 if TYPE_CHECKING:
     from .verdict import Findings
 
-_MOST, _ROWS = 0.9, 6  # part of the squared misfit whose rows are named, and how many of them at most
+_ROWS = 6  # at most, named as those that hold nearly all of a misfit
 _MANY = 50  # entries, of which it can be said what their misfit looks like
 
 
@@ -62,17 +61,17 @@ def _culprits(evidence: Evidence) -> str:
 
 def _unexplained(certificate: Certificate) -> str:
     """The beginning of a sentence where no few entries are to blame: how much is left, and around which rows."""
-    if certificate.backward_error <= FITS:
+    if certificate.backward_error <= ALIKE:
         return ""
     squares = certificate.misfits**2
     left = squares.copy()
     rows: list[int] = []
-    while len(rows) < _ROWS and left.sum() > (1 - _MOST) * squares.sum():
+    while len(rows) < _ROWS and left.sum() > (1 - NEARLY_ALL) * squares.sum():
         at_row = np.bincount(certificate.pairs.ravel(), np.repeat(left, 2))
         rows.append(int(at_row.argmax()))
         left[(certificate.pairs == rows[-1]).any(axis=1)] = 0.0
     share = 1 - left.sum() / squares.sum()
-    count = int((certificate.misfits > FITS).sum())
+    count = int((certificate.misfits > ALIKE).sum())
     return (
         f"no set of cells was found that fits: {count_of(count, 'entry', 'entries')} of {len(squares):,} "
         f"{'is' if count == 1 else 'are'} left unexplained, with {share:.0%} of the squared misfit in "

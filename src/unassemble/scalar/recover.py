@@ -18,7 +18,7 @@ from ..options import ScalarOptions
 from ..planar.hinges import free_images, join
 from ..planar.pencil import pencil_pattern
 from ..recovery import PlanarMesh
-from ..tolerances import SIGMAS
+from ..tolerances import SIGMAS, SMALL
 from ..topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
 from .deviations import coordinate_deviations
 from .evidence import weigh
@@ -28,8 +28,6 @@ from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanis
 from .placement import Placement
 from .solving import Solved, Task, solve
 from .verdict import Findings, Held, Verdict, verdict
-
-_SMALL = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +175,7 @@ def _report(
     if options.noise and evidence.noise is not None and evidence.noise < 0.5 * options.noise:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
     # What a misfit that small lacks is digits, and not triangles.
-    if refused and not (noise or held.certificate.backward_error < _SMALL):
+    if refused and not (noise or held.certificate.backward_error < SMALL):
         notes += origin_notes(findings.stored, evidence.suspects)
     if found.uniqueness == "searched" and np.bincount(components_of(findings.stored)).max() > SEARCHED_ROWS:
         notes.append(f"other meshes were looked for in connected parts of up to {SEARCHED_ROWS:,} rows only")

@@ -18,6 +18,7 @@ from ..options import ScalarOptions
 from ..planar.cotangent import left_by_all
 from ..planar.piece import PieceMesh, brought_near, positions, refined
 from ..planar.triangles import lone_triangles
+from ..tolerances import NOISY
 from ..topology import Piece, Polygons, Topology
 from .factors import Factors, fitted_together
 from .noise import Noise, with_vanished
@@ -25,8 +26,6 @@ from .placement import Placement
 from .wrong_entries import wrong_entries
 
 Clock = Callable[[str], AbstractContextManager[None]]
-
-_BEYOND = 2.0  # root mean square of a misfit, over errors of rounding, that are not all
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,7 +154,7 @@ def _is_rounding(topology: Topology, matrix: OperatorMatrix, meshes: list[PieceM
     left = left_by_all(topology.pieces, -matrix.entries, [mesh.z for mesh in meshes], scales)
     error = noise.sigma * noise.on(topology)[np.concatenate([piece.edge_rows for piece in topology.pieces])]
     with np.errstate(all="ignore"):  # flat triangles
-        return bool(np.sqrt(np.mean((left / error) ** 2)) <= _BEYOND)
+        return bool(np.sqrt(np.mean((left / error) ** 2)) <= NOISY)
 
 
 def _polished(

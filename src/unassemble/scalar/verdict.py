@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from ..cells import Alternative
 from ..certify import Certificate, without_spare_equations
 from ..matrix import OperatorMatrix
-from ..tolerances import CERTIFIED, SUSPICIOUS
+from ..tolerances import CERTIFIED, PLACED, SUSPICIOUS
 from .evidence import Evidence
 from .factors import discord
 from .joined import JoinedMesh
 from .noise import NoiseTest
 from .reasons import ambiguous, astray, because, far_away, misfit, nothing_to_spare, unlikely, with_noise
 from .solving import Solved
-
-_SURE = 1e-8  # of a piece's size: how far off certified positions may be
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +153,7 @@ def _by_itself(f: Findings) -> tuple[bool, str]:
     if not good or f.evidence.certain:
         bare = good and len(topology.bare_edges) > 0
         return (False, _bare(f)) if bare else (False, misfit(f, f.trouble) + (f"; {apart}" if apart else ""))
-    if not doubt <= _SURE:
+    if not doubt <= PLACED:
         return False, (
             f"{fits}, but so may others: in double precision the entries determine the positions to about {doubt:.0e} "
             "of the size only"
@@ -169,7 +167,7 @@ def _by_noise(f: Findings, test: NoiseTest) -> tuple[bool, str]:
         return False, misfit(f, (*f.trouble, unlikely(test, f.certificate))) + astray(f, ())
     reason = with_noise(f, test)
     doubt = max(mesh.doubt for mesh in f.solved.meshes)
-    if f.near.passes and not doubt <= max(_SURE, test.noise.sigma / float(np.abs(f.solved.scales).min())):
+    if f.near.passes and not doubt <= max(PLACED, test.noise.sigma / float(np.abs(f.solved.scales).min())):
         return False, f"{reason}, but that mesh need not be the likeliest{because(f.trouble)}"
     return f.near.passes, reason
 

@@ -10,18 +10,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cells.agreement import SAME_SCALE
-from ..cells.doubt import SURE, Attempt, Outcome, misfits_of, unexplained, with_pieces
-from ..cells.judge.labelling import FITS, even
+from ..cells.doubt import Attempt, Outcome, misfits_of, unexplained, with_pieces
+from ..cells.judge.labelling import even
 from ..matrix import OperatorMatrix
-from ..planar.cautious import count_flipped
+from ..planar.cautious import CautiousOptions, count_flipped
 from ..planar.cotangent import edge_weights
 from ..planar.piece import PieceMesh
 from ..planar.robust import RobustFit, robust_fit
+from ..tolerances import ALIKE, CHANCE, SMALL
 from ..topology import Numbering, Piece, Topology
-
-_MOST_VERTICES = 200_000
-_CHANCE = np.log(1e-6)  # that the entries which fit do so by coincidence
 
 
 def wrong_entries(
@@ -60,7 +57,7 @@ def _in_component(
 ) -> dict[Piece, PieceMesh] | None:
     """Meshes of the pieces that do not fit, or None."""
     wrong = sorted(
-        (piece for piece in meshes if (misfit[piece.edge_rows] > FITS).any()), key=lambda piece: piece.n_vertices
+        (piece for piece in meshes if (misfit[piece.edge_rows] > ALIKE).any()), key=lambda piece: piece.n_vertices
     )
     found: dict[Piece, PieceMesh] = {}
     aside = [np.empty(0, dtype=np.int64)]
@@ -77,12 +74,12 @@ def _in_component(
         if not _apart(len(part.vertices), part.edges, part.edges[rows]):
             return None
     scales = np.array([mesh.scale for mesh in (meshes | found).values() if isinstance(mesh, PieceMesh)])
-    return found if len(scales) and np.abs(scales / scales[0] - 1).max() < SAME_SCALE else None
+    return found if len(scales) and np.abs(scales / scales[0] - 1).max() < ALIKE else None
 
 
 def _without_few(piece: Piece, weights: NDArray, z: NDArray | None, scale: float | None) -> PieceMesh | None:
     """The mesh of a piece that fits all entries but a few, or all; None where there is none."""
-    if piece.n_vertices > _MOST_VERTICES or not _provable(piece, 1, scale):
+    if piece.n_vertices > CautiousOptions().most_vertices or not _provable(piece, 1, scale):
         return None
 
     fit = robust_fit(piece, weights, z, settled, scale=scale)
@@ -95,7 +92,7 @@ def _without_few(piece: Piece, weights: NDArray, z: NDArray | None, scale: float
 
 def settled(misfit: NDArray) -> bool:
     """Whether a misfit, relative to the entry and a typical one, is that of rounding, or of noise."""
-    return bool((misfit <= FITS).all()) or (even(misfit) and float(np.sqrt(np.mean(misfit**2))) < SURE)
+    return bool((misfit <= ALIKE).all()) or (even(misfit) and float(np.sqrt(np.mean(misfit**2))) < SMALL)
 
 
 def _left(piece: Piece, weights: NDArray, fit: RobustFit) -> float:
@@ -105,13 +102,13 @@ def _left(piece: Piece, weights: NDArray, fit: RobustFit) -> float:
     return float(np.sqrt(np.mean(misfit**2)))
 
 
-def _provable(piece: Piece, aside: int, scale: float | None, left: float = FITS) -> bool:
+def _provable(piece: Piece, aside: int, scale: float | None, left: float = ALIKE) -> bool:
     """Whether that the others fit is no coincidence, whichever of them so many entries set aside are.
 
     Each equation beyond the unknowns that holds to within `left` does so by chance about that often.
     """
     equations = len(piece.edges) - 2 * piece.n_vertices + 4 - (scale is None) - aside
-    return bool(equations * np.log(max(left, FITS)) + aside * np.log(len(piece.edges)) < _CHANCE)
+    return bool(equations * np.log(max(left, ALIKE)) + aside * np.log(len(piece.edges)) < np.log(CHANCE))
 
 
 def _apart(n: int, edges: NDArray[np.int64], some: NDArray[np.int64]) -> bool:

@@ -1,17 +1,21 @@
 """Frames, shells and plates, whose nodes have rotations beside displacements; and trusses, which consist of bars."""
 
 from .bars import truss_numbering
+from .beams import Beam, find_beam, serve_beam
 from .frames import serve_structure
 from .layouts import LAYOUTS, Layout, layout_named
 from .recognise import StructuralNumbering, find_structure, given_structure
 
 __all__ = [
     "LAYOUTS",
+    "Beam",
     "Layout",
     "StructuralNumbering",
+    "find_beam",
     "find_structure",
     "given_structure",
     "layout_named",
+    "serve_beam",
     "serve_structure",
     "truss_numbering",
 ]

@@ -8,13 +8,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..budget import SAMPLE
 from ..nodes.constants import uncoupled_rows
 from ..nodes.nodal import NodalMatrix, nodal_matrix
 from ..nodes.numbering import Numbering
 from ..nodes.orders import ORDERS, regular
 from ..tolerances import CANCELLED
-
-_SAMPLE = 64  # blocks to look at before all are
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +49,7 @@ def bars_of(nodal: NodalMatrix) -> Bars | None:
     blocks = nodal.data[upper]
     if not len(blocks):
         return None
-    some = np.linalg.svd(blocks[:_SAMPLE], compute_uv=False)
+    some = np.linalg.svd(blocks[:SAMPLE], compute_uv=False)
     if (some[:, 1] > CANCELLED * some[:, 0]).any():  # mostly a solid: not worth looking at all of it
         return None
     i, j = nodal.node[upper].astype(np.int64), nodal.indices[upper].astype(np.int64)

@@ -14,12 +14,12 @@ from ..matrix import OperatorMatrix
 from ..nodes.anchoring import anchored, checked_anchors, digits_lost, near_enough
 from ..nodes.rounded import Rounding, with_exact_sums
 from ..recovery import Structure
-from ..tolerances import CERTIFIED
+from ..tolerances import ALIKE, CERTIFIED
 from ..words import count_of
 from .certificate import forces
 from .members import members_and_cells, mispaired
 from .nodes import Nodes, nodes_of
-from .placed import SURE, Placed, covered
+from .placed import Placed, covered
 from .recognise import StructuralNumbering
 from .turning import turning_positions
 
@@ -79,7 +79,7 @@ def serve_structure(
         reason += f": {covered(used, abs(whole[used]).sum(axis=0) > 0)}"
     notes = list(found.notes)
     fields: dict[str, Any] = {}
-    if cells and error < 1e-6:
+    if cells and error < ALIKE:
         with clock("members"):
             fields = members_and_cells(nodes, found.points)
         notes.append("members and cells were read off the graph; what is certified is the coordinates")
@@ -125,21 +125,24 @@ def _verdict(error: float, found: Placed, rounding: Rounding | None) -> tuple[st
             f"the null space has dimension {found.null_dimension} where {d} translations are expected: supports leave "
             "too few whole rows"
         )
-    if rounding and error < rounding.spread:
-        return "uncertified", (
-            f"the entries are rounded to {rounding.name}, and rigid rotations cause forces of {error:.1e} of those "
-            "that make them up, which is what that leaves"
-        )
     loosest = min(found.evidence, key=lambda one: one.gap / np.sqrt(one.rows))
-    doubt = error * np.sqrt(loosest.rows) / loosest.gap  # each equation may be off by as much
-    if not error <= CERTIFIED or doubt > SURE:
+    allowed = max(CERTIFIED, rounding.spread) if rounding else CERTIFIED
+    off = max(error, rounding.spread) if rounding else error
+    doubt = off * np.sqrt(loosest.rows) / loosest.gap  # each equation may be off by as much
+    if not error <= allowed or doubt > ALIKE:
+        digits = f" of entries rounded to {rounding.name}" if rounding else ""
         return "uncertified", (
-            f"rigid rotations of the nodes cause forces of {error:.1e} of those that make them up, and another field, "
-            f"no translation, only {loosest.gap:.1e}: positions may be off by {doubt:.0e} of the size"
+            f"rigid rotations of the nodes cause forces of {error:.1e} of those{digits} that make them up, and another "
+            f"field, no translation, only {loosest.gap:.1e}: positions may be off by {doubt:.0e} of the size"
         )
     if found.unnoticed.any():
         count = count_of(int(np.count_nonzero(found.unnoticed)), "equation has", "equations have")
         return "uncertified", (
             f"{count} no other to check against, so that springs would go unnoticed: too few whole rows are left"
+        )
+    if rounding:
+        return "certified", (
+            f"rigid rotations of the nodes cause no more forces than entries rounded to {rounding.name} leave, so that "
+            f"positions are known to {doubt:.0e} of the size"
         )
     return "certified", "rigid rotations of the nodes cause no forces, and only translations change nothing"

@@ -10,10 +10,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..nodes.constants import PENALTY
-from ..tolerances import CANCELLED
+from ..tolerances import CANCELLED, LAST_DIGITS
 from .layouts import Layout
-
-_NOTHING = 1e-14  # of sqrt(A_ii A_jj), which bounds an entry of a definite matrix: rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +112,7 @@ def nodes_of(matrix: sp.csr_array, layout: Layout, node: NDArray[np.int64], dire
     b = layout.block_size
     coo = matrix.tocoo()
     diagonal = np.abs(matrix.diagonal())
-    real = np.abs(coo.data) > _NOTHING * np.sqrt(diagonal[coo.row] * diagonal[coo.col])
+    real = np.abs(coo.data) > LAST_DIGITS * np.sqrt(diagonal[coo.row] * diagonal[coo.col])
     coupled = np.zeros(len(node), dtype=bool)
     coupled[coo.row[real & (coo.row != coo.col)]] = True
     coupled &= direction >= 0

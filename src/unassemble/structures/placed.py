@@ -17,8 +17,6 @@ from ..recovery import Evidence
 from ..tolerances import CERTIFIED
 from .recognise import StructuralNumbering
 
-SURE = 1e-6  # of the diameter: how far off the points of a certified structure may be
-
 
 @dataclass(frozen=True, eq=False)
 class Piece:

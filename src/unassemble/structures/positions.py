@@ -7,15 +7,13 @@ import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..budget import REFINEMENTS
 from ..errors import GeometryError
 from ..linalg import Factorisation, UpperTriangle, nearly_singular
-from ..nodes.shape import EXACT
+from ..linalg.definite import STEPS
+from ..nodes.shape import MOST_FIELDS
+from ..tolerances import LAST_DIGITS, SINGULAR
 
-_SHIFTS = (1e-15, 1e-13, 1e-11)  # of the typical diagonal of the normal matrix: the least at which no pivot vanishes
-_STEPS = 3
-_REFINEMENTS = 30
-_SPARE = 6  # fields to look at beyond translations; doubled while all of them are null
-_MOST = 200
 _PROBES = 3
 
 
@@ -50,15 +48,15 @@ def least_squares(
     sides = np.column_stack([right, random])
     normal = operator.T @ operator
     stored = sp.eye_array(normal.shape[0]) * np.finfo(float).tiny  # coordinates in no equation have a diagonal too
-    with nearly_singular(UpperTriangle.of(sp.csr_array(normal + stored)), _SHIFTS) as solver:
+    with nearly_singular(UpperTriangle.of(sp.csr_array(normal + stored))) as solver:
         fields, values = _least_fields(operator, solver, d)
-        free = fields[..., values <= EXACT].reshape(operator.shape[1], -1)
+        free = fields[..., values <= SINGULAR].reshape(operator.shape[1], -1)
         x = np.zeros((operator.shape[1], sides.shape[1]))
-        for _ in range(_REFINEMENTS):
+        for _ in range(REFINEMENTS):
             step = solver.solve(operator.T @ (sides - operator @ x))
             step -= free @ (free.T @ step)
             x += step
-            if np.abs(step[:, 0]).max() <= 1e-15 * np.abs(x[:, 0]).max():
+            if np.abs(step[:, 0]).max() <= LAST_DIGITS * np.abs(x[:, 0]).max():
                 break
     return x[:, 0], sides - operator @ x, fields, values
 
@@ -66,16 +64,16 @@ def least_squares(
 def _least_fields(operator: sp.csr_array, solver: Factorisation, d: int) -> tuple[NDArray, NDArray]:
     """Fields (n, d, k) that the operator maps to least, and their singular values."""
     order = operator.shape[1]
-    count = min(d + _SPARE, order)
+    count = min(4 * d, order)
     while True:
         x = np.random.default_rng(0).standard_normal((order, count))
-        for _ in range(_STEPS):
+        for _ in range(STEPS):
             x = np.linalg.qr(solver.solve(x))[0]
         triangle = np.linalg.qr(operator @ x, mode="r")
         _, values, v = scipy.linalg.svd(triangle)
         values = np.concatenate([values, np.zeros(count - len(values))])[::-1]
-        if values[-1] > EXACT or count == order:
+        if values[-1] > SINGULAR or count == order:
             return (x @ v[::-1].T).reshape(-1, d, count), values
-        if count >= _MOST:
+        if count >= MOST_FIELDS:
             raise GeometryError("the equations away from supports leave most of the structure free")
         count = min(2 * count, order)

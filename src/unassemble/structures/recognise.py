@@ -13,18 +13,15 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..budget import SAMPLE
 from ..errors import InputError
 from ..nodes.grouping import by_first_row, same_pattern
 from ..nodes.orders import ORDERS, regular
-from ..tolerances import CANCELLED
+from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE
 from .layouts import LAYOUTS, SPACE, Layout
 
-_SAMPLE = 2000  # rows to ask
 # On regular meshes some of a solid's rows annihilate whatever is asked; read as what it is it has more of them.
 _SOLIDS = (Layout("solid", 3, (0, 1, 2), ()), Layout("solid", 2, (0, 1), ()))
-_SIZES = (2, 3, 6)  # of the blocks of all of these
-_MOST = 0.1  # of that share: rows that annihilate their rotation by chance; where they are solids' all do
-_LEAST = 0.05  # rows that have to annihilate translations
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +68,10 @@ def find_structure(
     block_size : int, optional
     """
     orders = ORDERS if kind is None else (kind,)
+    sizes = {layout.block_size for layout in (*_SOLIDS, *LAYOUTS)}
     usual = {
         (b, name): regular(matrix.shape[0], b, name)
-        for b in _SIZES
+        for b in sizes
         for name in orders
         if matrix.shape[0] % b == 0 and matrix.shape[0] >= 2 * b
     }
@@ -89,7 +87,7 @@ def _best(
     block_size: int | None,
 ) -> StructuralNumbering | None:
     """The layout and the numbering, by its block size and name, with most rows that annihilate translations."""
-    best, most = None, _LEAST
+    best, most = None, HARDLY_ANY
     for layout in (*_SOLIDS, *LAYOUTS):
         for (b, name), numbering in numberings.items():
             if numbering is None or layout.block_size != b or block_size not in (None, b):
@@ -121,7 +119,7 @@ def given_structure(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> 
         return None
     fitting = [layout for layout in LAYOUTS if layout.block_size == size]
     shares = [_share(matrix, layout, direction) for layout in fitting]
-    if size != SPACE.block_size and max(shares, default=0) <= _LEAST:
+    if size != SPACE.block_size and max(shares, default=0) <= HARDLY_ANY:
         return None
     if not fitting:
         return None
@@ -135,8 +133,8 @@ def _share(matrix: sp.csr_array, layout: Layout, direction: NDArray) -> float:
     None do if rotations are annihilated like displacements.
     """
     rows = np.arange(len(direction))
-    if len(rows) > _SAMPLE:
-        rows = np.sort(np.random.default_rng(0).choice(rows, _SAMPLE, replace=False))
+    if len(rows) > SAMPLE:
+        rows = np.sort(np.random.default_rng(0).choice(rows, SAMPLE, replace=False))
     rows = rows[(np.diff(matrix.indptr)[rows] > 1) & (direction[rows] >= 0)]
     some = sp.csr_array(matrix[rows])
     labels = (direction[:, None] == np.arange(layout.block_size)).astype(float)
@@ -152,7 +150,7 @@ def _share(matrix: sp.csr_array, layout: Layout, direction: NDArray) -> float:
     tells = coupled[:, :moves].any(axis=1)
     kinds = [kind & tells for kind in (turning, ~turning) if kind.any()]
     share = float(min(good[kind].mean() if kind.any() else 0.0 for kind in kinds))
-    return 0.0 if layout.rotations and own[turning].mean() > (_MOST + layout.twisting) * share else share
+    return 0.0 if layout.rotations and own[turning].mean() > (LITTLE + layout.twisting) * share else share
 
 
 def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:

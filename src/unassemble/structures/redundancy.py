@@ -13,11 +13,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tolerances import CANCELLED
+from ..tolerances import CANCELLED, SMALL
 from .equations import Equations
 from .layouts import Layout
-
-NOTICED = 1e-4  # how much of a disturbance has to be left in the residuals
 
 
 def unnoticed(
@@ -72,7 +70,8 @@ def unnoticed(
 
 
 def _small(seen: NDArray) -> NDArray[np.bool_]:
-    return np.asarray(np.abs(seen).max(axis=-1, initial=0) < NOTICED)
+    """Whether next to nothing of a disturbance is left in the residuals."""
+    return np.asarray(np.abs(seen).max(axis=-1, initial=0) < SMALL)
 
 
 def _blind_together(blind: NDArray, place: NDArray, forces: NDArray, weighted: NDArray) -> None:

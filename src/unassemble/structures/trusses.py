@@ -19,14 +19,13 @@ from ..matrix import OperatorMatrix
 from ..nodes.anchoring import anchored, checked_anchors, digits_lost, near_enough
 from ..nodes.nodal import NodalMatrix, determined
 from ..nodes.numbering import Numbering
-from ..nodes.shape import EXACT, in_gauge, shape
+from ..nodes.shape import in_gauge, shape
 from ..recovery import Evidence, Structure
-from ..tolerances import CERTIFIED
+from ..tolerances import ALIKE, CERTIFIED, SINGULAR, SMALL
 from ..words import count_of
 from .bars import Bars
-from .placed import SURE, Piece, Placed, Positions, covered, placed
+from .placed import Piece, Placed, Positions, covered, placed
 from .positions import least_squares
-from .redundancy import NOTICED
 
 
 def serve_truss(
@@ -89,7 +88,7 @@ def _verdict(error: float, found: Placed) -> tuple[str, str]:
     if found.unnoticed.any():
         return "uncertified", "supports leave parts of bars only, and nothing contradicts other directions of these"
     worst = max(found.evidence, key=lambda one: one.residual / one.gap)
-    if worst.residual > SURE * worst.gap:
+    if worst.residual > ALIKE * worst.gap:
         return "uncertified", (
             f"the directions of the bars contradict each other by {worst.residual:.1e}, and a field that is neither "
             f"translation nor enlargement does so only by {worst.gap:.1e}: positions are known to about "
@@ -120,8 +119,8 @@ def place_joints(bars: Bars, n: int) -> Placed:
         one = shape(fields, values, np.zeros(order, dtype=bool))
         which = piece.rows.reshape(-1, d)[:, 0] // d
         seen = _across_one(directions[which]) @ probes[:, 1:].reshape(-1, d, probes.shape[1] - 1)
-        blind = ~whole[which] & (np.linalg.svd(seen, compute_uv=False)[:, d - 2] < NOTICED)
-        gap = values[values > EXACT]
+        blind = ~whole[which] & (np.linalg.svd(seen, compute_uv=False)[:, d - 2] < SMALL)
+        gap = values[values > SINGULAR]
         evidence = Evidence(one.dimension, float(values[d]), float(gap[0]) if len(gap) else float("inf"), len(which))
         return Positions(in_gauge(one.points, links), evidence, np.repeat(blind, d))
 

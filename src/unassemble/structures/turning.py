@@ -10,9 +10,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from ..nodes.shape import EXACT, set_aside
+from ..nodes.shape import set_aside
 from ..recovery import Evidence
-from ..tolerances import CANCELLED, CERTIFIED
+from ..tolerances import CANCELLED, CERTIFIED, SINGULAR
 from .equations import Equations, equations
 from .layouts import Layout
 from .nodes import Nodes
@@ -81,7 +81,7 @@ def _positions(given: Equations, layout: Layout, piece: Piece) -> Positions:
     span = np.linalg.norm(x[piece.edges[:, 0]] - x[piece.edges[:, 1]], axis=1).max(initial=0)
     if span <= CANCELLED * part.lever.max(initial=0):
         raise GeometryError("rotations and displacements do not depend on each other: the nodes would lie in one point")
-    null, gap = fields[..., values <= EXACT], values[values > EXACT]
+    null, gap = fields[..., values <= SINGULAR], values[values > SINGULAR]
     loose = np.zeros(n, dtype=bool)
     if null.shape[2] > d:
         null, loose = set_aside(null, d)

@@ -8,16 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import csgraph
 
 from ..errors import TopologyError
 from ..words import count_of
 from .cycles import lookup, three_cycles
 
-# The program has a few 3-cycles for each neck, and solids of tetrahedra most of theirs.
-_SHARE = 0.5
-_FEW = 1000
 _LEAST = 5  # triangles at the edges of a neck: two each, but for one edge that may be on the boundary
 
 
@@ -85,6 +81,8 @@ def surface_readings(cycles: Cycles) -> Iterator[NDArray[np.bool_]]:
         If there is none: an edge lies on no 3-cycle, or in three triangles whatever one does. A graph with edges on
         three 3-cycles, all of whose edges belong to tetrahedra, is taken for that of a solid.
     """
+    from scipy.optimize import Bounds, LinearConstraint, milp  # takes long to load
+
     chosen, doubtful = _forced(cycles)
     rows = np.flatnonzero(doubtful)
     if not len(rows):
@@ -159,7 +157,8 @@ def _forced(cycles: Cycles) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
             break
         chosen |= new
         open_ &= ~(new | gone)
-    if open_.sum() > _FEW + _SHARE * len(open_):
+    # A few 3-cycles are open for each neck, and of solids of tetrahedra most.
+    if 2 * open_.sum() > len(open_) + 2000:
         raise _crowded(cycles, int(np.argmax(cycles.at_edges(open_))))
     return chosen, open_
 

@@ -12,14 +12,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...budget import SAMPLE
 from ...topology.faces import FaceComplex
 
 FULL = 1.3 * np.pi
 """Angle sum below which a face may be a cell."""
 
+SHORT = 4
+"""Edges of faces that are cells unless the numbers say otherwise."""
+
 _LARGEST, _GAP, _MANY = 3 * np.pi, 0.2 * np.pi, 50  # or below a gap so wide, if so many lie below that
-_SAMPLE = 2000
-_SHORT = 4
 
 
 def facing_angles(cotangents: NDArray) -> NDArray[np.float64]:
@@ -71,8 +73,8 @@ def likeliest_scale(complex_: FaceComplex, weights: NDArray) -> float:
     length = complex_.size[complex_.simple]
     if not len(length):
         return unit
-    short = np.flatnonzero(complex_.simple & (complex_.size <= max(_SHORT, length.min())))
-    faces = short[np.linspace(0, len(short) - 1, min(len(short), _SAMPLE)).astype(int)]
+    short = np.flatnonzero(complex_.simple & (complex_.size <= max(SHORT, length.min())))
+    faces = short[np.linspace(0, len(short) - 1, min(len(short), SAMPLE)).astype(int)]
     return unit * float(np.exp(np.median(np.log(scales_of_faces(complex_, weights / unit, faces)))))
 
 

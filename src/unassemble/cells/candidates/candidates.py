@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 
 from ...topology import Polygons
 from ...topology.faces import FaceComplex
-from .angles import face_sums, facing_angles, likeliest_scale, vertex_excess
+from .angles import SHORT, face_sums, facing_angles, likeliest_scale, vertex_excess
 from .cell_set import CellSet
 from .corners import Corners
 from .outer_faces import outer_faces
-
-_SHORT = 4  # faces of so many edges are cells unless the numbers say otherwise
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +57,7 @@ class Candidates(CellSet):
         sums = face_sums(blocks, angles)
         outer = outer_faces(blocks, sums)
         faces = np.flatnonzero(blocks.simple)
-        empty = (blocks.size > _SHORT) | outer | ~blocks.simple
+        empty = (blocks.size > SHORT) | outer | ~blocks.simple
         corners = Corners.of(blocks.joined(empty), empty[blocks.face])
         excess = vertex_excess(blocks, angles)[corners.vertices[:, 1]]
         chosen = np.isin(blocks.face[blocks.order], faces)
@@ -82,7 +80,7 @@ class Candidates(CellSet):
             relative=relative,
             sides=np.concatenate([of_faces, corners.sides + [len(faces), 0]]),
             belief=np.r_[1 - np.abs(sums[faces] / np.pi - 1), 0.5 - np.abs(excess) / np.pi],
-            first=np.r_[(blocks.size <= _SHORT)[faces] & ~outer[faces], none],
+            first=np.r_[(blocks.size <= SHORT)[faces] & ~outer[faces], none],
             outer=np.r_[outer[faces], none],
         )
 

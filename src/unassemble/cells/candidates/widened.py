@@ -11,14 +11,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...tolerances import LITTLE
 from ...topology import Polygons
 from ...topology.adjacency import adjacency
 from ...topology.cycles import three_cycles
 from ...topology.faces import joined
 from .candidates import Candidates
-
-_FAINT = 0.1
-"""Misfit at a vertex, relative to the largest, below which nothing is looked for around it."""
 
 _MOST_NEIGHBOURS = 12
 """Of a vertex all of whose pairs of neighbours may make a corner."""
@@ -37,7 +35,7 @@ def widened(candidates: Candidates, edges: NDArray[np.int64], misfit: NDArray[np
     n = candidates.n_vertices
     at = np.zeros(n)
     np.maximum.at(at, edges.ravel(), np.repeat(misfit, 2))
-    near = at > _FAINT * at.max(initial=0.0)
+    near = at > LITTLE * at.max(initial=0.0)
     triangles, _ = three_cycles(n, candidates.edges)
     found = np.concatenate([triangles[near[triangles].any(axis=1)], _wedges(candidates, near)])
     names = {frozenset(cell.tolist()) for cell in np.split(candidates.cells.vertices, candidates.cells.offsets[1:-1])}

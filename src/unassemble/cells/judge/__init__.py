@@ -1,5 +1,5 @@
 """Labels to conformal map to misfit: the only test of acceptance."""
 
-from .labelling import FITS, Labelling
+from .labelling import Labelling
 
-__all__ = ["FITS", "Labelling"]
+__all__ = ["Labelling"]

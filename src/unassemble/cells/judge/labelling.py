@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from ...matrix.operator import row_sizes
 from ...planar.cotangent import weights_of_all
-from ...planar.hinges import CLOSED, gap
+from ...planar.hinges import gap
 from ...planar.piece import PieceMesh
 from ...planar.triangles import lone_triangles
+from ...tolerances import ALIKE
 from ...topology import Piece, Topology
 from ...topology.keys import pair_keys, with_sides
 from ...topology.pieces import planar_pieces
@@ -21,12 +22,6 @@ from ..candidates.cell_set import CellSet
 from .maps import map_of
 from .triangulation import triangulation
 from .within_errors import GAP, beyond, factor_tolerances, polished
-
-FITS = 1e-6
-"""Largest misfit, relative to the row, of a conformal solve with the right cells; the polish does the rest."""
-
-_RIGHT_ANGLES = 4
-
 
 C = TypeVar("C", bound=CellSet)
 
@@ -119,7 +114,7 @@ class Labelling(Generic[C]):
     @property
     def fits(self) -> bool:
         """Whether every entry is reproduced."""
-        return bool(len(self.pieces) and (self.misfit <= FITS).all())
+        return bool(len(self.pieces) and (self.misfit <= ALIKE).all())
 
     @property
     def has_wrong_entries(self) -> bool:
@@ -146,9 +141,7 @@ class Labelling(Generic[C]):
 def _crowded(candidates: CellSet, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Vertices with more than four right angles: the mesh would wind around them more than once."""
     apex = candidates.cells.vertices[candidates.cells.offsets[:-1] + 1]
-    return np.flatnonzero(
-        np.bincount(apex[labels & candidates.corner], minlength=candidates.n_vertices) > _RIGHT_ANGLES
-    )
+    return np.flatnonzero(np.bincount(apex[labels & candidates.corner], minlength=candidates.n_vertices) > 4)
 
 
 def misfits(n: int, edges: NDArray, weights: NDArray, solved: list[tuple[Piece, PieceMesh]]) -> NDArray[np.float64]:
@@ -183,11 +176,11 @@ def _add_discord(
         return
     tolerance = 0.0 if errors is None else factor_tolerances(solved, errors, scale)
     add_differing_factors(solved, misfit, scale, tolerance)
-    if (misfit > FITS).any():  # whether rings close is the last question, and the dearest
+    if (misfit > ALIKE).any():  # whether rings close is the last question, and the dearest
         return
     topology = Topology(n, edges, tuple(piece for piece, _ in solved), "")
     closed = 0.0 if errors is None else GAP * float(errors.max()) / min(abs(mesh.scale) for _, mesh in solved)
-    left = gap(topology, [mesh.z / np.abs(mesh.z).max() for _, mesh in solved], max(CLOSED, closed))
+    left = gap(topology, [mesh.z / np.abs(mesh.z).max() for _, mesh in solved], max(ALIKE, closed))
     left = left if left > closed else 0.0
     at_hinges = np.isin(edges, topology.hinges).any(axis=1)
     misfit[at_hinges] = np.maximum(misfit[at_hinges], min(left, 1.0))

@@ -10,20 +10,14 @@ from ...errors import SolverError
 from ...matrix.operator import row_sizes
 from ...planar.cotangent import left_by_all
 from ...planar.deviations import factor_deviations
-from ...planar.piece import EXACT, PieceMesh
-from ...planar.polish import PolishOptions, polish
+from ...planar.piece import PieceMesh
+from ...planar.polish import SHORT, polish
+from ...tolerances import CHANCE, LITTLE, MAGNIFIED, SIGMAS, SMALL
 from ...topology import Piece
-
-SIGMAS = 6.0
-"""Standard deviations that errors of the entries of any mesh stay below."""
 
 GAP = 30.0
 """What errors may leave open in rings of pieces, in units of their size and of the errors over c."""
 
-_FAR = 1e5  # standard deviations of misfits that conformal maps with the right cells leave, where these are slender
-_DROWNED = 0.1  # misfit, relative to the row, of which nothing is to be learnt
-_CHANCE = 1e-6  # of a misfit with the right cells: of many readings one may be improbable
-_SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 
 Solved = list[tuple[Piece, PieceMesh]]
 
@@ -41,16 +35,16 @@ def polished(solved: Solved, weights: NDArray, errors: NDArray, misfit: NDArray)
     """
     if not solved:
         return None
-    allowed = _FAR * errors.max(initial=0.0) / np.median(np.abs(weights[weights != 0]))
-    if not misfit.max() <= min(allowed, _DROWNED):
+    allowed = MAGNIFIED * errors.max(initial=0.0) / np.median(np.abs(weights[weights != 0]))
+    if not misfit.max() <= min(allowed, LITTLE):
         return None
-    spread = np.maximum(errors, EXACT * np.median(errors[errors > 0]))
+    spread = np.maximum(errors, SMALL * np.median(errors[errors > 0]))
     found = []
     for piece, mesh in solved:
         rows = piece.edge_rows
         try:
             with np.errstate(all="ignore"):
-                better = polish(piece, weights[rows], mesh.z, spread=spread[rows], options=_SHORT)
+                better = polish(piece, weights[rows], mesh.z, spread=spread[rows], options=SHORT)
         except SolverError:
             return None
         if not (np.isfinite(better.z).all() and np.isfinite(better.scale)):
@@ -66,7 +60,7 @@ def _likely(solved: Solved, weights: NDArray, errors: NDArray) -> bool:
     freedom = max(sum(piece.redundancy for piece in pieces), 1)
     with np.errstate(all="ignore"):  # flat triangles
         squares = float(np.sum((left / errors[np.concatenate([piece.edge_rows for piece in pieces])]) ** 2))
-    return bool(chdtrc(freedom, squares) >= _CHANCE)
+    return bool(chdtrc(freedom, squares) >= CHANCE)
 
 
 def beyond(n: int, edges: NDArray, solved: Solved, weights: NDArray, errors: NDArray) -> NDArray[np.float64]:
@@ -76,7 +70,7 @@ def beyond(n: int, edges: NDArray, solved: Solved, weights: NDArray, errors: NDA
     rows = np.concatenate([piece.edge_rows for piece in pieces])
     smaller = row_sizes(n, edges, np.abs(weights))[edges[rows]].min(axis=1)
     left = left_by_all(pieces, weights, [mesh.z for mesh in meshes], np.array([mesh.scale for mesh in meshes]))
-    error = np.maximum(errors, EXACT * np.median(errors[errors > 0]))[rows]
+    error = np.maximum(errors, SMALL * np.median(errors[errors > 0]))[rows]
     with np.errstate(all="ignore"):
         excess = np.maximum(np.abs(left) - SIGMAS * error, 0.0) / smaller
     misfit[rows] = np.where(excess < 1, excess, 1.0)
@@ -87,7 +81,7 @@ def factor_tolerances(solved: Solved, errors: NDArray, scale: float | None) -> N
     """(pieces,) what errors explain of how far factors c are from a known one, or from that of the largest piece."""
     pieces, meshes = zip(*solved, strict=True)
     typical = float(np.median(errors[errors > 0]))
-    spreads = [np.maximum(errors[piece.edge_rows] / typical, EXACT) for piece in pieces]
+    spreads = [np.maximum(errors[piece.edge_rows] / typical, SMALL) for piece in pieces]
     deviation = factor_deviations(pieces, [mesh.z for mesh in meshes], spreads)
     deviation *= typical / np.abs([mesh.scale for mesh in meshes])
     largest = int(np.argmax([piece.n_vertices for piece in pieces]))

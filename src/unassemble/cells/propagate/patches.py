@@ -12,13 +12,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...tolerances import AGREED, LAST_DIGITS, SIGMAS
 from ...topology.keys import Grouped
 
 _MOST = 100  # trees behind one side that are listed anew: depth three where nothing is known, more where much is
 _LEVELS = 12  # of triangles in a tree; lists end long before, but where long rows of triangles lie between holes
-_DIGITS = 1e-14  # relative error of entries, cancellation in slivers included
-_SIGMAS = 10.0  # errors, added up to first order, by which the two sides of an edge may differ
-_SURE = 1e-9  # error of a cotangent, relative to it and to 1, that leaves no room for chance
 
 
 def arcs_across(sides: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -53,7 +51,7 @@ def patches(
     state : (m,) int8
         1 for a known cell, -1 for a known hole, else 0.
     """
-    trees = _Trees(sides, cotangents, _DIGITS * size, state)
+    trees = _Trees(sides, cotangents, LAST_DIGITS * size, state)
     for _ in range(_LEVELS):
         if not trees.grow():
             break
@@ -107,8 +105,8 @@ class _Trees:
         a, b = left[i], left[j]
         with np.errstate(all="ignore"):
             cotangent = (1 - a * b) / (a + b)
-            spread = ((1 + b * b) * error[i] + (1 + a * a) * error[j]) / (a + b) ** 2 + _DIGITS * np.abs(cotangent)
-        possible = (a + b > 0) & (spread < _SURE * (1 + np.abs(cotangent)))
+            spread = ((1 + b * b) * error[i] + (1 + a * a) * error[j]) / (a + b) ** 2 + LAST_DIGITS * np.abs(cotangent)
+        possible = (a + b > 0) & (spread < AGREED * (1 + np.abs(cotangent)))
         kept = self._listed[full[self._arc[self._listed]]]
         new = len(self._arc) + np.arange(np.count_nonzero(possible))
         self._arc = np.append(self._arc, arc[possible])
@@ -145,7 +143,7 @@ class _Trees:
         order = np.lexsort((number, own))
         a, b = order[:-1], order[1:]
         agree = (own[a] == own[b]) & (first[a] != first[b])
-        agree &= np.abs(number[a] - number[b]) <= _SIGMAS * (error[a] + error[b])
+        agree &= np.abs(number[a] - number[b]) <= SIGMAS * (error[a] + error[b])
         pairs = np.where(first[a], [a, b], [b, a]).T[agree]
         found = {}
         for pair in tree[pairs].tolist():

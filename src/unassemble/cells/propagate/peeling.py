@@ -13,16 +13,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ...tolerances import AGREED, ALIKE
 from .patches import patches
-
-_AGREE = 1e-9
-"""Relative difference of the c of two lone triangles."""
 
 _MOST_SCALES = 8
 """Factors that are tried: inner triangles of a lattice agree as well, in a wrong one."""
-
-_NOTHING = 1e-6
-"""What rounding may leave of a weight, relative to it or to 1."""
 
 
 class ContradictionError(Exception):
@@ -47,7 +42,7 @@ def lone_scales(sides: NDArray[np.int64], weights: NDArray[np.float64]) -> Itera
     scales = np.sort(2 * np.sqrt(square[square > 0]))
     if not len(scales):
         return
-    run = np.cumsum(np.append(0, np.diff(scales) > _AGREE * scales[1:]))
+    run = np.cumsum(np.append(0, np.diff(scales) > AGREED * scales[1:]))
     size = np.bincount(run)
     start = np.cumsum(size) - size
     for k in np.argsort(-size, kind="stable")[:_MOST_SCALES].tolist():
@@ -92,7 +87,7 @@ class _Peeling:
         self._sides: list[list[int]] = sides.tolist()
         self._known: list[dict[int, float]] = [{} for _ in self._sides]
         self._left: list[float] = cotangents.tolist()
-        self._nothing: list[float] = (_NOTHING * (np.abs(cotangents) + 1)).tolist()
+        self._nothing: list[float] = (ALIKE * (np.abs(cotangents) + 1)).tolist()
         self._nonzero: list[bool] = (cotangents != 0).tolist()
         self._at: list[list[int]] = [[] for _ in self._left]
         for triangle, edges in enumerate(self._sides):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import heapq
 import logging
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice
 
@@ -31,22 +32,31 @@ _log = logging.getLogger(__name__)
 _Waiting = tuple[float, int, Labelling, Iterator[NDArray[np.bool_]] | None]
 
 
+@dataclass(frozen=True)
 class Judge:
-    """Solves labellings, at the expense of a budget; pieces that come again are not solved again."""
+    """Solves labellings of one graph at the expense of a budget of solves; pieces that come again cost nothing new.
 
-    def __init__(self, budget: Budget):
-        self.budget = budget
-        self._known: dict[bytes, PieceMesh | None] = {}
+    Parameters
+    ----------
+    budget : Budget
+    """
+
+    budget: Budget
+    _known: dict[bytes, PieceMesh | None] = field(default_factory=dict)
 
     def __call__(self, candidates: Candidates, labels: NDArray[np.bool_]) -> Labelling[Candidates]:
         """A labelling, its cost taken."""
         labelling = Labelling.of(candidates, labels, self._known)
-        self.spend(labelling, 1 + len(labelling.pieces) // 20)
+        self.spend(1 + len(labelling.pieces) // 20)
         return labelling
 
-    def spend(self, labelling: Labelling, solves: float) -> None:
-        """Take what some solves of its size cost, or what is left."""
-        self.budget.take(min(solves * labelling.candidates.n_vertices, self.budget.left))
+    def spend(self, solves: float) -> None:
+        """Take so many solves, or what is left."""
+        self.budget.take(min(solves, self.budget.left))
+
+    def part(self, fraction: float) -> Judge:
+        """The same with a fraction of what is left."""
+        return Judge(self.budget.share(fraction), self._known)
 
     @property
     def spent(self) -> bool:
@@ -64,6 +74,7 @@ def leapt(start: Labelling[Candidates], judge: Judge, options: SearchOptions = D
     best = labelling = start
     sheet, seen = Sheet(start.candidates, start.scale), {start.labels.tobytes()}
     for _ in range(options.leaps):
+        judge.spend(options.leaping)
         labels = leap(sheet, labelling.labels)
         if labelling.fits or judge.spent or labels.tobytes() in seen:
             break
@@ -95,7 +106,8 @@ class BestFirst:
         self._first = self._least = start.mean_misfit
         self._ranked = self._in_vain = 0
         # Misfit, more where batches have been tried, a number that settles ties, the labelling and its changes.
-        self._waiting: list[_Waiting] = [(self._least, -1, start, None)] if start.pieces else []
+        near = start.pieces and start.misfit.sum() <= options.most_left
+        self._waiting: list[_Waiting] = [(self._least, -1, start, None)] if near else []
 
     @cached_property
     def _updates(self) -> Updates:
@@ -110,6 +122,7 @@ class BestFirst:
                     break
                 self._seen.add(self._updates.outline(labelling.labels))
                 self._ranked += 1
+                judge.spend(self._options.ranking)
                 changed = self._changed(labelling)
             asked = 0
             for labels in islice(changed, self._options.batch):
@@ -117,7 +130,6 @@ class BestFirst:
                 if judge.spent or self._tried(labels, labelling, judge) < self._options.better * value:
                     break
             else:
-                judge.spend(labelling, self._options.ranking)  # what leads on is not counted
                 value += self._options.tried * labelling.mean_misfit
             if asked:
                 heapq.heappush(self._waiting, (value, number, labelling, changed))

@@ -13,14 +13,22 @@ class SearchOptions:
     ----------
     most_vertices : int
         Of a graph whose labels are relaxed and searched for.
-    solves, least_solves, work : float
-        Solves that a graph is worth: at most so many, or as many as `work` over its vertices, but some in any case.
-    first : float
-        Part of what is left for the likeliest start; half for each of the others.
-    close, widened_solves : float
-        Misfit of labellings that few cells are missing in, and solves for these among all that may be cells there.
-    least_relaxed, relaxed_solves : int
-        Vertices from which labels are relaxed, and solves for the last wrong ones.
+    solves, work : float
+        Solves that a graph is worth: so many, and `work` over its vertices and `overhead` more.
+    overhead : float
+        Vertices that a graph costs as much as, whatever its size.
+    relaxing, first, widening : float
+        Parts of what is left: for the last wrong ones of relaxed labels; for the likeliest start of the others, half
+        of what is left for each of the next; and of all, for cells that no embedding at hand has.
+    close : float
+        Misfit of labellings that few cells are missing in.
+    most_left, most_wrong : float
+        Entries, as many as the misfit adds up to, that small changes can put right, each of which takes a ranking; and
+        the part of all entries that leaps can, which change many labels at once.
+    least_relaxed : int
+        Vertices from which labels are relaxed.
+    relaxation, leaping, ranking : float
+        Solves that a relaxation, a leap and ranking the changes of a labelling cost.
     leaps : int
         Changes of many labels at once, one after the other.
     batch : int
@@ -31,8 +39,6 @@ class SearchOptions:
         A labelling with a batch tried is put off behind those with so much more misfit.
     better : float
         Misfit, relative to the least before, that is an improvement worth its price.
-    ranking : int
-        Solves that ranking the changes of a labelling costs.
     patience, at_least : int
         Labellings whose changes are ranked for as much misfit as there is, if it goes on falling as it has; this is
         asked after so many.
@@ -49,20 +55,24 @@ class SearchOptions:
     """
 
     most_vertices: int = 20_000
-    solves: float = 500
-    least_solves: float = 12
-    work: float = 1.2e5
+    solves: float = 150
+    work: float = 3e5
+    overhead: float = 500
+    relaxing: float = 0.4
     first: float = 0.7
+    widening: float = 0.25
     close: float = 0.15
-    widened_solves: float = 300
+    most_left: float = 120
+    most_wrong: float = 0.25
     least_relaxed: int = 60
-    relaxed_solves: int = 200
+    relaxation: float = 30
+    leaping: float = 2
+    ranking: float = 8
     leaps: int = 8
     batch: int = 8
     in_vain: int = 40
     tried: float = 0.25
     better: float = 0.9
-    ranking: int = 10
     patience: int = 15
     at_least: int = 5
     moves: float = 1500

@@ -48,7 +48,7 @@ def label_cells(
     Labelling or None
         None if no labelling makes a planar surface.
     """
-    judge = Judge(Budget(float(np.clip(options.work, options.least_solves * n, options.solves * n))))
+    judge = Judge(Budget(options.solves + options.work / (n + options.overhead)))
     starts: list[Labelling[Candidates]] = []
     for number, candidates in enumerate(embedded(n, edges, weights, scale, errors)):
         for labels in likely_labels(candidates):
@@ -57,23 +57,23 @@ def label_cells(
                 return start
             starts += [start] if start.pieces else []
         if not number and options.least_relaxed <= n <= options.most_vertices:
-            relaxed = _with_holes(candidates, options)
+            relaxed = _with_holes(candidates, judge.part(options.relaxing), options)
             if relaxed is not None and relaxed.fits:
                 return relaxed
             starts += [relaxed] if relaxed is not None and relaxed.pieces else []
     best: Labelling[Candidates] | None = None
+    searching = judge.part(1 - options.widening)
     for number, start in enumerate(sorted(starts, key=lambda one: one.mean_misfit)):
         best = better(best, start)
-        if n <= options.most_vertices and not judge.spent:
-            judge.budget, whole = judge.budget.share(options.first if number == 0 else 0.5), judge.budget
-            start = leapt(start, judge, options)
-            best = better(best, start if start.fits else BestFirst(start, options=options).run(judge))
-            judge.budget = whole
+        hopeless = start.misfit.sum() > max(options.most_left, options.most_wrong * len(edges))
+        if n <= options.most_vertices and not (hopeless or searching.spent):
+            own = searching.part(options.first if number == 0 else 0.5)
+            start = leapt(start, own, options)
+            best = better(best, start if start.fits else BestFirst(start, options=options).run(own))
         if best.fits:
             break
     if best is not None and not best.fits and best.size < options.close and n <= options.most_vertices:
-        last = Judge(Budget(float(options.widened_solves * n)))
-        best = better(best, BestFirst(_widened(best), options=options).run(last))
+        best = better(best, BestFirst(_widened(best), options=options).run(judge))
     return best
 
 
@@ -85,26 +85,28 @@ def _widened(labelling: Labelling[Candidates]) -> Labelling[Candidates]:
     return Labelling.of(candidates, labels)
 
 
-def _with_holes(candidates: Candidates, options: SearchOptions) -> Labelling[Candidates] | None:
+def _with_holes(candidates: Candidates, judge: Judge, options: SearchOptions) -> Labelling[Candidates] | None:
     """Triangles that fit best, where every edge lies on one; with the c that lone triangles tell, if they do."""
     sides, weights = candidates.triangle_sides, candidates.weights
     best: Labelling[Candidates] | None = None
     for c in lone_scales(sides, weights) if candidates.scale is None else [candidates.scale]:
         with suppress(ContradictionError):
             known = Candidates.of(candidates.embedding, weights, c)
-            best = _relaxed(known, peeled(sides, 2 * weights / c), options)
+            best = _relaxed(known, peeled(sides, 2 * weights / c), judge.part(0.5), options)
             break
     if candidates.scale is None and (best is None or not best.fits):
-        best = _relaxed(candidates, np.zeros(len(sides), dtype=np.int8), options) or best
+        best = _relaxed(candidates, np.zeros(len(sides), dtype=np.int8), judge, options) or best
     return best
 
 
-def _relaxed(candidates: Candidates, state: NDArray[np.int8], options: SearchOptions) -> Labelling[Candidates] | None:
+def _relaxed(
+    candidates: Candidates, state: NDArray[np.int8], judge: Judge, options: SearchOptions
+) -> Labelling[Candidates] | None:
     found = with_holes(candidates, state)
     if found is None:
         return None
+    judge.spend(options.relaxation)
     labels, free = found
-    judge = Judge(Budget(float(options.relaxed_solves * candidates.n_vertices)))
     return BestFirst(judge(candidates, labels), free, options).run(judge)
 
 

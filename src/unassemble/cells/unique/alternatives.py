@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ...errors import RecoveryError
 from ...matrix import OperatorMatrix
+from ...tolerances import ALIKE
 from ...topology import Numbering, Polygons, components
 from ...topology.embedding import face_complexes
 from ...topology.faces import FaceComplex, from_rotation
@@ -40,8 +41,6 @@ from .cracks import cracked
 SEARCHED_ROWS = 1000
 """Rows of a component around whose answer others are looked for: the cost grows like the square."""
 
-_RIGHT = 1e-6
-"""Cosine of a right angle, and relative difference of equal ratios, without noise."""
 
 _MOST_SOLVED = 60
 """Labellings of a component that are solved for, of either kind."""
@@ -86,7 +85,7 @@ def alternatives(
     found = []
     for part in components(stored.n, stored.edges):
         if len(part.vertices) <= SEARCHED_ROWS:
-            other = _other(stored, part, _within(part, cells, stored.n), z[part.vertices], scale, max(agree, _RIGHT))
+            other = _other(stored, part, _within(part, cells, stored.n), z[part.vertices], scale, max(agree, ALIKE))
             found += [] if other is None else [other]
     return found
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...tolerances import ALIKE, CANCELLED
 from ..judge.labelling import Labelling
-
-_FLAT = 1e-9  # area over the square of the length of its boundary
-_SAME_PLACE = 1e-6  # of this length
 
 
 def cracked(labelling: Labelling) -> bool:
@@ -24,7 +22,7 @@ def cracked(labelling: Labelling) -> bool:
         first = np.repeat(tail[begin], np.diff(piece.loop_offsets))
         area = np.add.reduceat((np.conj(tail - first) * (head - first)).imag / 2, begin)
         length = np.add.reduceat(np.abs(head - tail), begin)
-        flat = np.abs(area) <= _FLAT * length**2
+        flat = np.abs(area) <= CANCELLED * length**2
         flat[np.argmax(np.abs(area))] = False  # the outer boundary
         for k in np.flatnonzero(flat).tolist():
             if not _is_slit(tail[begin[k] : piece.loop_offsets[k + 1]] / length[k]):
@@ -34,5 +32,5 @@ def cracked(labelling: Labelling) -> bool:
 
 def _is_slit(z: NDArray[np.complex128]) -> bool:
     """Whether a loop (k,) of length 1 runs along a tree and back: all k / 2 edges of the tree have both their sides."""
-    places = np.unique(np.round(z / _SAME_PLACE))
+    places = np.unique(np.round(z / ALIKE))
     return 2 * (len(places) - 1) == len(z)

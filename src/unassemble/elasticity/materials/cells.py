@@ -17,11 +17,9 @@ from ...elements.candidates import Block, candidates
 from ...elements.cliques import Graph
 from ...elements.surface import tiles
 from ...nodes.nodal import NodalMatrix, determined, surrounded, valid_pairs
-from ...tolerances import CERTIFIED
+from ...tolerances import ALIKE, CERTIFIED
 from .entries import Entries, Pairs
 from .fits import Fit, fits
-
-_EMPTY = 1e-7  # of the largest coefficient; candidates below carry no material
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +170,7 @@ def _accepted(fit: Fit) -> Cells | None:
     lame = fit.lame
     if not fit.misfit <= CERTIFIED or not lame.any():
         return None
-    carries = np.abs(lame).max(axis=1) > _EMPTY * np.abs(lame).max()
+    carries = np.abs(lame).max(axis=1) > ALIKE * np.abs(lame).max()
     parts = np.split(carries, np.cumsum([len(one.cells) for one in fit.blocks])[:-1])
     blocks = [replace(one, cells=one.cells[part]) for one, part in zip(fit.blocks, parts, strict=True) if part.any()]
     mu = lame[carries, 1]

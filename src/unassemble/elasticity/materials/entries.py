@@ -9,14 +9,13 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ...budget import AT_ONCE
 from ...elements.cliques import Graph
 from ...elements.kinds import Kind
 from ...elements.matrices import elasticity
 from ...elements.reference import Rule
 from ...nodes.nodal import NodalMatrix, valid_pairs
 from ...tolerances import CERTIFIED
-
-_AT_ONCE = 8_000_000  # numbers in the blocks and gradients of one batch of cells
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +197,7 @@ class Model:
         own, cells = pairs.at(some), self.cells[some]
         k, d, partial = self.kind.nodes, self.kind.dim, not entries.told.all()
         a, b = np.triu_indices(k, 1)
-        step = max(_AT_ONCE // (k * d * (3 * k * d + 2 * len(self.rule[1]))), 1)
+        step = max(AT_ONCE // (k * d * (3 * k * d + 2 * len(self.rule[1]))), 1)
         for start in range(0, len(cells), step):
             batch = slice(start, start + step)
             unit = np.stack([one[:, a, b] for one in elasticity(self.points, cells[batch], self.kind, self.rule)])

@@ -13,24 +13,19 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ...budget import LARGE, REFINEMENTS
 from ...elements.candidates import Block
 from ...elements.reference import Rule, rules
 from ...errors import SolverError
 from ...linalg import threads
 from ...linalg.factorisation import factorisation
 from ...linalg.upper import UpperTriangle
-from ...tolerances import CERTIFIED
+from ...tolerances import CERTIFIED, LAST_DIGITS, LITTLE, ROUNDED, SINGULAR
 from .entries import Entries, Model, Pairs, added, claims
 
-_ROUNDS = 6  # cells next to supports may wait for their neighbours
-_INDEPENDENT = 1e-10  # least eigenvalue of the scaled normal equations of a cell whose coefficients show
 _SAMPLE = 60  # cells on which quadrature rules are tried
 _FEW = 0.3  # of the candidates: how many may be no cells
 _LARGEST = 50_000_000  # numbers in a least-squares problem
-_DIRECT = 20_000  # coefficients: a factorisation costs half of the iterations here, and fills memory beyond
-_SHIFT = 1e-11  # of normal equations: rounding of their entries is 1e-16
-_STEPS = 20
-_STILL = 1e-15  # relative change of coefficients at which steps end
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +93,7 @@ def _likely_rule(points: NDArray, block: Block, entries: Entries, beside: Sequen
     best, chosen = CERTIFIED, None
     for rule in rules(block.kind) if len(few.key) else ():
         found, rest = cell_by_cell(Model(points, block.cells[some], block.kind, rule), few)
-        if np.isfinite(found).all() and rest.largest < 0.1 * best:  # where geometry is affine they all fit
+        if np.isfinite(found).all() and rest.largest < LITTLE * best:  # where geometry is affine they all fit
             best, chosen = rest.largest, rule
     return chosen
 
@@ -116,7 +111,7 @@ def cell_by_cell(model: Model, entries: Entries, beside: Sequence[Pairs] = ()) -
     todo = np.flatnonzero(pairs.seen)
     lame[todo] = np.nan
     count = claims((pairs, *beside), entries)
-    for _ in range(_ROUNDS):
+    while True:  # cells next to supports may wait for their neighbours
         alone, before = count == 1, len(todo)
         for batch, unit in model.contributions(pairs, entries, todo):
             some = todo[batch]
@@ -144,7 +139,7 @@ def _of_own_entries(unit: NDArray, target: NDArray, own: NDArray[np.bool_], size
     right = columns @ (target * weight).reshape(m, -1, 1)
     length = np.sqrt(np.maximum(np.diagonal(normal, axis1=1, axis2=2), 1e-300))
     normal = normal / (length[:, :, None] * length[:, None, :])
-    enough = np.linalg.eigvalsh(normal)[:, 0] > _INDEPENDENT
+    enough = np.linalg.eigvalsh(normal)[:, 0] > SINGULAR
     found = np.full((m, s), np.nan)
     scaled = np.linalg.solve(normal[enough], (right[..., 0] / length)[enough][..., None])[..., 0]
     found[enough] = scaled / length[enough]
@@ -179,7 +174,7 @@ def one_material(model: Model, entries: Entries, ratio: float) -> tuple[NDArray[
 def _usual_factor(blocks: NDArray, values: NDArray) -> float:
     """Between the entries and those assembled, whatever a few candidates too many add."""
     square = (blocks * blocks).sum(axis=(1, 2))
-    weighty = square > 1e-12 * square.max(initial=0)
+    weighty = square > ROUNDED * square.max(initial=0)
     if not weighty.any():
         return 0.0
     return float(np.median((blocks * values).sum(axis=(1, 2))[weighty] / square[weighty]))
@@ -197,7 +192,7 @@ def _least_squares(model: Model, entries: Entries, ratio: float | None = None) -
     scaled = sp.csr_array(design[:, np.flatnonzero(seen)] @ sp.diags_array(1 / weight[seen]))
     coefficients = np.zeros(design.shape[1])
     with threads(1):  # many short vectors are not worth waking threads for
-        found = _refined(scaled, target) if scaled.shape[1] <= _DIRECT else None
+        found = _refined(scaled, target) if scaled.shape[1] <= LARGE else None
         if found is None:
             found = sp.linalg.lsmr(scaled, target, atol=1e-15, btol=1e-15, conlim=0, maxiter=600)[0]
     coefficients[seen] = found / weight[seen]
@@ -210,12 +205,12 @@ def _refined(design: sp.csr_array, target: NDArray) -> NDArray[np.float64] | Non
     """The least coefficients that fit best, by normal equations whose errors are taken off again and again.
 
     Columns have length one. Each step divides what is left of a combination of squared singular value s by 1 + s /
-    `_SHIFT`; combinations that fit nothing stay zero. None where they have no factors.
+    `ROUNDED`; combinations that fit nothing stay zero. None where they have no factors.
     """
     if not (design.shape[1] and np.isfinite(design.data).all() and np.isfinite(target).all()):
         return None
     transposed = sp.csr_array(design.T)
-    normal = UpperTriangle.of(sp.csr_array(transposed @ design + _SHIFT * sp.eye_array(design.shape[1])))
+    normal = UpperTriangle.of(sp.csr_array(transposed @ design + ROUNDED * sp.eye_array(design.shape[1])))
     solver = factorisation(normal, definite=True)
     try:
         solver.factorise(normal)
@@ -223,10 +218,10 @@ def _refined(design: sp.csr_array, target: NDArray) -> NDArray[np.float64] | Non
         solver.release()
         return None
     found = np.zeros(design.shape[1])
-    for _ in range(_STEPS):
+    for _ in range(REFINEMENTS):
         step = solver.solve(transposed @ (target - design @ found))
         found += step
-        if np.abs(step).max(initial=0) <= _STILL * np.abs(found).max(initial=0):
+        if np.abs(step).max(initial=0) <= LAST_DIGITS * np.abs(found).max(initial=0):
             break
     solver.release()
     return found

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from ...linalg import svd
 from ...nodes.nodal import NodalMatrix
+from ...tolerances import ALIKE
 from .charts import Chart, chart, patches
 from .identities import identities
 
@@ -30,7 +31,6 @@ _log = logging.getLogger(__name__)
 _PATCH = {2: 6000, 3: 1900}  # rows per chart: larger ones cost more to factorise, smaller ones overlap more
 _MOST = 64  # fields of the whole body to look for, at most
 _LEAST = 8
-_SOFT = 1e-6  # least squares of fields beyond which they are stiff
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,14 +149,14 @@ def _lowest(form: NDArray, count: int) -> NDArray:
     n = len(form)
     if n <= 4 * count:
         values, v = scipy.linalg.eigh(form)
-        return np.asarray(v[:, : max(int((values[:count] < _SOFT).sum()) + 1, min(_LEAST, count))])
+        return np.asarray(v[:, : max(int((values[:count] < ALIKE).sum()) + 1, min(_LEAST, count))])
     factor = scipy.linalg.cho_factor(form + 1e-13 * np.eye(n))
     x = np.random.default_rng(0).standard_normal((n, count))
     for _ in range(4):
         x = np.linalg.qr(scipy.linalg.cho_solve(factor, x))[0]
     values, v = scipy.linalg.eigh(x.T @ form @ x)
     # The stiff rest says nothing but where it begins.
-    kept = max(int((values < _SOFT).sum()) + 1, min(_LEAST, count))
+    kept = max(int((values < ALIKE).sum()) + 1, min(_LEAST, count))
     return np.asarray(x @ v[:, :kept])
 
 

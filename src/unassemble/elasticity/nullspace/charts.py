@@ -17,12 +17,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...linalg import Factorisation, UpperTriangle, nearly_singular, svd
+from ...linalg.definite import STEPS
 from ...nodes.nodal import NodalMatrix
+from ...nodes.shape import MOST_FIELDS
+from ...tolerances import ALIKE, LITTLE, SMALL
 from .identities import Identities, identities
-
-SHIFTS = (1e-12, 3e-11, 1e-9)  # above the rounding of the normal matrix, below every eigenvalue that is not zero
-_STEPS = 2  # each divides what is not wanted by its eigenvalue over the shift, 1e4 and more
-_STIFF = 1e-4  # fields whose singular value is larger need no place in a chart of several
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +74,14 @@ def chart(
     if not n:
         return Chart(local.columns, np.empty((0, d, 0)), np.empty(0), 0)
     count = min(4 * d, n * d)
-    with nearly_singular(UpperTriangle.of(local.normal_matrix()), SHIFTS) as solver:
+    with nearly_singular(UpperTriangle.of(local.normal_matrix())) as solver:
         while True:
             fields, values = _least_fields(local, solver, count)
-            if count == n * d or count >= 256 or values[-1] > (1e-6 if whole else _STIFF):
+            if count == n * d or count >= MOST_FIELDS or values[-1] > (ALIKE if whole else SMALL):
                 break
             count = min(2 * count, n * d)
         if not whole:
-            keep = values < 1e3 * _STIFF
+            keep = values < LITTLE
             fields, values = fields[..., keep], values[keep]
         fields, values = _refine(local, solver, fields, values)
     return Chart(local.columns, fields, values, own)
@@ -117,7 +116,7 @@ def _least_fields(local: Identities, solver: Factorisation, count: int) -> tuple
     """Inverse iteration on a block of fields, then Rayleigh-Ritz on squares: values to half the digits."""
     n, d = len(local.columns), local.dim
     x = np.random.default_rng(0).standard_normal((n * d, count))
-    for _ in range(_STEPS):
+    for _ in range(STEPS):
         x = np.linalg.qr(solver.solve(x))[0]
     residual = local.residual(x.reshape(n, d, -1)).reshape(-1, count)
     squares, v = scipy.linalg.eigh(residual.T @ residual)
@@ -136,7 +135,7 @@ def _ritz(local: Identities, x: NDArray) -> tuple[NDArray, NDArray]:
 def _refine(local: Identities, solver: Factorisation, fields: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
     """One step of inverse iteration in correction form: its error is that of the residual, not of the factor."""
     n, d, k = fields.shape
-    null = values < 1e-6
+    null = values < ALIKE
     if null.any():
         gradient = local.gradient(local.residual(fields[..., null]))
         step = solver.solve(gradient.reshape(n * d, -1)).reshape(n, d, -1)

@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...nodes.nodal import NodalMatrix, determined
+from ...tolerances import ALIKE, SMALL
 from .identities import identities
-
-_CONSTANT = 1e-6  # spread of lambda / mu, relative to 1 + lambda / mu, up to which it counts as one number
 
 
 def poisson_ratio(lame_ratio: float) -> float:
@@ -42,9 +41,9 @@ def lame_ratio(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.
     strength = np.linalg.norm(q, axis=1)
     if not len(q) or strength.max() < 1e-8:
         return None
-    p, q = p[strength > 1e-3 * strength.max()], q[strength > 1e-3 * strength.max()]
+    p, q = p[strength > SMALL * strength.max()], q[strength > SMALL * strength.max()]
     ratio = float((p * q).sum() / (q * q).sum())
     misfit = np.linalg.norm(p - ratio * q, axis=1) / np.linalg.norm(q, axis=1)
-    if np.max(misfit) > _CONSTANT * (1 + abs(ratio)):
+    if np.max(misfit) > ALIKE * (1 + abs(ratio)):
         return None
     return ratio

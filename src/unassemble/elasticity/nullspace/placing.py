@@ -10,15 +10,14 @@ from numpy.typing import NDArray
 
 from ...errors import GeometryError
 from ...nodes.nodal import NodalMatrix, determined, linked
-from ...nodes.shape import EXACT, Shape, in_gauge, shape
+from ...nodes.shape import Shape, in_gauge, shape
 from ...recovery import Evidence
+from ...tolerances import PLACED, SINGULAR, SMALL
 from ..springs import drawn_together
 from .atlas import NullFields, null_fields
 from .slender import affordable, unbent
 from .solution import Solution
 
-_SLENDER = 1e-4  # gap below which a step on the whole piece is worth its cost
-_SETTLED = 1e-8  # residual over gap: what coordinates may be wrong by
 # Nodes of a body whose best fit, where none is exact, one factorisation finds. Charts are no help there: each fits in
 # its own way, and where two of them meet the joined field has a kink that costs far more than the misfit itself.
 _WHOLE = {2: 250_000, 3: 30_000}
@@ -68,19 +67,19 @@ def placed(
         except GeometryError as error:
             failure = failure or error
             warnings.append(f"piece {piece} with node {body[0]}: {error}")
-            evidence.append(Evidence(int((found.values < EXACT).sum()), float("nan"), float("nan"), found.rows))
+            evidence.append(Evidence(int((found.values < SINGULAR).sum()), float("nan"), float("nan"), found.rows))
             freedoms.append("")
             continue
         points[found.nodes] = one.points
         points[body] = in_gauge(points[body], graph[body][:, body])
         evidence.append(_evidence(found, one))
-        if one.exact and not one.freedom and evidence[-1].gap < _SLENDER and affordable(points[body]):
+        if one.exact and not one.freedom and evidence[-1].gap < SMALL and affordable(points[body]):
             whole = np.full_like(points, np.nan)
             whole[body] = points[body]
             better, residual = unbent(nodal, valid, whole, evidence[-1].gap, terms)
             if residual < evidence[-1].residual:
                 points[body] = in_gauge(better[body], graph[body][:, body])
-                settled = residual <= _SETTLED * evidence[-1].gap
+                settled = residual <= PLACED * evidence[-1].gap
                 evidence[-1] = replace(evidence[-1], residual=residual, settled=settled)
         freedoms.append(one.freedom)
         exact.append(one.exact)
@@ -94,7 +93,7 @@ def placed(
 def _settled(found: NullFields) -> bool:
     """Whether more than translations satisfies the identities exactly, and not all fields that were looked for."""
     d = found.fields.shape[1]
-    return len(found.values) > d and bool(found.values[d] <= EXACT < found.values[-1])
+    return len(found.values) > d and bool(found.values[d] <= SINGULAR < found.values[-1])
 
 
 def pieces_of(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:

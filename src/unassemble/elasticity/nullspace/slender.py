@@ -12,19 +12,14 @@ import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ...budget import REFINEMENTS
 from ...errors import SolverError
 from ...linalg.normal import NormalEquations
 from ...nodes.nodal import NodalMatrix, determined, linked
+from ...tolerances import SMALL
 from .identities import Identities, boundary_basis, identities
 
-_STEPS = 8
-_SHRINKING = 0.2  # a step over the one before; those of normal equations go like the square of the condition
-_STILL = 1e-11  # a step relative to the coordinates that rounding leaves: that of a residual, over the gap
 _WORK = 3e6  # nodes times the square of those across, up to which one factorisation costs a few seconds
-_ROUNDING = 1e-15  # of an entry
-# How much softer, at most, a piece is whose first node is held, and not its centroid, is the root of its number of
-# nodes. Random numbers and all fields but the softest add less than this factor; a field that is free adds 1e6.
-_SOFTER = 30.0
 
 
 def affordable(points: NDArray[np.float64]) -> bool:
@@ -73,7 +68,9 @@ def unbent(
     except SolverError:
         return points, float("inf")
     try:
-        if gap * _softness(system, equations.shape[0]) > _SOFTER * np.sqrt(len(x)):
+        # Holding the first node, not the centroid, makes a piece softer by the root of its number of nodes, and random
+        # numbers add some tens; a field that is free adds a million.
+        if SMALL * gap * _softness(system, equations.shape[0]) > np.sqrt(len(x)):
             return points, float("inf")
         x = _stepped(system, equations, x, free)
     except SolverError:
@@ -82,7 +79,7 @@ def unbent(
         system.release()
     better = points.copy()
     better[local.columns] = x
-    residual = np.linalg.norm(_residual(equations, x)) + _ROUNDING * np.sqrt(equations.shape[0])
+    residual = np.linalg.norm(_residual(equations, x)) + np.finfo(float).eps * np.sqrt(equations.shape[0])
     return better, float(residual / np.linalg.norm(x - x.mean(axis=0)))
 
 
@@ -91,11 +88,11 @@ def _stepped(
 ) -> NDArray[np.float64]:
     """Coordinates (n, d) after steps as long as they shrink, down to rounding."""
     x, before = x.copy(), np.inf
-    for _ in range(_STEPS):
+    for _ in range(REFINEMENTS):
         step = system.solve(_residual(equations, x))
         x[free] -= step
         size = float(np.linalg.norm(step))
-        if size <= _STILL * np.linalg.norm(x) or not size <= _SHRINKING * before:
+        if not 2 * size <= before:
             break
         before = size
     return x

@@ -24,16 +24,14 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from ...budget import SAMPLE
 from ...elements.candidates import Block, candidates
 from ...elements.reference import rules
 from ...elements.surface import contested
 from ...nodes.nodal import NodalMatrix, determined
-from ...tolerances import CERTIFIED
+from ...tolerances import ALIKE, CERTIFIED
 from ..materials.cells import coupled
 from ..materials.entries import Entries, Model, Pairs
-
-_ROWS = 2000  # nodes whose rows are fitted; re-assembly looks at all of them
-_INDEPENDENT = 1e-6  # least singular value of the tables, relative to the largest, with which they tell T
 
 
 def frame(nodal: NodalMatrix, picture: NDArray[np.float64]) -> tuple[NDArray[np.float64], float] | None:
@@ -86,7 +84,7 @@ def _sampled(entries: Entries) -> NDArray[np.int64]:
     nodes = np.unique(np.concatenate([i, j]))
     whole = nodes[entries.complete[nodes]]
     chosen = np.zeros(entries.n, dtype=bool)
-    chosen[whole[np.unique(np.linspace(0, len(whole) - 1, _ROWS).astype(int))]] = True
+    chosen[whole[np.unique(np.linspace(0, len(whole) - 1, SAMPLE).astype(int))]] = True
     return np.flatnonzero(chosen[i] | chosen[j])
 
 
@@ -96,7 +94,7 @@ def _tensors(tables: NDArray, values: NDArray) -> NDArray[np.float64] | None:
     design, right = tables.reshape(-1, d * d), values.reshape(-1, d * d)
     if len(design) < d * d:
         return None
-    solution, _, rank, size = scipy.linalg.lstsq(design, right, cond=_INDEPENDENT)
+    solution, _, rank, size = scipy.linalg.lstsq(design, right, cond=ALIKE)
     if rank < d * (d + 1) // 2 or size[0] == 0 or np.abs(design @ solution - right).max() > CERTIFIED:
         return None
     t = solution.T.reshape(d, d, d, d)

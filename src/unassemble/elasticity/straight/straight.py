@@ -18,15 +18,14 @@ from numpy.typing import NDArray
 
 from ...linalg import svd
 from ...nodes.nodal import NodalMatrix, determined
-from ...nodes.shape import EXACT, in_gauge, set_aside
+from ...nodes.shape import in_gauge, set_aside
 from ...recovery import Evidence
+from ...tolerances import ALIKE, SINGULAR
 from ..nullspace.atlas import null_fields
 from ..nullspace.identities import no_terms
 from ..nullspace.placing import pieces_of
 from ..nullspace.solution import Solution
 from .frame import frame
-
-_NONE = 1e-6  # singular value of functions that are none, beside others of norm one
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +80,7 @@ def _straight(nodal: NodalMatrix, inside: NDArray[np.bool_], patch: int | None) 
     for piece in range(n_pieces):
         body = np.flatnonzero(component == piece)
         null = null_fields(nodal, inside, body, patch=patch, terms=no_terms(nodal.dim))
-        exact = null.values <= EXACT
+        exact = null.values <= SINGULAR
         if not len(exact) or exact[-1] or exact.sum() <= nodal.dim:
             continue
         shown = _picture(null.fields[..., exact])
@@ -117,7 +116,7 @@ def _picture(null: NDArray[np.float64]) -> _Picture | None:
         functions = _functions(null[held])
     if functions.shape[1] != d:
         return None
-    fields = int((scipy.linalg.svdvals(null[held].reshape(-1, null.shape[2])) > _NONE).sum())
+    fields = int((scipy.linalg.svdvals(null[held].reshape(-1, null.shape[2])) > ALIKE).sum())
     return _Picture(held, functions, fields)
 
 
@@ -125,7 +124,7 @@ def _functions(null: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N, m) orthonormal basis of all components of the fields, constants aside."""
     flat = (null - null.mean(axis=0)).reshape(len(null), -1)
     u, s, _ = svd(flat, full_matrices=False)
-    return np.asarray(u[:, s > _NONE * max(s.max(initial=0), _NONE)])
+    return np.asarray(u[:, s > ALIKE * max(s.max(initial=0), ALIKE)])
 
 
 def in_place(found: Solution | None, valid: NDArray[np.bool_], straight: list[Straight]) -> Solution:

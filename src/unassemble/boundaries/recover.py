@@ -1,0 +1,122 @@
+"""Scalar matrices that have lost rows."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cells.undivided import undivided
+from ..clock import Clock
+from ..matrix import OperatorMatrix
+from ..options import ScalarOptions
+from ..recovery import PlanarMesh
+from ..scalar.joined import JoinedMesh
+from ..scalar.notes import vanished_notes
+from ..scalar.placement import Placement
+from ..tolerances import CERTIFIED
+from ..topology import Polygons, Topology
+from ..topology.keys import with_sides
+from ..topology.pieces import planar_pieces
+from ..words import count_of
+from .lattice import Lattice
+from .witness import Witness
+
+
+def recover_lattice(
+    matrix: OperatorMatrix, placement: Placement, clock: Clock, options: ScalarOptions
+) -> PlanarMesh | None:
+    """The lattice that a matrix is a part of, certified; None where there is none.
+
+    Its cells are continued by those whose vertices are gone, and the mesh of both has the rows of the matrix, entries
+    and diagonal. That such a mesh exists is proved by this; but others may as well, with cells that are not alike.
+    """
+    with clock("lattice"):
+        lattice = Lattice.of(matrix)
+    if lattice is None or len(lattice.z) == matrix.n or lattice.neighbours == 8 or options.method != "conformal":
+        return None
+    if options.scale is not None and abs(lattice.scale / options.scale - 1) > CERTIFIED:
+        return None
+    topology = _topology(matrix, lattice)
+    if topology is None:
+        return None
+    with clock("place"):
+        (piece,) = topology.pieces
+        placed, notes = placement.apply(piece, lattice.z[piece.vertices])
+        tensor = placement.tensor
+        mesh = JoinedMesh.of(topology, [placed], np.array([lattice.scale / (tensor.root_determinant if tensor else 1)]))
+        gone = _moved_along(lattice.z[: matrix.n], mesh.points, lattice.z[matrix.n :])
+    with clock("certify"):
+        points = np.concatenate([mesh.points, gone])
+        triangles = _upright(points, _divided(lattice.cells))
+        known = (tensor.kxx, tensor.kxy, tensor.kyy) if tensor else None
+        witness = Witness.of(matrix, points, triangles, float(mesh.scale[0]), lattice.shift, known)
+    if not witness.backward_error <= CERTIFIED:
+        return None
+    polygons = Polygons.none() if options.triangulate else mesh.polygons
+    return PlanarMesh(
+        points=mesh.points,
+        triangles=mesh.triangles if options.triangulate else mesh.triangles[~mesh.in_polygon],
+        component=mesh.component,
+        hinges=topology.hinges,
+        scale=mesh.scale,
+        polygons_offsets=polygons.offsets,
+        polygons_data=polygons.vertices,
+        boundary=mesh.boundary,
+        boundary_offsets=mesh.boundary_offsets,
+        node_status=np.zeros(matrix.n, np.int8),
+        status="certified",
+        uniqueness="ambiguous",
+        reason=(
+            f"the lattice, continued by {count_of(len(gone), 'vertex that has', 'vertices that have')} no row, gives "
+            f"the matrix back to {witness.backward_error:.1e}, row sums included"
+        ),
+        operator="anisotropic laplacian" if tensor else "laplacian",
+        backward_error=witness.backward_error,
+        n_holes=topology.n_holes,
+        timings=clock.timings,
+        warnings=(*matrix.warnings, *_lattice_notes(lattice), *notes, *vanished_notes(topology)),
+        eliminated_points=gone,
+    )
+
+
+def _lattice_notes(lattice: Lattice) -> list[str]:
+    notes = [
+        "this is the only mesh whose cells are all alike; others, bent next to the unknowns that were eliminated, may "
+        "fit as well"
+    ]
+    if lattice.shift:
+        notes.append(f"{lattice.shift:.6g} times the identity was added to the matrix")
+    return notes
+
+
+def _topology(matrix: OperatorMatrix, lattice: Lattice) -> Topology | None:
+    """The cells that have all their vertices; None unless they are one piece, with all rows."""
+    cells = lattice.cells[(lattice.cells < matrix.n).all(axis=1)]
+    triangles = _divided(cells)
+    edges, given, opposite = with_sides(matrix.n, matrix.edges, triangles)
+    pieces = planar_pieces(matrix.n, edges, triangles, opposite)
+    if pieces is None or len(pieces) != 1 or pieces[0].n_vertices < matrix.n or len(pieces[0].edges) < len(edges):
+        return None
+    added = np.ones(len(edges), dtype=bool)
+    added[given] = False
+    return Topology(
+        matrix.n, edges, pieces, "3-cycles", vanished=np.flatnonzero(added), polygons=undivided(list(pieces), added)[1]
+    )
+
+
+def _divided(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Triangles, with squares (m, 4) divided in two."""
+    return cells[:, [0, 1, 2, 0, 2, 3][: 3 * (cells.shape[1] - 2)]].reshape(-1, 3)
+
+
+def _moved_along(z: NDArray, points: NDArray, others: NDArray) -> NDArray[np.float64]:
+    """Where others go by the affine map that moves z to points."""
+    design = np.column_stack([z.real, z.imag, np.ones(len(z))])
+    affine = np.linalg.lstsq(design, points, rcond=None)[0]
+    return np.column_stack([others.real, others.imag, np.ones(len(others))]) @ affine
+
+
+def _upright(points: NDArray, triangles: NDArray) -> NDArray[np.int64]:
+    """Triangles of a mesh that may be turned over as a whole, counter-clockwise."""
+    a, b, c = (points @ [1, 1j])[triangles[0]]
+    return triangles if (np.conj(b - a) * (c - a)).imag > 0 else triangles[:, ::-1]

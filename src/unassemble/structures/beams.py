@@ -1,0 +1,278 @@
+"""A straight beam: bending apart from everything else, in nodes that form a line.
+
+A member of length l and stiffness k = EI / l^3 between nodes i and j, deflections w and rotations t = dw/dx, has
+
+    A[w_i, w_j] = -12 k,   A[w_i, t_j] = 6 k l,   A[t_i, w_j] = -6 k l,   A[t_i, t_j] = 2 k l^2
+
+(the cubic Hermite element; e.g. Zienkiewicz and Taylor, The Finite Element Method, vol. 1). Each block has two numbers
+and four entries, and says by itself that it is one: x_j - x_i = -2 A[w_i, t_j] / A[w_i, w_j]. So the row sums that
+supports spoil are not needed. Stretching and torsion are chains of springs beside it, which know no length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..clock import Clock
+from ..matrix import OperatorMatrix
+from ..nodes.anchoring import anchored, checked_anchors
+from ..recovery import Evidence, Structure
+from ..tolerances import ALIKE, CERTIFIED
+from ..words import count_of
+from .layouts import PLANE
+from .placed import covered
+from .recognise import StructuralNumbering
+
+MOST = 5  # entries of a bending row off the diagonal: four of the neighbours, one of its own node
+
+
+@dataclass(frozen=True, eq=False)
+class Beam(StructuralNumbering):
+    """Rows of a straight beam: directions 1 (deflection) and 2 (rotation); 0 for one chain of springs, -1 for several.
+
+    Attributes
+    ----------
+    members : (m, 2) int64
+        Nodes.
+    steps : (m,) float64
+        x of the second node less that of the first.
+    """
+
+    members: NDArray[np.int64]
+    steps: NDArray[np.float64]
+
+
+class _Blocks(NamedTuple):
+    """(m,) rows w_i, t_i, w_j, t_j of members, and x_j - x_i."""
+
+    w: NDArray[np.int64]
+    t: NDArray[np.int64]
+    other_w: NDArray[np.int64]
+    other_t: NDArray[np.int64]
+    step: NDArray[np.float64]
+
+
+def find_beam(matrix: sp.csr_array) -> Beam | None:
+    """Recognise the rows of one straight beam, in any order; None for all other matrices.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+        Symmetric.
+    """
+    order = matrix.shape[0]
+    off = matrix - sp.diags_array(matrix.diagonal())
+    off.eliminate_zeros()
+    if order < 4 or np.diff(off.indptr).max(initial=0) > MOST or (matrix.diagonal() <= 0).any():
+        return None
+    blocks = _members(sp.csr_array(off))
+    deflections = np.unique(np.concatenate([blocks.w, blocks.other_w]))
+    partner = np.full(order, -1)
+    for w, t in ((blocks.w, blocks.t), (blocks.other_w, blocks.other_t)):
+        partner[w] = t
+        if (partner[w] != t).any():
+            return None  # one deflection with two rotations
+    rotations = partner[deflections]
+    node = np.full(order, -1)
+    node[deflections] = node[rotations] = np.arange(len(deflections))
+    direction = np.full(order, -1)
+    direction[rotations], direction[deflections] = 2, 1
+    if not len(deflections) or len(np.unique(rotations)) < len(rotations) or np.isin(rotations, deflections).any():
+        return None
+    members, steps = np.column_stack([node[blocks.w], node[blocks.other_w]]), blocks.step
+    members, steps = _with_ends(sp.csr_array(off), node, direction, members, steps)
+    n = int(node.max()) + 1
+    if len(members) != n - 1 or _components(n, members)[0] != 1:
+        return None
+    count, label = _components(order, np.column_stack(off.nonzero()))
+    bending = np.unique(label[node >= 0])
+    if len(bending) > 1 or (node[label == bending[0]] < 0).any():
+        return None
+    line = np.argsort(_along(n, members, steps))
+    chains = [np.flatnonzero(label == one) for one in range(count) if one != bending[0]]
+    for chain in chains:
+        if not _beside(sp.csr_array(off), chain, line, node):
+            return None
+    if len(chains) == 1:
+        direction[chains[0]] = 0
+    renamed = np.unique(node, return_index=True)[1].argsort().argsort()  # by the first row of each
+    share = float(np.mean(direction > 0))
+    return Beam(PLANE, renamed[node], direction, "pattern", share, members=renamed[members], steps=steps)
+
+
+def _members(off: sp.csr_array) -> _Blocks:
+    """Members whose blocks are whole, each once."""
+    order, width = off.shape[0], MOST
+    count = np.diff(off.indptr)
+    row = np.repeat(np.arange(order), count)
+    neighbours, values = np.full((order, width), -1), np.zeros((order, width))
+    place = np.arange(len(row)) - off.indptr[row]
+    neighbours[row, place], values[row, place] = off.indices, off.data
+    down = (off.data < 0) & (row < off.indices)
+    w, other_w, least = row[down], off.indices[down], off.data[down]
+    # Every neighbour of w_i for t_j, and every one of w_j for t_i.
+    a, b = (index.ravel() for index in np.meshgrid(np.arange(width), np.arange(width), indexing="ij"))
+    other_t, right = neighbours[w][:, a], values[w][:, a]
+    t, left = neighbours[other_w][:, b], values[other_w][:, b]
+    lower, upper = np.maximum(t, 0), np.maximum(other_t, 0)
+    corner = np.where((neighbours[lower] == other_t[..., None]) & (t >= 0)[..., None], values[lower], 0).sum(axis=-1)
+    good = (t >= 0) & (other_t >= 0) & (t != w[:, None]) & (other_t != other_w[:, None]) & (corner > 0) & (t != other_t)
+    good &= np.abs(left + right) <= ALIKE * np.abs(right)
+    good &= np.abs(1.5 * corner * -least[:, None] - right**2) <= ALIKE * right**2
+    k, which = np.nonzero(good)
+    return _Blocks(w[k], lower[k, which], other_w[k], upper[k, which], -2 * right[k, which] / least[k])
+
+
+def _with_ends(
+    off: sp.csr_array,
+    node: NDArray[np.int64],
+    direction: NDArray[np.int64],
+    members: NDArray[np.int64],
+    steps: NDArray[np.float64],
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Members, with those to nodes at the ends of which a support left the rotation only; `node` is told of these."""
+    entry = off.tocoo()
+    alone = (node[entry.row] < 0) & (entry.data > 0) & (direction[entry.col] == 2) & (node[entry.col] >= 0)
+    for t, other_t, corner in zip(entry.row[alone], entry.col[alone], entry.data[alone], strict=True):
+        columns, data = off[[t]].indices, off[[t]].data
+        beside = columns[(node[columns] == node[other_t]) & (direction[columns] == 1)]
+        if len(columns) == 2 and len(beside) == 1:
+            coupling = float(data[columns == beside[0]][0])  # - 6 k l, with 2 k l^2 in the corner
+            node[t], direction[t] = node.max() + 1, 2
+            members = np.vstack([members, [node[t], node[other_t]]])
+            steps = np.append(steps, -3 * corner / coupling)
+    return members, steps
+
+
+def _along(n: int, members: NDArray[np.int64], steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) positions along the beam, the first node's zero."""
+    tree = sp.csr_array((steps, members.T), shape=(n, n))
+    both = sp.csr_array(tree - tree.T)
+    order, before = sp.csgraph.breadth_first_order(abs(both), 0, directed=False)
+    x = np.zeros(n)
+    for k in order[1:]:
+        x[k] = x[before[k]] + both[before[k], k]
+    return x
+
+
+def _components(n: int, pairs: NDArray) -> tuple[int, NDArray[np.int64]]:
+    graph = sp.csr_array((np.ones(len(pairs)), pairs.T), shape=(n, n))
+    count, label = sp.csgraph.connected_components(graph, directed=False)
+    return int(count), label.astype(np.int64)
+
+
+def _beside(off: sp.csr_array, chain: NDArray[np.int64], line: NDArray[np.int64], node: NDArray[np.int64]) -> bool:
+    """Give the rows of a chain of springs the nodes next to which they are numbered; False if it is no such chain."""
+    part = sp.csr_array(off[chain][:, chain])
+    degree = np.diff(part.indptr)
+    if (
+        len(chain) > len(line)
+        or degree.max(initial=0) > 2
+        or degree.sum() != 2 * len(chain) - 2
+        or (part.data > 0).any()
+    ):
+        return False
+    path = chain[sp.csgraph.breadth_first_order(part, int(np.argmin(degree)), directed=False)[0]]
+    rows = np.arange(len(node))
+    middle = np.array([rows[node == k].mean() for k in line])
+    starts = range(len(line) - len(path) + 1)
+    ways = [(np.abs(p - middle[s : s + len(p)]).sum(), s, p) for p in (path, path[::-1]) for s in starts]
+    _, start, path = min(ways, key=lambda way: way[:2])
+    node[path] = line[start : start + len(path)]
+    return True
+
+
+def serve_beam(
+    matrix: OperatorMatrix, beam: Beam, clock: Clock, *, anchors: Sequence[Any] | None, choice: str
+) -> Structure:
+    """Positions along a straight beam, in true units of length, and its members.
+
+    The axis is x and deflections are along y; the direction of the axis, which the sign of rotations tells where it is
+    known, is free.
+    """
+    n = beam.n_nodes
+    known = checked_anchors(anchors, beam.node_of_row, beam.layout.dim)
+    with clock("solve"):
+        x = _along(n, beam.members, beam.steps)
+        points = np.column_stack([x - x.mean(), np.zeros(n)])
+    with clock("certify"):
+        misfit, told = _held_against(matrix.csr(), beam, points[:, 0])
+    certified = misfit <= CERTIFIED
+    chains = int(np.count_nonzero(beam.direction_of_row <= 0))
+    reason = "bending members along a line give back the blocks of all neighbours, and the sums of rows between them: "
+    notes = ["a beam by itself lies along x; its direction along x is free"]
+    if chains:
+        notes.append(f"{count_of(chains, 'row')} of stretching or torsion know no length: they are taken for those of "
+                     "the nodes next to which they are numbered")  # fmt: skip
+    bending = beam.direction_of_row > 0
+    component = np.zeros(n, np.int64)
+    points, _, more = anchored(points, component, 1, known, sized=True)
+    return Structure(
+        points=points,
+        lines=np.sort(beam.members, axis=1),
+        component=component,
+        scale=np.full(1, np.nan),
+        node_status=np.zeros(n, np.int8),
+        evidence=(Evidence(1, misfit, float("inf"), int(told.sum())),),
+        status="certified" if certified else "uncertified",
+        uniqueness="proved" if certified else None,
+        reason=reason + covered(told, bending)
+        if certified
+        else (f"the bending rows differ from those of members along a line by {misfit:.1e} of the row's largest entry"),
+        operator="plane frame",
+        backward_error=misfit,
+        timings=clock.timings,
+        warnings=(*matrix.warnings, *notes, *more),
+        node_of_row=beam.node_of_row,
+        direction_of_row=beam.direction_of_row,
+        numbering=beam.kind,
+        choice=choice,
+    )
+
+
+def _held_against(matrix: sp.csr_array, beam: Beam, x: NDArray[np.float64]) -> tuple[float, NDArray[np.bool_]]:
+    """Largest misfit of re-assembled bending rows, relative to the row's largest entry, and rows that were held.
+
+    Entries between nodes count in all rows, those within a node where it has both its deflection and rotation, and
+    they are what two members make of them: next to a support something more may be there.
+    """
+    order, n = matrix.shape[0], len(x)
+    row_of = np.full((n, 2), -1)
+    bending = np.flatnonzero(beam.direction_of_row > 0)
+    row_of[beam.node_of_row[bending], beam.direction_of_row[bending] - 1] = bending
+    i, j = beam.members.T
+    length = x[j] - x[i]
+    both = (row_of[i] >= 0).all(axis=1) & (row_of[j] >= 0).all(axis=1)
+    stiffness = np.zeros(len(length))
+    stiffness[both] = -_entries(matrix, row_of[i[both], 0], row_of[j[both], 0]) / 12
+    stiffness[~both] = _entries(matrix, row_of[i[~both], 1], row_of[j[~both], 1]) / (2 * length[~both] ** 2)
+    one, left = np.ones_like(length), length
+    block = np.stack([12 * one, 6 * left, -12 * one, 6 * left,
+                      6 * left, 4 * left**2, -6 * left, 2 * left**2,
+                      -12 * one, -6 * left, 12 * one, -6 * left,
+                      6 * left, 2 * left**2, -6 * left, 4 * left**2], axis=1).reshape(-1, 4, 4)  # fmt: skip
+    rows = np.concatenate([row_of[i], row_of[j]], axis=1)
+    live = (rows[:, :, None] >= 0) & (rows[:, None, :] >= 0)
+    k, a, b = np.nonzero(live)
+    values = block[k, a, b] * stiffness[k]
+    again = sp.csr_array((values, (rows[k, a], rows[k, b])), shape=(order, order))
+    left_over = sp.coo_array(matrix - again)
+    inner = np.bincount(beam.members.ravel(), minlength=n) == 2
+    node = beam.node_of_row
+    held = (node[left_over.row] != node[left_over.col]) | inner[node[left_over.row]]
+    held &= (beam.direction_of_row[left_over.row] > 0) & (beam.direction_of_row[left_over.col] > 0)
+    size = np.zeros(order)
+    entry = matrix.tocoo()
+    np.maximum.at(size, entry.row, np.abs(entry.data) * (entry.row != entry.col))
+    misfit = np.abs(left_over.data[held]) / size[left_over.row[held]]
+    return float(misfit.max(initial=0.0)), (beam.direction_of_row > 0) & inner[node]
+
+
+def _entries(matrix: sp.csr_array, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.float64]:
+    return np.asarray(sp.coo_array(matrix[i, j]).toarray()).ravel()
