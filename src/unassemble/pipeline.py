@@ -212,7 +212,8 @@ class _Task:
         try:
             found = self._as_scalar(self.matrix, self.frame.anchors)
         except RecoveryError as error:
-            other = self._as_certified_surface() or self._as_second_reading()
+            curved = self._as_certified_surface()
+            other = self._as_second_reading() if curved is None else _unless_planar(curved)
             if other is not None:
                 return other
             nodes = about_translations(self.matrix) if isinstance(error, NotPlanarError) else ""
@@ -222,10 +223,9 @@ class _Task:
         curved = self._as_certified_surface() if found.status == "uncertified" else None
         if curved is not None:
             noise, little = found.estimated_noise, LARGEST_NOISE * np.abs(found.scale).min()
-            if noise is None or noise > little:
-                return curved
-            # Errors of entries bend a flat mesh, too, if the diagonal makes up for them.
-            note = "a surface in space, bent a little, has exactly these entries: see `operator='surface'`"
+            if curved.fits_no_plane or (not found.missing_term and (noise is None or noise > little)):
+                return _unless_planar(curved)
+            note = "a surface in space has exactly these entries, as one has nearly any: see `operator='surface'`"
             found = replace(found, warnings=(*found.warnings, note))
         if not (found.node_status.any() or isinstance(found, ConformingMesh)):
             return judged(found, self.matrix)
@@ -323,6 +323,20 @@ class _Task:
                 f"`{self.given[0]}` is for scalar matrices, and this one is read as vector-valued: leave it out, or "
                 "choose `operator='laplacian'`"
             )
+
+
+def _unless_planar(surface: Surface) -> Surface:
+    """A surface that was not asked for, certified only where no mesh in the plane has its triangles.
+
+    It has as many lengths as entries, so that nearly any matrix on these triangles is that of one.
+    """
+    if surface.fits_no_plane:
+        return surface
+    reason = (
+        "the lengths give every entry back, but a coefficient that varies in the plane may do so as well: a surface "
+        "has as many lengths as entries. If it is one in space, say so by `operator='surface'`"
+    )
+    return replace(surface, status="uncertified", uniqueness=None, reason=reason)
 
 
 def _check_proportion(scale: float, largest: float) -> None:

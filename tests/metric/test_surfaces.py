@@ -78,8 +78,9 @@ def test_auto_on_a_bent_disc():
     known = surface(mesh["points"], mesh["triangles"], c=2.0)
     found = recover(known.matrix)
     assert isinstance(found, Surface)
-    assert found.certified
-    assert found.loops.tolist() == [1]
+    assert (found.status, found.loops.tolist()) == ("uncertified", [1])
+    assert "operator='surface'" in found.reason  # a coefficient that varies in the plane may have the same matrix
+    assert largest_error(found, known.points) <= 1e-9
 
 
 def test_curvature_is_that_of_the_surface():

@@ -6,7 +6,7 @@ import pytest
 import scipy.sparse as sp
 
 from meshes import delaunay, largest_error, random_mesh, specimen
-from unassemble import GeometryError, InputError, recover
+from unassemble import GeometryError, InputError, RecoveryError, recover
 
 
 def half_ring(n=9, inner=1.0, outer=1.5):
@@ -98,7 +98,7 @@ def test_piece_without_a_mesh_does_not_stop_the_others():
 )
 def test_triangles_that_do_not_exist(entries):
     a, b, c = entries
-    with pytest.raises(GeometryError):
+    with pytest.raises(RecoveryError):
         recover(sp.coo_array(([a, b, c] * 2, ([0, 0, 1, 1, 2, 2], [1, 2, 2, 0, 0, 1])), shape=(3, 3)))
 
 

@@ -35,6 +35,8 @@ class PlanarMesh(Recovery):
         ``largest``, ``largest_p_value``; see :func:`unassemble.certify.chi_square_verdict`.
     estimated_noise : float or None
         Standard deviation of independent errors of the entries that would leave the misfit; None where it is no noise.
+    missing_term : str
+        ``"mass"``, ``"coefficient"`` or ``"one sign"``, a term that the model lacks, where that explains the misfit.
     suspects : (k, 2) int64
         Entries that the mesh would fit the others far better without, the gravest first.
     areas : (m,) float64 or None
@@ -55,6 +57,7 @@ class PlanarMesh(Recovery):
     standard_deviations: NDArray[np.float64] | None = None
     chi_square: Mapping[str, float] | None = None
     estimated_noise: float | None = None
+    missing_term: str = ""
     suspects: NDArray[np.int64] = field(default_factory=none_of(2))
     areas: NDArray[np.float64] | None = None
     row_scaling: NDArray[np.float64] | None = None

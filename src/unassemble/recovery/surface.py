@@ -61,6 +61,11 @@ class Surface(Recovery):
         return bool(np.abs(self.curvature[inside]).max(initial=0.0) < 1e-8)
 
     @property
+    def fits_no_plane(self) -> bool:
+        """Whether a piece is closed, one-sided or has a handle, so that no mesh in the plane has these triangles."""
+        return bool(((self.loops == 0) | ~self.orientable | (self.genus > 0)).any())
+
+    @property
     def genus(self) -> NDArray[np.int64]:
         """(number of pieces,) handles, or cross-caps of pieces that are not orientable."""
         total = 2 - self.loops - self.euler

@@ -242,6 +242,7 @@ def _report(
         standard_deviations=deviations,
         chi_square=held.test.figures if held.test else None,
         estimated_noise=evidence.noise,
+        missing_term=evidence.term.name if evidence.term else "",
         n_entries=len(held.certificate.misfits),
         n_fitting=int(np.count_nonzero(held.certificate.misfits <= CERTIFIED)),
         suspects=evidence.suspects,
