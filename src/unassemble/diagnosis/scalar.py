@@ -21,9 +21,9 @@ _CELLS = {
     (6, 3): ("quadratic", "quadratic elements on triangles"),
     (8, 3): ("quadratic", "serendipity elements on quadrilaterals"),
     (9, 3): ("quadratic", "biquadratic elements on quadrilaterals"),
-    (10, 6): ("quadratic", "quadratic elements on tetrahedra"),
-    (20, 8): ("quadratic", "serendipity elements on hexahedra"),
-    (27, 9): ("quadratic", "triquadratic elements on hexahedra"),
+    (10, 6): ("tetrahedra", "quadratic elements on tetrahedra"),
+    (20, 8): ("hexahedra", "serendipity elements on hexahedra"),
+    (27, 9): ("hexahedra", "triquadratic elements on hexahedra"),
     (10, 4): ("cubic", "cubic elements on triangles"),
     (16, 4): ("cubic", "bicubic elements on quadrilaterals"),
 }
@@ -130,7 +130,7 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
         operator = _operator(matrix, sums, cells)
         kind, name = _CELLS.get((cells.nodes, cells.shared), ("", ""))
         # About half of the pairs of quadrilaterals are diagonals.
-        doubtful = {"quadrilaterals": cells.often < 1 - MOST, "hexahedra": several}
+        doubtful = {"quadrilaterals": cells.often < 1 - MOST, "hexahedra": several and cells.nodes == 8}
         if kind and not doubtful.get(kind):
             shown = f"rows form cliques of {cells.nodes}, neighbours of which share {cells.shared} rows"
             return _of_kind(kind, f"{operator} of {name}", shown, *sums.evidence)
@@ -156,7 +156,8 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
 
 
 def _of_kind(kind: str, name: str, *evidence: str) -> Diagnosis:
-    return Diagnosis(kind, name, evidence, UNREAD.get(kind, ""))
+    without = "keep all rows and columns, those on the boundary too" if "eliminated" in evidence[-1] else ""
+    return Diagnosis(kind, name, evidence, UNREAD.get(kind, without))
 
 
 def _further(sums: Sums) -> str:
