@@ -118,11 +118,11 @@ def test_error_bars_of_pieces_that_hold_each_other(told):
 
 
 @pytest.mark.parametrize("sigma", [1e-8, 1e-4])
-def test_filled_holes_are_found_without_being_told_the_noise(sigma):
-    """Filled, they fit with another factor: how much that may differ follows from what the rest leaves unexplained."""
+def test_noise_is_told_beside_holes_that_may_be_filled(sigma):
+    """Filled, they fit with another factor; without being told the noise nothing is certified, whichever it is."""
     known = specimen(*with_rings(2, 0), c=C, seed=0)
     found = recover(noisy(known.matrix, sigma * C, 1))
-    assert triangle_set(found.triangles) == triangle_set(known.triangles)
+    assert found.status == "uncertified"
     assert found.estimated_noise == pytest.approx(sigma * C, rel=0.6)
 
 
