@@ -10,7 +10,7 @@ import pytest
 import unassemble
 
 ROOT = Path(unassemble.__file__).parent
-MOST_NUMBERS = 150
+MOST_NUMBERS = 120
 MOST_LINES = 350
 WITHOUT = "paper"  # the paper of 2002 as it is, with its own numbers
 

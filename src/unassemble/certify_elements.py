@@ -12,21 +12,21 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.special import roots_legendre
 
+from .budget import AT_ONCE
 from .certify import Certificate, compared
 
-_AT_ONCE = 40_000  # cells
-_THIRD, _SIXTH = 1 / 3, 1 / 6
+_CELLS = AT_ONCE // 100  # whose products have about a hundred numbers each
 
 # Orbits (weight, repeated barycentric coordinate), weights adding up to 1 over all points: Dunavant, "High degree
 # efficient symmetrical Gaussian quadrature rules for the triangle", IJNME 21, 1985.
 _TRIANGLE_RULES: dict[str, tuple[tuple[float, float], ...]] = {
-    "degree 2": ((_THIRD, _SIXTH),),
+    "degree 2": ((1 / 3, 1 / 6),),
     "degree 4": (
         (0.22338158967801146569500700843312, 0.44594849091596488631832925388305),
         (0.10995174365532186763832632490021, 0.09157621350977074345957146340220),
     ),
     "degree 5": (
-        (0.225, _THIRD),
+        (0.225, 1 / 3),
         (0.12593918054482715259568394550018, 0.10128650732345633880098736191512),
         (0.13239415278850618073764938783315, 0.47014206410511508977044120951345),
     ),
@@ -72,8 +72,8 @@ def certify_elements(
         vertex = np.array([(0, 0), (1, 0), (0, 1)] if base == "triangle" else [(-1, -1), (1, -1), (1, 1), (-1, 1)])
         (phi_s, phi_t), (corner_s, corner_t) = _slopes(name, at), _slopes(name, vertex)
         a, b = np.triu_indices(cells.shape[1], 1)
-        for start in range(0, len(cells), _AT_ONCE):
-            some = cells[start : start + _AT_ONCE]
+        for start in range(0, len(cells), _CELLS):
+            some = cells[start : start + _CELLS]
             x, y = points[some, 0], points[some, 1]
             xs, ys, xt, yt = x @ phi_s.T, y @ phi_s.T, x @ phi_t.T, y @ phi_t.T
             determinant = xs * yt - xt * ys
@@ -89,7 +89,7 @@ def certify_elements(
             right = (determinant > 0).all(axis=1) & (at_corner > 0).all(axis=1)
             flipped.append(first + start + np.flatnonzero(~right))
             keys.append((np.minimum(some[:, a], some[:, b]) * n + np.maximum(some[:, a], some[:, b])).ravel())
-            values.append((value * factors[name][start : start + _AT_ONCE, None]).ravel())
+            values.append((value * factors[name][start : start + _CELLS, None]).ravel())
         first += len(cells)
     key = np.concatenate(keys)
     summed = sp.coo_array((np.concatenate(values), (key // n, key % n)), shape=(n, n)).tocsr()
@@ -108,7 +108,7 @@ def _triangle_rule(name: str) -> tuple[NDArray, NDArray]:
     """Points (q, 2) of the unit triangle, and weights."""
     points, weights = [], []
     for weight, r in _TRIANGLE_RULES[name]:
-        orbit = {(r, r), (r, 1 - 2 * r), (1 - 2 * r, r)} if abs(r - _THIRD) > 1e-9 else {(r, r)}
+        orbit = {(r, r), (r, 1 - 2 * r), (1 - 2 * r, r)} if abs(r - 1 / 3) > 1e-9 else {(r, r)}
         points += sorted(orbit)
         weights += [weight / 2] * len(orbit)
     return np.array(points), np.array(weights)

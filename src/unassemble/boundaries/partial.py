@@ -19,12 +19,10 @@ from ..recovery import PlanarMesh
 from ..scalar.joined import JoinedMesh
 from ..scalar.notes import piece_notes, topology_notes
 from ..scalar.placement import Placement
-from ..tolerances import CERTIFIED
+from ..tolerances import ALIKE, CERTIFIED
 from ..topology import Piece, Topology, local_numbering, surfaces
 from ..words import count_of
 from .inside import InsideMesh, fit_inside
-
-_WHOLE = 1e-6  # misfit of entries, in typical ones, of a conformal map that a polish would make exact
 
 
 def recover_partial(
@@ -100,7 +98,7 @@ def _is_whole(piece: Piece, matrix: OperatorMatrix, scale: float | None) -> bool
         return False
     with np.errstate(all="ignore"):
         misfit = np.abs(weights / mesh.scale - edge_weights(piece, mesh.z))
-    return bool((misfit <= _WHOLE).all())
+    return bool((misfit <= ALIKE).all())
 
 
 @dataclass(frozen=True, eq=False)

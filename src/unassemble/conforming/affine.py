@@ -13,13 +13,12 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..budget import SAMPLE
 from ..elements.kinds import Kind
 from ..elements.reference import exact_rule, shape_gradients
 from ..matrix import OperatorMatrix
+from ..tolerances import LITTLE
 from .sets import pairs_of
-
-_SAMPLE = 500  # cells
-_SHARED = 0.1  # weight of entries that other cells have a part in: split evenly, which is a guess
 
 
 @cache
@@ -53,7 +52,10 @@ class ElementEntries:
         a, b = np.triu_indices(k, 1)
         self._values, self._weights = np.zeros((m, k, k)), np.zeros((m, k, k))
         for i, j in ((a, b), (b, a)):
-            self._values[:, i, j], self._weights[:, i, j] = value, np.where(parts == 1, 1.0, _SHARED)
+            self._values[:, i, j], self._weights[:, i, j] = (
+                value,
+                np.where(parts == 1, 1.0, LITTLE),
+            )  # split evenly, which is a guess
 
     def misfit(self, kind: Kind, cells: NDArray[np.int64], order: NDArray[np.int64]) -> NDArray[np.float64]:
         """(c,) squared misfits of some cells (c,) whose nodes, as places in their sets, stand in an order (c, k)."""
@@ -73,7 +75,7 @@ def typical_misfit(matrix: OperatorMatrix, blocks: Mapping[Kind, NDArray[np.int6
     every = np.sort(np.concatenate([pairs_of(matrix.n, cells).ravel() for cells in blocks.values()]))
     found = []
     for kind, cells in blocks.items():
-        some = cells[:: len(cells) // _SAMPLE + 1]
+        some = cells[:: len(cells) // SAMPLE + 1]
         order = np.broadcast_to(np.arange(kind.nodes), some.shape)
         found.append(float(np.median(ElementEntries(matrix, some, every).misfit(kind, np.arange(len(some)), order))))
     return max(found)

@@ -20,11 +20,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..budget import AT_ONCE
 from ..elements.kinds import Kind
 from ..elements.reference import Rule, shape_gradients
 from .parts import Part
 
-_AT_ONCE = 40_000  # cells
+_CELLS = AT_ONCE // 100  # whose products have about a hundred numbers each
 
 
 class Entries:
@@ -130,8 +131,8 @@ class _Block:
 
     def parts(self, z: NDArray) -> Iterator[tuple[slice, _Local]]:
         """Some cells at a time."""
-        for first in range(0, len(self.cells), _AT_ONCE):
-            some = slice(first, first + _AT_ONCE)
+        for first in range(0, len(self.cells), _CELLS):
+            some = slice(first, first + _CELLS)
             corner = z[self.cells[some]]
             s, t = (_matmul(corner, slopes.T) for slopes in (self._p, self._r))
             yield some, _Local(s, t, s.real * t.imag - s.imag * t.real, self._weights)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..elements.reference import planar_rules
 from ..errors import SolverError
 from ..planar.polish import polish
-from ..tolerances import CERTIFIED, ROUNDED
+from ..tolerances import CERTIFIED, LAST_DIGITS, ROUNDED
 from .assembly import Entries
 from .parts import Part
 from .positions import corner_positions
@@ -20,7 +20,6 @@ from .positions import corner_positions
 _ALIKE = 1.01  # ratio of misfits of rules between which only rounding or noise decides
 
 _NEARLY = 10.0  # ratio of misfits of rules that a polish may change
-_ROUNDING = 1e-14  # misfit, relative to c, that leaves nothing to explain
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +119,7 @@ def fitted(
 def _settled(start: Fitted, scale: float | None, noise: NDArray | None) -> Fitted:
     """Polished, with the best of those rules that are too much alike to be told apart before."""
     best = _polished(start, start.weights, scale, noise)
-    if best.size < _ROUNDING:
+    if best.size < LAST_DIGITS:
         return best
     for rule in _rules(best.part, straight=best.straight):
         other = _with_rule(best.part, best.weights, best.z, best.scale, noise, rule, straight=best.straight)

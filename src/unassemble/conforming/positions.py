@@ -18,11 +18,10 @@ from ..linalg import factorisation
 from ..planar.conformal import ConformalOptions, smooth_start
 from ..planar.krylov import ShiftedSearch
 from ..planar.pencil import ConformalPencil
+from ..tolerances import SUMMED
 from ..topology.keys import distinct
 from .parts import Part
 from .sets import pairs_of
-
-_LEAST_SUM = 1e-10  # of the weights at a corner, in units of a typical one
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +79,7 @@ def corner_positions(part: Part, weights: NDArray, scale: float | None) -> tuple
         raise GeometryError("the off-diagonal entries add up to zero, those of a Laplacian cannot")
     relative = weights / unit
     sums = np.bincount(edges.ravel(), np.repeat(relative, 2), part.n_corners)
-    if not (np.isfinite(relative).all() and (sums > _LEAST_SUM).all()):
+    if not (np.isfinite(relative).all() and (sums > SUMMED).all()):
         row = int(part.piece.vertices[np.argmin(sums)])
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     piece, options = part.piece, ConformalOptions()

@@ -15,6 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..budget import SAMPLE
 from ..elements.kinds import KINDS, Kind
 from ..errors import TopologyError
 from ..matrix import OperatorMatrix
@@ -24,7 +25,6 @@ from .sets import NodeSets, pairs_of
 _KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9", 10: "triangle10"}
 _RINGS = {3: ((0, 1, 2),), 4: ((0, 1, 2, 3), (0, 1, 3, 2), (0, 2, 1, 3))}
 _DOUBTFUL = 4  # quadrilaterals whose sides are tried both ways
-_FEW = 5000  # quadrilaterals among which that is done
 _MOST = 6  # rows of a cell whose sides only entries tell
 
 
@@ -90,7 +90,7 @@ def ordered_cells(matrix: OperatorMatrix, found: NodeSets) -> Iterator[Cells]:
     told = found.told and not any(len(other.which) for other in others.values())
     yield Cells(blocks, told)
     for kind, other in others.items():
-        if kind.corners == 4 and kind.degree == 1 and len(blocks[kind]) <= _FEW:
+        if kind.corners == 4 and kind.degree == 1 and len(blocks[kind]) <= SAMPLE:
             doubtful = np.argsort(-other.likeness, kind="stable")[:_DOUBTFUL]
             for turned in product((False, True), repeat=len(doubtful)):
                 if any(turned):

@@ -11,17 +11,16 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..budget import AT_ONCE, LARGE, SAMPLE
 from ..elements.cliques import Graph, simplices
 from ..matrix import OperatorMatrix
 from ..tolerances import ROUNDED
 from ..topology.keys import contains, distinct, pair_keys
 
-_AT_ONCE = 10_000_000  # products in one go
 _ABSENT = {4: 0, 6: 3, 8: 4, 9: 6, 10: 9}
 """Pairs that a cell of so many nodes may lack, because the entry vanishes and is not stored."""
 
 _DENSEST = 10  # entries above the diagonal, of a row in the mean: cubic triangles and biquadratic cells have eight
-_MANY, _SAMPLE = 10_000, 1_000  # pairs, and of more than so many the sample that must hold a cell
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +68,7 @@ class Common:
         closed = self.closed
         work = np.cumsum(closed @ np.diff(closed.indptr).astype(np.int64))
         found = []
-        for rows in np.split(np.arange(self.n), np.searchsorted(work, np.arange(_AT_ONCE, work[-1], _AT_ONCE))):
+        for rows in np.split(np.arange(self.n), np.searchsorted(work, np.arange(AT_ONCE, work[-1], AT_ONCE))):
             block = closed[rows]
             common = sp.csr_array((block @ closed).multiply(block))
             common.sort_indices()
@@ -80,7 +79,7 @@ class Common:
     def sets(self, k: int) -> NDArray[np.int64]:
         """(m, k) rows that two of them have in common, nearly all coupled to each other."""
         keys = self.keys[self.count == k]
-        if len(keys) > _MANY and not len(self._in_common(keys[:: len(keys) // _SAMPLE], k)):
+        if len(keys) > LARGE and not len(self._in_common(keys[:: len(keys) // SAMPLE], k)):
             return np.empty((0, k), np.int64)
         return once(self._in_common(keys, k))
 

@@ -15,9 +15,6 @@ from ..tolerances import CERTIFIED
 
 Plain = Callable[..., PlanarMesh]
 
-ALIKE = 1e-6
-"""Relative difference up to which, at first sight, row sums are areas and entries those of a Laplacian."""
-
 
 @dataclass(frozen=True, eq=False)
 class Held:

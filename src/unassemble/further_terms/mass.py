@@ -15,9 +15,9 @@ from ..clock import Clock
 from ..matrix import OperatorMatrix
 from ..reaction import MetricFit, Skeleton, areas_of_mass, fit_metric
 from ..recovery import PlanarMesh
-from ..tolerances import CERTIFIED
+from ..tolerances import ALIKE, CERTIFIED
 from ..topology import Topology
-from .again import ALIKE, Held, Plain, areas_of
+from .again import Held, Plain, areas_of
 from .row_sums import RowSums
 
 _HOLES = 8

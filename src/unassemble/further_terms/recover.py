@@ -12,8 +12,9 @@ from ..planar.conformal import conformal_map
 from ..planar.cotangent import edge_weights
 from ..reaction import Skeleton
 from ..recovery import PlanarMesh
+from ..tolerances import ALIKE
 from ..topology import Topology, surfaces
-from .again import ALIKE, Held, Plain
+from .again import Held, Plain
 from .mass import mass_alone, with_consistent_mass, with_lumped_mass
 from .row_sums import RowSums
 from .scaling import unscaled

@@ -16,15 +16,11 @@ from numpy.typing import NDArray
 from ..certify import Terms
 from ..clock import Clock
 from ..linalg import UpperTriangle, factorisation
+from ..linalg.definite import STEPS
 from ..matrix import OperatorMatrix
 from ..recovery import PlanarMesh
-from ..tolerances import SUMMED
+from ..tolerances import LAST_DIGITS, SUMMED
 from .again import Held, Plain
-
-_SHIFT = 1e-14
-"""Of the matrix with diagonal 1, against a pivot that is zero."""
-_STEPS = 4
-"""Inverse iterations; each gains the ratio of the shift to the next eigenvalue."""
 
 
 def unscaled(held: Held, plain: Plain, clock: Clock) -> PlanarMesh | None:
@@ -51,12 +47,12 @@ def positive_null_vector(matrix: OperatorMatrix) -> NDArray[np.float64] | None:
         return None
     unit = 1 / np.sqrt(np.abs(matrix.diagonal))
     scaled = sp.csr_array(sp.diags_array(unit) @ (sign[0] * matrix.csr()) @ sp.diags_array(unit))
-    shifted = UpperTriangle.of(sp.csr_array(scaled + _SHIFT * sp.eye_array(matrix.n)))
+    shifted = UpperTriangle.of(sp.csr_array(scaled + LAST_DIGITS * sp.eye_array(matrix.n)))
     factor = factorisation(shifted)
     try:
         factor.factorise(shifted)
         x = np.ones(matrix.n)
-        for _ in range(_STEPS):
+        for _ in range(STEPS + 1):
             x = factor.solve(x)
             x = x / np.abs(x).max()
     finally:

@@ -41,14 +41,12 @@ def perhaps_planar(surface: Surface) -> bool:
     inside = surface.curvature.copy()
     inside[surface.boundary] = 0  # boundaries bend as they like
     bent = float(inside[surface.triangles].sum(axis=1).max())
-    return could_be_planar(surface) or bent > (_BENT if surface.loops.all() else _CLOSED)
+    return could_be_planar(surface) or bent > _BENT[0 if surface.loops.all() else 1]
 
 
-# Radians at the corners of a triangle that is none.
-_BENT = 1.5  # 2.2 to 3.8 in the place of a hole
-_CLOSED = (
-    8.0  # 14.5 in the place of the outside, where all of the 4 pi have to be; at most 4.2 on other closed surfaces
-)
+# Radians at the corners of a triangle that is none: 2.2 to 3.8 in the place of a hole; 14.5 in that of the outside,
+# which has to hold all 4 pi, where on other closed surfaces at most 4.2 was seen.
+_BENT = (1.5, 8.0)
 
 
 def flattened(surface: Surface, planar: PlanarMesh) -> Surface:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 # d(u_1 + u_2 - u_0)/du and so on: sums that are four areas times the cotangents.
-SIGNS = np.array([[-1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, -1.0]])
+SIGNS = np.array([[-1, 1, 1], [1, -1, 1], [1, 1, -1]], dtype=np.float64)
 
 
 def heron(sides: NDArray) -> NDArray[np.float64]:

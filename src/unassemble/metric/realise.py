@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,12 +15,27 @@ from ..linalg import UpperTriangle, factorisation
 from ..recovery import Surface
 from ..tolerances import CERTIFIED
 
-_STARTS = 4
-_STEPS = 80
-_LANDMARKS = 60
+
+@dataclass(frozen=True)
+class RealisationOptions:
+    """How coordinates are looked for.
+
+    Attributes
+    ----------
+    steps : int
+        Of Levenberg's and Marquardt's method from each start, at most.
+    landmarks : int
+        Vertices whose distances to all others make the starts.
+    """
+
+    steps: int = 80
+    landmarks: int = 60
 
 
-def realised(surface: Surface, clock: Clock, starts: int = _STARTS) -> Surface:
+_OPTIONS = RealisationOptions()
+
+
+def realised(surface: Surface, clock: Clock, starts: int = 4) -> Surface:
     """The surface with coordinates that minimise the misfit of squared edge lengths, and with what is left of it.
 
     Lengths do not determine a shape: surfaces that are open mostly bend, and those that do not may have several shapes,
@@ -75,7 +90,7 @@ def _starts(n: int, edges: NDArray, lengths: NDArray, count: int) -> list[NDArra
     marks = [0]
     far = np.full(n, np.inf)
     distances = []
-    for _ in range(min(n, _LANDMARKS)):
+    for _ in range(min(n, _OPTIONS.landmarks)):
         distances.append(csgraph.dijkstra(graph, directed=False, indices=marks[-1]))
         far = np.minimum(far, distances[-1])
         marks.append(int(np.argmax(far)))
@@ -107,7 +122,7 @@ def _fitted(start: NDArray, edges: NDArray, lengths: NDArray) -> NDArray[np.floa
         return side / lengths[:, None], ((side**2).sum(axis=1) - lengths**2) / (2 * lengths)
 
     side, left = residual(x)
-    for _ in range(_STEPS):
+    for _ in range(_OPTIONS.steps):
         jacobian = sp.csr_array((np.hstack([side, -side]).ravel(), (rows, columns)), shape=(len(edges), x.size))
         normal = UpperTriangle.of(sp.csr_array(jacobian.T @ jacobian))
         data = normal.data.copy()

@@ -7,6 +7,7 @@ from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from ..certify_metric import MetricCertificate, certify_metric
 from ..clock import Clock
@@ -183,7 +184,7 @@ def _with_noise(found: _Found, kept: str, fits: str, sigma: float, scale: float 
     if scale is not None:
         error = [sigma * scale_deviation(found.squared[rows], place) for rows, place in found.mesh.pieces()]
         off = float((np.abs(found.scale - scale) / error).max())
-        if off <= _OFF:
+        if 2 * ndtr(-off) >= CONFIDENCE:
             return _Verdict("certified", kept, f"{fits}; the scale is the given one up to noise")
         return _Verdict("uncertified", kept, f"the entries tell another scale, off by {off:.1f} standard deviations")
     test = found.sums or {}
@@ -192,7 +193,6 @@ def _with_noise(found: _Found, kept: str, fits: str, sigma: float, scale: float 
     return _Verdict("uncertified", kept, "rows do not sum to zero, by more than noise, and no entries are to spare")
 
 
-_OFF = 3.3  # standard deviations: one right scale in a thousand is refused
 _SUMS = {
     "zero": "rows sum to zero",
     "constant": "rows sum to one number",

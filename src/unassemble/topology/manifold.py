@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import csgraph
 
+from ..budget import SAMPLE
 from ..errors import TopologyError
 from ..words import count_of
 from .cycles import lookup, three_cycles
 
 # The program has a few 3-cycles for each neck, and solids of tetrahedra most of theirs.
 _SHARE = 0.5
-_FEW = 1000
 _LEAST = 5  # triangles at the edges of a neck: two each, but for one edge that may be on the boundary
 
 
@@ -159,7 +159,7 @@ def _forced(cycles: Cycles) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
             break
         chosen |= new
         open_ &= ~(new | gone)
-    if open_.sum() > _FEW + _SHARE * len(open_):
+    if open_.sum() > SAMPLE + _SHARE * len(open_):
         raise _crowded(cycles, int(np.argmax(cycles.at_edges(open_))))
     return chosen, open_
 

@@ -12,6 +12,8 @@ one Newton step for each t, q falling with t. The path commits itself to whole l
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -20,15 +22,38 @@ from ...errors import RecoveryError
 from ...linalg import solved
 from .sheet import Placed, Sheet, unpinned
 
-_HELD = 1e-9  # keeps the problem definite where labels of zero leave vertices free
-_NEAREST = 0.1  # of the way to 0 or 1 that one step leaves
-_NEAR = 0.95  # strength of the first labels
-_FIRST, _LAST, _FACTOR = 0.3, 1e-3, 0.75  # barriers t, and the ratio of one to the one before
-_SLACK = 0.03  # q at the first barrier
-_OUTLIER = 0.3  # misfit beyond which an edge counts by its misfit, not by the square
+
+@dataclass(frozen=True)
+class PathOptions:
+    """The path of the barrier.
+
+    Attributes
+    ----------
+    first, last, factor : float
+        Barriers t, and the ratio of one to the one before.
+    slack : float
+        q at the first barrier.
+    near : float
+        Strength of the first labels.
+    nearest : float
+        Of the way to 0 or 1 that one step leaves.
+    outlier : float
+        Misfit beyond which an edge counts by its misfit, not by the square.
+    held : float
+        Keeps the problem definite where labels of zero leave vertices free.
+    """
+
+    first: float = 0.3
+    last: float = 1e-3
+    factor: float = 0.75
+    slack: float = 0.03
+    near: float = 0.95
+    nearest: float = 0.1
+    outlier: float = 0.3
+    held: float = 1e-9
 
 
-def relaxed(sheet: Sheet, free: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
+def relaxed(sheet: Sheet, free: NDArray[np.bool_], options: PathOptions | None = None) -> NDArray[np.bool_] | None:
     """Whole labels at the end of a path that begins with all chosen candidates as cells.
 
     Parameters
@@ -36,27 +61,29 @@ def relaxed(sheet: Sheet, free: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
     sheet : Sheet
     free : (k,) bool
         Which of the chosen candidates may be holes; the others are known cells.
+    options : PathOptions, optional
 
     Returns
     -------
     (cells,) bool or None
         None where there is no conformal map on the way, or an equation is singular.
     """
+    options = options or PathOptions()
     strength = np.zeros(sheet.candidates.count)
-    strength[sheet.chosen] = np.where(free, _NEAR, 1.0)
-    changing, t, placed = np.flatnonzero(sheet.chosen)[free], _FIRST, None
+    strength[sheet.chosen] = np.where(free, options.near, 1.0)
+    changing, t, placed = np.flatnonzero(sheet.chosen)[free], options.first, None
     try:
-        while t > _LAST:
+        while t > options.last:
             placed = sheet.mapped(strength, placed)
-            strength[changing] = _step(sheet, placed, strength, free, t)
-            t *= _FACTOR
+            strength[changing] = _step(sheet, placed, strength, free, t, options)
+            t *= options.factor
     except RecoveryError:
         return None
     return strength > 0.5
 
 
 def _step(
-    sheet: Sheet, placed: Placed, strength: NDArray, may_change: NDArray[np.bool_], t: float
+    sheet: Sheet, placed: Placed, strength: NDArray, may_change: NDArray[np.bool_], t: float, options: PathOptions
 ) -> NDArray[np.float64]:
     """New strengths of the candidates that may change."""
     s = strength[sheet.chosen][may_change]
@@ -66,13 +93,13 @@ def _step(
     columns = sp.hstack(
         [by_position[:, free], by_label[:, np.flatnonzero(may_change)], sp.csr_array(by_scale[:, None])]
     )
-    misfit, slack = sheet.misfit(placed, strength), _SLACK * t / _FIRST
+    misfit, slack = sheet.misfit(placed, strength), options.slack * t / options.first
     with np.errstate(divide="ignore"):
-        weighted = columns.T @ sp.diags_array(np.minimum(_OUTLIER / np.abs(misfit), 1.0) / slack)
-    held = np.full(moving + k + 1, _HELD / slack)
+        weighted = columns.T @ sp.diags_array(np.minimum(options.outlier / np.abs(misfit), 1.0) / slack)
+    held = np.full(moving + k + 1, options.held / slack)
     held[-1] += 0.0 if sheet.free_scale else 1.0
     held[moving : moving + k] = t / s**2 + t / (1 - s) ** 2
     rhs = weighted @ misfit
     rhs[moving : moving + k] += 1.0 + t / s - t / (1 - s)  # labels are drawn to 1
     step = solved((weighted @ columns + sp.diags_array(held)).tocsr(), rhs)
-    return np.clip(s + step[moving : moving + k], _NEAREST * s, 1 - _NEAREST * (1 - s))
+    return np.clip(s + step[moving : moving + k], options.nearest * s, 1 - options.nearest * (1 - s))
