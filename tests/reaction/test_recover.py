@@ -241,3 +241,20 @@ def test_a_hole_of_three_edges_is_no_triangle():
     assert found.certified
     assert triangle_set(found.triangles) == triangle_set(cells)
     assert largest_error(found.points, true) < 1e-9
+
+
+def test_scaled_unknowns_of_a_mesh_whose_sides_have_vanished():
+    """Of right triangles zeros are not stored, and the graph does not show the cells."""
+    basis = Basis(MeshTri().refined(3), ElementTriP1())
+    stiffness = sp.csr_array(BilinearForm(lambda u, v, w: dot(grad(u), grad(v))).assemble(basis))
+    stiffness.data[np.abs(stiffness.data) < 1e-14] = 0
+    stiffness.eliminate_zeros()
+    place = np.random.default_rng(0).permutation(stiffness.shape[0])
+    scaling = sp.diags_array(stiffness.diagonal() ** -0.5)
+    found = recover(sp.csr_array(scaling @ stiffness @ scaling)[place][:, place])
+    assert found.certified, found.reason
+    assert largest_error(found.points, basis.mesh.p.T[place]) < 1e-11
+    np.testing.assert_allclose(
+        found.row_scaling * np.sqrt(stiffness.diagonal()[place]),
+        found.row_scaling[0] * np.sqrt(stiffness.diagonal()[place[0]]),
+    )

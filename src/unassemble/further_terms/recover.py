@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..clock import Clock
@@ -41,25 +43,29 @@ def recover_with_terms(
         return plain(matrix)
     with clock("topology"):
         topology = surfaces(matrix.n, matrix.edges)
+    held = Held(matrix, tensor)
     if not topology.pieces or len(topology.bare_edges) or not topology.multiplicity.all():
-        return plain(matrix)
+        # Sides of cells have vanished, or this is no mesh: scaled or not shows by itself.
+        return (None if sums.sign else _or_none(lambda: unscaled(held, plain, clock))) or plain(matrix)
     with clock("conformal"):
         laplacian = _is_laplacian(matrix, topology)
-    held = Held(matrix, tensor)
     if laplacian:
         found = plain(matrix)
         return with_lumped_mass(held, found, sums) if sums.sign else found
-    try:
-        if sums.sign:
-            skeleton = Skeleton.of(matrix.n, matrix.edges, topology.pieces)
-            found_or_none = mass_alone(held, topology, skeleton, sums) or with_consistent_mass(
-                held, skeleton, sums, plain, clock
-            )
-        else:
-            found_or_none = unscaled(held, plain, clock)
-    except RecoveryError:
-        found_or_none = None
+    if not sums.sign:
+        return _or_none(lambda: unscaled(held, plain, clock)) or plain(matrix)
+    skeleton = Skeleton.of(matrix.n, matrix.edges, topology.pieces)
+    found_or_none = _or_none(
+        lambda: mass_alone(held, topology, skeleton, sums) or with_consistent_mass(held, skeleton, sums, plain, clock)
+    )
     return found_or_none or plain(matrix)
+
+
+def _or_none(reading: Callable[[], PlanarMesh | None]) -> PlanarMesh | None:
+    try:
+        return reading()
+    except RecoveryError:
+        return None
 
 
 def _is_laplacian(matrix: OperatorMatrix, topology: Topology) -> bool:
