@@ -33,7 +33,7 @@ from click.testing import CliRunner
 from hostile_inputs import KINDS, Given, Piece, pieces_of
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
-from skfem.models import laplace
+from skfem.models import laplace, mass
 
 from unassemble import ConformingMesh, InputError, RecoveryError, recover
 from unassemble.cli import main as command_line
@@ -124,6 +124,22 @@ def assembled_on(mesh, element, rows: NDArray, found) -> sp.csr_array:
     return sp.coo_array((part.data, (place[part.row], place[part.col])), shape=2 * (found.n_points,)).tocsr()
 
 
+def areas_give_back(found, matrix: sp.csr_array) -> bool:
+    """Whether triangles of these areas add up to a mass matrix, off the diagonal."""
+    i, j = np.concatenate([found.triangles[:, [a, b]] for a in range(3) for b in range(3) if a != b]).T
+    total = sp.csr_array((np.tile(found.areas / 12, 6), (i, j)), shape=matrix.shape)
+    difference = abs(matrix - sp.diags_array(matrix.diagonal()) - total)
+    return bool(difference.max() <= MISFIT * abs(matrix).max())
+
+
+def masses(found) -> sp.csr_array:
+    """The mass matrix of linear triangles, from scikit-fem."""
+    rows, corners = np.unique(found.divided()[0], return_inverse=True)
+    mesh = skfem.MeshTri(found.points[rows].T.copy(), corners.reshape(-1, 3).T.copy())
+    part = sp.coo_array(mass.assemble(skfem.Basis(mesh, skfem.ElementTriP1())))
+    return sp.coo_array((part.data, (rows[part.row], rows[part.col])), shape=2 * (found.n_points,)).tocsr()
+
+
 def judged(given: Given) -> str:
     """What comes of one input."""
     if given.name:
@@ -139,6 +155,17 @@ def judged(given: Given) -> str:
     if not hasattr(found, "divided"):  # bodies and structures
         return "right" if right else "WRONG"
     matrix = sp.csr_array(given.matrix)
+    if found.areas is not None:
+        return "right" if areas_give_back(found, matrix) else "WRONG"
+    if len(found.eliminated_points):  # the triangles beyond are not in the answer, so that nothing can be assembled
+        return "right" if right else "ambiguous" if found.uniqueness == "ambiguous" else "WRONG"
+    if found.row_scaling is not None:
+        back = sp.diags_array(1 / found.row_scaling)
+        matrix = sp.csr_array(back @ matrix @ back)
+    if (found.node_status == 2).any():  # plausible points are not claimed, and entries beside them are not whole
+        return "right" if right or given.pieces is None else "WRONG"
+    if found.reaction and not gives_back(found, matrix):  # else it is lumped
+        matrix = sp.csr_array(matrix - found.reaction * masses(found))
     if not gives_back(found, matrix):
         return "WRONG"
     if right or given.pieces is None or not given.intact:
