@@ -218,7 +218,7 @@ def strange(rng) -> Given:
         lambda: sp.coo_array(values.astype(float)),
         lambda: np.ones(rng.integers(0, 3, rng.integers(4))),
         lambda: rng.choice([None, 3, "", "no such file", "-x"]),
-        lambda: sp.diags_array([1.0, -4, -4, 1], offsets=[-2, -1, 1, 2], shape=(n, n)),
+        lambda: sp.diags_array([1.0, -4, -4, 1], offsets=[-2, -1, 1, 2], shape=(n + 2, n + 2)),
     ]
     return Given(makers[rng.integers(len(makers))]())
 

@@ -159,7 +159,7 @@ def _forced(cycles: Cycles) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
             break
         chosen |= new
         open_ &= ~(new | gone)
-    if open_.sum() > SAMPLE + _SHARE * len(open_):
+    if open_.sum() > SAMPLE // 20 + _SHARE * len(open_):
         raise _crowded(cycles, int(np.argmax(cycles.at_edges(open_))))
     return chosen, open_
 
