@@ -1,4 +1,4 @@
-"""Section 13 of the theory: the form M of any conforming element, on matrices that scikit-fem assembled."""
+"""Section 14 of the theory: the form M of any conforming element, on matrices that scikit-fem assembled."""
 
 import numpy as np
 import pytest
