@@ -191,18 +191,23 @@ class _Task:
                 return judged(self._as_scalar(self.matrix, self.frame.anchors), self.matrix)
             except RecoveryError as error:
                 raise explained(error, self.matrix) from error
-        if self._readings.crowded:
-            # Unknowns of one node overlap in more rows than nodes of scalar elements do: this takes no time from them.
-            with suppress(InputError, RecoveryError):  # options may be for vector-valued matrices only
-                found = self._readings.other_elements(self._placement(self.matrix, self.frame.anchors))
-                if found is not None and found.certified:
-                    return found
+        # Unknowns of one node overlap in more rows than nodes of scalar elements do: this takes no time from them.
+        with suppress(InputError, RecoveryError):  # options may be for vector-valued matrices only
+            found = self._readings.other_elements if self._readings.crowded else None
+            if found is not None and found.certified:
+                return found
         at_sight = vector_valued(self.matrix)
         return self._first_that_fits() if at_sight is None else self._as_vector(at_sight)
 
     @cached_property
     def _readings(self) -> ScalarReadings:
-        return ScalarReadings(self.matrix, self.clock, self.planar)
+        return self._readings_of(self.matrix, self.frame.anchors)
+
+    def _readings_of(self, part: OperatorMatrix, anchors: Sequence[Any]) -> ScalarReadings:
+        frame = self.frame
+        self._check_scale(part)
+        placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
+        return ScalarReadings(part, placement, self.clock, self.planar)
 
     def _first_that_fits(self) -> Recovery:
         """A planar mesh; or a surface in space; or nodes of several unknowns where no rows, or fewer, belong to these.
@@ -241,16 +246,9 @@ class _Task:
         except (RecoveryError, InputError):  # options may be for scalar matrices only
             return None
 
-    def _placement(self, part: OperatorMatrix, anchors: Sequence[Any]) -> Placement:
-        frame = self.frame
-        self._check_scale(part)
-        return Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
-
     def _as_scalar(self, part: OperatorMatrix, anchors: Sequence[Any]) -> PlanarMesh:
-        placement = self._placement(part, anchors)
-        whole = part is self.matrix
-        readings = self._readings if whole else ScalarReadings(part, self.clock, self.planar)
-        return readings.likeliest(placement)
+        whole = part is self.matrix and anchors is self.frame.anchors
+        return (self._readings if whole else self._readings_of(part, anchors)).likeliest()
 
     def _as_surface(self) -> Surface:
         """A surface in space, with coordinates on demand; a flat one with those of the planar mesh that it is."""

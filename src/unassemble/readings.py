@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,30 +30,26 @@ class ScalarReadings:
     """
 
     matrix: OperatorMatrix
+    placement: Placement
     clock: Clock
     options: ScalarOptions
-    _kept: dict[str, PlanarMesh | None] = field(default_factory=dict)  # what was read before, for one placement
 
     @property
     def crowded(self) -> bool:
         """Whether the graph has more edges than a planar one can have."""
         return len(self.matrix.edges) > 3 * self.matrix.n
 
-    def other_elements(self, placement: Placement) -> PlanarMesh | None:
-        """A mesh of other elements than linear triangles; None where none is near.
+    @cached_property
+    def other_elements(self) -> PlanarMesh | None:
+        """A mesh of other elements than linear triangles; None where no cells show, or none is near."""
+        cells = shown_cells(self.matrix)
+        try:
+            found = recover_conforming(self.matrix, cells, self.placement, self.clock, self.options)
+        except RecoveryError:
+            return None
+        return found if found.certified or found.backward_error < LITTLE else None
 
-        Raises
-        ------
-        RecoveryError
-            If no cells show.
-        """
-        if "found" not in self._kept:
-            cells = shown_cells(self.matrix)
-            found = recover_conforming(self.matrix, cells, placement, self.clock, self.options)
-            self._kept["found"] = found if found.certified or found.backward_error < LITTLE else None
-        return self._kept["found"]
-
-    def likeliest(self, placement: Placement) -> PlanarMesh:
+    def likeliest(self) -> PlanarMesh:
         """The mesh of the first reading that fits, or else of the first that comes near.
 
         Raises
@@ -60,18 +58,18 @@ class ScalarReadings:
             If there is none.
         """
         if self.options.method != "conformal":
-            return self._plain(placement, self.matrix)
-        order = [(0, self._lattice)]
+            return self._plain(self.matrix)
+        order: list[tuple[int, Callable[[], PlanarMesh | None]]] = [(0, self._lattice)]
         replaced, incomplete = self.matrix.replaced is not None, self.matrix.incomplete_rows.any()
         if replaced or not self.matrix.adds_up.all():  # else nothing was taken out
             order.append((1 if replaced or incomplete else 3, self._partial))
         if not replaced:
-            order += [(1 if self.crowded else 3, self.other_elements), (2, self._linear)]
+            order += [(1 if self.crowded else 3, lambda: self.other_elements), (2, self._linear)]
         nearest: PlanarMesh | None = None
         failure: RecoveryError | None = None
         for _, reading in sorted(order, key=lambda one: one[0]):
             try:
-                found = reading(placement)
+                found = reading()
             except RecoveryError as error:
                 failure = error if reading == self._linear else failure or error
                 continue
@@ -84,24 +82,16 @@ class ScalarReadings:
             )
         return nearest
 
-    def _lattice(self, placement: Placement) -> PlanarMesh | None:
-        return recover_lattice(self.matrix, placement, self.clock, self.options)
+    def _lattice(self) -> PlanarMesh | None:
+        return recover_lattice(self.matrix, self.placement, self.clock, self.options)
 
-    def _partial(self, placement: Placement) -> PlanarMesh | None:
+    def _partial(self) -> PlanarMesh | None:
         matrix = with_boundary_edges(self.matrix)
         whole = None if matrix.replaced is None else np.asarray(~matrix.replaced[matrix.edges].all(axis=1))
-        return recover_partial(matrix, whole, placement, self.clock, self.options)
+        return recover_partial(matrix, whole, self.placement, self.clock, self.options)
 
-    def _linear(self, placement: Placement) -> PlanarMesh:
-        def plain(matrix: OperatorMatrix, squared_lengths: NDArray | None = None) -> PlanarMesh:
-            return self._plain(placement, matrix, squared_lengths)
+    def _linear(self) -> PlanarMesh:
+        return recover_with_terms(self.matrix, self._plain, self.clock, self.placement.coefficients)
 
-        tensor = placement.tensor
-        return recover_with_terms(
-            self.matrix, plain, self.clock, (tensor.kxx, tensor.kxy, tensor.kyy) if tensor else None
-        )
-
-    def _plain(
-        self, placement: Placement, matrix: OperatorMatrix, squared_lengths: NDArray | None = None
-    ) -> PlanarMesh:
-        return recover_scalar(matrix, placement, self.clock, self.options, squared_lengths)
+    def _plain(self, matrix: OperatorMatrix, squared_lengths: NDArray | None = None) -> PlanarMesh:
+        return recover_scalar(matrix, self.placement, self.clock, self.options, squared_lengths)

@@ -31,7 +31,7 @@ def test_positions_that_are_no_mesh(monkeypatch, why, refine):
     monkeypatch.setattr(where, name, spoilt)
     if not refine:
         monkeypatch.setattr(solving, "in_doubt", lambda _, topology, *args: np.zeros(len(topology.pieces), dtype=bool))
-    monkeypatch.setattr(ScalarReadings, "other_elements", lambda *_: None)  # which would have another way to positions
+    monkeypatch.setattr(ScalarReadings, "other_elements", None)  # which would have another way to positions
     with pytest.raises(GeometryError, match=why):
         recover(KNOWN.matrix, refine=refine)
 

@@ -14,7 +14,7 @@ from ..scalar.joined import JoinedMesh
 from ..scalar.notes import vanished_notes
 from ..scalar.placement import Placement
 from ..tolerances import CERTIFIED
-from ..topology import Polygons, Topology
+from ..topology import Topology
 from ..topology.keys import with_sides
 from ..topology.pieces import planar_pieces
 from ..words import count_of
@@ -50,21 +50,13 @@ def recover_lattice(
     with clock("certify"):
         points = np.concatenate([mesh.points, gone])
         triangles = _upright(points, _divided(lattice.cells))
-        known = (tensor.kxx, tensor.kxy, tensor.kyy) if tensor else None
-        witness = Witness.of(matrix, points, triangles, float(mesh.scale[0]), lattice.shift, known)
+        witness = Witness.of(matrix, points, triangles, float(mesh.scale[0]), lattice.shift, placement.coefficients)
     if not witness.backward_error <= CERTIFIED:
         return None
-    polygons = Polygons.none() if options.triangulate else mesh.polygons
     return PlanarMesh(
+        **mesh.fields(triangulate=options.triangulate),
         points=mesh.points,
-        triangles=mesh.triangles if options.triangulate else mesh.triangles[~mesh.in_polygon],
-        component=mesh.component,
         hinges=topology.hinges,
-        scale=mesh.scale,
-        polygons_offsets=polygons.offsets,
-        polygons_data=polygons.vertices,
-        boundary=mesh.boundary,
-        boundary_offsets=mesh.boundary_offsets,
         node_status=np.zeros(matrix.n, np.int8),
         status="certified",
         uniqueness="ambiguous",
@@ -72,7 +64,7 @@ def recover_lattice(
             f"the lattice, continued by {count_of(len(gone), 'vertex that has', 'vertices that have')} no row, gives "
             f"the matrix back to {witness.backward_error:.1e}, row sums included"
         ),
-        operator="anisotropic laplacian" if tensor else "laplacian",
+        operator=placement.operator,
         backward_error=witness.backward_error,
         n_holes=topology.n_holes,
         timings=clock.timings,

@@ -162,10 +162,11 @@ class _Judged:
     @classmethod
     def of(cls, matrix: OperatorMatrix, placed: _Placed, placement: Placement, *, known_scale: bool) -> _Judged:
         """Assembled again from points and triangles."""
-        mesh, tensor = placed.mesh, placement.tensor
-        known = (tensor.kxx, tensor.kxy, tensor.kyy) if tensor else None
+        mesh = placed.mesh
         factor = mesh.scale[mesh.triangle_piece]
-        found = certify(matrix.edges, matrix.entries, np.nan_to_num(mesh.points), mesh.triangles, factor, known)
+        found = certify(
+            matrix.edges, matrix.entries, np.nan_to_num(mesh.points), mesh.triangles, factor, placement.coefficients
+        )
         rows, spare = [], []
         for piece, inside in zip(placed.topology.pieces, placed.meshes, strict=True):
             if inside.determined.any():
@@ -198,13 +199,9 @@ def _report(
             "that were taken out, or that other terms share, entries do not determine them"
         )
     return PlanarMesh(
+        **mesh.fields(),
         points=mesh.points,
-        triangles=mesh.triangles,
-        component=mesh.component,
         hinges=topology.hinges,
-        scale=mesh.scale,
-        boundary=mesh.boundary,
-        boundary_offsets=mesh.boundary_offsets,
         node_status=placed.status,
         status="certified",
         uniqueness="searched",
@@ -212,7 +209,7 @@ def _report(
             f"{known:,} of {matrix.n:,} points are determined by {judged.entries:,} whole entries, which the operator "
             f"re-assembled on them gives back to {judged.backward_error:.1e}"
         ),
-        operator="anisotropic laplacian" if placement.tensor else "laplacian",
+        operator=placement.operator,
         backward_error=judged.backward_error,
         n_holes=topology.n_holes,
         timings=clock.timings,

@@ -143,7 +143,7 @@ def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -
         status=found.status,
         uniqueness=found.uniqueness,
         reason=found.reason,
-        operator="anisotropic laplacian" if task.placement.tensor else "laplacian",
+        operator=task.placement.operator,
         backward_error=certificate.backward_error,
         n_holes=sum(part.n_holes for part in parts),
         timings=clock.timings,

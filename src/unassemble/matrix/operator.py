@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -52,7 +53,7 @@ class OperatorMatrix:
         """(n,) largest absolute off-diagonal entry of each row."""
         return row_sizes(self.n, self.edges, np.abs(self.entries))
 
-    @property
+    @cached_property
     def adds_up(self) -> NDArray[np.bool_]:
         """(n,) rows that add up to zero, as those of a Laplacian do."""
         size, sums = np.abs(self.diagonal), self.diagonal.copy()

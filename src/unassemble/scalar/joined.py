@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,19 @@ class JoinedMesh:
     scale: NDArray[np.float64]
     boundary: NDArray[np.int64]
     boundary_offsets: NDArray[np.int64]
+
+    def fields(self, *, triangulate: bool = False) -> dict[str, Any]:
+        """What every planar mesh's recovery says of cells, pieces and boundary; polygons in triangles on request."""
+        polygons = Polygons.none() if triangulate else self.polygons
+        return {
+            "triangles": self.triangles if triangulate else self.triangles[~self.in_polygon],
+            "component": self.component,
+            "scale": self.scale,
+            "polygons_offsets": polygons.offsets,
+            "polygons_data": polygons.vertices,
+            "boundary": self.boundary,
+            "boundary_offsets": self.boundary_offsets,
+        }
 
     @classmethod
     def of(cls, topology: Topology, placed: list[NDArray], scale: NDArray) -> JoinedMesh:

@@ -67,6 +67,16 @@ class Placement:
     direction: Direction | None = None
     handed: str | None = None
 
+    @property
+    def coefficients(self) -> tuple[float, float, float] | None:
+        """(kxx, kxy, kyy) of the tensor, as the certificate takes them; None where there is none."""
+        return (self.tensor.kxx, self.tensor.kxy, self.tensor.kyy) if self.tensor else None
+
+    @property
+    def operator(self) -> str:
+        """The operator's name."""
+        return "anisotropic laplacian" if self.tensor else "laplacian"
+
     @classmethod
     def checked(
         cls,

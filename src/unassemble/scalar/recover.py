@@ -157,14 +157,14 @@ def _sizes(solved: Solved, squared_lengths: NDArray) -> NDArray[np.float64]:
 
 def _held_against(stored: OperatorMatrix, solved: Solved, mesh: JoinedMesh, points: NDArray, task: Task) -> Held:
     """The certificate of a mesh with these points, and the test against noise."""
-    tensor, noise = task.placement.tensor, solved.noise
+    noise = solved.noise
     certificate = certify(
         stored.edges,
         stored.entries,
         points,
         mesh.triangles,
         mesh.scale[mesh.triangle_piece],
-        (tensor.kxx, tensor.kxy, tensor.kyy) if tensor else None,
+        task.placement.coefficients,
     )
     if noise is None:
         return Held(certificate, None)
@@ -216,23 +216,16 @@ def _report(
         notes += origin_notes(findings.stored, evidence.suspects)
     if found.uniqueness == "searched" and np.bincount(components_of(findings.stored)).max() > SEARCHED_ROWS:
         notes.append(f"other meshes were looked for in connected parts of up to {SEARCHED_ROWS:,} rows only")
-    polygons = Polygons.none() if options.triangulate else mesh.polygons
     return PlanarMesh(
+        **mesh.fields(triangulate=options.triangulate),
         points=placed.points,
-        triangles=mesh.triangles if options.triangulate else mesh.triangles[~mesh.in_polygon],
-        component=mesh.component,
         hinges=topology.hinges,
-        scale=mesh.scale,
-        polygons_offsets=polygons.offsets,
-        polygons_data=polygons.vertices,
-        boundary=mesh.boundary,
-        boundary_offsets=mesh.boundary_offsets,
         node_status=(topology.multiplicity == 0).astype(np.int8),
         status=found.status,
         uniqueness=found.uniqueness,
         reason=found.reason.text,
         advice=found.reason.advice,
-        operator="anisotropic laplacian" if task.placement.tensor else "laplacian",
+        operator=task.placement.operator,
         backward_error=held.certificate.backward_error,
         n_holes=topology.n_holes,
         timings=clock.timings,
