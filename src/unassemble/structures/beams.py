@@ -28,6 +28,7 @@ from ..words import count_of
 from .layouts import PLANE
 from .placed import covered
 from .recognise import StructuralNumbering
+from .straight import entries_at
 
 MOST = 5  # entries of a bending row off the diagonal: four of the neighbours, one of its own node
 
@@ -250,8 +251,8 @@ def _held_against(matrix: sp.csr_array, beam: Beam, x: NDArray[np.float64]) -> t
     length = x[j] - x[i]
     both = (row_of[i] >= 0).all(axis=1) & (row_of[j] >= 0).all(axis=1)
     stiffness = np.zeros(len(length))
-    stiffness[both] = -_entries(matrix, row_of[i[both], 0], row_of[j[both], 0]) / 12
-    stiffness[~both] = _entries(matrix, row_of[i[~both], 1], row_of[j[~both], 1]) / (2 * length[~both] ** 2)
+    stiffness[both] = -entries_at(matrix, row_of[i[both], 0], row_of[j[both], 0]) / 12
+    stiffness[~both] = entries_at(matrix, row_of[i[~both], 1], row_of[j[~both], 1]) / (2 * length[~both] ** 2)
     one, left = np.ones_like(length), length
     block = np.stack([12 * one, 6 * left, -12 * one, 6 * left,
                       6 * left, 4 * left**2, -6 * left, 2 * left**2,
@@ -272,7 +273,3 @@ def _held_against(matrix: sp.csr_array, beam: Beam, x: NDArray[np.float64]) -> t
     np.maximum.at(size, entry.row, np.abs(entry.data) * (entry.row != entry.col))
     misfit = np.abs(left_over.data[held]) / size[left_over.row[held]]
     return float(misfit.max(initial=0.0)), (beam.direction_of_row > 0) & inner[node]
-
-
-def _entries(matrix: sp.csr_array, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.float64]:
-    return np.asarray(sp.coo_array(matrix[i, j]).toarray()).ravel()

@@ -1,4 +1,8 @@
-"""The certificate of a structure's coordinates: its rigid rotations cost nothing. Shares no code with the solver."""
+"""The certificate of a structure's coordinates: its rigid rotations cost nothing, and its members' blocks are theirs.
+
+Forces share no code with the solver. Blocks of members are held against the formula that found them, at the points as
+they are written.
+"""
 
 from __future__ import annotations
 

@@ -133,12 +133,12 @@ def shown_by_members(matrix: sp.csr_array, layout: Layout) -> NDArray[np.bool_]:
     some = (entry.col >= entry.row + b) & (entry.col <= order - b) & (entry.data < 0)
     i, j = entry.row[some].astype(np.int64), entry.col[some].astype(np.int64)
     for k in range(1, len(layout.displacements)):
-        some = _entries(matrix, i + k, j + k) < 0
+        some = entries_at(matrix, i + k, j + k) < 0
         i, j = i[some], j[some]
     every = np.arange(b)
     rows, columns = i[:, None, None] + every[:, None], j[:, None, None] + every
     shape = (len(i), b, b)
-    blocks = _entries(matrix, np.broadcast_to(rows, shape).ravel(), np.broadcast_to(columns, shape).ravel())
+    blocks = entries_at(matrix, np.broadcast_to(rows, shape).ravel(), np.broadcast_to(columns, shape).ravel())
     blocks = blocks.reshape(shape)
     good = misfits(blocks, told_by_blocks(blocks, layout), layout) <= SUMMED
     begins = np.zeros(order, dtype=bool)
@@ -146,5 +146,6 @@ def shown_by_members(matrix: sp.csr_array, layout: Layout) -> NDArray[np.bool_]:
     return begins
 
 
-def _entries(matrix: sp.csr_array, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.float64]:
+def entries_at(matrix: sp.csr_array, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(k,) entries of a matrix at rows i and columns j, zero where none is stored."""
     return np.asarray(sp.coo_array(matrix[i, j]).toarray()).ravel() if len(i) else np.empty(0)
