@@ -225,27 +225,33 @@ def without_spare_equations(
     (k,) int64
     """
     n = len(points)
-    ends = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2)
-    key, side = np.unique(ends @ [n, 1], return_inverse=True)
-    owner = np.repeat(np.arange(len(triangles)), 3)
-    by_side = sp.coo_array((np.ones(len(owner)), (owner, side.ravel())), shape=(len(triangles), len(key))).tocsr()
-    count, piece = csgraph.connected_components(by_side @ by_side.T, directed=False)
-    vertex = np.unique(np.repeat(piece, 3) * np.int64(n) + triangles.ravel())
-    member, row = vertex // n, vertex % n
-    of_side = np.empty(len(key), dtype=np.int64)
-    of_side[side.ravel()] = np.repeat(piece, 3)
+    ends = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2) @ [n, 1]
+    order = np.argsort(ends, kind="stable")
+    first = np.append(True, np.diff(ends[order]) > 0)
+    key, owner = ends[order[first]], order // 3
+    beside = sp.coo_array(
+        (np.ones((~first).sum()), (owner[:-1][~first[1:]], owner[1:][~first[1:]])), shape=2 * (len(triangles),)
+    )
+    count, piece = csgraph.connected_components(beside, directed=False)
+    pieces_at = sp.coo_array(
+        (np.ones(triangles.size), (triangles.ravel(), np.repeat(piece, 3))), shape=(n, count)
+    ).tocsr()
+    row, member = pieces_at.nonzero()
+    any_row = np.zeros(count, dtype=np.int64)
+    any_row[member] = row
+    of_side = piece[owner[first]]
     spare = np.bincount(of_side, minlength=count) - (2 * np.bincount(member, minlength=count) - 4)
-    stored = np.isin(key, edges @ [n, 1])
+    known = np.append(np.sort(edges @ [n, 1]), -1)
+    stored = known[np.searchsorted(known[:-1], key)] == key
     gone = np.bincount(of_side[~stored], minlength=count)
     for k in np.flatnonzero((gone > 0) & (spare - 1 <= gone)):
         own = triangles[piece == k]
         spare[k] -= _dependent(points, own, key[(of_side == k) & ~stored])
     if known_scale:
-        return row[np.searchsorted(member, np.flatnonzero(spare <= 0))]
-    touching = sp.coo_array((np.ones(len(vertex)), (member, row)), shape=(count, n)).tocsr()
-    group = csgraph.connected_components(touching @ touching.T, directed=False)[1]
+        return any_row[spare <= 0]
+    group = csgraph.connected_components(pieces_at.T @ pieces_at, directed=False)[1]
     told = np.bincount(group, spare >= 2) > 0
-    return row[np.searchsorted(member, np.flatnonzero(~told[group] | (spare <= 0)))]
+    return any_row[~told[group] | (spare <= 0)]
 
 
 def _dependent(points: NDArray, triangles: NDArray, gone: NDArray) -> int:

@@ -46,11 +46,12 @@ def in_doubt(
     """
     doubtful = unexplained(matrix, topology)
     solved = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
+    misfit = misfits_of(matrix, solved)
     if not noise:
-        doubtful |= _discordant(matrix, solved, scale)
+        doubtful |= _discordant(matrix, solved, scale, misfit)
     solved = [(piece, mesh) for piece, mesh in solved if not doubtful[piece.vertices[0]]]
     rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
-    misfit = misfits_of(matrix, solved)[rest]
+    misfit = misfit[rest]
     wrong = misfit > ALIKE
     if not wrong.any() or _like_noise(misfit, matrix.n):
         return doubtful
@@ -61,7 +62,7 @@ def in_doubt(
     return doubtful | _components_of(matrix, rest[wrong])
 
 
-def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None) -> NDArray[np.bool_]:
+def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None, misfit: NDArray) -> NDArray[np.bool_]:
     """(n,) rows of components whose pieces all fit, but loose ones with another factor c than is known or others have.
 
     With a hole filled such a piece still fits, with another c. That of pieces with more entries than unknowns is right,
@@ -82,7 +83,7 @@ def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None) -> 
     wrong, hopeless = np.zeros((2, len(telling)), dtype=bool)
     wrong[own[apart]] = True
     hopeless[own[apart & ~loose]] = True
-    hopeless[label[matrix.edges[misfits_of(matrix, solved) > ALIKE, 0]]] = True
+    hopeless[label[matrix.edges[misfit > ALIKE, 0]]] = True
     return np.asarray((wrong & ~hopeless)[label])
 
 
