@@ -8,7 +8,7 @@ from unassemble import recover
 from unassemble.linalg import factorisation
 from unassemble.planar.piece import positions, refined
 from unassemble.planar.triangles import lone_triangles
-from unassemble.topology import components, recognise
+from unassemble.topology import components, surfaces
 
 
 def chain(count, seed=0):
@@ -38,7 +38,7 @@ def test_a_chain_is_joined_from_triangle_to_triangle(scale):
 def test_lone_triangles_are_those_of_the_general_method(rounding):
     known = specimen(*chain(20, seed=3))
     edges = np.argwhere(np.triu(known.matrix.toarray(), 1))
-    topology = recognise(len(known.points), edges)
+    topology = surfaces(len(known.points), edges)
     weights = -known.matrix.toarray()[edges[:, 0], edges[:, 1]] + 1e-3 * np.random.default_rng(0).random(len(edges))
     lone = lone_triangles(topology.pieces, weights, spread=None if rounding else np.ones(len(edges)))
     assert len(lone) == len(topology.pieces) == 20
@@ -54,7 +54,7 @@ def test_lone_triangles_are_those_of_the_general_method(rounding):
 
 
 def test_three_numbers_that_are_no_triangle_are_left_to_the_general_method():
-    topology = recognise(3, np.array([[0, 1], [0, 2], [1, 2]]))
+    topology = surfaces(3, np.array([[0, 1], [0, 2], [1, 2]]))
     assert not lone_triangles(topology.pieces, np.array([1.0, 1.0, -1.5]))
     assert not lone_triangles(topology.pieces, np.array([1.0, 1.0, -0.5]))  # flat
     assert lone_triangles(topology.pieces, np.array([1.0, 1.0, -0.4]))
