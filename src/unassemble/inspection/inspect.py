@@ -10,16 +10,17 @@ from numpy.typing import NDArray
 
 from ..cells import guessed
 from ..diagnosis import LINEAR, PLANAR, diagnosed
-from ..errors import NotPlanarError, TopologyError
+from ..errors import NotPlanarError, RecoveryError
 from ..matrix import OperatorMatrix, load
 from ..operators import VectorReading, second_reading, vector_valued
 from ..quiet import quiet_libraries
-from ..topology import Topology, recognise, surfaces
+from ..topology import Topology, components, located, require_planar, surfaces
 from ..words import count_of
 from .facts import element_facts, matrix_facts, mesh_facts, nodes_facts, surface_facts
 from .text import element_text, lines_of, mesh_text
 
 _IF = "if the entries agree, which recovery tells"
+_NO_CELLS = "the graph of the matrix is planar, but no cell shows in it, nor do the entries suggest any"
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,21 +241,17 @@ def _inspected(matrix: OperatorMatrix) -> Inspection:
     if _left_over(matrix, topology):
         read, topology = guessed(matrix, topology)
     if not topology.pieces or _left_over(read, topology):
-        try:
-            plain = recognise(matrix.n, matrix.edges)  # says what is wrong with the graph, if that is it
-        except (NotPlanarError, TopologyError) as error:
-            planar = not isinstance(error, NotPlanarError)
-            if not (planar and topology.pieces):
-                if shown := element_facts(matrix):
-                    return Inspection(**facts, **_diagnosis(matrix, planar=planar), planar=planar, **shown)
-                vector = second_reading(matrix)  # as recovery does
-                if vector is not None:
-                    return _vector_valued(matrix, facts, vector)
-                facts |= _diagnosis(matrix, planar=planar)
-                return Inspection(**facts, planar=planar, obstacle=str(error), witness=getattr(error, "witness", ()))
-        else:
-            if not topology.pieces:
-                read, topology = matrix, plain
+        error = _not_planar(matrix)
+        if error or not topology.pieces:
+            planar = error is None
+            if shown := element_facts(matrix):
+                return Inspection(**facts, **_diagnosis(matrix, planar=planar), planar=planar, **shown)
+            vector = second_reading(matrix)  # as recovery does
+            if vector is not None:
+                return _vector_valued(matrix, facts, vector)
+            facts |= _diagnosis(matrix, planar=planar)
+            witness = getattr(error, "witness", ())
+            return Inspection(**facts, planar=planar, obstacle=str(error or _NO_CELLS), witness=witness)
     return Inspection(**facts, **mesh_facts(read, topology), **_diagnosis(matrix, planar=True))
 
 
@@ -265,6 +262,20 @@ def _vector_valued(matrix: OperatorMatrix, facts: dict[str, Any], vector: Vector
 def _diagnosis(matrix: OperatorMatrix, *, planar: bool) -> dict[str, Any]:
     found = diagnosed(matrix, planar=planar)
     return {"kind": found.kind, "name": found.name, "evidence": found.evidence, "advice": found.advice}
+
+
+def _not_planar(matrix: OperatorMatrix) -> RecoveryError | None:
+    """Why the largest component of the graph is not planar; None where some component is."""
+    parts = components(matrix.n, matrix.edges)
+    errors = []
+    for part in parts:
+        try:
+            require_planar(len(part.vertices), part.edges)
+        except NotPlanarError as error:
+            errors.append(located(error, part, named=len(parts) > 1))
+        else:
+            return None
+    return errors[0]
 
 
 def _left_over(matrix: OperatorMatrix, topology: Topology) -> bool:

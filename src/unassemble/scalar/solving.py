@@ -17,7 +17,6 @@ from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.cotangent import left_by_all
 from ..planar.piece import PieceMesh, brought_near, collapsed, positions, refined
-from ..planar.triangles import lone_triangles
 from ..tolerances import NOISY
 from ..topology import Piece, Polygons, Topology
 from ..words import sentences
@@ -108,14 +107,10 @@ def solve(
         If no piece has positions.
     """
     method, refine, scale, noise = task.options.method, task.options.polished, task.scale, task.noise
-    lone = lone_triangles(topology.pieces, -matrix.entries, scale) if method == "conformal" else {}
-
     drowning = refine and noise is not None and not noise.digits  # rounding to a few digits does not
 
     @cache
     def start(piece: Piece) -> Outcome:
-        if piece in lone:
-            return lone[piece]
         try:
             weights = -matrix.entries[piece.edge_rows]
             mesh = _start(piece, weights, method, scale, sharp=not refine, analyse=analyse)
@@ -167,10 +162,8 @@ def _polished(
 ) -> list[PieceMesh]:
     """Each piece by itself."""
     errors = with_vanished(topology) if noise is None else noise.on(topology)
-    exact = lone_triangles(topology.pieces, -matrix.entries, scale, None if noise is None else errors)
     return [
-        exact.get(piece)
-        or refined(
+        refined(
             piece,
             -matrix.entries[piece.edge_rows],
             mesh,
