@@ -48,8 +48,8 @@ def judged(mesh: PlanarMesh, matrix: OperatorMatrix) -> PlanarMesh:
     if mesh.status != "uncertified" or mesh.backward_error <= CERTIFIED:
         return mesh
     found = diagnosed(matrix, planar=True)
-    if not found.unread:
-        return mesh
     if found.kind in ("mass", "segments"):
         raise GeometryError(found.sentence())
+    if not found.unread:
+        return mesh
     return replace(mesh, reason=sentences([f"the matrix is {found.name}", *found.evidence]), advice=found.advice)

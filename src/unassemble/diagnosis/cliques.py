@@ -65,7 +65,7 @@ def cells_of(n: int, edges: NDArray[np.int64], most: int = 1500) -> Cells:
     inner = np.diff(near.indptr) == np.diff(graph.indptr)[rows]  # those with all of their neighbours
     pairs = np.column_stack(sp.triu(near, 1).nonzero())
     pairs = pairs[inner[pairs].any(axis=1)] if inner.any() else pairs
-    pairs = pairs[:: max(1, len(pairs) // most)]
+    pairs = np.random.default_rng(0).permutation(pairs)[:most]  # every second one may be all of one kind, on a grid
     others = [set(near.indices[a:b].tolist()) for a, b in zip(near.indptr[:-1], near.indptr[1:], strict=True)]
     found: Counter[int] = Counter()
     cells: set[frozenset[int]] = set()

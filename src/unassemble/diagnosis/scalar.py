@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
+from ..nodes.unknowns import nodes_of_pattern
 from ..tolerances import MOST, ROUNDED, SMALL, SUMMED
+from ..topology import components
 from ..words import count_of
 from .cliques import Cells, cells_of, mostly, often
-from .kinds import PLANAR, UNKNOWN, UNREAD, Diagnosis
+from .kinds import LENGTHS, PLANAR, UNKNOWN, UNREAD, Diagnosis
+from .mass import mass_bounds
 
 _CELLS = {
     # nodes of a cell, and those that neighbours share: kind, and name
@@ -103,11 +106,10 @@ def diagnosed(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis:
         Whether its graph is one of triangles, or of other cells with linear elements, in the plane.
     """
     sums = Sums.of(matrix)
-    dimension = _mass_of_simplices(matrix)
-    if dimension:
-        ratio = {1: "twice", 2: "once", 3: "two thirds of"}[dimension]
-        of = f"each diagonal entry is {ratio} the sum of the others in its row, and all are of one sign"
-        return _of_kind("mass", f"a mass matrix of linear elements on {_SIMPLICES[dimension]}", of)
+    if dimension := _mass_of_simplices(matrix):
+        return _mass_of_linear(dimension, planar=planar)
+    if (bounds := mass_bounds(matrix)) is not None:
+        return _mass(matrix, bounds)
     degree = np.bincount(matrix.edges.ravel(), minlength=matrix.n)
     if degree.max() <= 2 and matrix.n >= _SMALL:
         return _of_kind(
@@ -118,7 +120,38 @@ def diagnosed(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis:
         return _of_kind("graph", "the Laplacian of a graph without weights", equal, *sums.evidence)
     if planar:
         return Diagnosis(PLANAR, LINEAR + _further(sums), sums.evidence)
+    if not (sums.zero.any() or sums.sign):  # as of no stiffness matrix, whatever its graph looks like
+        return _unknown(sums)
     return _by_cells(matrix, sums)
+
+
+def _mass_of_linear(dimension: int, *, planar: bool) -> Diagnosis:
+    """The mass matrix of linear elements on simplices, of which those of triangles in the plane are read."""
+    ratio = {1: "twice", 2: "once", 3: "two thirds of"}[dimension]
+    of = f"each diagonal entry is {ratio} the sum of the others in its row, and all are of one sign"
+    found = _of_kind("mass", f"a mass matrix of linear elements on {_SIMPLICES[dimension]}", of)
+    advice = {1: LENGTHS, 2: "" if planar else found.advice, 3: found.advice}[dimension]
+    return replace(found, advice=advice)
+
+
+def _mass(matrix: OperatorMatrix, bounds: tuple[float, float]) -> Diagnosis:
+    """A mass matrix of other elements, or of several unknowns per node, by its eigenvalues."""
+    used = matrix.edges[matrix.entries != 0]
+    cells = cells_of(matrix.n, used)
+    n_parts = len(components(matrix.n, used))
+    name = "a consistent mass matrix"
+    if (cells.nodes, cells.shared) in _CELLS and n_parts == 1:
+        name += f" of {_CELLS[cells.nodes, cells.shared][1]}"
+    elif nodes_of_pattern(matrix.csr()) is not None or n_parts > 1 or often(cells.twins):
+        name += " of several unknowns per node"
+    massless = int((matrix.diagonal == 0).sum())
+    return _of_kind(
+        "mass",
+        name,
+        f"scaled to identity blocks its least eigenvalue is {bounds[0]:.2g}, where those of stiffnesses near zero",
+        f"its couplings add up in one vector, to a largest eigenvalue of {bounds[1]:.2g}, as under a translation",
+        f"{count_of(massless, 'row is', 'rows are')} zero, of unknowns without a mass" if massless else "",
+    )
 
 
 def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
@@ -147,6 +180,10 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
         if _is_grid(matrix.n, edges, cells):
             shown = "no three rows are coupled to each other, and most rows are coupled to six"
             return _of_kind("grid in space", "that of a grid in space, a seven-point stencil", shown, *sums.evidence)
+    return _unknown(sums)
+
+
+def _unknown(sums: Sums) -> Diagnosis:
     return Diagnosis(
         UNKNOWN,
         "no scalar matrix of a kind that is known",
@@ -156,8 +193,9 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
 
 
 def _of_kind(kind: str, name: str, *evidence: str) -> Diagnosis:
-    without = "keep all rows and columns, those on the boundary too" if "eliminated" in evidence[-1] else ""
-    return Diagnosis(kind, name, evidence, UNREAD.get(kind, without))
+    said = tuple(filter(None, evidence))
+    without = "keep all rows and columns, those on the boundary too" if "eliminated" in said[-1] else ""
+    return Diagnosis(kind, name, said, UNREAD.get(kind, without))
 
 
 def _further(sums: Sums) -> str:
@@ -177,8 +215,6 @@ def _operator(matrix: OperatorMatrix, sums: Sums, cells: Cells) -> str:
         return "a mass matrix"
     if sums.zero.any():
         return "a stiffness matrix"
-    if (np.sign(matrix.entries) == np.sign(matrix.diagonal[0])).all() and (matrix.diagonal != 0).all():
-        return "a mass matrix"
     return "a stiffness matrix, plus a mass matrix or a diagonal,"
 
 
@@ -188,8 +224,8 @@ def _mass_of_simplices(matrix: OperatorMatrix) -> int:
     A simplex of volume V in d dimensions adds 2 V / ((d + 1) (d + 2)) to each diagonal entry and half as much to each
     of d off-diagonal ones in the same row.
     """
-    sign = np.sign(matrix.entries[0])
-    if sign == 0 or not ((matrix.entries * sign > 0).all() and (matrix.diagonal * sign > 0).all()):
+    sign = np.sign(matrix.entries[0])  # rows of zeros, as inside of a mesh whose boundary has masses, do no harm
+    if sign == 0 or not ((matrix.entries * sign > 0).all() and (matrix.diagonal * sign >= 0).all()):
         return 0
     others = np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n)
     return next(

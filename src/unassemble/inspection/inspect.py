@@ -176,6 +176,8 @@ class Inspection:
                 f"{mesh_text(self)} on {self.n_rows - self.n_isolated:,} points, up to position, rotation, size and "
                 f"mirror image, {_IF}"
             )
+        if self.kind == "mass" and not self.advice:
+            return f"areas of {mesh_text(self)}, up to the density, and no positions: a mass matrix has no shape"
         if self.kind != PLANAR:
             return f"nothing: {self.advice}"
         if self.obstacle:
@@ -255,7 +257,11 @@ def _inspected(matrix: OperatorMatrix) -> Inspection:
         else:
             if not topology.pieces:
                 read, topology = matrix, plain
-    return Inspection(**facts, **mesh_facts(read, topology), **_diagnosis(matrix, planar=True))
+    found = mesh_facts(read, topology)
+    vector = second_reading(matrix) if found["mixed_signs"] else None  # as recovery does where no mesh fits
+    if vector is not None:
+        return _vector_valued(matrix, facts, vector)
+    return Inspection(**facts, **found, **_diagnosis(matrix, planar=True))
 
 
 def _vector_valued(matrix: OperatorMatrix, facts: dict[str, Any], vector: VectorReading) -> Inspection:
