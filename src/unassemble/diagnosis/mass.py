@@ -10,6 +10,9 @@ A. J. Wathen, Realistic eigenvalue bounds for the Galerkin mass matrix, IMA J. N
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -17,40 +20,135 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
 from ..matrix import OperatorMatrix
 from ..nodes.grouping import same_pattern
+from ..nodes.unknowns import nodes_of_pattern
 from ..structures.layouts import SPACE
-from ..tolerances import LITTLE
+from ..tolerances import LITTLE, ROUNDED, SUMMED
+from ..topology import components
+from ..words import count_of
+from .cliques import CELLS, cells_of, often
+from .kinds import LENGTHS, UNREAD, Diagnosis
 
 _LEAST = 0.05
 """Eigenvalue that no stiffness matrix has: masses of beams have 0.08, hexahedra 1/8, squares 1/4, triangles 1/2."""
 
-_TOGETHER = 0.98
-"""Share of couplings that add up in one vector: of masses 0.99 and more, of a tenth of stiffness beside them 0.96."""
+_TOGETHER = 0.9
+"""Share of couplings that add up in one vector: of masses 0.94 and more, of as much stiffness beside them 0.8."""
 
-_PRECISE = 0.01
-_RESTARTS = 20
+_SIMPLICES = {1: "segments", 2: "triangles", 3: "tetrahedra"}
 
 
-def mass_bounds(matrix: OperatorMatrix) -> tuple[float, float] | None:
-    """Least and largest eigenvalue of a mass matrix scaled to identity blocks; None for any other matrix.
+def mass_matrix(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis | None:
+    """What kind of mass matrix this is; None where it is none.
 
-    Rows of zeros, of unknowns without a mass, are left out.
+    Parameters
+    ----------
+    matrix : OperatorMatrix
+    planar : bool
+        Whether it may still be that of a mesh in the plane, which are read with much mass beside little stiffness.
     """
-    used = matrix.diagonal != 0
-    sign = np.sign(matrix.diagonal[used][0]) if used.any() else 0
-    whole = sign * matrix.csr()
-    whole.eliminate_zeros()
-    if not (sign * matrix.diagonal >= 0).all() or whole.nnz != (M := whole[used][:, used]).nnz or M.shape[0] < 3:
+    masses = _Masses.of(matrix)
+    if masses is None:
         return None
-    root = sp.diags_array(1 / np.sqrt(M.diagonal()))
-    scaled = (root @ M @ root).tocsr()
-    couplings = scaled - sp.eye_array(scaled.shape[0])
-    if not couplings.maximum(0).sum() > LITTLE * abs(couplings).sum():
-        return None  # on a graph with two colours, a grid's, the signs of one colour may be turned
-    together, all_of_them = _extreme(couplings, "LA"), _extreme(abs(couplings), "LA")
-    if together is None or all_of_them is None or together < _TOGETHER * all_of_them:
+    if dimension := masses.simplices:
+        ratio = {1: "twice", 2: "once", 3: "two thirds of"}[dimension]
+        advice = {1: LENGTHS, 2: "" if planar else UNREAD["mass"], 3: UNREAD["mass"]}[dimension]
+        exact = f"each diagonal entry is {ratio} the sum of the others in its row, and all are of one sign"
+        name = f"a mass matrix of linear elements on {_SIMPLICES[dimension]}"
+        return Diagnosis("mass", name, (exact, *masses.without), advice)
+    if masses.quadratic:
+        exact = "rows add up to zero, or to 15/8 of their diagonal entry, as those of corners and of middles of sides"
+        return Diagnosis("mass", "a mass matrix of quadratic elements on triangles", (exact,), UNREAD["mass"])
+    crowded = masses.M.nnz > 7 * masses.M.shape[0] - 12  # twice 3 n - 6, and the diagonal
+    bounds = masses.bounds if crowded or not planar else None
+    if bounds is None:
         return None
-    least = _extreme(scaled, "SA", _blocks(scaled))
-    return None if least is None or least < _LEAST else (least, 1 + together)
+    shown = (
+        f"scaled to identity blocks its least eigenvalue is {bounds[0]:.2g}, where those of stiffnesses near zero",
+        f"its couplings add up in one vector, to a largest eigenvalue of {bounds[1]:.2g}, as under a translation",
+    )
+    return Diagnosis("mass", f"a consistent mass matrix{masses.unknowns}", (*shown, *masses.without), UNREAD["mass"])
+
+
+@dataclass(frozen=True, eq=False)
+class _Masses:
+    """A matrix with diagonal entries of one sign, made positive, without the rows of zeros.
+
+    Attributes
+    ----------
+    M : (k, k) sparse
+    n_massless : int
+        Rows of zeros: unknowns without a mass, or points inside of a mesh whose boundary has one.
+    """
+
+    M: sp.csr_array
+    n_massless: int
+
+    @classmethod
+    def of(cls, matrix: OperatorMatrix) -> _Masses | None:
+        """Those of a matrix, if it may be one of masses at all: rows of stiffnesses may add up to zero."""
+        nothing = ROUNDED * np.abs(matrix.diagonal).max()
+        used = np.abs(matrix.diagonal) > nothing
+        if not used.any() or np.ptp(np.sign(matrix.diagonal[used])):
+            return None
+        whole = np.sign(matrix.diagonal[used][0]) * matrix.csr()
+        whole.data[np.abs(whole.data) <= nothing] = 0
+        whole.eliminate_zeros()
+        M = whole[used][:, used]
+        return cls(M, int((~used).sum())) if M.nnz == whole.nnz and M.shape[0] > 2 else None
+
+    @property
+    def without(self) -> tuple[str, ...]:
+        """The sentence on rows of zeros."""
+        return (f"{count_of(self.n_massless, 'row is', 'rows are')} zero",) if self.n_massless else ()
+
+    @cached_property
+    def simplices(self) -> int:
+        """Dimension of the simplices whose mass matrix with linear elements this is; 0 for none.
+
+        A simplex of volume V in d dimensions adds 2 V / ((d + 1) (d + 2)) to each diagonal entry and half as much to
+        each of d off-diagonal ones in the same row.
+        """
+        if not (self.M.data > 0).all():
+            return 0
+        diagonal = self.M.diagonal()
+        others = self.M.sum(axis=1) - diagonal
+        return next((d for d in _SIMPLICES if np.allclose(d * diagonal, 2 * others, rtol=SUMMED, atol=0)), 0)
+
+    @cached_property
+    def quadratic(self) -> bool:
+        """Whether this is the mass matrix of quadratic triangles: corners have no integral, middles (16 + 16 - 4) / 32.
+
+        Of an element of area 180 the rows are 6, -1, -1, 0, 0, -4 and 32, 16, 16, 0, 0, -4.
+        """
+        sums, diagonal = self.M.sum(axis=1), self.M.diagonal()
+        corners, middles = (np.abs(sums - part * diagonal) <= SUMMED * diagonal for part in (0, 15 / 8))
+        return bool((corners | middles).all() and corners.any() and middles.any())
+
+    @cached_property
+    def bounds(self) -> tuple[float, float] | None:
+        """Least and largest eigenvalue, scaled to identity blocks; None for other matrices than those of masses."""
+        root = sp.diags_array(1 / np.sqrt(self.M.diagonal()))
+        scaled = (root @ self.M @ root).tocsr()
+        couplings = scaled - sp.eye_array(scaled.shape[0])
+        if not couplings.maximum(0).sum() > LITTLE * abs(couplings).sum():
+            return None  # on a graph with two colours, a grid's, the signs of one colour may be turned
+        together, all_of_them = _extreme(couplings, "LA"), _extreme(abs(couplings), "LA")
+        if together is None or all_of_them is None or together < _TOGETHER * all_of_them:
+            return None
+        least = _extreme(scaled, "SA", _blocks(scaled))
+        return None if least is None or least < _LEAST else (least, 1 + together)
+
+    @property
+    def unknowns(self) -> str:
+        """Of which elements, or of how many unknowns per node, as far as the graph shows that."""
+        upper = sp.triu(self.M, 1).tocoo()
+        edges = np.column_stack([upper.row, upper.col]).astype(np.int64)
+        cells = cells_of(self.M.shape[0], edges)
+        n_parts = len(components(self.M.shape[0], edges))
+        if (cells.nodes, cells.shared) in CELLS and n_parts == 1:
+            return f" of {CELLS[cells.nodes, cells.shared][1]}"
+        several = n_parts > 1 or often(cells.twins) or nodes_of_pattern(self.M) is not None
+        return " of several unknowns per node" if several else ""
 
 
 def _blocks(scaled: sp.csr_array) -> sp.csc_array:
@@ -63,13 +161,13 @@ def _blocks(scaled: sp.csr_array) -> sp.csc_array:
 
 
 def _extreme(A: sp.csr_array, which: str, blocks: sp.csc_array | None = None) -> float | None:
-    """The largest (``"LA"``) or least (``"SA"``) eigenvalue, relative to blocks; None where it does not show."""
+    """The largest (``"LA"``) or least (``"SA"``) eigenvalue, relative to blocks; None where it does not show soon."""
     more: dict[str, object] = {}
     start: NDArray[np.float64] = np.random.default_rng(0).standard_normal(A.shape[0])
     try:
         if blocks is not None:
             more = {"M": blocks, "Minv": LinearOperator(A.shape, splu(blocks).solve)}
-        found = eigsh(A, k=1, which=which, v0=start, tol=_PRECISE, maxiter=_RESTARTS, return_eigenvectors=False, **more)
+        found = eigsh(A, k=1, which=which, v0=start, tol=LITTLE**2, maxiter=20, return_eigenvectors=False, **more)
     except (ArpackError, RuntimeError):  # no convergence, so no gap to zero; or singular blocks
         return None
     return float(found[0])

@@ -2,36 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
-from ..nodes.unknowns import nodes_of_pattern
 from ..tolerances import MOST, ROUNDED, SMALL, SUMMED
-from ..topology import components
 from ..words import count_of
-from .cliques import Cells, cells_of, mostly, often
-from .kinds import LENGTHS, PLANAR, UNKNOWN, UNREAD, Diagnosis
-from .mass import mass_bounds
+from .cliques import CELLS, Cells, cells_of, mostly, often
+from .kinds import PLANAR, UNKNOWN, UNREAD, Diagnosis
+from .mass import mass_matrix
 
-_CELLS = {
-    # nodes of a cell, and those that neighbours share: kind, and name
-    (4, 2): ("quadrilaterals", "bilinear elements on quadrilaterals"),
-    (8, 4): ("hexahedra", "trilinear elements on hexahedra"),
-    (6, 3): ("quadratic", "quadratic elements on triangles"),
-    (8, 3): ("quadratic", "serendipity elements on quadrilaterals"),
-    (9, 3): ("quadratic", "biquadratic elements on quadrilaterals"),
-    (10, 6): ("tetrahedra", "quadratic elements on tetrahedra"),
-    (20, 8): ("hexahedra", "serendipity elements on hexahedra"),
-    (27, 9): ("hexahedra", "triquadratic elements on hexahedra"),
-    (10, 4): ("cubic", "cubic elements on triangles"),
-    (16, 4): ("cubic", "bicubic elements on quadrilaterals"),
-}
 LINEAR = "a stiffness matrix of linear elements on triangles"
-_SIMPLICES = {1: "segments", 2: "triangles", 3: "tetrahedra"}
 _SMALL = 10  # rows: fewer may be a mesh of few triangles, whatever their entries are
 
 
@@ -43,8 +27,8 @@ class Sums:
     ----------
     zero : (n,) bool
         Rows that add up to nothing, alone ones left out.
-    alone : (n,) bool
-        Rows with nothing beside the diagonal.
+    alone, identity : (n,) bool
+        Rows with nothing beside the diagonal; those of them that have something on it.
     penalised : (n,) bool
         Rows whose diagonal is beyond everything else.
     sign : int
@@ -53,6 +37,7 @@ class Sums:
 
     zero: NDArray[np.bool_]
     alone: NDArray[np.bool_]
+    identity: NDArray[np.bool_]
     penalised: NDArray[np.bool_]
     sign: int
 
@@ -67,16 +52,17 @@ class Sums:
         penalised = (SMALL * np.abs(matrix.diagonal) > size) & ~alone
         signs = np.unique(np.sign(sums[~alone & ~penalised]))
         sign = int(signs[0]) if len(signs) == 1 and not (zero & ~alone).any() else 0
-        return cls(zero, alone, penalised, sign)
+        return cls(zero, alone, alone & (matrix.diagonal != 0), penalised, sign)
 
     @property
     def evidence(self) -> tuple[str, ...]:
         """What they say of boundary conditions and further terms, the strongest first."""
         used = ~self.alone
         said = []
-        if self.alone.any() and self.zero.any():
-            rows = count_of(int(self.alone.sum()), "row is that", "rows are those")
-            said.append(f"{rows} of the identity, as of unknowns with Dirichlet conditions (row {_first(self.alone)})")
+        if self.identity.any() and self.zero.any():
+            rows = count_of(int(self.identity.sum()), "row is that", "rows are those")
+            which = f"of the identity, as of unknowns with Dirichlet conditions (row {_first(self.identity)})"
+            said.append(f"{rows} {which}")
         if self.penalised.any():
             rows = count_of(int(self.penalised.sum()), "diagonal entry is", "diagonal entries are")
             said.append(f"{rows} a penalty, as for Dirichlet conditions (row {_first(self.penalised)})")
@@ -86,10 +72,10 @@ class Sums:
             said.append("all other rows add up to zero")
         elif self.zero.any():
             rest = used & ~self.zero & ~self.penalised
-            said.append(
-                f"{int(rest.sum()):,} of {int(used.sum()):,} rows do not add up to zero, as next to unknowns that were "
-                f"eliminated (row {_first(rest)})"
-            )
+            most = rest.sum() > MOST * used.sum()
+            cause = "where a mass matrix or a diagonal was added" if most else "next to unknowns that were eliminated"
+            rows = f"{int(rest.sum()):,} of {int(used.sum()):,} rows do not add up to zero"
+            said.append(f"{rows}, as {cause} (row {_first(rest)})")
         else:
             one = f"all sums are {'positive' if self.sign > 0 else 'negative'}" if self.sign else "sums have both signs"
             said.append(f"no row adds up to zero, and {one}")
@@ -106,10 +92,8 @@ def diagnosed(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis:
         Whether its graph is one of triangles, or of other cells with linear elements, in the plane.
     """
     sums = Sums.of(matrix)
-    if dimension := _mass_of_simplices(matrix):
-        return _mass_of_linear(dimension, planar=planar)
-    if (bounds := mass_bounds(matrix)) is not None:
-        return _mass(matrix, bounds)
+    if (mass := mass_matrix(matrix, planar=planar)) is not None:
+        return mass
     degree = np.bincount(matrix.edges.ravel(), minlength=matrix.n)
     if degree.max() <= 2 and matrix.n >= _SMALL:
         return _of_kind(
@@ -119,39 +103,10 @@ def diagnosed(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis:
         equal = "all off-diagonal entries are equal, and on a mesh those of the boundary have one cell and others two"
         return _of_kind("graph", "the Laplacian of a graph without weights", equal, *sums.evidence)
     if planar:
-        return Diagnosis(PLANAR, LINEAR + _further(sums), sums.evidence)
+        return Diagnosis(PLANAR, LINEAR + further_terms(matrix), sums.evidence)
     if not (sums.zero.any() or sums.sign):  # as of no stiffness matrix, whatever its graph looks like
         return _unknown(sums)
     return _by_cells(matrix, sums)
-
-
-def _mass_of_linear(dimension: int, *, planar: bool) -> Diagnosis:
-    """The mass matrix of linear elements on simplices, of which those of triangles in the plane are read."""
-    ratio = {1: "twice", 2: "once", 3: "two thirds of"}[dimension]
-    of = f"each diagonal entry is {ratio} the sum of the others in its row, and all are of one sign"
-    found = _of_kind("mass", f"a mass matrix of linear elements on {_SIMPLICES[dimension]}", of)
-    advice = {1: LENGTHS, 2: "" if planar else found.advice, 3: found.advice}[dimension]
-    return replace(found, advice=advice)
-
-
-def _mass(matrix: OperatorMatrix, bounds: tuple[float, float]) -> Diagnosis:
-    """A mass matrix of other elements, or of several unknowns per node, by its eigenvalues."""
-    used = matrix.edges[matrix.entries != 0]
-    cells = cells_of(matrix.n, used)
-    n_parts = len(components(matrix.n, used))
-    name = "a consistent mass matrix"
-    if (cells.nodes, cells.shared) in _CELLS and n_parts == 1:
-        name += f" of {_CELLS[cells.nodes, cells.shared][1]}"
-    elif nodes_of_pattern(matrix.csr()) is not None or n_parts > 1 or often(cells.twins):
-        name += " of several unknowns per node"
-    massless = int((matrix.diagonal == 0).sum())
-    return _of_kind(
-        "mass",
-        name,
-        f"scaled to identity blocks its least eigenvalue is {bounds[0]:.2g}, where those of stiffnesses near zero",
-        f"its couplings add up in one vector, to a largest eigenvalue of {bounds[1]:.2g}, as under a translation",
-        f"{count_of(massless, 'row is', 'rows are')} zero, of unknowns without a mass" if massless else "",
-    )
 
 
 def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
@@ -160,8 +115,8 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
     for edges in (matrix.edges, used):  # zeros that are stored show cells better than where they are left out
         cells = cells_of(matrix.n, edges)
         several = often(cells.twins)  # unknowns in a node, or nodes inside of an edge or cell
-        operator = _operator(matrix, sums, cells)
-        kind, name = _CELLS.get((cells.nodes, cells.shared), ("", ""))
+        operator = "a stiffness matrix" if sums.zero.any() else "a stiffness matrix, plus a mass matrix or a diagonal,"
+        kind, name = CELLS.get((cells.nodes, cells.shared), ("", ""))
         # About half of the pairs of quadrilaterals are diagonals.
         doubtful = {"quadrilaterals": cells.often < 1 - MOST, "hexahedra": several and cells.nodes == 8}
         if kind and not doubtful.get(kind):
@@ -193,45 +148,25 @@ def _unknown(sums: Sums) -> Diagnosis:
 
 
 def _of_kind(kind: str, name: str, *evidence: str) -> Diagnosis:
-    said = tuple(filter(None, evidence))
-    without = "keep all rows and columns, those on the boundary too" if "eliminated" in said[-1] else ""
-    return Diagnosis(kind, name, said, UNREAD.get(kind, without))
+    without = "keep all rows and columns, those on the boundary too" if "eliminated" in evidence[-1] else ""
+    return Diagnosis(kind, name, evidence, UNREAD.get(kind, without))
 
 
-def _further(sums: Sums) -> str:
-    """What was added to the Laplacian."""
+def further_terms(matrix: OperatorMatrix) -> str:
+    """What was added to a Laplacian, or done to it, as its row sums tell before anything is solved."""
+    sums = Sums.of(matrix)
     if (sums.zero | sums.alone).all():
         return ""
     if sums.penalised.any() and (sums.zero | sums.alone | sums.penalised).all():
         return ", plus a diagonal"
     if sums.zero.any():
         return ", plus a diagonal or without some unknowns"
-    return ", plus a diagonal or a mass matrix" if sums.sign else ", plus a diagonal"
-
-
-def _operator(matrix: OperatorMatrix, sums: Sums, cells: Cells) -> str:
-    # Of a mass matrix of quadratic triangles the sums of vertices are zero, a quarter of all.
-    if (cells.nodes, cells.shared) == (6, 3) and 0 < sums.zero.mean() < 1 - MOST:
-        return "a mass matrix"
-    if sums.zero.any():
-        return "a stiffness matrix"
-    return "a stiffness matrix, plus a mass matrix or a diagonal,"
-
-
-def _mass_of_simplices(matrix: OperatorMatrix) -> int:
-    """Dimension of the simplices whose mass matrix with linear elements this is; 0 for none.
-
-    A simplex of volume V in d dimensions adds 2 V / ((d + 1) (d + 2)) to each diagonal entry and half as much to each
-    of d off-diagonal ones in the same row.
-    """
-    sign = np.sign(matrix.entries[0])  # rows of zeros, as inside of a mesh whose boundary has masses, do no harm
-    if sign == 0 or not ((matrix.entries * sign > 0).all() and (matrix.diagonal * sign >= 0).all()):
-        return 0
-    others = np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n)
-    return next(
-        (d for d in _SIMPLICES if np.allclose(d * matrix.diagonal, 2 * others, rtol=SUMMED, atol=0)),
-        0,
-    )
+    if np.ptp(matrix.diagonal) <= ROUNDED * np.abs(matrix.diagonal).max():
+        return ", plus a diagonal, or with rows and columns scaled to a constant diagonal"
+    if sums.sign:
+        return ", plus a diagonal or a mass matrix, as of a reaction"
+    scaled = (matrix.diagonal > 0).all() or (matrix.diagonal < 0).all()  # squares of factors keep signs
+    return ", plus a diagonal, or with rows and columns scaled" if scaled else ", plus a diagonal"
 
 
 def _has_middles(matrix: OperatorMatrix, most: int = 400) -> bool:
