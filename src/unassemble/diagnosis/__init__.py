@@ -2,7 +2,7 @@
 
 from .answers import explained, judged
 from .kinds import PLANAR, UNKNOWN, Diagnosis
-from .mass import mass_matrix
+from .mass import mass_matrix, refuse_masses
 from .scalar import diagnosed, further_terms
 
 __all__ = [

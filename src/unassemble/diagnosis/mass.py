@@ -18,23 +18,30 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
+from ..errors import GeometryError
 from ..matrix import OperatorMatrix
 from ..nodes.grouping import same_pattern
 from ..nodes.unknowns import nodes_of_pattern
 from ..structures.layouts import SPACE
-from ..tolerances import LITTLE, ROUNDED, SUMMED
+from ..tolerances import HARDLY_ANY, LITTLE, NEARLY_ALL, ROUNDED, SUMMED
 from ..topology import components
 from ..words import count_of
 from .cliques import CELLS, cells_of, often
 from .kinds import LENGTHS, UNREAD, Diagnosis
 
-_LEAST = 0.05
-"""Eigenvalue that no stiffness matrix has: masses of beams have 0.08, hexahedra 1/8, squares 1/4, triangles 1/2."""
-
-_TOGETHER = 0.9
-"""Share of couplings that add up in one vector: of masses 0.94 and more, of as much stiffness beside them 0.8."""
-
 _SIMPLICES = {1: "segments", 2: "triangles", 3: "tetrahedra"}
+
+
+def refuse_masses(matrix: OperatorMatrix, *, planar: bool) -> None:
+    """Raise an error that names a mass matrix which recovery does not read; as :func:`mass_matrix`.
+
+    Raises
+    ------
+    GeometryError
+    """
+    mass = mass_matrix(matrix, planar=planar)
+    if mass is not None and mass.unread:
+        raise GeometryError(mass.sentence())
 
 
 def mass_matrix(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis | None:
@@ -133,10 +140,12 @@ class _Masses:
         if not couplings.maximum(0).sum() > LITTLE * abs(couplings).sum():
             return None  # on a graph with two colours, a grid's, the signs of one colour may be turned
         together, all_of_them = _extreme(couplings, "LA"), _extreme(abs(couplings), "LA")
-        if together is None or all_of_them is None or together < _TOGETHER * all_of_them:
+        # The share of masses is 0.94 and more; that of as much stiffness beside them 0.8.
+        if together is None or all_of_them is None or together < NEARLY_ALL * all_of_them:
             return None
+        # Masses of beams have 0.08, of hexahedra 1/8, of quadrilaterals 1/4, of triangles and tetrahedra 1/2.
         least = _extreme(scaled, "SA", _blocks(scaled))
-        return None if least is None or least < _LEAST else (least, 1 + together)
+        return None if least is None or least < HARDLY_ANY else (least, 1 + together)
 
     @property
     def unknowns(self) -> str:
