@@ -15,4 +15,5 @@ __all__ = [
     "further_terms",
     "judged",
     "mass_matrix",
+    "refuse_masses",
 ]
