@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import guessed
-from ..diagnosis import LINEAR, PLANAR, diagnosed
+from ..diagnosis import PLANAR, Diagnosis, diagnosed, further_terms, mass_matrix
 from ..errors import NotPlanarError, RecoveryError
 from ..matrix import OperatorMatrix, load
 from ..operators import VectorReading, second_reading, vector_valued
@@ -90,6 +90,8 @@ class Inspection:
         Of scalar matrices whose rows form cells of other elements than linear triangles: ``"P2"``, ``"Q1"``, ...
     n_quads : int
         Quadrilaterals, beside `n_triangles`; the number of cells of such a mesh is that of both.
+    further : str
+        Of scalar matrices: what was added to the Laplacian, or done to it, as row sums tell; begins with a comma.
     """
 
     n_rows: int
@@ -128,6 +130,7 @@ class Inspection:
     surface: str = ""
     element: str = ""
     n_quads: int = 0
+    further: str = ""
 
     @property
     def operator(self) -> str:
@@ -140,22 +143,18 @@ class Inspection:
             kind = "elasticity, if the material is isotropic" if self.coupled else "laplacian in each direction"
             return f"vector-valued, {self.block_size} components, {self.numbering}: {kind}"
         if self.element:
-            return f"laplacian, {element_text(self)}{self._diagonal}"
+            return f"laplacian, {element_text(self)}{self.further}"
         if self.surface:
             sphere = self.surface.startswith("closed, 0 handles")  # whose graph is planar
             other = "; or of a mesh in the plane whose outline has three edges" if sphere else ""
-            return f"laplacian of a surface in space, linear triangles{self._diagonal}{other}"
+            return f"laplacian of a surface in space, linear triangles{self.further}{other}"
         if self.kind != PLANAR:
             return self.name
         if self.obstacle:
             return "none that is known"
         if self.mixed_signs:
             return "not a Laplacian: its diagonal has one sign, and the off-diagonal sums here have both"
-        return "laplacian, linear triangles" + self.name.removeprefix(LINEAR)
-
-    @property
-    def _diagonal(self) -> str:
-        return "" if self.n_zero_sums == self.n_rows - self.n_isolated else ", plus a diagonal"
+        return f"laplacian, linear triangles{self.further}"
 
     @property
     def recoverable(self) -> str:
@@ -177,6 +176,8 @@ class Inspection:
                 f"{mesh_text(self)} on {self.n_rows - self.n_isolated:,} points, up to position, rotation, size and "
                 f"mirror image, {_IF}"
             )
+        if self.kind == "mass" and not self.advice:
+            return f"areas of {mesh_text(self)}, up to the density, and no positions: a mass matrix has no shape"
         if self.kind != PLANAR:
             return f"nothing: {self.advice}"
         if self.obstacle:
@@ -228,6 +229,9 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
 
 def _inspected(matrix: OperatorMatrix) -> Inspection:
     facts = matrix_facts(matrix)
+    mass = mass_matrix(matrix, planar=True)
+    if mass is not None and mass.unread:
+        return _masses(facts, mass)
     crowded = len(matrix.edges) > 3 * matrix.n
     if crowded and (shown := element_facts(matrix)):
         return Inspection(**facts, **_diagnosis(matrix, planar=False), planar=False, **shown)
@@ -252,7 +256,17 @@ def _inspected(matrix: OperatorMatrix) -> Inspection:
             facts |= _diagnosis(matrix, planar=planar)
             witness = getattr(error, "witness", ())
             return Inspection(**facts, planar=planar, obstacle=str(error or _NO_CELLS), witness=witness)
-    return Inspection(**facts, **mesh_facts(read, topology), **_diagnosis(matrix, planar=True))
+    found = mesh_facts(read, topology)
+    if found["mixed_signs"]:  # other readings, as in recovery where no mesh fits
+        if (mass := mass_matrix(matrix, planar=False)) is not None:
+            return _masses(facts, mass)
+        if (vector := second_reading(matrix)) is not None:
+            return _vector_valued(matrix, facts, vector)
+    return Inspection(**facts, **found, **_diagnosis(matrix, planar=True))
+
+
+def _masses(facts: dict[str, Any], mass: Diagnosis) -> Inspection:
+    return Inspection(**facts, **_named(mass), planar=False, obstacle=mass.name)
 
 
 def _vector_valued(matrix: OperatorMatrix, facts: dict[str, Any], vector: VectorReading) -> Inspection:
@@ -260,7 +274,10 @@ def _vector_valued(matrix: OperatorMatrix, facts: dict[str, Any], vector: Vector
 
 
 def _diagnosis(matrix: OperatorMatrix, *, planar: bool) -> dict[str, Any]:
-    found = diagnosed(matrix, planar=planar)
+    return {**_named(diagnosed(matrix, planar=planar)), "further": further_terms(matrix)}
+
+
+def _named(found: Diagnosis) -> dict[str, Any]:
     return {"kind": found.kind, "name": found.name, "evidence": found.evidence, "advice": found.advice}
 
 

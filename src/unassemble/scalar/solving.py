@@ -40,12 +40,15 @@ class Task:
         Errors of the entries, where they are not those of assembly.
     squared_lengths : (e,) float64 or None
         Of the edges of the matrix, where they are known from elsewhere.
+    search : bool
+        Whether to look for other cells where those that the graph shows do not fit.
     """
 
     options: ScalarOptions
     placement: Placement
     noise: Noise | None
     squared_lengths: NDArray[np.float64] | None = None
+    search: bool = True
 
     @property
     def stretch(self) -> float:
@@ -127,7 +130,7 @@ def solve(
     def attempt(piece: Piece) -> Outcome:
         return spoilt.get(piece) or start(piece)
 
-    if doubtful.any():
+    if doubtful.any() and task.search:
         with clock("faces"), blas_threads(1):  # hundreds of small readings
             matrix, topology, outcomes = completed(matrix, topology, attempt, doubtful, scale)
             # The search leaves c free in its solves, stops early and knows one method, which is polished.
@@ -195,7 +198,7 @@ def _successes(topology: Topology, outcomes: list[Outcome]) -> tuple[Topology, l
         if not isinstance(error, PieceMesh)
     ]
     if not meshes:
-        raise errors[0]
+        raise errors[0] if errors else GeometryError("the cycles of three edges form no mesh")
     if errors:
         pieces = [p for p, mesh in zip(topology.pieces, outcomes, strict=True) if isinstance(mesh, PieceMesh)]
         failures = (*topology.failures, *map(str, errors))
