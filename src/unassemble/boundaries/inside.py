@@ -42,8 +42,9 @@ class InsideOptions:
         The largest guess of a weight, in units of typical ones.
     rounds : int
         Fits, with fewer vertices at the rim each.
-    grown : int
-        Fits with vertices at the rim that were taken off before.
+    grown, quick : int
+        Fits with vertices at the rim that were taken off before, and their steps: all else fits already, so that they
+        take few or lead nowhere.
     exact : float
         Root mean square misfit of whole entries that is none, in units of typical ones.
     """
@@ -58,6 +59,7 @@ class InsideOptions:
     steepest: float = 3.0
     rounds: int = 15
     grown: int = 4
+    quick: int = 10
     exact: float = 1e-12
 
 
@@ -140,7 +142,8 @@ def fit_inside(
         if exact:
             grown = Rim(piece, given, np.ones(len(piece.triangles), dtype=bool))
             for _ in range(options.grown):
-                tried = problem.faded(core.z, core.scale, grown.whole, options.regrowing)
+                quick = FitOptions(last_steps=options.quick)
+                tried = problem.faded(core.z, core.scale, grown.whole, options.regrowing, quick)
                 work += tried.factorisations
                 _log.debug("grown to %d whole entries: misfit %.1e", grown.whole.sum(), tried.misfit)
                 if tried.misfit <= options.exact:
