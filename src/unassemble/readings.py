@@ -9,7 +9,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .boundaries import recover_lattice, recover_partial, recover_without_boundary_terms, with_boundary_edges
+from .boundaries import (
+    recover_lattice,
+    recover_partial,
+    recover_without_boundary_terms,
+    with_boundary_edges,
+    with_diagonals,
+)
 from .clock import Clock
 from .conforming.recover import recover_conforming, shown_cells
 from .errors import GeometryError, RecoveryError
@@ -94,7 +100,7 @@ class ScalarReadings:
         return recover_without_boundary_terms(self.matrix, self._plain, self.options.scale)
 
     def _partial(self) -> PlanarMesh | None:
-        matrix = with_boundary_edges(self.matrix)
+        matrix = with_boundary_edges(with_diagonals(self.matrix))
         whole = None if matrix.replaced is None else np.asarray(~matrix.replaced[matrix.edges].all(axis=1))
         return recover_partial(matrix, whole, self.placement, self.clock, self.options)
 

@@ -78,6 +78,17 @@ def test_identity_rows_without_their_zeros():
     assert determined(found, points) >= 0.9
 
 
+@pytest.mark.parametrize("levels", [3, 4])
+def test_identity_rows_of_a_disc(levels):
+    """Some cells are rectangles, on whose diagonals nothing is stored."""
+    matrix, points = identity_rows(MeshTri.init_circle(levels))
+    matrix.eliminate_zeros()
+    found = recover(matrix)
+    assert found.certified, found.reason
+    assert determined(found, points) == 1
+    assert "on one circle" in " ".join(found.warnings)
+
+
 @needs_shared
 @pytest.mark.parametrize("name", ["pyamg_airfoil", "skfem_annulus", "gc_lego", "skfem_square"])
 def test_identity_rows_third_party(name):
