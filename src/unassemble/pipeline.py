@@ -195,7 +195,7 @@ class _Task:
                 raise explained(error, self.matrix) from error
         # Unknowns of one node overlap in more rows than nodes of scalar elements do: this takes no time from them.
         with suppress(InputError, RecoveryError):  # options may be for vector-valued matrices only
-            found = self._readings.other_elements if self._readings.crowded else None
+            found = (self._readings.lattice or self._readings.other_elements) if self._readings.crowded else None
             if found is not None and found.certified:
                 return found
         at_sight = vector_valued(self.matrix)
