@@ -6,7 +6,6 @@ from .mass import mass_matrix, refuse_masses
 from .scalar import diagnosed, further_terms
 
 __all__ = [
-    "LINEAR",
     "PLANAR",
     "UNKNOWN",
     "Diagnosis",
