@@ -80,8 +80,8 @@ def with_diagonals(matrix: OperatorMatrix) -> OperatorMatrix:
     order = np.argsort(keys)
     entries = np.concatenate([matrix.entries, np.zeros(len(added))])[order]
     note = (
-        f"{count_of(len(added), 'cell has', 'cells have')} four corners on one circle: entries on both diagonals vanish, and "
-        "which of them divides it is arbitrary"
+        f"{count_of(len(added), 'cell has', 'cells have')} four corners on one circle: entries on both diagonals "
+        "vanish, and which of them divides it is arbitrary"
     )
     edges = np.column_stack(np.divmod(keys[order], n))
     return replace(matrix, edges=edges, entries=entries, warnings=(*matrix.warnings, note))
