@@ -89,7 +89,7 @@ def measured(matrix: sp.csr_array, points: np.ndarray) -> tuple[float, float, st
 
 
 def unit(matrix: sp.csr_array) -> float:
-    """Processor seconds to analyse, factorise and solve with a definite matrix of this pattern."""
+    """Processor seconds of one direct solve with a definite matrix of this pattern: analysis, factors, solution."""
     off = -abs(sp.triu(matrix, 1) + sp.tril(matrix, -1).T)
     off = off + off.T
     upper = sp.triu(off + sp.diags_array(1.001 * abs(off).sum(axis=1)), format="csr")
