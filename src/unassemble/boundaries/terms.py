@@ -24,8 +24,6 @@ from ..recovery import PlanarMesh
 from ..tolerances import ALIKE, CERTIFIED, ROUNDED
 from ..topology import Piece, local_numbering, surfaces
 
-_STEPS = 12  # of Gauss-Newton for the loops of evenly many edges
-
 
 def recover_without_boundary_terms(
     matrix: OperatorMatrix, plain: Callable[[OperatorMatrix], PlanarMesh], scale: float | None
@@ -128,8 +126,8 @@ class _Loops:
             terms[start:end] = sign * (first + along)
         return terms
 
-    def terms(self, matrix: OperatorMatrix, scale: float | None) -> NDArray[np.float64] | None:
-        """(b,) m with which a conformal map has all entries; None where there is none."""
+    def terms(self, matrix: OperatorMatrix, scale: float | None, steps: int = 12) -> NDArray[np.float64] | None:
+        """(b,) m with which a conformal map has all entries, by Gauss-Newton; None where there is none."""
         terms = self._particular()
         if terms is None:
             return None
@@ -138,7 +136,7 @@ class _Loops:
         ways = np.where(self.loop[:, None] == even, self.sign[:, None], 0).astype(float)
         misfit = self._misfit(matrix, terms, scale)
         step = ALIKE * float(np.median(np.abs(matrix.entries)))
-        for _ in range(_STEPS):
+        for _ in range(steps):
             if misfit is None or np.abs(misfit).max() <= ROUNDED or not len(even):
                 break
             others = [self._misfit(matrix, terms + step * way, scale) for way in ways.T]
