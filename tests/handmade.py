@@ -11,12 +11,12 @@ from meshes import edge_list, random_mesh
 from unassemble import Body, PlanarMesh, Recovery
 from unassemble.elements.kinds import KINDS
 from unassemble.elements.reference import reference_nodes
-from unassemble.topology import recognise
+from unassemble.topology import surfaces
 
 
 def recovery_of(points: np.ndarray, triangles: np.ndarray) -> PlanarMesh:
     """A certified result with this mesh, whose triangles may have any orientation and one piece only."""
-    piece = recognise(len(points), edge_list(triangles)).pieces[0]
+    piece = surfaces(len(points), edge_list(triangles)).pieces[0]
     a, b, c = (points[piece.vertices[corner]] @ [1, 1j] for corner in piece.triangles.T)
     mirrored = np.sum(np.imag(np.conj(b - a) * (c - a))) < 0
     boundary, offsets = piece.vertices[piece.boundary], piece.loop_offsets

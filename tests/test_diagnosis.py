@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import networkx
 import numpy as np
 import pyamg
@@ -212,3 +214,95 @@ def test_convection_is_named():
     A = shuffled(convection.assemble(fem.Basis(DISC, fem.ElementTriP1())))
     with pytest.raises(MatrixError, match=r"not symmetric: .* as where convection .* was added"):
         recover(A)
+
+
+def vector_masses(mesh, element):
+    form = fem.BilinearForm(lambda u, v, w: (1 + w.x[0] ** 2) * dot(u, v))  # a density that varies
+    return form.assemble(fem.Basis(mesh, fem.ElementVector(element)))
+
+
+def beams(n=12, length=0.7):
+    """Masses of bending members in a row, with displacements and rotations: Przemieniecki (1968), chapter 11."""
+    a = length
+    member = np.array(
+        [[156, 22 * a, 54, -13 * a], [22 * a, 4 * a**2, 13 * a, -3 * a**2], [54, 13 * a, 156, -22 * a],
+         [-13 * a, -3 * a**2, -22 * a, 4 * a**2]]
+    )  # fmt: skip
+    M = np.zeros((2 * n + 2, 2 * n + 2))
+    for k in range(n):
+        M[2 * k : 2 * k + 4, 2 * k : 2 * k + 4] += member * a / 420
+    return sp.csr_array(M)
+
+
+MASSES = {
+    "quadratic triangles": (lambda: masses(DISC, fem.ElementTriP2()), "quadratic elements on triangles"),
+    "quadrilaterals": (lambda: masses(moved(fem.MeshQuad().refined(3)), fem.ElementQuad1()), "bilinear elements"),
+    "hexahedra": (lambda: masses(fem.MeshHex().refined(2), fem.ElementHex1()), "trilinear elements on hexahedra"),
+    "vectors": (lambda: vector_masses(TETS, fem.ElementTetP1()), "of several unknowns per node"),
+    "vectors on quadrilaterals": (lambda: vector_masses(moved(fem.MeshQuad().refined(3)), fem.ElementQuad1()), "of"),
+    "beams": (beams, "a consistent mass matrix"),
+    "negative": (lambda: -masses(moved(fem.MeshQuad().refined(3)), fem.ElementQuad1()), "bilinear elements"),
+}
+
+
+@pytest.mark.parametrize("name", MASSES)
+def test_masses_of_every_element_are_named(name):
+    assembled, words = MASSES[name]
+    A = shuffled(assembled())
+    facts = inspect_matrix(A)
+    assert facts.kind == "mass"
+    assert words in facts.operator
+    for operator in ("auto", "laplacian", "elasticity"):
+        with pytest.raises(RecoveryError, match="mass matrix") as caught:
+            recover(A, operator=operator)
+        assert facts.name in str(caught.value)
+        assert facts.advice.split(":")[0] in str(caught.value).lower()
+
+
+def test_masses_of_a_boundary_are_those_of_segments():
+    A = shuffled(mass.assemble(fem.FacetBasis(DISC, fem.ElementTriP1())))
+    facts = inspect_matrix(A)
+    assert (facts.kind, "segments" in facts.operator, "113 rows are zero") == ("mass", True, facts.evidence[1])
+    with pytest.raises(RecoveryError, match="six times its entry"):
+        recover(A)
+
+
+def test_areas_of_a_mass_matrix_are_promised_and_given():
+    A = shuffled(masses(DISC, fem.ElementTriP1()))
+    facts, found = inspect_matrix(A), recover(A)
+    assert facts.recoverable.startswith("areas of 256 triangles")
+    assert found.certified
+    assert np.isclose(
+        np.sort(found.areas), np.sort(np.abs(np.linalg.det(DISC.mapping().A.transpose(2, 0, 1))) / 2)
+    ).all()
+
+
+def test_lumped_masses():
+    A = sp.diags_array(np.arange(1.0, 20))
+    for ask in (inspect_matrix, recover):
+        with pytest.raises(MatrixError, match="as a lumped mass matrix is"):
+            ask(A)
+
+
+@pytest.mark.parametrize("much", [0.1, 1.0])
+def test_stiffness_beside_masses_is_no_mass_matrix(much):
+    mesh = moved(fem.MeshQuad().refined(3))
+    K, M = stiffness(mesh, fem.ElementQuad1()), masses(mesh, fem.ElementQuad1())
+    both = sp.kron(K + much * K.diagonal().mean() / M.diagonal().mean() * M, sp.eye_array(2)).tocsr()
+    scaled = K + much * K.diagonal().mean() * sp.eye_array(K.shape[0])
+    for A in (both, scaled):
+        assert inspect_matrix(shuffled(A)).kind != "mass"
+
+
+CLASSICS = Path(__file__).resolve().parents[2] / "shared" / "classics"
+
+
+@pytest.mark.parametrize("name", sorted(path.name for path in CLASSICS.glob("*.mtx.gz")) if CLASSICS.exists() else [])
+def test_masses_among_classics(name):
+    """Their collections call all of these mass matrices; bcsstm10 is indefinite, and none."""
+    matrices = ("bcsstm07", "bcsstm12", "bcsstm13", "rail_109_M", "rail_371_E", "rail_371_M", "wathen_30_30")
+    if name.startswith("bcsstm08"):
+        with pytest.raises(MatrixError, match="as a lumped mass matrix is"):
+            inspect_matrix(CLASSICS / name)
+        return
+    assert (inspect_matrix(CLASSICS / name).kind == "mass") == name.startswith(matrices)

@@ -13,7 +13,7 @@ from unassemble.paper.corners import Corners, corners_of
 from unassemble.paper.equations import AngleSystem, Unknowns
 from unassemble.paper.newton import NewtonOptions, NewtonResult, solve
 from unassemble.paper.starts import angles_of, start_angles
-from unassemble.topology import Piece, recognise
+from unassemble.topology import Piece, surfaces
 
 from . import meshes
 
@@ -125,7 +125,7 @@ def case(name: str) -> Case:
 def case_of(mesh: meshes.Mesh, name: str, figure: int = 0) -> Case:
     """Any mesh of one piece."""
     edges, weights = meshes.stiffness(mesh)
-    (piece,) = recognise(len(mesh.points), edges).pieces
+    (piece,) = surfaces(len(mesh.points), edges).pieces
     z: NDArray[np.complex128] = (mesh.points @ np.array([1, 1j]))[piece.vertices]
     p = z[piece.triangles]
     if ((p[:, 1] - p[:, 0]).conj() * (p[:, 2] - p[:, 0])).imag.sum() < 0:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .clock import Clock
-from .diagnosis import explained, judged
+from .diagnosis import explained, judged, refuse_masses
 from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
@@ -179,6 +179,8 @@ class _Task:
 
     def answer(self) -> Recovery:
         """As the operator that is named; else as the one that the graph shows, or else the first that fits."""
+        with self.clock("check"):
+            refuse_masses(self.matrix, planar=not self.about.names_nodes)
         if self.about.names_nodes:
             self._refuse_scalar_options()
             with self.clock("numbering"):
@@ -193,7 +195,7 @@ class _Task:
                 raise explained(error, self.matrix) from error
         # Unknowns of one node overlap in more rows than nodes of scalar elements do: this takes no time from them.
         with suppress(InputError, RecoveryError):  # options may be for vector-valued matrices only
-            found = self._readings.other_elements if self._readings.crowded else None
+            found = (self._readings.lattice or self._readings.other_elements) if self._readings.crowded else None
             if found is not None and found.certified:
                 return found
         at_sight = vector_valued(self.matrix)

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .boundaries import recover_lattice, recover_partial, with_boundary_edges
+from .boundaries import (
+    recover_lattice,
+    recover_partial,
+    recover_without_boundary_terms,
+    with_boundary_edges,
+    with_diagonals,
+)
 from .clock import Clock
 from .conforming.recover import recover_conforming, shown_cells
 from .errors import GeometryError, RecoveryError
@@ -17,7 +23,7 @@ from .further_terms import recover_with_terms
 from .matrix import OperatorMatrix
 from .options import ScalarOptions
 from .recovery import PlanarMesh
-from .scalar import recover_scalar
+from .scalar import of_other_scale, recover_scalar
 from .scalar.placement import Placement
 from .tolerances import LITTLE
 
@@ -40,6 +46,11 @@ class ScalarReadings:
         return len(self.matrix.edges) > 3 * self.matrix.n
 
     @cached_property
+    def lattice(self) -> PlanarMesh | None:
+        """A grid of cells that are all alike, beside rows that were taken out; None where it is none."""
+        return recover_lattice(self.matrix, self.placement, self.clock, self.options)
+
+    @cached_property
     def other_elements(self) -> PlanarMesh | None:
         """A mesh of other elements than linear triangles; None where no cells show, or none is near."""
         cells = shown_cells(self.matrix)
@@ -59,10 +70,13 @@ class ScalarReadings:
         """
         if self.options.method != "conformal":
             return self._plain(self.matrix)
-        order: list[tuple[int, Callable[[], PlanarMesh | None]]] = [(0, self._lattice)]
+        if (other := self._lattice_of_other_scale()) is not None:
+            return other
+        order: list[tuple[int, Callable[[], PlanarMesh | None]]] = [(0, lambda: self.lattice)]
         replaced, incomplete = self.matrix.replaced is not None, self.matrix.incomplete_rows.any()
         if replaced or not self.matrix.adds_up.all():  # else nothing was taken out
             order.append((1 if replaced or incomplete else 3, self._partial))
+            order.append((0, self._without_boundary_terms))
         if not replaced:
             order += [(1 if self.crowded else 3, lambda: self.other_elements), (2, self._linear)]
         nearest: PlanarMesh | None = None
@@ -82,11 +96,20 @@ class ScalarReadings:
             )
         return nearest
 
-    def _lattice(self) -> PlanarMesh | None:
-        return recover_lattice(self.matrix, self.placement, self.clock, self.options)
+    def _without_boundary_terms(self) -> PlanarMesh | None:
+        if self.matrix.replaced is not None or self.options.noise is not None:
+            return None
+        return recover_without_boundary_terms(self.matrix, self._plain, self.options.scale)
+
+    def _lattice_of_other_scale(self) -> PlanarMesh | None:
+        """A lattice that does not have the scale given."""
+        if self.options.scale is None or self.lattice is not None:
+            return None
+        free = recover_lattice(self.matrix, self.placement, self.clock, replace(self.options, scale=None))
+        return None if free is None else of_other_scale(free, self.options.scale)
 
     def _partial(self) -> PlanarMesh | None:
-        matrix = with_boundary_edges(self.matrix)
+        matrix = with_boundary_edges(with_diagonals(self.matrix))
         whole = None if matrix.replaced is None else np.asarray(~matrix.replaced[matrix.edges].all(axis=1))
         return recover_partial(matrix, whole, self.placement, self.clock, self.options)
 

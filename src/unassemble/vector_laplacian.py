@@ -85,12 +85,13 @@ def recover_directions(
     worst = max([mesh, *others], key=lambda one: (not one.certified, one.backward_error))
     notes = ["the directions are not coupled: each was treated as a scalar matrix"]
     if others:
-        notes.append("the directions have different matrices; the mesh is that of the one with most nodes")
+        notes.append("the directions have different matrices: the mesh is that of the one with most nodes")
     return replace(
         _among_all_nodes(mesh, nodes, _rows_of(parts, lead), numbering.n_nodes),
         status=worst.status,
         uniqueness=worst.uniqueness,
         reason=worst.reason,
+        advice=worst.advice,
         backward_error=worst.backward_error,
         operator="vector laplacian",
         warnings=(*matrix.warnings, *mesh.warnings, *notes),

@@ -1,8 +1,9 @@
-"""Numbers with their nouns."""
+"""Numbers with their nouns, and sentences."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 
 def count_of(number: int, noun: str, plural: str | None = None) -> str:
@@ -36,6 +37,32 @@ def sentences(parts: Iterable[str], most: int = 2) -> str:
     """
     chosen = [part for part in parts if part][:most]
     return ". ".join(part if k == 0 else part[:1].upper() + part[1:] for k, part in enumerate(chosen))
+
+
+# What to do about rows, where a body or a structure is not certified.
+GIVE_NUMBERING = "give the numbering if it is known"
+WITHOUT_SUPPORTS = "assemble the matrix without supports, if that can be done"
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why an answer has its status.
+
+    Attributes
+    ----------
+    text : str
+        At most two sentences.
+    advice : str
+        What to do next; empty where there is nothing to do.
+    """
+
+    text: str
+    advice: str = ""
+
+    @classmethod
+    def of(cls, *parts: str, advice: str = "") -> Reason:
+        """Of sentences, the important one first; only two are kept."""
+        return cls(sentences(parts), advice)
 
 
 def kind_text(euler: int, orientable: bool, loops: int) -> str:

@@ -5,9 +5,13 @@ import pyamg
 import pytest
 import scipy.sparse as sp
 from conditions import convected, determined, eliminated, identity_rows, jittered, mesh_of, robin, shuffled
+from scipy.spatial import Delaunay
+from skfem import Basis, BilinearForm, ElementTriP1, MeshTri
+from skfem.helpers import dot, grad
+from skfem.models import laplace
 
 from meshes import SHARED, largest_error, needs_shared, random_mesh
-from unassemble import recover
+from unassemble import RecoveryError, recover
 
 
 def corpus(name):
@@ -74,6 +78,17 @@ def test_identity_rows_without_their_zeros():
     assert determined(found, points) >= 0.9
 
 
+@pytest.mark.parametrize("levels", [3, 4])
+def test_identity_rows_of_a_disc(levels):
+    """Some cells are rectangles, on whose diagonals nothing is stored."""
+    matrix, points = identity_rows(MeshTri.init_circle(levels))
+    matrix.eliminate_zeros()
+    found = recover(matrix)
+    assert found.certified, found.reason
+    assert determined(found, points) == 1
+    assert "on one circle" in " ".join(found.warnings)
+
+
 @needs_shared
 @pytest.mark.parametrize("name", ["pyamg_airfoil", "skfem_annulus", "gc_lego", "skfem_square"])
 def test_identity_rows_third_party(name):
@@ -83,21 +98,59 @@ def test_identity_rows_third_party(name):
     assert determined(found, points) >= (0.8 if name == "pyamg_airfoil" else 0.9)
 
 
-@pytest.mark.parametrize("alpha", [1.0, 100.0])
-def test_robin(alpha):
-    matrix, points = robin(jittered(seed=3), alpha)
-    found = recover(matrix)
+def annulus(n=24, seed=0):
+    """Rings of triangles: two loops of evenly many edges, and hardly an entry that is whole."""
+    rng = np.random.default_rng(seed)
+    angle = 2 * np.pi * (np.arange(n) + rng.uniform(-0.2, 0.2, (3, n))) / n
+    radius = np.array([[1.0], [1.3], [1.7]]) + rng.uniform(-0.05, 0.05, (3, n))
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle)], -1).reshape(-1, 2)
+    a = np.arange(2 * n).reshape(2, n)
+    b, c, d = np.roll(a, -1, axis=1), a + n, np.roll(a, -1, axis=1) + n
+    return mesh_of(points, np.stack([a, c, b, b, c, d], -1).reshape(-1, 3))
+
+
+MESHES = {
+    "odd loop": lambda: mesh_of(*random_mesh(150, seed=3, holes=False)),
+    "even loop": lambda: jittered(seed=3),
+    "even loops, all narrow": annulus,
+}
+
+
+@pytest.mark.parametrize("mesh", MESHES)
+@pytest.mark.parametrize("alpha", [1e-3, 1.0, 100.0])
+def test_robin(mesh, alpha):
+    """Row sums say what the boundary has: all points come back."""
+    matrix, points = robin(MESHES[mesh](), alpha)
+    found = recover(-0.3 * matrix)
     assert found.certified, found.reason
-    assert determined(found, points) >= 0.85
+    assert determined(found, points) == 1
+    assert "was taken off" in " ".join(found.warnings)
+    assert found.scale == pytest.approx(-0.3, rel=1e-9)
 
 
+@pytest.mark.parametrize("mesh", MESHES)
 @pytest.mark.parametrize("field", [(1.0, 0.0), (-20.0, 30.0)])
-def test_the_symmetric_part_of_convection(field):
+def test_the_symmetric_part_of_convection(mesh, field):
     """With a constant field C + C' is a boundary integral: entries inside are those of the Laplacian."""
-    matrix, points = convected(jittered(seed=4), field)
+    matrix, points = convected(MESHES[mesh](), field)
     found = recover((matrix + matrix.T) / 2)
     assert found.certified, found.reason
     assert determined(found, points) >= 0.85
+
+
+def test_robin_terms_of_another_factor_on_each_edge():
+    """No Robin condition: row sums give terms, but not those of the mesh."""
+    mesh = jittered(seed=5)
+    matrix, points = robin(mesh, 0.0)
+    rng, more = np.random.default_rng(0), sp.lil_array(matrix.shape)
+    place = {tuple(x): k for k, x in enumerate(points.tolist())}
+    for ends in mesh.facets[:, mesh.boundary_facets()].T:
+        rows, factor = [place[tuple(mesh.p[:, v].tolist())] for v in ends], rng.uniform(0.5, 2)
+        more[np.ix_(rows, rows)] += factor * np.array([[2, 1], [1, 2]])
+    found = recover(sp.csr_array(matrix + more))
+    if found.certified:
+        assert "was taken off" not in " ".join(found.warnings)
+        determined(found, points)
 
 
 @pytest.mark.parametrize("noise", [1e-6, 1e-3])
@@ -133,3 +186,72 @@ def test_shuffled_keeps_zeros():
     matrix, _ = identity_rows(mesh_of(*random_mesh(100, seed=7)))
     assert (matrix.data == 0).any()
     assert shuffled(matrix, np.zeros((matrix.shape[0], 2)))[0].nnz == matrix.nnz
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_slivers_at_the_rim(seed):
+    """What is called determined is right, whatever the rim is like."""
+    rng = np.random.default_rng(seed)
+    mesh = MeshTri(*skewed(rng))
+    for matrix, points in (eliminated(mesh), identity_rows(mesh), robin(mesh, 5.0)):
+        try:
+            found = recover(matrix)
+        except RecoveryError:
+            continue
+        if found.certified:
+            determined(found, points)
+
+
+def skewed(rng):
+    """Points in no order, drawn out by a thousand near the rim."""
+    points = rng.uniform(size=(150, 2))
+    points[:, 0] = np.where(points[:, 0] < 0.1, 1e-3 * points[:, 0], points[:, 0])
+    return np.ascontiguousarray(points.T), np.ascontiguousarray(Delaunay(points).simplices.T)
+
+
+def test_a_wrong_interface():
+    """Two materials are no boundary condition: nothing of a mesh of one factor is certified beyond what is right."""
+    mesh = jittered(seed=8)
+    factor = np.where(mesh.p[0, mesh.t].mean(axis=0) < 0.5, 1.0, 3.0)
+
+    @BilinearForm
+    def form(u, v, w):
+        return factor[:, None] * dot(grad(u), grad(v))
+
+    matrix = form.assemble(Basis(mesh, ElementTriP1()))
+    inside = np.setdiff1d(np.arange(mesh.nvertices), mesh.boundary_nodes())
+    for some in (np.arange(mesh.nvertices), inside):
+        found = recover(sp.csr_array(matrix)[some][:, some])
+        if found.certified:
+            determined(found, mesh.p.T[some])
+
+
+def test_a_surface_with_rows_taken_out():
+    """Entries of a bent sheet belong to no mesh in the plane."""
+    mesh = jittered(seed=9)
+    x, y = mesh.p
+    bent = np.stack([x, y, 0.5 * np.sin(3 * x) * np.cos(2 * y)])
+    matrix = cotangents(bent, mesh.t)
+    inside = np.setdiff1d(np.arange(mesh.nvertices), mesh.boundary_nodes())
+    try:
+        found = recover(matrix[inside][:, inside], operator="laplacian")
+    except RecoveryError:
+        return
+    assert not found.certified
+
+
+def cotangents(points, triangles):
+    """The matrix of linear elements on a surface in space, by scikit-fem: each triangle laid flat."""
+    a, b, c = points[:, triangles].transpose(1, 0, 2)
+    along = np.linalg.norm(b - a, axis=0)
+    x = ((c - a) * (b - a)).sum(axis=0) / along
+    y = np.sqrt(((c - a) ** 2).sum(axis=0) - x**2)
+    zero = np.zeros_like(x)
+    flat = MeshTri(
+        np.stack([[zero, along, x], [zero, zero, y]]).transpose(0, 2, 1).reshape(2, -1),
+        np.arange(3 * len(x)).reshape(-1, 3).T,
+    )
+    apart = sp.coo_array(laplace.assemble(Basis(flat, ElementTriP1())))
+    rows = triangles.T.ravel()
+    n = points.shape[1]
+    return sp.coo_array((apart.data, (rows[apart.row], rows[apart.col])), shape=(n, n)).tocsr()

@@ -1,14 +1,18 @@
 """Lattices that lost their boundary: finite differences above all."""
 
+import gzip
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from pyamg.gallery import diffusion_stencil_2d, poisson, stencil_grid
-from skfem import Basis, ElementTriP1, MeshTri
+from scipy.io import mmread
+from skfem import Basis, BilinearForm, ElementQuad1, ElementTriP1, MeshQuad, MeshTri
+from skfem.helpers import grad
 from skfem.models import laplace
 
-from meshes import largest_error
-from unassemble import RecoveryError, recover
+from meshes import SHARED, largest_error, needs_shared
+from unassemble import ConformingMesh, RecoveryError, recover
 
 
 def shuffled(matrix, points, seed=0):
@@ -153,6 +157,61 @@ def test_one_wrong_number(which):
         matrix[40, 40] = 4.001
     try:
         found = recover(shuffled(matrix, grid_points((9, 9)))[0])
+    except RecoveryError:
+        return
+    assert not found.certified
+
+
+@pytest.mark.parametrize("basis", [((1.0, 0.0), (0.0, 1.0)), ((1.0, 0.0), (0.0, 0.6)), ((1.0, 0.2), (-0.3, 0.7))])
+def test_bilinear_elements(basis):
+    """Nine-point stars: all rows with their unknowns on the boundary taken out, by scikit-fem."""
+    mesh = MeshQuad.init_tensor(np.arange(9.0), np.arange(7.0))
+    mesh = MeshQuad(np.array(basis).T @ mesh.p, mesh.t)
+    matrix = laplace.assemble(Basis(mesh, ElementQuad1()))
+    inside = np.setdiff1d(np.arange(mesh.nvertices), mesh.boundary_nodes())
+    matrix, points = shuffled(-2.0 * sp.csr_array(matrix)[inside][:, inside], mesh.p.T[inside])
+    found = recover(matrix)
+    assert found.certified, found.reason
+    assert isinstance(found, ConformingMesh)
+    assert found.quads.shape == (6 * 4, 4)
+    assert len(found.eliminated_points) == 28
+    assert largest_error(found.points, points) <= 1e-11
+    assert found.scale == pytest.approx(-2.0, rel=1e-11)
+
+
+def test_bilinear_elements_of_a_tensor():
+    """Nine-point stars of a diffusion that prefers a direction."""
+    tensor = np.array([[1.5, 0.3], [0.3, 1.0]])
+    mesh = MeshQuad.init_tensor(np.arange(9.0), np.arange(7.0))
+
+    @BilinearForm
+    def form(u, v, _):
+        return sum(tensor[i, j] * grad(u)[j] * grad(v)[i] for i in range(2) for j in range(2))
+
+    inside = np.setdiff1d(np.arange(mesh.nvertices), mesh.boundary_nodes())
+    matrix, points = shuffled(
+        sp.csr_array(form.assemble(Basis(mesh, ElementQuad1())))[inside][:, inside], mesh.p.T[inside]
+    )
+    found = recover(matrix, tensor=(1.5, 0.3, 1.0), anchors=[(k, *points[k]) for k in (0, 5, 17)])
+    assert found.certified, found.reason
+    assert np.abs(found.points - points).max() <= 1e-10
+
+
+@needs_shared
+def test_the_nine_point_star_of_harwell_boeing():
+    with gzip.open(SHARED / "classics" / "gr_30_30.mtx.gz") as stream:
+        found = recover(mmread(stream))
+    assert found.certified, found.reason
+    assert found.quads.shape == (29 * 29, 4)
+    assert len(found.eliminated_points) == 124
+
+
+def test_one_wrong_entry_among_nine_points():
+    star = np.array([[-1.0, -1, -1], [-1, 8, -1], [-1, -1, -1]])
+    matrix = sp.lil_array(stencil_grid(star, (9, 9)))
+    matrix[40, 41] = matrix[41, 40] = -1.001
+    try:
+        found = recover(matrix)
     except RecoveryError:
         return
     assert not found.certified

@@ -10,7 +10,7 @@ from unassemble import recover
 from unassemble.linalg import factorisation
 from unassemble.planar.krylov import ShiftedSearch
 from unassemble.planar.pencil import ConformalPencil
-from unassemble.topology import recognise
+from unassemble.topology import surfaces
 from unassemble.topology.cycles import three_cycles
 from unassemble.topology.separating import not_faces
 from vanishing import used
@@ -126,7 +126,7 @@ def test_a_vertex_of_degree_three_with_nothing_beyond():
 def test_a_krylov_space_whose_first_vector_has_a_negative_area():
     known = specimen(*random_mesh(100, holes=False))
     edges = edge_list(known.triangles)
-    (piece,) = recognise(len(known.points), edges).pieces
+    (piece,) = surfaces(len(known.points), edges).pieces
     weights = -np.asarray(known.matrix[edges[:, 0], edges[:, 1]]).ravel()
     pencil = ConformalPencil(piece, weights[piece.edge_rows])
     z = known.points[piece.vertices] @ [1, 1j]

@@ -8,14 +8,14 @@ from meshes import specimen
 from unassemble import recover
 from unassemble.cells.undivided import undivided
 from unassemble.scalar.joined import JoinedMesh
-from unassemble.topology import recognise
+from unassemble.topology import surfaces
 from vanishing import forgotten, squares
 
 
 def test_triangles_that_share_vanished_sides_become_one_polygon():
     triangles = np.array([(0, 1, 2), (0, 2, 3), (0, 3, 4), (3, 5, 4), (5, 6, 4)])
     edges = np.unique(np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
-    pieces = recognise(7, edges).pieces
+    pieces = surfaces(7, edges).pieces
     vanished = np.isin(edges @ [10, 1], [2, 3, 45])
     lone, polygons = undivided(pieces, vanished)
     assert not len(lone)
@@ -28,7 +28,7 @@ def test_triangles_that_share_vanished_sides_become_one_polygon():
 
 def test_nothing_has_vanished():
     edges = np.array([(0, 1), (0, 2), (1, 2)])
-    for pieces in (recognise(3, edges).pieces, ()):
+    for pieces in (surfaces(3, edges).pieces, ()):
         lone, polygons = undivided(pieces, np.zeros(3, bool))
         assert len(lone) == len(pieces)
         assert polygons.count == 0
@@ -47,7 +47,7 @@ def test_cells_without_an_outline_are_written_as_triangles():
     ring = [(k, (k + 1) % 6, (k + step) % 6 + 6) for k in range(6) for step in (0, 1)]
     triangles = np.array([(a, b, c) if c == a + 6 else (b, c, a + 6) for a, b, c in ring])
     edges = np.unique(np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
-    topology = recognise(12, edges)
+    topology = surfaces(12, edges)
     (piece,) = topology.pieces
     vanished = np.flatnonzero(piece.inner)
     lone, polygons = undivided([piece], np.isin(np.arange(len(edges)), piece.edge_rows[vanished]))

@@ -12,7 +12,7 @@ from unassemble.planar.conformal import conformal_map
 from unassemble.planar.piece import PieceMesh
 from unassemble.planar.robust import robust_fit
 from unassemble.scalar.wrong_entries import wrong_entries
-from unassemble.topology import recognise, surfaces
+from unassemble.topology import surfaces
 from vanishing import forgotten, holes, squares, triangular_holes
 
 MESHES = {
@@ -101,7 +101,7 @@ def test_sides_of_a_hole_are_no_wrong_entries():
     upper = sp.triu(known.matrix, 1).tocoo()
     order = np.lexsort((upper.col, upper.row))
     edges = np.column_stack([upper.row, upper.col])[order].astype(np.int64)
-    (piece,) = recognise(len(known.points), edges).pieces
+    (piece,) = surfaces(len(known.points), edges).pieces
     weights = -upper.data[order][piece.edge_rows]
     start = conformal_map(piece, weights).z
     fit = robust_fit(piece, weights, start, lambda misfit: bool((misfit < 1e-6).all()))

@@ -16,7 +16,7 @@ def test_text(work):
     assert lines["matrix"].startswith(f"{len(work.true.points)} rows, {len(edge_list(work.true.triangles))} off-")
     assert lines["planar"] == "yes"
     assert lines["holes"] == "2"
-    assert lines["operator"] == "laplacian, linear triangles, plus a diagonal"
+    assert lines["operator"] == "laplacian, linear triangles, plus a diagonal, or with rows and columns scaled"
     assert "scale c       about -" in result.stdout
     assert "up to position, rotation, size and mirror image" in lines["recoverable"]
     assert work.files() == {"A.mtx"}

@@ -9,7 +9,7 @@ from skfem.helpers import dot, grad
 
 from unassemble.paper.corners import corners_of
 from unassemble.paper.starts import angles_of
-from unassemble.topology import recognise
+from unassemble.topology import surfaces
 from unassemble_paper import meshes
 from unassemble_paper.cases import Case, case
 
@@ -34,7 +34,7 @@ def assembled(mesh: meshes.Mesh, name: str = "", *, seed: int = 7, scale: float 
     sides = np.sort(shuffled.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges = np.unique(sides, axis=0)  # zero entries are structure, and scikit-fem drops them
     weights = -np.asarray(matrix[edges[:, 0], edges[:, 1]]).ravel()
-    (piece,) = recognise(len(order), edges).pieces
+    (piece,) = surfaces(len(order), edges).pieces
     z = (shuffled.points @ np.array([1, 1j]))[piece.vertices]
     p = z[piece.triangles]
     if ((p[:, 1] - p[:, 0]).conj() * (p[:, 2] - p[:, 0])).imag.sum() < 0:

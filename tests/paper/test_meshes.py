@@ -43,7 +43,7 @@ def test_own_weights_are_those_of_scikit_fem(name, assemble, own_cases):
 
 def test_fans_at_a_boundary_that_touches_itself():
     """Two squares' worth of triangles around a pinched vertex: one fan for every passage."""
-    from unassemble.topology import recognise
+    from unassemble.topology import surfaces
 
     # A ring of triangles whose inner boundary touches the outer one in vertex 0.
     rim = [0, 1, 2, 3, 4, 5, 6]
@@ -51,7 +51,7 @@ def test_fans_at_a_boundary_that_touches_itself():
     triangles = [(0, 1, 7), (1, 2, 7), (2, 8, 7), (2, 3, 8), (3, 9, 8), (3, 4, 9), (4, 10, 9), (4, 5, 10),
                  (5, 11, 10), (5, 6, 11), (6, 0, 11)]  # fmt: skip
     edges = np.unique(np.sort(np.array(triangles)[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
-    (piece,) = recognise(12, edges).pieces
+    (piece,) = surfaces(12, edges).pieces
     corners = corners_of(piece)
     assert set(rim) | set(inner) == set(range(12))
     assert corners.w == 0

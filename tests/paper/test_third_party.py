@@ -8,7 +8,7 @@ import pytest
 from unassemble.paper import AngleOptions, recover_angles
 from unassemble.paper.alignment import distance
 from unassemble.paper.newton import NewtonOptions
-from unassemble.topology import recognise
+from unassemble.topology import surfaces
 from unassemble_paper.meshes import Mesh, stiffness
 
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "corpus" / "planar"
@@ -26,7 +26,7 @@ def test_converges_or_says_so(path):
     used, local = np.unique(stored["triangles"], return_inverse=True)
     points = stored["points"][used, :2].astype(float)
     edges, weights = stiffness(Mesh(points, local.reshape(-1, 3).astype(np.int64)))
-    piece = max(recognise(len(points), edges).pieces, key=lambda one: one.n_vertices)
+    piece = max(surfaces(len(points), edges).pieces, key=lambda one: one.n_vertices)
     budget = 1_500 if path.stem in FAILURES else 10_000
     options = AngleOptions(newton=NewtonOptions(tolerance=1e-10, max_products=budget))
     found = recover_angles(piece, weights[piece.edge_rows], options=options)

@@ -11,7 +11,7 @@ from unassemble import recover
 from unassemble.planar.cotangent import edge_weights
 from unassemble.planar.deviations import factor_deviations
 from unassemble.planar.polish import PolishOptions
-from unassemble.topology import recognise
+from unassemble.topology import surfaces
 
 C = 1.7
 
@@ -210,7 +210,7 @@ def test_pieces_too_large_to_be_fitted_together_are_said_to_be(monkeypatch):
 
 def test_deviation_of_a_factor():
     """That of log c over many draws, for a lone triangle."""
-    piece = recognise(3, np.array([(0, 1), (0, 2), (1, 2)])).pieces[0]
+    piece = surfaces(3, np.array([(0, 1), (0, 2), (1, 2)])).pieces[0]
     z = np.array([0, 1 + 0.1j, 0.4 + 0.8j])
     z = z if edge_weights(piece, z).sum() > 0 else np.conj(z)
     a, b, c = (edge_weights(piece, z) + 1e-6 * np.random.default_rng(0).standard_normal((4000, 3))).T

@@ -13,13 +13,13 @@ from unassemble.planar.deviations import coordinate_covariances
 from unassemble.planar.frame import canonical_frame, collinear, fit_similarity
 from unassemble.planar.normal import WeightJacobian
 from unassemble.planar.polish import PolishOptions, polish
-from unassemble.topology import recognise
+from unassemble.topology import surfaces
 
 
 def single_piece(n=400, seed=0, c=1.0):
     known = specimen(*random_mesh(n, seed), c=c, seed=seed)
     edges = edge_list(known.triangles)
-    (piece,) = recognise(len(known.points), edges).pieces
+    (piece,) = surfaces(len(known.points), edges).pieces
     weights = -np.asarray(known.matrix[edges[:, 0], edges[:, 1]]).ravel()
     return piece, weights, known.points @ [1, 1j]
 

@@ -5,10 +5,7 @@ import pytest
 
 from meshes import largest_error, random_mesh, specimen
 from unassemble import recover
-from unassemble.linalg import factorisation
-from unassemble.planar.piece import positions, refined
-from unassemble.planar.triangles import lone_triangles
-from unassemble.topology import components, recognise
+from unassemble.topology import components
 
 
 def chain(count, seed=0):
@@ -32,34 +29,6 @@ def test_a_chain_is_joined_from_triangle_to_triangle(scale):
     assert found.scale == pytest.approx(-2.5, rel=1e-9)
     for rows in known.triangles[::50]:
         assert largest_error(found.points[rows], known.points[rows]) < 1e-9
-
-
-@pytest.mark.parametrize("rounding", [True, False])
-def test_lone_triangles_are_those_of_the_general_method(rounding):
-    known = specimen(*chain(20, seed=3))
-    edges = np.argwhere(np.triu(known.matrix.toarray(), 1))
-    topology = recognise(len(known.points), edges)
-    weights = -known.matrix.toarray()[edges[:, 0], edges[:, 1]] + 1e-3 * np.random.default_rng(0).random(len(edges))
-    lone = lone_triangles(topology.pieces, weights, spread=None if rounding else np.ones(len(edges)))
-    assert len(lone) == len(topology.pieces) == 20
-    for piece, mesh in lone.items():
-        own = weights[piece.edge_rows]
-        start = positions(piece, own, scale=None, sharp=False, analyse=factorisation)
-        general = refined(piece, own, start, scale=None, rounding=rounding)
-        assert mesh.scale == pytest.approx(general.scale, rel=1e-9)
-        shape, other = (z - z.mean() for z in (mesh.z, general.z))
-        assert abs(np.vdot(shape, other)) == pytest.approx(np.linalg.norm(shape) * np.linalg.norm(other), rel=1e-12)
-        if rounding:
-            assert mesh.spread == pytest.approx(general.spread, rel=1e-6)
-
-
-def test_three_numbers_that_are_no_triangle_are_left_to_the_general_method():
-    topology = recognise(3, np.array([[0, 1], [0, 2], [1, 2]]))
-    assert not lone_triangles(topology.pieces, np.array([1.0, 1.0, -1.5]))
-    assert not lone_triangles(topology.pieces, np.array([1.0, 1.0, -0.5]))  # flat
-    assert lone_triangles(topology.pieces, np.array([1.0, 1.0, -0.4]))
-    assert not lone_triangles(topology.pieces, np.full(3, 0.5), scale=1.0)
-    assert lone_triangles(topology.pieces, np.full(3, 0.5), scale=np.sqrt(3))
 
 
 def test_components_are_numbered_by_themselves():

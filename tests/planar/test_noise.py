@@ -13,7 +13,7 @@ from unassemble.planar import piece as pieces
 from unassemble.planar.cautious import cautious_polish, count_flipped
 from unassemble.planar.conformal import conformal_map
 from unassemble.planar.polish import polish
-from unassemble.topology import recognise
+from unassemble.topology import surfaces
 
 
 def noisy(matrix, sigma, seed=0):
@@ -142,7 +142,7 @@ def channel(length, width):
 def test_start_far_off_is_polished_to_the_same_mesh_as_the_truth():
     known, sigma = channel(200, 5), 1e-2
     checked = check_matrix(noisy(known.matrix, sigma), noise=sigma)
-    piece = recognise(checked.n, checked.edges).pieces[0]
+    piece = surfaces(checked.n, checked.edges).pieces[0]
     entries = -checked.entries[piece.edge_rows]
     start = conformal_map(piece, entries, sharp=False)
     chord, careful = polish(piece, entries, start.z), cautious_polish(piece, entries, start.z)
@@ -191,7 +191,7 @@ def test_large_steps_that_fail_are_replaced_by_small_ones(monkeypatch):
 def test_triangles_turned_over_are_counted():
     known = specimen(*random_mesh(200, seed=5))
     checked = check_matrix(known.matrix)
-    piece = recognise(checked.n, checked.edges).pieces[0]
+    piece = surfaces(checked.n, checked.edges).pieces[0]
     z = known.points[piece.vertices] @ [1, 1j]
     assert count_flipped(piece, z) == count_flipped(piece, z.conj()) == 0
     inner = np.setdiff1d(np.arange(len(z)), piece.boundary)[0]

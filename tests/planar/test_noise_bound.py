@@ -15,7 +15,7 @@ from irregular import laplacian
 from unassemble.matrix import check_matrix
 from unassemble.planar.conformal import conformal_map
 from unassemble.planar.piece import PieceMesh, refined
-from unassemble.topology import recognise
+from unassemble.topology import surfaces
 
 WITHIN = 1.1
 
@@ -32,7 +32,7 @@ class Setting:
         self.bound = Bound(self.z, np.array([place[tuple(p)] for p in points])[triangles])
         checked = check_matrix(self.matrix)
         self.edges = checked.edges
-        self.piece = recognise(checked.n, checked.edges).pieces[0]
+        self.piece = surfaces(checked.n, checked.edges).pieces[0]
 
     def draw(self, sigma: float, seed: int) -> tuple[float, float, float]:
         """Mean square errors of the polished mesh, of the null vector and of the best linear estimate."""

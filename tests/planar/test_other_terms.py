@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pyamg
 import pytest
 import scipy.sparse as sp
 from skfem import Basis, BilinearForm, ElementTriP1, MeshTri
@@ -110,4 +111,23 @@ def test_a_wrong_scale_names_the_right_one():
     assert found.status == "uncertified"
     assert found.reason.startswith("the scale 2.9 does not fit, and 3 does")
     assert "scale=3" in found.advice
+    assert "faces" not in found.timings  # no cells were searched for
     assert recover(A, scale=3.0).certified
+
+
+@pytest.mark.parametrize("wrong", [2.0, -1.0])
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        lambda: pyamg.gallery.poisson((12, 12), format="csr"),  # without its boundary
+        lambda: laplace.assemble(
+            Basis(MeshTri.init_tensor(np.linspace(0, 1, 9), np.linspace(0, 1, 8)), ElementTriP1())
+        ),
+    ],
+)
+def test_a_wrong_scale_where_zeros_are_not_stored(matrix, wrong):
+    A = shuffled(matrix())
+    found = recover(A, scale=wrong)
+    assert found.status == "uncertified"
+    assert found.reason.startswith(f"the scale {wrong:g} does not fit, and 1 does")
+    assert recover(A, scale=1.0).certified

@@ -183,6 +183,20 @@ def shell(shape=curved, counts=(9, 7), thickness: float = 0.02) -> Built:
     return assembled(model, points)
 
 
+def vault(counts=(7, 5)) -> Built:
+    """A barrel of flat quadrilaterals on columns under its corners: members and shells in one matrix."""
+    u, v = (part.ravel() for part in np.meshgrid(np.linspace(0, np.pi, counts[0]), np.arange(counts[1]), indexing="ij"))
+    points = np.column_stack([3 * np.cos(u), 1.5 * v, 3 + 2 * np.sin(u)])
+    corners = np.flatnonzero((points[:, 2] < 3 + 1e-9) & np.isin(v, (0, counts[1] - 1)))
+    ends = np.column_stack([len(points) + np.arange(len(corners)), corners])
+    points = np.concatenate([points, points[corners] * (1, 1, 0)])
+    model = model_on(points)
+    for k, around in enumerate(cells_of(counts)):
+        model.add_quad(str(k), *map(str, around), 0.1, "steel")
+    add_members(model, ends, 0, turned=False)
+    return assembled(model, points, ends)
+
+
 def plate(counts=(9, 8), seed: int = 0, off: float = 0.2) -> Built:
     """A flat plate that only bends: one displacement and two rotations."""
     u, v = (part.ravel() for part in np.meshgrid(*(np.arange(k, dtype=float) for k in counts), indexing="ij"))
@@ -216,9 +230,10 @@ def sound(matrix, true, **options) -> bool:
     if not found.certified:
         return False
     rows = np.flatnonzero(np.isin(found.direction_of_row, range({"plate": 1, "plane frame": 2}.get(found.operator, 3))))
+    free_size = found.operator in ("truss", "elasticity")
     points, piece = found.points[found.node_of_row[rows]], found.component[found.node_of_row[rows]]
     for one in range(found.n_components):
-        assert error(points[piece == one], true[rows][piece == one], scaled=found.operator == "truss") < 1e-6
+        assert error(points[piece == one], true[rows][piece == one], scaled=free_size) < 1e-6
     return True
 
 

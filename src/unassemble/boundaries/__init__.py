@@ -4,7 +4,14 @@ Entries next to them contain cells that are gone, so that each says less than th
 """
 
 from .lattices import recover_lattice
-from .missing import with_boundary_edges
+from .missing import with_boundary_edges, with_diagonals
 from .partial import recover_partial
+from .terms import recover_without_boundary_terms
 
-__all__ = ["recover_lattice", "recover_partial", "with_boundary_edges"]
+__all__ = [
+    "recover_lattice",
+    "recover_partial",
+    "recover_without_boundary_terms",
+    "with_boundary_edges",
+    "with_diagonals",
+]

@@ -166,11 +166,14 @@ class WholeEntries:
         _log.debug("mu %.0e: misfit %.1e, prior %.1e, %d factorisations", mu, rest, size, factorisations)
         return Fit(z, scale, rest, size, factorisations)
 
-    def faded(self, z: NDArray, scale: float, whole: NDArray[np.bool_], mus: Sequence[float]) -> Fit:
+    def faded(
+        self, z: NDArray, scale: float, whole: NDArray[np.bool_], mus: Sequence[float],
+        options: FitOptions | None = None,
+    ) -> Fit:  # fmt: skip
         """One fit after the other, with less and less prior; parameters as for :meth:`fit`."""
         work = 0
         for mu in mus:
-            found = self.fit(z, scale, whole, mu)
+            found = self.fit(z, scale, whole, mu, options)
             z, scale, work = found.z, found.scale, work + found.factorisations
         return replace(found, factorisations=work)
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,12 +35,16 @@ class InsideOptions:
         Guess of the weight of an edge that has no guess, in units of typical ones.
     outlines : int
         Boundary loops, the longest ones, that are tried as the outer one.
+    near : float
+        Root mean square misfit of a first fit, in units of typical weights, next to which no other is tried: with a
+        loop inside out it is far larger.
     steepest : float
         The largest guess of a weight, in units of typical ones.
     rounds : int
         Fits, with fewer vertices at the rim each.
-    grown : int
-        Fits with vertices at the rim that were taken off before.
+    grown, quick : int
+        Fits with vertices at the rim that were taken off before, and their steps: all else fits already, so that they
+        take few or lead nowhere.
     exact : float
         Root mean square misfit of whole entries that is none, in units of typical ones.
     """
@@ -50,9 +55,11 @@ class InsideOptions:
     regrowing: tuple[float, ...] = (1e-3, 0.0)
     unknown: float = 0.5
     outlines: int = 4
+    near: float = 0.01
     steepest: float = 3.0
     rounds: int = 15
     grown: int = 4
+    quick: int = 10
     exact: float = 1e-12
 
 
@@ -135,7 +142,8 @@ def fit_inside(
         if exact:
             grown = Rim(piece, given, np.ones(len(piece.triangles), dtype=bool))
             for _ in range(options.grown):
-                tried = problem.faded(core.z, core.scale, grown.whole, options.regrowing)
+                quick = FitOptions(last_steps=options.quick)
+                tried = problem.faded(core.z, core.scale, grown.whole, options.regrowing, quick)
                 work += tried.factorisations
                 _log.debug("grown to %d whole entries: misfit %.1e", grown.whole.sum(), tried.misfit)
                 if tried.misfit <= options.exact:
@@ -150,6 +158,8 @@ def fit_inside(
     known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(whole)
     if exact:
         known, entries = determined(piece, fit.z, whole, known_scale=scale is not None)
+        if entries.sum() <= 2 * known.sum() - (4 if scale is not None else 3):  # nothing that checks them as a whole
+            known, entries = np.zeros_like(known), np.zeros_like(entries)
     return InsideMesh(fit.z, fit.scale * unit, given, entries, exact, known, work)
 
 
@@ -177,11 +187,13 @@ def _start(problem: WholeEntries, rim: Rim, weight: float, options: InsideOption
     over, or there are several loops, drawings with one or another of them as the outline are tried.
     """
     piece, whole, best, least = problem.piece, rim.whole, None, np.inf
-    drawings = [_conformal(problem)] if conformal else []
+    drawings: Iterable[NDArray[np.complex128]] = [_conformal(problem)] if conformal else []
     if piece.n_loops > 1 or not any(map(partial(_upright, piece), drawings)):
         loops = np.argsort(-np.diff(piece.loop_offsets), kind="stable")[: options.outlines]
-        drawings += [tutte(piece, loop) for loop in loops.tolist()]
+        drawings = chain(drawings, (tutte(piece, loop) for loop in loops.tolist()))
     for z in drawings:
+        if best is not None and best.misfit <= options.near:
+            break
         if not _upright(piece, z):
             continue
         c = problem.best_scale(z, whole)

@@ -42,6 +42,8 @@ class JudgeOptions:
         What is left of a standard normal number at an entry that nothing checks.
     solves, probes, most : int
         Inverse iterations, random vectors, and null vectors at most.
+    parts : int
+        Vertices far from the rim about which others are looked for that move with them.
     """
 
     shift: float = 1e-14
@@ -51,6 +53,7 @@ class JudgeOptions:
     solves: int = 4
     probes: int = 8
     most: int = 256
+    parts: int = 8
 
 
 def determined(
@@ -185,20 +188,32 @@ class _Linearised:
 
 
 def _moving_alike(piece: Piece, z: NDArray, free: NDArray, size: NDArray, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(n,) the vertices about the one farthest from the rim that every displacement moves by one similarity."""
+    """(n,) the most vertices that every displacement moves by one similarity: about one of those far from the rim.
+
+    Beyond a neck others may move by another one.
+    """
     n = piece.n_vertices
     graph = sp.coo_array((np.ones(len(piece.edges), np.int8), piece.edges.T), shape=(n, n)).tocsr()
     graph = graph + graph.T
     outside = np.union1d(piece.boundary.ravel(), np.flatnonzero(~held))
-    depth = csgraph.dijkstra(graph, unweighted=True, indices=outside, min_only=True)
-    deepest = int(np.where(held, depth, -1).argmax())
-    alike = np.zeros(n, dtype=bool)
-    alike[[deepest, *graph.indices[graph.indptr[deepest] : graph.indptr[deepest + 1]]]] = True
+    depth = np.where(held, csgraph.dijkstra(graph, unweighted=True, indices=outside, min_only=True), -1)
     basis = np.column_stack([np.ones(n), z / np.abs(z).max()])
-    while True:
-        fit = np.linalg.lstsq(basis[alike], free[alike], rcond=None)[0]
-        moves = np.abs(free - basis @ fit).max(axis=1, initial=0.0)
-        now = held & (moves <= JudgeOptions.moves * size)
-        if now.sum() <= alike.sum():
-            return now & alike if (alike & ~now).any() else now
-        alike = now
+    best = np.zeros(n, dtype=bool)
+    for _ in range(JudgeOptions.parts):
+        deepest = int(depth.argmax())
+        alike = np.zeros(n, dtype=bool)
+        alike[[deepest, *graph.indices[graph.indptr[deepest] : graph.indptr[deepest + 1]]]] = True
+        depth[alike] = -1
+        while True:
+            fit = np.linalg.lstsq(basis[alike], free[alike], rcond=None)[0]
+            moves = np.abs(free - basis @ fit).max(axis=1, initial=0.0)
+            now = held & (moves <= JudgeOptions.moves * size)
+            if now.sum() <= alike.sum():
+                alike = np.zeros(n, dtype=bool) if (alike & ~now).any() else now
+                break
+            alike = now
+        depth[alike] = -1
+        best = alike if alike.sum() > best.sum() else best
+        if 2 * best.sum() > held.sum():
+            break
+    return best

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..cells.undivided import undivided
+from ..certify import certify
+from ..certify_elements import certify_elements
 from ..clock import Clock
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..recovery import PlanarMesh
+from ..recovery import ConformingMesh, PlanarMesh
 from ..scalar.joined import JoinedMesh
 from ..scalar.notes import vanished_notes
 from ..scalar.placement import Placement
@@ -20,6 +25,8 @@ from ..topology.pieces import planar_pieces
 from ..words import count_of
 from .lattice import Lattice, rows_alike
 from .witness import Witness
+
+_RULE = "2 x 2 Gauss"
 
 
 def recover_lattice(
@@ -34,7 +41,7 @@ def recover_lattice(
         return None
     with clock("lattice"):
         lattice = Lattice.of(matrix)
-    if lattice is None or len(lattice.z) == matrix.n or lattice.neighbours == 8 or options.method != "conformal":
+    if lattice is None or len(lattice.z) == matrix.n or options.method != "conformal":
         return None
     if options.scale is not None and abs(lattice.scale / options.scale - 1) > CERTIFIED:
         return None
@@ -49,12 +56,28 @@ def recover_lattice(
         gone = _moved_along(lattice.z[: matrix.n], mesh.points, lattice.z[matrix.n :])
     with clock("certify"):
         points = np.concatenate([mesh.points, gone])
-        triangles = _upright(points, _divided(lattice.cells))
-        witness = Witness.of(matrix, points, triangles, float(mesh.scale[0]), lattice.shift, placement.coefficients)
+        cells = _upright(points, lattice.cells)
+        if lattice.neighbours == 8:
+            seen = tensor.to_laplacian(points @ [1, 1j]) if tensor else points @ [1, 1j]
+            certificate = certify_elements(
+                matrix.edges, matrix.entries, np.column_stack([seen.real, seen.imag]), {"quad": cells},
+                {"quad": np.full(len(cells), lattice.scale)}, {"quad": _RULE},
+            )  # fmt: skip
+        else:
+            triangles = _divided(cells)
+            factor = np.full(len(triangles), float(mesh.scale[0]))
+            certificate = certify(matrix.edges, matrix.entries, points, triangles, factor, placement.coefficients)
+        witness = Witness.of(matrix, certificate, len(points), lattice.shift)
     if not witness.backward_error <= CERTIFIED:
         return None
-    return PlanarMesh(
-        **mesh.fields(triangulate=options.triangulate),
+    kind: Callable[..., PlanarMesh] = PlanarMesh
+    undivided_cells = [] if lattice.neighbours == 8 else vanished_notes(topology)
+    fields = mesh.fields(triangulate=options.triangulate and lattice.neighbours != 8)
+    if lattice.neighbours == 8:
+        kind = partial(ConformingMesh, quads=cells[(cells < matrix.n).all(axis=1)], quadrature=_RULE, straight=True)
+        fields = {name: value for name, value in fields.items() if not name.startswith("polygons")}
+    return kind(
+        **fields,
         points=mesh.points,
         hinges=topology.hinges,
         node_status=np.zeros(matrix.n, np.int8),
@@ -68,7 +91,7 @@ def recover_lattice(
         backward_error=witness.backward_error,
         n_holes=topology.n_holes,
         timings=clock.timings,
-        warnings=(*matrix.warnings, *_lattice_notes(lattice), *notes, *vanished_notes(topology)),
+        warnings=(*matrix.warnings, *_lattice_notes(lattice), *notes, *undivided_cells),
         eliminated_points=gone,
     )
 
@@ -86,8 +109,10 @@ def _lattice_notes(lattice: Lattice) -> list[str]:
 def _topology(matrix: OperatorMatrix, lattice: Lattice) -> Topology | None:
     """The cells that have all their vertices; None unless they are one piece, with all rows."""
     cells = lattice.cells[(lattice.cells < matrix.n).all(axis=1)]
-    triangles = _divided(cells)
-    edges, given, opposite = with_sides(matrix.n, matrix.edges, triangles)
+    triangles, known = _divided(cells), matrix.edges
+    if lattice.neighbours == 8:  # without diagonals
+        known = np.unique(np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)), axis=0)
+    edges, given, opposite = with_sides(matrix.n, known, triangles)
     pieces = planar_pieces(matrix.n, edges, triangles, opposite)
     if pieces is None or len(pieces) != 1 or pieces[0].n_vertices < matrix.n or len(pieces[0].edges) < len(edges):
         return None
@@ -110,7 +135,7 @@ def _moved_along(z: NDArray, points: NDArray, others: NDArray) -> NDArray[np.flo
     return np.column_stack([others.real, others.imag, np.ones(len(others))]) @ affine
 
 
-def _upright(points: NDArray, triangles: NDArray) -> NDArray[np.int64]:
-    """Triangles of a mesh that may be turned over as a whole, counter-clockwise."""
-    a, b, c = (points @ [1, 1j])[triangles[0]]
-    return triangles if (np.conj(b - a) * (c - a)).imag > 0 else triangles[:, ::-1]
+def _upright(points: NDArray, cells: NDArray) -> NDArray[np.int64]:
+    """Cells of a mesh that may be turned over as a whole, counter-clockwise."""
+    a, b, c = (points @ [1, 1j])[cells[0, :3]]
+    return cells if (np.conj(b - a) * (c - a)).imag > 0 else cells[:, ::-1]

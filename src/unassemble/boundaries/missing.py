@@ -1,14 +1,16 @@
-"""Edges between rows that were replaced, where their zeros are not stored."""
+"""Edges of matrices with replaced rows, where zeros are not stored."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..matrix import OperatorMatrix
 from ..topology.cycles import three_cycles
-from ..topology.keys import distinct, pair_keys
+from ..topology.keys import contains, distinct, pair_keys
+from ..words import count_of
 
 
 def with_boundary_edges(matrix: OperatorMatrix) -> OperatorMatrix:
@@ -44,3 +46,46 @@ def with_boundary_edges(matrix: OperatorMatrix) -> OperatorMatrix:
     entries = np.zeros(len(keys))
     entries[np.searchsorted(keys, given)] = matrix.entries
     return replace(matrix, edges=np.column_stack(np.divmod(keys, n)), entries=entries)
+
+
+def with_diagonals(matrix: OperatorMatrix) -> OperatorMatrix:
+    """The same with zeros on one diagonal of each cell of four rows, whose diagonals both vanish: it is a rectangle.
+
+    Only for rows that were replaced: all edges but those between two of these have triangles on both sides, so that
+    cells are missing, and not holes, where they do not.
+    """
+    if matrix.replaced is None:
+        return matrix
+    n, edges = matrix.n, matrix.edges
+    _, opposite = three_cycles(n, edges)
+    replaced = matrix.replaced[edges].all(axis=1)
+    opened = np.bincount(opposite.ravel(), minlength=len(edges)) < np.where(replaced, 1, 2)
+    ends = edges[opened]
+    graph = sp.coo_array((np.ones(len(ends), np.int32), ends.T), shape=(n, n)).tocsr()
+    graph = graph + graph.T
+    across = sp.triu(graph @ graph, 1).tocoo()
+    pairs = np.column_stack([across.row, across.col])[across.data == 2].astype(np.int64)
+    given = pair_keys(n, *edges.T)
+    pairs = pairs[~contains(given, pair_keys(n, *pairs.T))]
+    absent = {frozenset(pair) for pair in pairs.tolist()}
+    added: list[list[int]] = []
+    for a, c in pairs[~matrix.replaced[pairs].all(axis=1)].tolist():
+        other = frozenset(set(_around(graph, a)) & set(_around(graph, c)))
+        if other in absent:
+            absent.discard(frozenset((a, c)))  # its cell is divided
+            added.append([a, c])
+    if not added:
+        return matrix
+    keys = np.concatenate([given, pair_keys(n, *np.array(added).T)])
+    order = np.argsort(keys)
+    entries = np.concatenate([matrix.entries, np.zeros(len(added))])[order]
+    note = (
+        f"{count_of(len(added), 'cell has', 'cells have')} four corners on one circle: entries on both diagonals "
+        "vanish, and which of them divides it is arbitrary"
+    )
+    edges = np.column_stack(np.divmod(keys[order], n))
+    return replace(matrix, edges=edges, entries=entries, warnings=(*matrix.warnings, note))
+
+
+def _around(graph: sp.csr_array, row: int) -> list[int]:
+    return graph.indices[graph.indptr[row] : graph.indptr[row + 1]].tolist()

@@ -71,8 +71,8 @@ def recover_partial(
             )
             for piece, own in zip(topology.pieces, given, strict=True)
         ]
-    found = [mesh for mesh in meshes if mesh is not None]
-    if not all(mesh.exact for mesh in found) or not any(mesh.determined.any() for mesh in found):
+    meshes = [mesh if mesh is not None and mesh.exact else None for mesh in meshes]  # others have no positions
+    if not any(mesh is not None and mesh.determined.any() for mesh in meshes):
         return None
     with clock("place"):
         placed = _Placed.of(topology, meshes, placement, stretch)

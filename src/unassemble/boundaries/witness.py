@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..certify import certify
+from ..certify import Certificate
 from ..matrix import OperatorMatrix
-
-Tensor = tuple[float, float, float] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,30 +34,24 @@ class Witness:
         return max(self.entries, self.diagonal) if self.upright else np.inf
 
     @classmethod
-    def of(
-        cls, matrix: OperatorMatrix, points: NDArray, triangles: NDArray, scale: float, shift: float, tensor: Tensor
-    ) -> Witness:
-        """Assemble on all points, and compare rows and columns of the matrix.
+    def of(cls, matrix: OperatorMatrix, found: Certificate, n_points: int, shift: float) -> Witness:
+        """Compare rows and columns of the matrix.
 
         Parameters
         ----------
         matrix : OperatorMatrix
-        points : (n + g, 2) float64
-            Of rows first.
-        triangles : (m, 3) int64
-            Linear elements.
-        scale : float
+        found : Certificate
+            Of a mesh that has the rows first among its points.
+        n_points : int
         shift : float
             Multiple of the identity that was added.
-        tensor : (kxx, kxy, kyy), optional
         """
         n = matrix.n
-        found = certify(matrix.edges, matrix.entries, points, triangles, np.full(len(triangles), scale), tensor)
         within = (found.pairs < n).all(axis=1)
         sums = np.zeros(n)
         for end in matrix.edges.T:
             sums += np.bincount(end, matrix.entries, n)
         for end in found.pairs.T:
-            sums += np.bincount(end, found.differences, len(points))[:n]
+            sums += np.bincount(end, found.differences, n_points)[:n]
         diagonal = np.abs(shift - sums - matrix.diagonal) / matrix.row_size
         return cls(float(found.misfits[within].max()), float(diagonal.max()), not len(found.flipped))

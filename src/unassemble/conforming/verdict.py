@@ -12,7 +12,7 @@ from ..scalar.solving import Task
 from ..scalar.verdict import Held
 from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE, SUSPICIOUS
 from ..topology.keys import pair_keys
-from ..words import count_of
+from ..words import count_of, sentences
 from .fit import Fitted
 
 _STANDS_OUT = 0.25  # of the sum of squared misfits; where all is rounding no entry has a twentieth
@@ -64,9 +64,9 @@ def _obstacle(fits: Sequence[Fitted], near: Held, task: Task) -> str:
     """What speaks against a mesh, the gravest first; empty if nothing does."""
     certificate, test = near.certificate, near.test
     notes = list(dict.fromkeys(note for fit in fits for note in fit.notes))
-    because = f"; {notes[0]}" if notes else ""
     if len(certificate.flipped):
-        return count_of(len(certificate.flipped), "cell is", "cells are") + f" flat, not convex or turned over{because}"
+        turned = count_of(len(certificate.flipped), "cell is", "cells are") + " flat, not convex or turned over"
+        return sentences((turned, *notes))
     known = task.scale is not None
     loose = [fit for fit in fits if fit.freedom + known <= 0]
     if loose:
@@ -79,14 +79,16 @@ def _obstacle(fits: Sequence[Fitted], near: Held, task: Task) -> str:
             return "entries of so few digits may fit by chance"
         if not test.likely:
             p = min(test.figures["p_value"], test.figures["largest_p_value"])
-            return f"the misfit is too large for {test.noise} (p = {p:.1e}; {CONFIDENCE:g} is allowed){because}"
-        return f"the mesh that fits need not be the likeliest{because}" if notes else ""
+            large = f"the misfit is too large for {test.noise} (p = {p:.1e}, where {CONFIDENCE:g} is allowed)"
+            return sentences((large, *notes))
+        return sentences(("the mesh that fits need not be the likeliest", *notes)) if notes else ""
     if not near.passes:
         (i, j), misfit = certificate.pairs[certificate.misfits.argmax()], certificate.misfits.max()
-        return (
+        differs = (
             f"the re-assembled matrix differs, most in the entry of rows {i} and {j} (by {misfit:.1e} of the row's "
-            f"largest; {CERTIFIED:g} is allowed){because}"
+            f"largest, where {CERTIFIED:g} is allowed)"
         )
+        return sentences((differs, *notes))
     for fit in fits if certificate.backward_error > SUSPICIOUS and task.options.refine else ():
         squares = (fit.misfit / fit.spread) ** 2
         if squares.max() > _STANDS_OUT * squares.sum():

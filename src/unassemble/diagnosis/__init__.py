@@ -2,6 +2,17 @@
 
 from .answers import explained, judged
 from .kinds import PLANAR, UNKNOWN, Diagnosis
-from .scalar import LINEAR, diagnosed
+from .mass import mass_matrix, refuse_masses
+from .scalar import diagnosed, further_terms
 
-__all__ = ["LINEAR", "PLANAR", "UNKNOWN", "Diagnosis", "diagnosed", "explained", "judged"]
+__all__ = [
+    "PLANAR",
+    "UNKNOWN",
+    "Diagnosis",
+    "diagnosed",
+    "explained",
+    "further_terms",
+    "judged",
+    "mass_matrix",
+    "refuse_masses",
+]

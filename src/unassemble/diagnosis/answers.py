@@ -10,6 +10,7 @@ from ..recovery import PlanarMesh
 from ..tolerances import CERTIFIED
 from ..words import sentences
 from .kinds import UNKNOWN
+from .mass import mass_matrix
 from .scalar import diagnosed
 
 
@@ -24,7 +25,7 @@ def explained(error: RecoveryError, matrix: OperatorMatrix, otherwise: str = "")
         What else may be said, where it is of no kind that is known.
     """
     planar = not isinstance(error, NotPlanarError)
-    found = diagnosed(matrix, planar=planar)
+    found = mass_matrix(matrix, planar=False) or diagnosed(matrix, planar=planar)
     if isinstance(error, NotPlanarError):
         begun = "the graph of the matrix is not planar"
         if found.kind == UNKNOWN:
@@ -47,9 +48,9 @@ def judged(mesh: PlanarMesh, matrix: OperatorMatrix) -> PlanarMesh:
     """
     if mesh.status != "uncertified" or mesh.backward_error <= CERTIFIED:
         return mesh
-    found = diagnosed(matrix, planar=True)
-    if not found.unread:
-        return mesh
+    found = mass_matrix(matrix, planar=False) or diagnosed(matrix, planar=True)
     if found.kind in ("mass", "segments"):
         raise GeometryError(found.sentence())
+    if not found.unread:
+        return mesh
     return replace(mesh, reason=sentences([f"the matrix is {found.name}", *found.evidence]), advice=found.advice)

@@ -13,11 +13,14 @@ UNREAD: Mapping[str, str] = {
     "tetrahedra": "scalar matrices of meshes in space are not read yet, but elasticity matrices of such meshes are",
     "hexahedra": "scalar matrices of meshes in space are not read yet, but elasticity matrices of such meshes are",
     "grid in space": "scalar matrices of meshes in space are not read yet, but elasticity matrices of such meshes are",
-    "mass": "pass the stiffness matrix of the same mesh: a mass matrix tells areas, and of linear triangles only",
+    "mass": "pass the stiffness matrix of the same mesh: a mass matrix tells sizes of cells, and no shape",
     "graph": "a graph without weights has no coordinates: a layout of the graph may draw it",
     "segments": "the length of each segment is the reciprocal of its entry, with nothing left to solve",
 }
 """What to do with kinds that :func:`unassemble.recover` refuses; who builds the recovery of one takes its line out."""
+
+LENGTHS = "the length of each segment is six times its entry, over the density, with nothing left to solve"
+"""What to do with the mass matrix of linear elements on segments, a boundary's for one."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class Diagnosis:
     @property
     def unread(self) -> bool:
         """Whether recovery refuses such matrices."""
-        return self.kind in UNREAD
+        return self.kind in UNREAD and bool(self.advice)
 
     def sentence(self, begun: str = "the matrix is") -> str:
         """What it is, and what to do next."""

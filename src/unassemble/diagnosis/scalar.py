@@ -11,24 +11,11 @@ from numpy.typing import NDArray
 from ..matrix import OperatorMatrix
 from ..tolerances import MOST, ROUNDED, SMALL, SUMMED
 from ..words import count_of
-from .cliques import Cells, cells_of, mostly, often
+from .cliques import CELLS, Cells, cells_of, mostly, often
 from .kinds import PLANAR, UNKNOWN, UNREAD, Diagnosis
+from .mass import mass_matrix
 
-_CELLS = {
-    # nodes of a cell, and those that neighbours share: kind, and name
-    (4, 2): ("quadrilaterals", "bilinear elements on quadrilaterals"),
-    (8, 4): ("hexahedra", "trilinear elements on hexahedra"),
-    (6, 3): ("quadratic", "quadratic elements on triangles"),
-    (8, 3): ("quadratic", "serendipity elements on quadrilaterals"),
-    (9, 3): ("quadratic", "biquadratic elements on quadrilaterals"),
-    (10, 6): ("tetrahedra", "quadratic elements on tetrahedra"),
-    (20, 8): ("hexahedra", "serendipity elements on hexahedra"),
-    (27, 9): ("hexahedra", "triquadratic elements on hexahedra"),
-    (10, 4): ("cubic", "cubic elements on triangles"),
-    (16, 4): ("cubic", "bicubic elements on quadrilaterals"),
-}
 LINEAR = "a stiffness matrix of linear elements on triangles"
-_SIMPLICES = {1: "segments", 2: "triangles", 3: "tetrahedra"}
 _SMALL = 10  # rows: fewer may be a mesh of few triangles, whatever their entries are
 
 
@@ -40,8 +27,8 @@ class Sums:
     ----------
     zero : (n,) bool
         Rows that add up to nothing, alone ones left out.
-    alone : (n,) bool
-        Rows with nothing beside the diagonal.
+    alone, identity : (n,) bool
+        Rows with nothing beside the diagonal; those of them that have something on it.
     penalised : (n,) bool
         Rows whose diagonal is beyond everything else.
     sign : int
@@ -50,6 +37,7 @@ class Sums:
 
     zero: NDArray[np.bool_]
     alone: NDArray[np.bool_]
+    identity: NDArray[np.bool_]
     penalised: NDArray[np.bool_]
     sign: int
 
@@ -64,16 +52,17 @@ class Sums:
         penalised = (SMALL * np.abs(matrix.diagonal) > size) & ~alone
         signs = np.unique(np.sign(sums[~alone & ~penalised]))
         sign = int(signs[0]) if len(signs) == 1 and not (zero & ~alone).any() else 0
-        return cls(zero, alone, penalised, sign)
+        return cls(zero, alone, alone & (matrix.diagonal != 0), penalised, sign)
 
     @property
     def evidence(self) -> tuple[str, ...]:
         """What they say of boundary conditions and further terms, the strongest first."""
         used = ~self.alone
         said = []
-        if self.alone.any() and self.zero.any():
-            rows = count_of(int(self.alone.sum()), "row is that", "rows are those")
-            said.append(f"{rows} of the identity, as of unknowns with Dirichlet conditions (row {_first(self.alone)})")
+        if self.identity.any() and self.zero.any():
+            rows = count_of(int(self.identity.sum()), "row is that", "rows are those")
+            which = f"of the identity, as of unknowns with Dirichlet conditions (row {_first(self.identity)})"
+            said.append(f"{rows} {which}")
         if self.penalised.any():
             rows = count_of(int(self.penalised.sum()), "diagonal entry is", "diagonal entries are")
             said.append(f"{rows} a penalty, as for Dirichlet conditions (row {_first(self.penalised)})")
@@ -83,10 +72,10 @@ class Sums:
             said.append("all other rows add up to zero")
         elif self.zero.any():
             rest = used & ~self.zero & ~self.penalised
-            said.append(
-                f"{int(rest.sum()):,} of {int(used.sum()):,} rows do not add up to zero, as next to unknowns that were "
-                f"eliminated (row {_first(rest)})"
-            )
+            most = rest.sum() > MOST * used.sum()
+            cause = "where a mass matrix or a diagonal was added" if most else "next to unknowns that were eliminated"
+            rows = f"{int(rest.sum()):,} of {int(used.sum()):,} rows do not add up to zero"
+            said.append(f"{rows}, as {cause} (row {_first(rest)})")
         else:
             one = f"all sums are {'positive' if self.sign > 0 else 'negative'}" if self.sign else "sums have both signs"
             said.append(f"no row adds up to zero, and {one}")
@@ -103,11 +92,8 @@ def diagnosed(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis:
         Whether its graph is one of triangles, or of other cells with linear elements, in the plane.
     """
     sums = Sums.of(matrix)
-    dimension = _mass_of_simplices(matrix)
-    if dimension:
-        ratio = {1: "twice", 2: "once", 3: "two thirds of"}[dimension]
-        of = f"each diagonal entry is {ratio} the sum of the others in its row, and all are of one sign"
-        return _of_kind("mass", f"a mass matrix of linear elements on {_SIMPLICES[dimension]}", of)
+    if (mass := mass_matrix(matrix, planar=planar)) is not None:
+        return mass
     degree = np.bincount(matrix.edges.ravel(), minlength=matrix.n)
     if degree.max() <= 2 and matrix.n >= _SMALL:
         return _of_kind(
@@ -117,7 +103,9 @@ def diagnosed(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis:
         equal = "all off-diagonal entries are equal, and on a mesh those of the boundary have one cell and others two"
         return _of_kind("graph", "the Laplacian of a graph without weights", equal, *sums.evidence)
     if planar:
-        return Diagnosis(PLANAR, LINEAR + _further(sums), sums.evidence)
+        return Diagnosis(PLANAR, LINEAR + further_terms(matrix), sums.evidence)
+    if not (sums.zero.any() or sums.sign):  # as of no stiffness matrix, whatever its graph looks like
+        return _unknown(sums)
     return _by_cells(matrix, sums)
 
 
@@ -127,8 +115,8 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
     for edges in (matrix.edges, used):  # zeros that are stored show cells better than where they are left out
         cells = cells_of(matrix.n, edges)
         several = often(cells.twins)  # unknowns in a node, or nodes inside of an edge or cell
-        operator = _operator(matrix, sums, cells)
-        kind, name = _CELLS.get((cells.nodes, cells.shared), ("", ""))
+        operator = "a stiffness matrix" if sums.zero.any() else "a stiffness matrix, plus a mass matrix or a diagonal,"
+        kind, name = CELLS.get((cells.nodes, cells.shared), ("", ""))
         # About half of the pairs of quadrilaterals are diagonals.
         doubtful = {"quadrilaterals": cells.often < 1 - MOST, "hexahedra": several and cells.nodes == 8}
         if kind and not doubtful.get(kind):
@@ -147,6 +135,10 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
         if _is_grid(matrix.n, edges, cells):
             shown = "no three rows are coupled to each other, and most rows are coupled to six"
             return _of_kind("grid in space", "that of a grid in space, a seven-point stencil", shown, *sums.evidence)
+    return _unknown(sums)
+
+
+def _unknown(sums: Sums) -> Diagnosis:
     return Diagnosis(
         UNKNOWN,
         "no scalar matrix of a kind that is known",
@@ -160,42 +152,21 @@ def _of_kind(kind: str, name: str, *evidence: str) -> Diagnosis:
     return Diagnosis(kind, name, evidence, UNREAD.get(kind, without))
 
 
-def _further(sums: Sums) -> str:
-    """What was added to the Laplacian."""
+def further_terms(matrix: OperatorMatrix) -> str:
+    """What was added to a Laplacian, or done to it, as its row sums tell before anything is solved."""
+    sums = Sums.of(matrix)
     if (sums.zero | sums.alone).all():
         return ""
     if sums.penalised.any() and (sums.zero | sums.alone | sums.penalised).all():
         return ", plus a diagonal"
     if sums.zero.any():
         return ", plus a diagonal or without some unknowns"
-    return ", plus a diagonal or a mass matrix" if sums.sign else ", plus a diagonal"
-
-
-def _operator(matrix: OperatorMatrix, sums: Sums, cells: Cells) -> str:
-    # Of a mass matrix of quadratic triangles the sums of vertices are zero, a quarter of all.
-    if (cells.nodes, cells.shared) == (6, 3) and 0 < sums.zero.mean() < 1 - MOST:
-        return "a mass matrix"
-    if sums.zero.any():
-        return "a stiffness matrix"
-    if (np.sign(matrix.entries) == np.sign(matrix.diagonal[0])).all() and (matrix.diagonal != 0).all():
-        return "a mass matrix"
-    return "a stiffness matrix, plus a mass matrix or a diagonal,"
-
-
-def _mass_of_simplices(matrix: OperatorMatrix) -> int:
-    """Dimension of the simplices whose mass matrix with linear elements this is; 0 for none.
-
-    A simplex of volume V in d dimensions adds 2 V / ((d + 1) (d + 2)) to each diagonal entry and half as much to each
-    of d off-diagonal ones in the same row.
-    """
-    sign = np.sign(matrix.entries[0])
-    if sign == 0 or not ((matrix.entries * sign > 0).all() and (matrix.diagonal * sign > 0).all()):
-        return 0
-    others = np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n)
-    return next(
-        (d for d in _SIMPLICES if np.allclose(d * matrix.diagonal, 2 * others, rtol=SUMMED, atol=0)),
-        0,
-    )
+    if np.ptp(matrix.diagonal) <= ROUNDED * np.abs(matrix.diagonal).max():
+        return ", plus a diagonal, or with rows and columns scaled to a constant diagonal"
+    if sums.sign:
+        return ", plus a diagonal or a mass matrix, as of a reaction"
+    scaled = (matrix.diagonal > 0).all() or (matrix.diagonal < 0).all()  # squares of factors keep signs
+    return ", plus a diagonal, or with rows and columns scaled" if scaled else ", plus a diagonal"
 
 
 def _has_middles(matrix: OperatorMatrix, most: int = 400) -> bool:

@@ -16,7 +16,7 @@ from .nullspace.material import lame_ratio, poisson_ratio
 from .nullspace.solution import Solution
 from .remarks import about_assumptions, about_cells, about_directions, about_nodes
 from .results import ElasticityRecovery
-from .verdict import NOTHING_SHOWN, RESTS_ON_PLANES, of_few_digits, verdict
+from .verdict import NOTHING_SHOWN, RESTS_ON_PLANES, hidden, of_few_digits, verdict
 
 
 def described(
@@ -56,7 +56,7 @@ def described(
     if rounding and near and not any(solution.freedoms):
         status, reason = of_few_digits(nodal, solution, error, numbering, rounding)
     elif rounding:
-        reason = f"{reason}; the entries are rounded to {rounding.name}, which may hide what rows lack"
+        reason = hidden(reason, rounding)
     withheld = np.zeros(nodal.n, dtype=bool)
     if status == "certified" and (found.certified or numbering.open_row is not None or not numbering.incomplete):
         withheld = unconfirmed(nodal, numbering, solution.points, found.shown)
@@ -82,7 +82,8 @@ def described(
         cells=found,
         backward_error=backward,
         status=status,
-        reason=reason,
+        reason=reason.text,
+        advice=reason.advice,
         numbering=numbering.kind,
         warnings=(
             *solution.warnings,

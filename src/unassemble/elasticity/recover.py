@@ -17,7 +17,7 @@ from .doubts import with_doubts
 from .positions import solve
 from .results import ElasticityRecovery
 from .springs import without_springs
-from .verdict import about_made_up_nodes, about_open_rows, about_rows
+from .verdict import about_made_up_nodes, about_open_rows, no_positions
 
 
 def recover_elasticity(
@@ -58,7 +58,7 @@ def recover_elasticity(
         nodal = nodal_matrix(whole, numbering)
     if uncoupled(nodal):
         raise GeometryError(
-            "the directions are not coupled: these are scalar matrices side by side; recover one of them by itself"
+            "the directions are not coupled: these are scalar matrices side by side. Recover one of them by itself"
         )
     return place_nodes(nodal, numbering, clock, cells=cells, patch=patch, rounding=rounding)
 
@@ -83,10 +83,8 @@ def place_nodes(
         except RecoveryError as error:
             if not numbering.inferred:
                 raise
-            raise GeometryError(
-                f"no positions were found: {about_open_rows(numbering) or about_rows(error)}"
-            ) from error
+            raise GeometryError(no_positions(about_open_rows(numbering) or error)) from error
         why = about_made_up_nodes(nodal, numbering, solution, rounding) if numbering.inferred else ""
         if why:
-            raise GeometryError(f"no positions were found: {why}")
+            raise GeometryError(no_positions(why))
     return described(nodal, numbering, solution, clock, cells=cells, rounding=rounding)

@@ -50,15 +50,15 @@ def about_nodes(
         )
     if withheld.any():
         told.append(
-            f"{count_of(int(withheld.sum()), 'node has', 'nodes have')} rows that no element shows to be theirs; "
-            "since it was inferred which rows make up a node, no coordinates are given there"
+            f"{count_of(int(withheld.sum()), 'node has', 'nodes have')} rows that no element shows to be theirs. "
+            "Since it was inferred which rows make up a node, no coordinates are given there"
         )
     resting = int((hanging & ~withheld).sum())
     if resting:
         told.append(
             f"{count_of(resting, 'node is', 'nodes are')} determined only if nodes that lack a direction lie in planes "
             "across it, or if Poisson's ratio is the same there, which neither another equation nor an element "
-            "confirms; no coordinates are given there"
+            "confirms. No coordinates are given there"
         )
     rest = int((loose & ~withheld & ~hanging & ~sprung).sum())
     if rest:
@@ -79,8 +79,8 @@ def about_assumptions(solution: Solution) -> list[str]:
         )
     if solution.straight:
         told.append(
-            "the body is homogeneous and held all around, where the identities leave an affine map free; the elements "
-            "determined it"
+            "the body is homogeneous and held all around, where the identities leave an affine map free that the "
+            "elements determined"
         )
     if solution.ratio is not None:
         told.append("Poisson's ratio, read off the nodes that determine it, was used to determine others")

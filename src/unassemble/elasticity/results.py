@@ -36,7 +36,8 @@ class ElasticityRecovery:
     backward_error : float
         Largest residual of a valid identity; or of the re-assembled matrix where `cells` hold.
     status : {"certified", "uncertified"}
-    reason : str
+    reason, advice : str
+        Why; what to do next where they are not certified.
     numbering : str
         How the unknowns are numbered: ``"interleaved"``, ``"by component"`` or ``"pattern"``.
     warnings : tuple of str
@@ -56,6 +57,7 @@ class ElasticityRecovery:
     status: str
     reason: str
     numbering: str
+    advice: str = ""
     warnings: tuple[str, ...] = ()
     timings: Mapping[str, float] = field(default_factory=dict)
 

@@ -19,6 +19,7 @@ from ..nodes.numbering import Numbering
 from ..nodes.rounded import Rounding
 from ..recovery import Body
 from ..tolerances import LAST_DIGITS
+from ..words import Reason
 from .materials.cells import Cells
 from .recover import place_nodes
 from .results import ElasticityRecovery
@@ -61,9 +62,9 @@ def serve_body(
     found = place_nodes(nodal, numbering, clock, cells=request.cells, rounding=request.rounding)
     known = checked_anchors(request.anchors, found.node_of_row, numbering.block_size)
     points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
-    status, reason = found.status, found.reason
+    status, reason = found.status, Reason(found.reason, found.advice)
     if status == "certified" and _flat(found):
-        status, reason = "uncertified", "the points lie in one line or plane, and no solid body does"
+        status, reason = "uncertified", Reason("the points lie in one line or plane, and no solid body does")
     status, reason = near_enough(status, reason, digits_lost(points, found.points, found.component, factor))
     lame, scale = _in_units(found, factor)
     if np.isnan(factor).any():
@@ -76,7 +77,8 @@ def serve_body(
         node_status=found.node_status,
         status=status,
         uniqueness="searched" if status == "certified" else None,
-        reason=reason,
+        reason=reason.text,
+        advice=reason.advice,
         operator="elasticity",
         backward_error=found.backward_error,
         timings=clock.timings,

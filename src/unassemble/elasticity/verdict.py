@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -11,20 +13,23 @@ from ..nodes.numbering import Numbering
 from ..nodes.rounded import Rounding
 from ..nodes.shape import SOFT
 from ..tolerances import ALIKE, CERTIFIED, SIGMAS
-from ..words import count_of
+from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, sentences
 from .materials.cells import Cells
 from .nullspace.solution import Solution
 
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
-_GIVE = "; give the numbering if it is known"
-NOTHING_SHOWN = "no node is left whose rows are shown to be its own and whose coordinates hang on no assumption"
-NOTHING_LEFT = (
-    "each row that is whole touches nodes that are not determined, so that no identity is left to certify the others, "
-    "and no elements do"
+NOTHING_SHOWN = Reason(
+    "no node is left whose rows are shown to be its own and whose coordinates hang on no assumption", GIVE_NUMBERING
 )
-RESTS_ON_PLANES = (
+NOTHING_LEFT = Reason(
+    "each row that is whole touches nodes that are not determined, so that no identity is left to certify the others, "
+    "and no elements do",
+    WITHOUT_SUPPORTS,
+)
+RESTS_ON_PLANES = Reason(
     "more than translation and scale is free unless nodes that lack a direction lie in planes across it, and no "
-    "elements show that they do"
+    "elements show that they do",
+    WITHOUT_SUPPORTS,
 )
 
 
@@ -35,13 +40,14 @@ def about_open_rows(numbering: Numbering) -> str:
         return ""
     return (
         f"{count_of(rows, 'row couples', 'rows couple')} to the same unknowns as rows of other nodes, and neither "
-        "order nor positions tell which of them belong together; give the numbering if it is known"
+        "order nor positions tell which of them belong together"
     )
 
 
-def about_rows(why: object) -> str:
-    """The sentence that says why, and what may be to blame where it was inferred which rows belong to one node."""
-    return f"{why}; which rows belong to one node, and to which direction, was inferred and may be wrong{_GIVE}"
+def no_positions(why: object) -> str:
+    """Why there are none, and what may be to blame where it was inferred which rows belong to one node."""
+    blame = f"which rows belong to one node, and to which direction, was inferred: {GIVE_NUMBERING}"
+    return sentences([f"no positions were found: {why}", blame])
 
 
 def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solution, rounding: Rounding | None) -> str:
@@ -52,36 +58,41 @@ def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solu
     """
     odd = _came_apart(nodal) if any(solution.freedoms) and numbering.open_row is None else 0
     if odd:
-        return f"{_lacking(odd)}, so that rows were not joined to nodes as they should be{_GIVE}"
+        return f"{_lacking(odd)}, so that rows were not joined to nodes as they should be"
     if not solution.exact and rounding is None and numbering.incomplete and (numbering.odd or numbering.common < 1):
-        return about_rows("none fit the matrix exactly, as where constraints tie unknowns together")
+        return "none fit the matrix exactly, as where constraints tie unknowns together"
     return ""
 
 
 def of_few_digits(
     nodal: NodalMatrix, solution: Solution, error: float, numbering: Numbering, rounding: Rounding
-) -> tuple[str, str]:
+) -> tuple[str, Reason]:
     """Status and reason where the entries are rounded, which is an error bar.
 
     Rounding moves the null vector by what it adds to the equations over the singular value of the next field; the
     residual that is left shows how much that is, but for the few parts in which the null vector could follow.
     """
     objection = _to_positions(nodal, solution, numbering, exact=False) or _to_identities(nodal, solution, numbering)
-    if objection:
-        return "uncertified", f"{objection}; the entries are rounded to {rounding.name}, which may hide what rows lack"
+    if objection.text:
+        return "uncertified", hidden(objection, rounding)
     if np.isnan(error):
         return "uncertified", NOTHING_LEFT
     doubt = SIGMAS * max(one.residual / one.gap if one.gap > 0 else np.inf for one in solution.evidence)
     holds = f"the entries are rounded to {rounding.name}, and the identities hold to {error:.1e}"
     if not error <= max(rounding.spread, CERTIFIED):
-        return (
-            "uncertified",
-            f"{holds}, which is more than that leaves: positions may be off by {doubt:.0e} of the size",
+        return "uncertified", Reason(
+            f"{holds}, which is more than that leaves: positions may be off by {doubt:.0e} of the size"
         )
     known = f"{holds}, which is what that leaves, so that positions are known to {doubt:.0e} of the size"
-    return ("certified" if doubt <= ALIKE else "uncertified"), known
+    return ("certified", Reason(known)) if doubt <= ALIKE else ("uncertified", Reason(known, _MORE_DIGITS))
 
 
+def hidden(reason: Reason, rounding: Rounding) -> Reason:
+    """A reason not to certify rounded entries, with what may be behind it."""
+    return replace(reason, advice=f"{_MORE_DIGITS}: they are rounded to {rounding.name}, which may hide what rows lack")
+
+
+_MORE_DIGITS = "write the entries with more digits"
 _FREEDOMS = {
     "axes": "each axis keeps a scale of its own",
     "affine": "an affine map stays free, since the material around every valid row is homogeneous",
@@ -90,7 +101,7 @@ _FREEDOMS = {
 
 def verdict(
     nodal: NodalMatrix, solution: Solution, error: float, found: Cells, numbering: Numbering
-) -> tuple[str, str]:
+) -> tuple[str, Reason]:
     """Status and reason.
 
     Parameters
@@ -103,24 +114,25 @@ def verdict(
     numbering : Numbering
     """
     objection = _to_positions(nodal, solution, numbering)
-    if objection:
+    if objection.text:
         return "uncertified", objection
     if found.certified and found.backward_error <= CERTIFIED:
-        return "certified", f"the matrix re-assembled on the {count_of(found.n_cells, 'element')} is the given one"
+        count = count_of(found.n_cells, "element")
+        return "certified", Reason(f"the matrix re-assembled on the {count} is the given one")
     nearly = _softest(solution)
     objection = _to_identities(nodal, solution, numbering)
-    if objection:
+    if objection.text:
         return "uncertified", objection
     if np.isnan(error):
         return "uncertified", NOTHING_LEFT
     if error > CERTIFIED:
-        return "uncertified", f"the largest residual of a valid identity is {error:.1e}"
+        return "uncertified", Reason(f"the largest residual of a valid identity is {error:.1e}")
     if error > _MAGNIFIED * nearly:
-        return "uncertified", (
+        return "uncertified", Reason(
             f"the valid identities hold to {error:.1e}, but a field that is no translation or scale satisfies them up "
             f"to {nearly:.1e}: nodes that it moves may be wrong by more than 1e-8"
         )
-    return "certified", "the valid identities hold to rounding, and only translations and scale satisfy them"
+    return "certified", Reason("the valid identities hold to rounding, and only translations and scale satisfy them")
 
 
 def _softest(solution: Solution) -> float:
@@ -128,49 +140,60 @@ def _softest(solution: Solution) -> float:
     return min((one.gap for one in solution.evidence if one.gap > 0 and not one.settled), default=1.0)
 
 
-def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, *, exact: bool = True) -> str:
-    """Why positions may be wrong whatever elements say; empty where nothing is to be said.
+def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, *, exact: bool = True) -> Reason:
+    """Why positions may be wrong whatever elements say; without words where nothing is to be said.
 
     Entries that are rounded have no `exact` null vector.
     """
     remaining = [_FREEDOMS[name] for name in solution.freedoms if name]
     if remaining:
-        unless = f". Or rows belong to other nodes than was inferred{_GIVE}" if numbering.inferred else ""
-        return f"the null space is larger than it should be: {remaining[0]}{unless}"
+        unless = "or rows belong to other nodes than was inferred" if numbering.inferred else ""
+        larger = f"the null space is larger than it should be: {remaining[0]}"
+        return Reason.of(larger, unless, advice=GIVE_NUMBERING if unless else WITHOUT_SUPPORTS)
     if exact and not solution.exact:
         worst = max(solution.evidence, key=lambda one: one.residual)
-        return (
+        return Reason.of(
             f"no exact null vector exists (singular value {worst.residual:.1e}, that of the next field "
-            f"{worst.gap:.1e}); the points are the best fit, as for materials that are not isotropic, elements that do "
-            "not reproduce linear functions, or nodes that constraints tie together"
+            f"{worst.gap:.1e})",
+            "the points are the best fit, as for materials that are not isotropic, elements that do not reproduce "
+            "linear functions, or nodes that constraints tie together",
         )
     if _softest(solution) < SOFT:
-        return (
+        return Reason.of(
             f"a field that is no translation or scale satisfies the identities up to {_softest(solution):.1e}, and "
-            "nodes that it moves may be wrong by more than 1e-8; slender bodies have such fields, and nodes that few "
-            "rows hold"
+            "nodes that it moves may be wrong by more than 1e-8",
+            "slender bodies have such fields, and nodes that few rows hold",
         )
     if not solution.strict:
-        return "supports leave too few rows that are surely whole; rows that add up to zero were taken for whole"
-    if _torn(nodal, solution):
-        return (
-            "coupled nodes came out as separate pieces, and how these lie to each other is not known: rows between "
-            f"them lack entries, or belong to other axes, as at inclined supports, or to other nodes{_GIVE}"
+        return Reason.of(
+            "supports leave too few rows that are surely whole",
+            "those that add up to zero were taken for whole",
+            advice=WITHOUT_SUPPORTS,
         )
-    return ""
+    if _torn(nodal, solution):
+        return Reason.of(
+            "coupled nodes came out as separate pieces, and how these lie to each other is not known",
+            "rows between them lack entries, or belong to other axes, as at inclined supports, or to other nodes",
+            advice=GIVE_NUMBERING,
+        )
+    return Reason("")
 
 
-def _to_identities(nodal: NodalMatrix, solution: Solution, numbering: Numbering) -> str:
-    """Why identities alone, without elements that re-assemble, certify nothing; empty where they do."""
+def _to_identities(nodal: NodalMatrix, solution: Solution, numbering: Numbering) -> Reason:
+    """Why identities alone, without elements that re-assemble, certify nothing; without words where they do."""
     if solution.straight:
-        return "elements told the axes of a homogeneous body, but re-assembled on them the matrix is not the given one"
+        return Reason(
+            "elements told the axes of a homogeneous body, but re-assembled on them the matrix is not the given one"
+        )
     if numbering.likely:
-        return (
+        return Reason.of(
             "which rows belong to one node was inferred, where some nodes lack rows and others do not store entries "
-            "that vanished; only elements that re-assemble to the matrix would show that it is right"
+            "that vanished",
+            "only elements that re-assemble to the matrix would show that it is right",
+            advice=GIVE_NUMBERING,
         )
     odd = _came_apart(nodal)
-    return f"{_lacking(odd)}: its rows belong to other nodes{_GIVE}" if odd else ""
+    return Reason(f"{_lacking(odd)}: its rows belong to other nodes", GIVE_NUMBERING) if odd else Reason("")
 
 
 def _came_apart(nodal: NodalMatrix) -> int:

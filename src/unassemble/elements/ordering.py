@@ -144,5 +144,5 @@ def _rounded(x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Corners of each cell (m, k, d) after the linear map that makes their covariance the identity: nearly a cube."""
     centred = x - x.mean(axis=1, keepdims=True)
     value, vector = np.linalg.eigh(np.einsum("mka,mkb->mab", centred, centred))
-    value = np.maximum(value, 1e-12 * value[:, -1:])
+    value = np.maximum(np.maximum(value, 1e-12 * value[:, -1:]), np.finfo(float).tiny)  # corners may all be one point
     return np.einsum("mka,mab->mkb", centred, vector / np.sqrt(value)[:, None, :])

@@ -17,6 +17,7 @@ from ..reaction import MetricFit, Skeleton, areas_of_mass, fit_metric
 from ..recovery import PlanarMesh
 from ..tolerances import ALIKE, CERTIFIED
 from ..topology import Topology
+from ..words import sentences
 from .again import Held, Plain, areas_of
 from .row_sums import RowSums
 
@@ -58,7 +59,7 @@ def mass_alone(held: Held, topology: Topology, skeleton: Skeleton, sums: RowSums
         node_status=np.ones(matrix.n, dtype=np.int8),
         status="certified",
         uniqueness="proved",
-        reason=f"the mass matrix of triangles with these areas is the given one to {error:.1e}; {_NO_SHAPE}",
+        reason=sentences((f"the mass matrix of triangles with these areas is the given one to {error:.1e}", _NO_SHAPE)),
         operator="mass",
         backward_error=error,
         n_holes=topology.n_holes + int(hole.sum()),

@@ -9,17 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import guessed
-from ..diagnosis import LINEAR, PLANAR, diagnosed
-from ..errors import NotPlanarError, TopologyError
+from ..diagnosis import PLANAR, Diagnosis, diagnosed, further_terms, mass_matrix
+from ..errors import NotPlanarError, RecoveryError
 from ..matrix import OperatorMatrix, load
 from ..operators import VectorReading, second_reading, vector_valued
 from ..quiet import quiet_libraries
-from ..topology import Topology, recognise, surfaces
+from ..topology import Topology, components, located, require_planar, surfaces
 from ..words import count_of
 from .facts import element_facts, matrix_facts, mesh_facts, nodes_facts, surface_facts
 from .text import element_text, lines_of, mesh_text
 
 _IF = "if the entries agree, which recovery tells"
+_NO_CELLS = "the graph of the matrix is planar, but no cell shows in it, nor do the entries suggest any"
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +90,8 @@ class Inspection:
         Of scalar matrices whose rows form cells of other elements than linear triangles: ``"P2"``, ``"Q1"``, ...
     n_quads : int
         Quadrilaterals, beside `n_triangles`; the number of cells of such a mesh is that of both.
+    further : str
+        Of scalar matrices: what was added to the Laplacian, or done to it, as row sums tell; begins with a comma.
     """
 
     n_rows: int
@@ -127,6 +130,7 @@ class Inspection:
     surface: str = ""
     element: str = ""
     n_quads: int = 0
+    further: str = ""
 
     @property
     def operator(self) -> str:
@@ -139,22 +143,18 @@ class Inspection:
             kind = "elasticity, if the material is isotropic" if self.coupled else "laplacian in each direction"
             return f"vector-valued, {self.block_size} components, {self.numbering}: {kind}"
         if self.element:
-            return f"laplacian, {element_text(self)}{self._diagonal}"
+            return f"laplacian, {element_text(self)}{self.further}"
         if self.surface:
             sphere = self.surface.startswith("closed, 0 handles")  # whose graph is planar
             other = "; or of a mesh in the plane whose outline has three edges" if sphere else ""
-            return f"laplacian of a surface in space, linear triangles{self._diagonal}{other}"
+            return f"laplacian of a surface in space, linear triangles{self.further}{other}"
         if self.kind != PLANAR:
             return self.name
         if self.obstacle:
             return "none that is known"
         if self.mixed_signs:
             return "not a Laplacian: its diagonal has one sign, and the off-diagonal sums here have both"
-        return "laplacian, linear triangles" + self.name.removeprefix(LINEAR)
-
-    @property
-    def _diagonal(self) -> str:
-        return "" if self.n_zero_sums == self.n_rows - self.n_isolated else ", plus a diagonal"
+        return f"laplacian, linear triangles{self.further}"
 
     @property
     def recoverable(self) -> str:
@@ -176,6 +176,8 @@ class Inspection:
                 f"{mesh_text(self)} on {self.n_rows - self.n_isolated:,} points, up to position, rotation, size and "
                 f"mirror image, {_IF}"
             )
+        if self.kind == "mass" and not self.advice:
+            return f"areas of {mesh_text(self)}, up to the density, and no positions: a mass matrix has no shape"
         if self.kind != PLANAR:
             return f"nothing: {self.advice}"
         if self.obstacle:
@@ -227,6 +229,9 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
 
 def _inspected(matrix: OperatorMatrix) -> Inspection:
     facts = matrix_facts(matrix)
+    mass = mass_matrix(matrix, planar=True)
+    if mass is not None and mass.unread:
+        return _masses(facts, mass)
     crowded = len(matrix.edges) > 3 * matrix.n
     if crowded and (shown := element_facts(matrix)):
         return Inspection(**facts, **_diagnosis(matrix, planar=False), planar=False, **shown)
@@ -240,22 +245,28 @@ def _inspected(matrix: OperatorMatrix) -> Inspection:
     if _left_over(matrix, topology):
         read, topology = guessed(matrix, topology)
     if not topology.pieces or _left_over(read, topology):
-        try:
-            plain = recognise(matrix.n, matrix.edges)  # says what is wrong with the graph, if that is it
-        except (NotPlanarError, TopologyError) as error:
-            planar = not isinstance(error, NotPlanarError)
-            if not (planar and topology.pieces):
-                if shown := element_facts(matrix):
-                    return Inspection(**facts, **_diagnosis(matrix, planar=planar), planar=planar, **shown)
-                vector = second_reading(matrix)  # as recovery does
-                if vector is not None:
-                    return _vector_valued(matrix, facts, vector)
-                facts |= _diagnosis(matrix, planar=planar)
-                return Inspection(**facts, planar=planar, obstacle=str(error), witness=getattr(error, "witness", ()))
-        else:
-            if not topology.pieces:
-                read, topology = matrix, plain
-    return Inspection(**facts, **mesh_facts(read, topology), **_diagnosis(matrix, planar=True))
+        error = _not_planar(matrix)
+        if error or not topology.pieces:
+            planar = error is None
+            if shown := element_facts(matrix):
+                return Inspection(**facts, **_diagnosis(matrix, planar=planar), planar=planar, **shown)
+            vector = second_reading(matrix)  # as recovery does
+            if vector is not None:
+                return _vector_valued(matrix, facts, vector)
+            facts |= _diagnosis(matrix, planar=planar)
+            witness = getattr(error, "witness", ())
+            return Inspection(**facts, planar=planar, obstacle=str(error or _NO_CELLS), witness=witness)
+    found = mesh_facts(read, topology)
+    if found["mixed_signs"]:  # other readings, as in recovery where no mesh fits
+        if (mass := mass_matrix(matrix, planar=False)) is not None:
+            return _masses(facts, mass)
+        if (vector := second_reading(matrix)) is not None:
+            return _vector_valued(matrix, facts, vector)
+    return Inspection(**facts, **found, **_diagnosis(matrix, planar=True))
+
+
+def _masses(facts: dict[str, Any], mass: Diagnosis) -> Inspection:
+    return Inspection(**facts, **_named(mass), planar=False, obstacle=mass.name)
 
 
 def _vector_valued(matrix: OperatorMatrix, facts: dict[str, Any], vector: VectorReading) -> Inspection:
@@ -263,8 +274,25 @@ def _vector_valued(matrix: OperatorMatrix, facts: dict[str, Any], vector: Vector
 
 
 def _diagnosis(matrix: OperatorMatrix, *, planar: bool) -> dict[str, Any]:
-    found = diagnosed(matrix, planar=planar)
+    return {**_named(diagnosed(matrix, planar=planar)), "further": further_terms(matrix)}
+
+
+def _named(found: Diagnosis) -> dict[str, Any]:
     return {"kind": found.kind, "name": found.name, "evidence": found.evidence, "advice": found.advice}
+
+
+def _not_planar(matrix: OperatorMatrix) -> RecoveryError | None:
+    """Why the largest component of the graph is not planar; None where some component is."""
+    parts = components(matrix.n, matrix.edges)
+    errors = []
+    for part in parts:
+        try:
+            require_planar(len(part.vertices), part.edges)
+        except NotPlanarError as error:
+            errors.append(located(error, part, named=len(parts) > 1))
+        else:
+            return None
+    return errors[0]
 
 
 def _left_over(matrix: OperatorMatrix, topology: Topology) -> bool:

@@ -80,6 +80,8 @@ def _planar(facts: Inspection) -> str:
         return "yes"
     if facts.element:
         return "no, but rows that are all coupled to each other form cells"
+    if facts.kind == "mass":
+        return "not looked for, since the matrix has no shape"
     if facts.n_nodes:
         return "not looked for, since the rows form nodes of several unknowns"
     return "no"

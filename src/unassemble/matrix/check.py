@@ -64,7 +64,7 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
     csr, notes = _real(csr)
     pairs = triangles(csr)
     if not len(pairs.edges):
-        raise MatrixError("the matrix is diagonal: it has no off-diagonal entry, and so no mesh edge")
+        raise MatrixError(_diagonal(csr.diagonal()))
     pairs, replaced, kept = from_columns(csr.diagonal(), pairs)
     entries, asymmetry, warnings = symmetric_entries(csr, pairs, noise)
     warnings += kept
@@ -85,6 +85,16 @@ def _check_options(drop_zeros: float | None, noise: float | None) -> None:
         raise InputError(f"`drop_zeros` is a relative tolerance, at least 0 and below 1 (say 1e-12), not {drop_zeros}")
     if noise is not None and not (noise >= 0 and np.isfinite(noise)):
         raise InputError(f"`noise` is a standard deviation, finite and not negative, not {noise}")
+
+
+def _diagonal(diagonal: NDArray[np.float64]) -> str:
+    """What a matrix is that has nothing else: without negative entries, the masses of a lumped mass matrix."""
+    if diagonal.any() and (diagonal >= 0).all():
+        return (
+            "the matrix is diagonal, as a lumped mass matrix is: it tells how much mass each unknown has, and no mesh "
+            "edge. Pass the stiffness matrix of the same mesh"
+        )
+    return "the matrix is diagonal: it has no off-diagonal entry, and so no mesh edge"
 
 
 def _as_sparse(A: Any) -> Any:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..recovery import PlanarMesh, Surface
 from ..tolerances import CERTIFIED
+from ..words import sentences
 
 
 def could_be_planar(surface: Surface) -> bool:
@@ -65,7 +66,7 @@ def flattened(surface: Surface, planar: PlanarMesh) -> Surface:
         triangles=np.where(turned[:, None], surface.triangles[:, [0, 2, 1]], surface.triangles),
         status=planar.status,
         uniqueness=planar.uniqueness,
-        reason=f"the surface is flat; {planar.reason}",
+        reason=sentences(("the surface is flat", planar.reason)),
         backward_error=max(planar.backward_error, surface.backward_error),
         warnings=planar.warnings,
         realisation={"misfit": 0.0, "largest": 0.0, "misfits": []},

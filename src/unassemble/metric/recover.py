@@ -17,7 +17,7 @@ from ..options import ScalarOptions
 from ..recovery import Surface
 from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE
 from ..topology.manifold import Cycles, in_four_cliques, surface_readings
-from ..words import count_of, words_of
+from ..words import count_of, sentences, words_of
 from .curvature import curvatures
 from .mesh import SurfaceMesh
 from .noise import length_deviations, row_sum_test, scale_deviation
@@ -175,17 +175,17 @@ def _verdict(
     if options.noise is not None:
         return _with_noise(found, kept, fits, options.noise, options.scale)
     if options.scale is not None:
-        return _Verdict("certified", kept, f"{fits}; the scale is the given one")
+        return _Verdict("certified", kept, sentences((fits, "the scale is the given one")))
     off = held.row_misfits > CERTIFIED
     inside = np.bincount(found.mesh.edges[found.mesh.boundary].ravel(), minlength=found.mesh.n) == 0
     if not off.any() and (held.diagonal == "zero" or inside.any()):
-        return _Verdict("certified", kept, f"{fits}; {_SUMS[held.diagonal]}")
+        return _Verdict("certified", kept, sentences((fits, _SUMS[held.diagonal])))
     row = int(np.argmax(off))
     reason = (
         f"{fits}, but there are as many unknowns as entries, and that this is a surface with all its rows does not "
-        f"show: rows do not sum to zero, row {row} for one; a known scale would tell"
+        f"show: rows do not sum to zero, row {row} for one"
     )
-    return _Verdict("uncertified", kept, reason)
+    return _Verdict("uncertified", kept, sentences((reason, "a known scale would tell")))
 
 
 def _with_noise(found: _Found, kept: str, fits: str, sigma: float, scale: float | None) -> _Verdict:
@@ -196,11 +196,11 @@ def _with_noise(found: _Found, kept: str, fits: str, sigma: float, scale: float 
         error = [sigma * scale_deviation(found.squared[rows], place) for rows, place in found.mesh.pieces()]
         off = float((np.abs(found.scale - scale) / error).max())
         if 2 * ndtr(-off) >= CONFIDENCE:
-            return _Verdict("certified", kept, f"{fits}; the scale is the given one up to noise")
+            return _Verdict("certified", kept, sentences((fits, "the scale is the given one up to noise")))
         return _Verdict("uncertified", kept, f"the entries tell another scale, off by {off:.1f} standard deviations")
     test = found.sums or {}
     if min(test["p_value"], test["largest_p_value"]) >= CONFIDENCE:
-        return _Verdict("certified", kept, f"{fits}; rows sum to zero up to noise")
+        return _Verdict("certified", kept, sentences((fits, "rows sum to zero up to noise")))
     return _Verdict("uncertified", kept, "rows do not sum to zero, by more than noise, and no entries are to spare")
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..tolerances import ALIKE, SUMMED
+from ..words import Reason
 
 Anchors = tuple[NDArray[np.int64], NDArray[np.float64]]
 
@@ -103,14 +104,16 @@ def digits_lost(
     return worst
 
 
-def near_enough(status: str, reason: str, lost: float) -> tuple[str, str]:
+def near_enough(status: str, reason: Reason, lost: float) -> tuple[str, Reason]:
     """Status and reason; what was certified is not if its coordinates lost more digits than entries would bear.
 
     `lost` is that of :func:`digits_lost`.
     """
     if status != "certified" or lost <= SUMMED:
         return status, reason
-    return "uncertified", (
-        f"{reason}, but the anchors lie so far from the origin that coordinates have too few digits left: as "
-        f"written they are off by {lost:.1e} edge lengths; subtract a point near the anchors from all of `anchors`"
+    return "uncertified", Reason.of(
+        f"the anchors lie so far from the origin that coordinates, as written, are off by {lost:.1e} edge lengths: "
+        "they have too few digits left",
+        f"before, {reason.text}",
+        advice="subtract a point near the anchors from all of `anchors`",
     )

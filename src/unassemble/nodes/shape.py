@@ -136,7 +136,7 @@ def _choose(moving: NDArray, *, exact: bool) -> tuple[NDArray, str]:
     if k == 1:
         return moving[..., 0], ""
     if k == 0:
-        raise GeometryError("no field but translations fits the valid rows; this is no isotropic elasticity matrix")
+        raise GeometryError("no field but translations fits the valid rows: this is no isotropic elasticity matrix")
     single = [svd(moving[:, a], full_matrices=False) for a in range(d)]
     ranks = [int((s > ALIKE).sum()) for _, s, _ in single]
     if k == d and ranks == [1] * d:

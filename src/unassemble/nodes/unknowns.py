@@ -120,7 +120,7 @@ def regular_numbering(matrix: sp.csr_array, kind: str, block_size: int | None = 
 
 def _sizes(block_size: int | None) -> tuple[int, ...]:
     if block_size not in (None, 2, 3):
-        raise InputError(f"the block size is {block_size}; elasticity has 2 or 3 unknowns per node")
+        raise InputError(f"the block size is {block_size}, and elasticity has 2 or 3 unknowns per node")
     return (block_size,) if block_size else (3, 2)
 
 

@@ -43,13 +43,14 @@ def draw_mesh(ax: Axes, mesh: PlanarMesh, points: NDArray, outer: NDArray) -> li
     rings = [points[mesh.boundary[a:b, 0]] for a, b in pairwise(mesh.boundary_offsets)]
     _fill(ax, rings)
     width = _line_width(ax, start, stop)
-    if len(start) > style.MOST_VECTOR:  # quicker, smaller, and it shows density where lines would be a blot
-        _draw_ink(ax, start, stop, width)
-    else:
-        lines = LineCollection(
-            list(np.stack([start, stop], axis=1)), colors=style.EDGE, linewidths=width, capstyle="round"
-        )
-        ax.add_collection(lines, autolim=False)
+    lines = LineCollection(
+        np.stack([start, stop], axis=1),  # type: ignore[arg-type]
+        colors=style.EDGE,
+        linewidths=width,
+        capstyle="round",
+        rasterized=len(start) > style.MOST_VECTOR,
+    )
+    ax.add_collection(lines, autolim=False)
     for is_outer, colour in ((False, style.HOLE), (True, style.OUTER)):
         chosen = [np.vstack([ring, ring[:1]]) for ring, flag in zip(rings, outer, strict=True) if flag == is_outer]
         ax.add_collection(
@@ -138,49 +139,8 @@ def _fill(ax: Axes, rings: list[NDArray]) -> None:
 
 
 def _line_width(ax: Axes, start: NDArray, stop: NDArray) -> float:
-    """In points; a small part of a typical edge, so that fine meshes do not drown in ink."""
+    """In points; a small part of a typical edge, so that fine meshes are shades and do not drown in ink."""
     line = stop - start
     box = ax.get_window_extent()
     pixels = np.median(np.hypot(line[:, 0], line[:, 1])) * box.width / np.ptp(ax.get_xlim())
-    return float(np.clip(0.045 * pixels * 72 / ax.figure.dpi, 0.22, 0.6))
-
-
-def _draw_ink(ax: Axes, start: NDArray, stop: NDArray, width: float) -> None:
-    from matplotlib.colors import to_rgb
-
-    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
-    # The image is made for the resolution at which figures are written, whatever the screen's.
-    scale = style.DPI / ax.figure.dpi
-    box = ax.get_window_extent()
-    shape = (max(round(box.height * scale), 1), max(round(box.width * scale), 1))
-    low, high = np.array([left, bottom]), np.array([right, top])
-    length = _ink(start, stop, low, high, shape)
-    # Lines as wide as elsewhere, but thinner where most of the picture would be covered: shades then show density.
-    covered = length * min(width * style.DPI / 72, 0.6 / float(np.median(length[length > 0])))
-    picture = np.empty((*shape, 4), dtype=np.float32)
-    picture[..., :3] = to_rgb(style.EDGE)
-    picture[..., 3] = 1 - np.exp(-covered)
-    ax.imshow(picture, extent=(left, right, bottom, top), origin="lower", zorder=1.5, aspect="equal")
-
-
-def _ink(start: NDArray, stop: NDArray, low: NDArray, high: NDArray, shape: tuple[int, int]) -> NDArray[np.float64]:
-    """Length of line in each pixel, in pixels: points at most half a pixel apart stand for each line.
-
-    Parameters
-    ----------
-    start, stop : (e, 2) float64
-        Ends of the lines.
-    low, high : (2,) float64
-        Corners of the image.
-    shape : (rows, columns)
-        Row 0 is the lowest.
-    """
-    to_pixel = np.array(shape[::-1]) / (high - low)
-    origin, line = (start - low) * to_pixel, (stop - start) * to_pixel
-    length = np.hypot(line[:, 0], line[:, 1])
-    count = np.ceil(2 * length).astype(np.int64).clip(1)
-    which = np.repeat(np.arange(len(count)), count)
-    step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
-    x, y = (origin[which] + ((step + 0.5) / count[which])[:, None] * line[which]).T
-    box = ((0, shape[0]), (0, shape[1]))
-    return np.histogram2d(y, x, bins=shape, range=box, weights=(length / count)[which])[0]
+    return float(np.clip(0.045 * pixels * 72 / ax.figure.dpi, 0.05, 0.6))

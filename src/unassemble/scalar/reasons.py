@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +14,7 @@ from ..matrix import OperatorMatrix
 from ..planar.terms import COEFFICIENT, MASS, ONE_SIGN, Term
 from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE, NEARLY_ALL, SUMMED
 from ..topology import Topology
-from ..words import count_of, sentences, words_of
+from ..words import Reason, count_of, words_of
 from .evidence import Evidence
 from .noise import NoiseTest
 
@@ -29,27 +28,6 @@ _CHECK_MODEL = "see what `inspect_matrix` says the matrix is: a wrong model leav
 _ONE_COEFFICIENT = "see whether a coefficient varies, the surface is curved or it is a network: all rows add up to zero"
 _KEEP_ROWS = "keep the rows and columns of all unknowns, those on the boundary too: some rows do not add up to zero"
 _GIVE_NOISE = "if the entries are measured, give the standard deviation of their errors as `noise`"
-
-
-@dataclass(frozen=True)
-class Reason:
-    """Why a mesh has its status.
-
-    Attributes
-    ----------
-    text : str
-        At most two sentences.
-    advice : str
-        What to do next; empty where there is nothing to do.
-    """
-
-    text: str
-    advice: str = ""
-
-    @classmethod
-    def of(cls, *parts: str, advice: str = "") -> Reason:
-        """Of sentences, the important one first; only two are kept."""
-        return cls(sentences(parts), advice)
 
 
 def misfit(f: Findings, notes: Sequence[str]) -> Reason:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..cells import SEARCHED_ROWS, Alternative, alternatives, components_of
 from ..certify import certify
 from ..clock import Clock
+from ..errors import RecoveryError
 from ..linalg import AnalysisAhead, Factorisation, UpperTriangle, blas_threads, factorisation
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
@@ -62,14 +63,36 @@ def recover_scalar(
     """
     noise = Noise.known(stored, options.noise)
     task = Task(options=options, placement=placement, noise=noise, squared_lengths=squared_lengths)
-    found = _by_digits(stored, clock, task)
-    if options.scale is None or found.status != "uncertified":
-        return found
-    free = _by_digits(stored, clock, replace(task, options=replace(options, scale=None)))
-    if not free.certified or np.ptp(free.scale) > ALIKE * np.abs(free.scale).max():
-        return found
-    why = other_scale(options.scale, float(free.scale[0]), free.backward_error)
-    return replace(found, reason=why.text, advice=why.advice)
+    if options.scale is None:
+        return _by_digits(stored, clock, task)
+    with suppress(RecoveryError):
+        found = _by_digits(stored, clock, replace(task, search=False))
+        if found.status != "uncertified":
+            return found
+    # Where no cells fit, a search for them does not come to an end soon: first see whether another scale does.
+    return _with_other_scale(stored, clock, task, options.scale) or _by_digits(stored, clock, task)
+
+
+def _with_other_scale(stored: OperatorMatrix, clock: Clock, task: Task, scale: float) -> PlanarMesh | None:
+    """The mesh of a scale that fits in place of the given one, which says so; None where there is none."""
+    free = replace(task, options=replace(task.options, scale=None))
+    for search in (False, True):
+        with suppress(RecoveryError):
+            found = _by_digits(stored, clock, replace(free, search=search))
+            if found.certified:
+                return of_other_scale(found, scale)
+    return None
+
+
+def of_other_scale(found: PlanarMesh, given: float) -> PlanarMesh | None:
+    """A certified mesh with the scale that fits, uncertified since another was given; None if that is the same."""
+    fitting = float(found.scale[0])
+    if not found.certified or np.abs(found.scale - fitting).max() > ALIKE * abs(fitting):
+        return None
+    if abs(given - fitting) <= ALIKE * abs(fitting):
+        return None
+    why = other_scale(given, fitting, found.backward_error)
+    return replace(found, status="uncertified", uniqueness=None, reason=why.text, advice=why.advice)
 
 
 def _by_digits(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:

@@ -17,7 +17,6 @@ from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.cotangent import left_by_all
 from ..planar.piece import PieceMesh, brought_near, collapsed, positions, refined
-from ..planar.triangles import lone_triangles
 from ..tolerances import NOISY
 from ..topology import Piece, Polygons, Topology
 from ..words import sentences
@@ -41,12 +40,15 @@ class Task:
         Errors of the entries, where they are not those of assembly.
     squared_lengths : (e,) float64 or None
         Of the edges of the matrix, where they are known from elsewhere.
+    search : bool
+        Whether to look for other cells where those that the graph shows do not fit.
     """
 
     options: ScalarOptions
     placement: Placement
     noise: Noise | None
     squared_lengths: NDArray[np.float64] | None = None
+    search: bool = True
 
     @property
     def stretch(self) -> float:
@@ -108,14 +110,10 @@ def solve(
         If no piece has positions.
     """
     method, refine, scale, noise = task.options.method, task.options.polished, task.scale, task.noise
-    lone = lone_triangles(topology.pieces, -matrix.entries, scale) if method == "conformal" else {}
-
     drowning = refine and noise is not None and not noise.digits  # rounding to a few digits does not
 
     @cache
     def start(piece: Piece) -> Outcome:
-        if piece in lone:
-            return lone[piece]
         try:
             weights = -matrix.entries[piece.edge_rows]
             mesh = _start(piece, weights, method, scale, sharp=not refine, analyse=analyse)
@@ -132,7 +130,7 @@ def solve(
     def attempt(piece: Piece) -> Outcome:
         return spoilt.get(piece) or start(piece)
 
-    if doubtful.any():
+    if doubtful.any() and task.search:
         with clock("faces"), blas_threads(1):  # hundreds of small readings
             matrix, topology, outcomes = completed(matrix, topology, attempt, doubtful, scale)
             # The search leaves c free in its solves, stops early and knows one method, which is polished.
@@ -167,10 +165,8 @@ def _polished(
 ) -> list[PieceMesh]:
     """Each piece by itself."""
     errors = with_vanished(topology) if noise is None else noise.on(topology)
-    exact = lone_triangles(topology.pieces, -matrix.entries, scale, None if noise is None else errors)
     return [
-        exact.get(piece)
-        or refined(
+        refined(
             piece,
             -matrix.entries[piece.edge_rows],
             mesh,
@@ -202,7 +198,7 @@ def _successes(topology: Topology, outcomes: list[Outcome]) -> tuple[Topology, l
         if not isinstance(error, PieceMesh)
     ]
     if not meshes:
-        raise errors[0]
+        raise errors[0] if errors else GeometryError("the cycles of three edges form no mesh")
     if errors:
         pieces = [p for p, mesh in zip(topology.pieces, outcomes, strict=True) if isinstance(mesh, PieceMesh)]
         failures = (*topology.failures, *map(str, errors))

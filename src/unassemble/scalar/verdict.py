@@ -12,11 +12,12 @@ from ..cells import Alternative
 from ..certify import Certificate, without_spare_equations
 from ..matrix import OperatorMatrix
 from ..tolerances import CERTIFIED, PLACED, SUSPICIOUS
+from ..words import Reason
 from .evidence import Evidence
 from .factors import discord
 from .joined import JoinedMesh
 from .noise import NoiseTest
-from .reasons import Reason, ambiguous, astray, far_away, misfit, nothing_to_spare, unlikely, with_noise
+from .reasons import ambiguous, astray, far_away, misfit, nothing_to_spare, unlikely, with_noise
 from .solving import Solved
 
 

@@ -207,7 +207,7 @@ def serve_beam(
     certified = misfit <= CERTIFIED
     chains = int(np.count_nonzero(beam.direction_of_row <= 0))
     reason = "bending members along a line give back the blocks of all neighbours, and the sums of rows between them: "
-    notes = ["a beam by itself lies along x; its direction along x is free"]
+    notes = ["a beam by itself lies along x, in a direction that is free"]
     if chains:
         notes.append(f"{count_of(chains, 'row')} of stretching or torsion know no length: they are taken for those of "
                      "the nodes next to which they are numbered")  # fmt: skip

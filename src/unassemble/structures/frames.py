@@ -15,7 +15,7 @@ from ..nodes.anchoring import anchored, checked_anchors, digits_lost, near_enoug
 from ..nodes.rounded import Rounding, with_exact_sums
 from ..recovery import Structure
 from ..tolerances import ALIKE, CERTIFIED
-from ..words import count_of
+from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
 from .certificate import forces, members_misfits
 from .members import members_and_cells, mispaired
 from .nodes import Nodes, nodes_of
@@ -75,26 +75,27 @@ def serve_structure(
     if pair is not None:
         first, second = (np.flatnonzero(node == one)[0] for one in pair)
         status = "uncertified"
-        reason = (
+        reason = Reason(
             f"which rows belong to one node is not certain: those of rows {first} and {second}, as numbered, do not "
-            "couple like the rows of two nodes; give the numbering if it is known"
+            "couple like the rows of two nodes",
+            GIVE_NUMBERING,
         )
     elif status == "certified":
-        reason += f": {covered(used, abs(whole[used]).sum(axis=0) > 0)}"
+        reason = Reason(f"{reason.text}: {covered(used, abs(whole[used]).sum(axis=0) > 0)}")
     notes = list(found.notes)
     placed = np.pad(found.points, ((0, 0), (0, layout.space - layout.dim)))
     fields: dict[str, Any] = {}
     if cells and error < ALIKE:
         with clock("members"):
             fields = members_and_cells(nodes, placed)
-        notes.append("members and cells were read off the graph; what is certified is the coordinates")
+        notes.append("members and cells were read off the graph: what is certified is the coordinates")
     if not valid[:, len(layout.displacements) :].any():
         notes.append("moments are not used alone: springs between rotations and the ground, as against drilling, would "
                      "spoil them")  # fmt: skip
     untold = np.unique(node[direction < 0])
     if len(untold):
         notes.append(f"which unknowns {count_of(len(untold), 'node')} lack the pattern does not tell: their rows were "
-                     "left out; give the numbering if it is known")  # fmt: skip
+                     f"left out unless you {GIVE_NUMBERING}")  # fmt: skip
     if (found.component < 0).any():
         notes.append(f"{(found.component < 0).sum()} of {count_of(nodes.n, 'node')} cannot be determined: at supports, "
                      "or tied to these only")  # fmt: skip
@@ -107,7 +108,8 @@ def serve_structure(
         points=points,
         status=status,
         uniqueness="searched" if status == "certified" else None,
-        reason=reason,
+        reason=reason.text,
+        advice=reason.advice,
         operator=layout.name,
         backward_error=error,
         timings=clock.timings,
@@ -123,12 +125,13 @@ def _edge_length(nodes: Nodes, found: Placed) -> float:
     return float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
 
 
-def _verdict(error: float, found: Placed, rounding: Rounding | None, members: int) -> tuple[str, str]:
+def _verdict(error: float, found: Placed, rounding: Rounding | None, members: int) -> tuple[str, Reason]:
     d = found.points.shape[1]
     if found.null_dimension > d:
-        return "uncertified", (
+        return "uncertified", Reason(
             f"the null space has dimension {found.null_dimension} where {d} translations are expected: supports leave "
-            "too few whole rows"
+            "too few whole rows",
+            WITHOUT_SUPPORTS,
         )
     loosest = min(found.evidence, key=lambda one: one.gap / np.sqrt(one.rows))
     allowed = max(CERTIFIED, rounding.spread) if rounding else CERTIFIED
@@ -136,19 +139,22 @@ def _verdict(error: float, found: Placed, rounding: Rounding | None, members: in
     doubt = off * np.sqrt(loosest.rows) / loosest.gap  # each equation may be off by as much
     if not error <= allowed or doubt > ALIKE:
         digits = f" of entries rounded to {rounding.name}" if rounding else ""
-        return "uncertified", (
+        return "uncertified", Reason(
             f"rigid rotations of the nodes cause forces of {error:.1e} of those{digits} that make them up, and another "
             f"field, no translation, only {loosest.gap:.1e}: positions may be off by {doubt:.0e} of the size"
         )
     if found.unnoticed.any():
         count = count_of(int(np.count_nonzero(found.unnoticed)), "equation has", "equations have")
-        return "uncertified", (
-            f"{count} no other to check against, so that springs would go unnoticed: too few whole rows are left"
+        return "uncertified", Reason(
+            f"{count} no other to check against, so that springs would go unnoticed: too few whole rows are left",
+            WITHOUT_SUPPORTS,
         )
     blocks = f", {count_of(members, 'block is that', 'blocks are those')} of straight members" if members else ""
     if rounding:
-        return "certified", (
+        return "certified", Reason(
             f"rigid rotations of the nodes cause no more forces than entries rounded to {rounding.name} leave{blocks}, "
             f"so that positions are known to {doubt:.0e} of the size"
         )
-    return "certified", f"rigid rotations of the nodes cause no forces{blocks}, and only translations change nothing"
+    return "certified", Reason(
+        f"rigid rotations of the nodes cause no forces{blocks}, and only translations change nothing"
+    )

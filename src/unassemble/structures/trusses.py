@@ -22,7 +22,7 @@ from ..nodes.numbering import Numbering
 from ..nodes.shape import in_gauge, shape
 from ..recovery import Evidence, Structure
 from ..tolerances import ALIKE, CERTIFIED, SINGULAR, SMALL
-from ..words import count_of
+from ..words import Reason, count_of
 from .bars import Bars
 from .placed import Piece, Placed, Positions, covered, placed
 from .positions import least_squares
@@ -63,7 +63,7 @@ def serve_truss(
     status, reason = _verdict(error, found)
     if status == "certified":
         rows = ~loose[numbering.node_of_row]
-        reason += f": {covered(rows, rows)}"
+        reason = Reason(f"{reason.text}: {covered(rows, rows)}")
     status, reason = near_enough(status, reason, lost)
     return Structure(
         **found.fields(numbering),
@@ -71,7 +71,8 @@ def serve_truss(
         lines=bars.ends[~loose[bars.ends].any(axis=1)],
         status=status,
         uniqueness="searched" if status == "certified" else None,
-        reason=reason,
+        reason=reason.text,
+        advice=reason.advice,
         operator="truss",
         backward_error=error,
         timings=clock.timings,
@@ -80,21 +81,23 @@ def serve_truss(
     )
 
 
-def _verdict(error: float, found: Placed) -> tuple[str, str]:
+def _verdict(error: float, found: Placed) -> tuple[str, Reason]:
     if found.null_dimension > found.points.shape[1] + 1:
-        return "uncertified", "the directions of the bars leave more free than translations and size"
+        return "uncertified", Reason("the directions of the bars leave more free than translations and size")
     if not error <= CERTIFIED:
-        return "uncertified", f"a block differs from that of a bar by {error:.1e} of the row's largest entry"
+        return "uncertified", Reason(f"a block differs from that of a bar by {error:.1e} of the row's largest entry")
     if found.unnoticed.any():
-        return "uncertified", "supports leave parts of bars only, and nothing contradicts other directions of these"
+        return "uncertified", Reason(
+            "supports leave parts of bars only, and nothing contradicts other directions of these"
+        )
     worst = max(found.evidence, key=lambda one: one.residual / one.gap)
     if worst.residual > ALIKE * worst.gap:
-        return "uncertified", (
+        return "uncertified", Reason(
             f"the directions of the bars contradict each other by {worst.residual:.1e}, and a field that is neither "
             f"translation nor enlargement does so only by {worst.gap:.1e}: positions are known to about "
             f"{worst.residual / worst.gap:.0e} of the size"
         )
-    return "certified", "bars along these directions re-assemble to the matrix, and these determine the nodes"
+    return "certified", Reason("bars along these directions re-assemble to the matrix, and these determine the nodes")
 
 
 def place_joints(bars: Bars, n: int) -> Placed:

@@ -3,7 +3,7 @@
 from .cycles import triangles_everywhere
 from .numbering import Numbering, components, local_numbering
 from .polygons import Polygons
-from .recognise import located, recognise, require_planar, surfaces
+from .recognise import located, require_planar, surfaces
 from .surface import Piece, Topology
 
 __all__ = [
@@ -14,7 +14,6 @@ __all__ = [
     "components",
     "local_numbering",
     "located",
-    "recognise",
     "require_planar",
     "surfaces",
     "triangles_everywhere",

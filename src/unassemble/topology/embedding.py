@@ -98,25 +98,6 @@ def fingerprint(drawing: FaceComplex) -> bytes:
     return np.sort(sums).tobytes()
 
 
-def triangular_faces(n: int, edges: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Faces with three edges of one planar embedding.
-
-    Returns
-    -------
-    triangles : (m, 3) int64
-        Vertices.
-    opposite : (m, 3) int64
-        Rows of `edges` that face the corners.
-    """
-    rotation = planarity.rotation_system(n, edges)
-    if rotation is None:
-        return np.empty((0, 3), np.int64), np.empty((0, 3), np.int64)
-    drawing = from_rotation(n, edges, *rotation)
-    faces = drawing.simple & (drawing.size == 3)
-    half = drawing.order[np.repeat(faces, drawing.size)].reshape(-1, 3)
-    return drawing.tail[half], half[:, [1, 2, 0]] >> 1
-
-
 def _with_faces(n: int, edges: NDArray, cycles: list[NDArray]) -> tuple[NDArray, NDArray] | None:
     """Rotation system of an embedding in which given cycles are faces; None if there is none.
 

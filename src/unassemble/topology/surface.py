@@ -110,7 +110,7 @@ class Topology:
     pieces : tuple of Piece
         In order of their lowest vertex.
     method : str
-        How the faces were found: ``"3-cycles"`` or ``"embedding"``.
+        How the faces were found: ``"3-cycles"``, ``"cliques"`` or ``"the numbers"``.
     failures : tuple of str
         Why connected components of the graph have no mesh, where others have one.
     vanished : (k,) int64

@@ -12,7 +12,6 @@ from ...matrix.operator import row_sizes
 from ...planar.cotangent import weights_of_all
 from ...planar.hinges import gap
 from ...planar.piece import PieceMesh
-from ...planar.triangles import lone_triangles
 from ...tolerances import ALIKE
 from ...topology import Piece, Topology
 from ...topology.keys import pair_keys, with_sides
@@ -72,14 +71,11 @@ class Labelling:
         bare = cls.unsolved(candidates, labels)
         weights = bare.weights
         known = {} if known is None else known
-        meshes: dict[Piece, PieceMesh | None] = {**lone_triangles(bare.pieces, weights)}
-        for piece in bare.pieces:
-            if piece not in meshes:
-                name = _key_of(piece)
-                if name not in known:
-                    known[name] = map_of(piece, weights[piece.edge_rows])
-                meshes[piece] = known[name]
-        return bare.placed(tuple(meshes[piece] for piece in bare.pieces))
+        names = [_key_of(piece) for piece in bare.pieces]
+        for name, piece in zip(names, bare.pieces, strict=True):
+            if name not in known:
+                known[name] = map_of(piece, weights[piece.edge_rows])
+        return bare.placed(tuple(known[name] for name in names))
 
     def placed(self, meshes: tuple[PieceMesh | None, ...]) -> Labelling:
         """With positions of each piece, or None."""

@@ -58,7 +58,7 @@ def placed(
                 found = null_fields(nodal, valid, body, patch=len(body), terms=terms)
             else:
                 warnings.append(
-                    f"piece {piece} with node {body[0]} is too large for the best fit by one factorisation; the "
+                    f"piece {piece} with node {body[0]} is too large for the best fit by one factorisation. The "
                     "points are those of smaller parts, joined, whose distances may be far from right"
                 )
         told = np.asarray(valid.reshape(nodal.n, -1).any(axis=1))

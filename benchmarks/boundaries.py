@@ -1,0 +1,108 @@
+"""Boundary conditions on third-party meshes: how much comes back, and whether all of it is right.
+
+    python benchmarks/boundaries.py [FOLDER] [--conditions eliminated robin] [--meshes NAME] [--most 3000]
+
+Every mesh of the folder (npz with points and triangles; ``../shared/corpus/planar`` unless told) gets each boundary
+condition as scikit-fem puts it in, in random order of the rows. Printed are the share of the points that are
+determined, the largest error among them after the best similarity, relative to the diameter of their piece, and
+processor time in direct solves with the same matrix. The last lines count meshes with 70, and with 90 per cent
+determined. Exit status 1 where a determined point is off by more than 1e-8.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "boundaries")]
+
+from conditions import convected, eliminated, identity_rows, largest_error_of, mesh_of, robin  # noqa: E402
+
+from unassemble import RecoveryError, recover  # noqa: E402
+from unassemble.linalg import UpperTriangle, factorisation  # noqa: E402
+
+CONDITIONS = {
+    "eliminated": eliminated,
+    "identity": identity_rows,
+    "robin": lambda mesh: robin(mesh, 1.0),
+    "convection": lambda mesh: symmetric(*convected(mesh, (3.0, -2.0))),
+}
+WRONG = 1e-8
+
+
+def symmetric(matrix, points):
+    """Half the matrix and half its transpose."""
+    return (matrix + matrix.T) / 2, points
+
+
+def main() -> int:
+    """Print a line for each mesh and condition, and what they add up to."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, nargs="?", default=ROOT.parent / "shared" / "corpus" / "planar")
+    parser.add_argument("--conditions", nargs="+", choices=CONDITIONS, default=list(CONDITIONS))
+    parser.add_argument("--meshes", nargs="+", help="these only")
+    parser.add_argument("--most", type=int, default=10**9, help="vertices of the meshes that are used")
+    arguments = parser.parse_args()
+    wrong = False
+    for condition in arguments.conditions:
+        shares = []
+        for name, mesh in meshes(arguments.folder, arguments.meshes, arguments.most):
+            share, error, line = measured(*CONDITIONS[condition](mesh))
+            shares.append(share)
+            wrong |= error > WRONG
+            print(f"{condition:11s} {name:36s} {line}{'   WRONG' if error > WRONG else ''}", flush=True)
+        good = [sum(share >= least for share in shares) for least in (0.01, 0.7, 0.9)]
+        print(f"{condition}: of {len(shares)} meshes {good[0]} certified, {good[1]} to 70 %, {good[2]} to 90 %\n")
+    return int(wrong)
+
+
+def meshes(folder: Path, names: list[str] | None, most: int) -> Iterator:
+    """Names and meshes, without vertices of no triangle."""
+    for file in sorted(folder.glob("*.npz")):
+        given = np.load(file)
+        used, triangles = np.unique(given["triangles"].astype(np.int64), return_inverse=True)
+        if (names is None or file.stem in names) and len(used) <= most:
+            yield file.stem, mesh_of(given["points"][used, :2].astype(float), triangles.reshape(-1, 3))
+
+
+def measured(matrix: sp.csr_array, points: np.ndarray) -> tuple[float, float, str]:
+    """Share of the points that are determined, their error, and both in words."""
+    start = time.process_time()
+    try:
+        found = recover(matrix)
+    except RecoveryError as refused:
+        return 0.0, 0.0, f"{len(points):6d} rows   refused: {str(refused)[:70]}"
+    seconds = time.process_time() - start
+    if not found.certified:
+        return 0.0, 0.0, f"{len(points):6d} rows   {found.status}: {found.reason[:70]}"
+    known = found.node_status == 0
+    error = largest_error_of(found, points, known) if known.sum() > 2 else 0.0
+    solves = f"{seconds / unit(matrix):5.0f} solves" if len(points) > 1000 else ""
+    return float(known.mean()), error, f"{len(points):6d} rows   {known.mean():5.0%} error {error:.0e} {solves}"
+
+
+def unit(matrix: sp.csr_array) -> float:
+    """Processor seconds of one direct solve with a definite matrix of this pattern: analysis, factors, solution."""
+    off = -abs(sp.triu(matrix, 1) + sp.tril(matrix, -1).T)
+    off = off + off.T
+    upper = sp.triu(off + sp.diags_array(1.001 * abs(off).sum(axis=1)), format="csr")
+    upper.sort_indices()
+    held = UpperTriangle(upper.data, upper.indices, upper.indptr)
+    start = time.process_time()
+    solver = factorisation(held, definite=True)
+    solver.factorise(held)
+    solver.solve(np.ones(upper.shape[0]))
+    seconds = time.process_time() - start
+    solver.release()
+    return seconds
+
+
+if __name__ == "__main__":
+    sys.exit(main())

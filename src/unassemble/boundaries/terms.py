@@ -1,0 +1,186 @@
+"""Terms on the boundary, taken off by row sums: Robin conditions, and flow of a constant field through it.
+
+On an edge ab of the boundary each adds m_ab (1/3 1/6; 1/6 1/3), m_ab = alpha |ab| for alpha u v, or half the flux of
+the field through ab for the symmetric part of a convection. Rows of everything else add up to zero, so that the row of
+a boundary vertex adds up to half of m on both sides of it: around a loop of oddly many edges these equations give m,
+and around one of evenly many all but m_k + (-1)^k t. The t of each such loop is the one with which a conformal map has
+all entries.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import GeometryError, RecoveryError, SolverError
+from ..linalg import factorisation
+from ..matrix import OperatorMatrix
+from ..planar.cotangent import edge_weights
+from ..planar.piece import positions
+from ..recovery import PlanarMesh
+from ..tolerances import ALIKE, CERTIFIED, ROUNDED
+from ..topology import Piece, local_numbering, surfaces
+
+
+def recover_without_boundary_terms(
+    matrix: OperatorMatrix, plain: Callable[[OperatorMatrix], PlanarMesh], scale: float | None
+) -> PlanarMesh | None:
+    """The certified mesh of a matrix without the terms on its boundary; None where there are no such terms.
+
+    Parameters
+    ----------
+    matrix : OperatorMatrix
+    plain : callable
+        The mesh of a matrix without them.
+    scale : float, optional
+        c, where it is known.
+
+    Returns
+    -------
+    PlanarMesh or None
+        Certified only where the terms of one factor for each loop and one field, integrated on the mesh as it is
+        written, give entries and row sums back.
+    """
+    loops = _Loops.of(matrix)
+    if loops is None:
+        return None
+    terms = loops.terms(matrix, scale)
+    if terms is None:
+        return None
+    try:
+        found = plain(loops.without(matrix, terms))
+    except RecoveryError:
+        return None
+    if not found.certified or found.node_status.any() or not loops.fits(matrix, terms, found.points):
+        return None
+    note = (
+        "entries on the boundary have a term of their own, a Robin condition or half of a flow through it: row sums "
+        "say how much, and it was taken off"
+    )
+    return replace(found, warnings=(*found.warnings, note))
+
+
+@dataclass(frozen=True, eq=False)
+class _Loops:
+    """Boundary edges, loop by loop in running order, of a matrix of a single piece.
+
+    Attributes
+    ----------
+    piece : Piece
+    ends : (b, 2) int64
+        Rows of the matrix.
+    edge : (b,) int64
+        Rows of `matrix.edges`.
+    loop : (b,) int64
+    sign : (b,) int64
+        1 and -1 in turn, from 1 in each loop.
+    sums : (b,) float64
+        Of the row at the first end of each edge.
+    """
+
+    piece: Piece
+    ends: NDArray[np.int64]
+    edge: NDArray[np.int64]
+    loop: NDArray[np.int64]
+    sign: NDArray[np.int64]
+    sums: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, matrix: OperatorMatrix) -> _Loops | None:
+        """None unless there is one piece, without pinched vertices, and only rows of its boundary have sums."""
+        incomplete = matrix.incomplete_rows
+        if not incomplete.any():
+            return None
+        topology = surfaces(matrix.n, matrix.edges, local_numbering(matrix.n, matrix.edges))
+        if len(topology.pieces) != 1 or topology.pieces[0].n_vertices < matrix.n:
+            return None
+        (piece,) = topology.pieces
+        ends = piece.vertices[piece.boundary]
+        outside = np.zeros(matrix.n, dtype=bool)
+        outside[ends[:, 0]] = True
+        if (incomplete & ~outside).any() or outside.sum() < len(ends) or len(piece.edges) < len(matrix.edges):
+            return None
+        sums = matrix.diagonal.copy()
+        for end in matrix.edges.T:
+            sums += np.bincount(end, matrix.entries, matrix.n)
+        key = np.searchsorted(matrix.edges @ [matrix.n, 1], np.sort(ends, axis=1) @ [matrix.n, 1])
+        size = np.diff(piece.loop_offsets)
+        place = np.arange(len(ends)) - np.repeat(piece.loop_offsets[:-1], size)
+        return cls(piece, ends, key, np.repeat(np.arange(len(size)), size), 1 - 2 * (place % 2), sums[ends[:, 0]])
+
+    def _particular(self) -> NDArray[np.float64] | None:
+        """(b,) terms that give the row sums; None where there are none."""
+        terms = np.empty(len(self.loop))
+        for start, end in zip(self.piece.loop_offsets[:-1], self.piece.loop_offsets[1:], strict=True):
+            sign, twice = self.sign[start:end], 2 * self.sums[start:end]
+            along = np.cumsum(sign * twice) - twice[0]  # less the first term: signed ones
+            if len(sign) % 2:
+                first = (twice[0] - along[-1]) / 2
+            elif abs(along[-1] + twice[0]) > ALIKE * np.abs(twice).sum():
+                return None
+            else:
+                first = -along.mean()
+            terms[start:end] = sign * (first + along)
+        return terms
+
+    def terms(self, matrix: OperatorMatrix, scale: float | None, steps: int = 12) -> NDArray[np.float64] | None:
+        """(b,) m with which a conformal map has all entries, by Gauss-Newton; None where there is none."""
+        terms = self._particular()
+        if terms is None:
+            return None
+        size = np.diff(self.piece.loop_offsets)
+        even = np.flatnonzero(size % 2 == 0)
+        ways = np.where(self.loop[:, None] == even, self.sign[:, None], 0).astype(float)
+        misfit = self._misfit(matrix, terms, scale)
+        step = ALIKE * float(np.median(np.abs(matrix.entries)))
+        for _ in range(steps):
+            if misfit is None or np.abs(misfit).max() <= ROUNDED or not len(even):
+                break
+            others = [self._misfit(matrix, terms + step * way, scale) for way in ways.T]
+            slopes = [(other - misfit) / step for other in others if other is not None]
+            if len(slopes) < len(even):
+                return None
+            move = ways @ np.linalg.lstsq(np.column_stack(slopes), -misfit, rcond=None)[0]
+            moved = None
+            for share in (1.0, 0.3, 0.1):
+                moved = self._misfit(matrix, terms + share * move, scale)
+                if moved is not None and np.linalg.norm(moved) < np.linalg.norm(misfit):
+                    break
+                moved = None
+            if moved is None:
+                break
+            terms, misfit = terms + share * move, moved
+        return terms if misfit is not None and np.abs(misfit).max() <= ALIKE else None
+
+    def _misfit(self, matrix: OperatorMatrix, terms: NDArray, scale: float | None) -> NDArray[np.float64] | None:
+        """(e,) of the conformal map; None where there is none."""
+        weights = -self.without(matrix, terms).entries[self.piece.edge_rows]
+        try:
+            mesh = positions(self.piece, weights, scale=scale, sharp=False, analyse=factorisation)
+        except (GeometryError, SolverError):
+            return None
+        with np.errstate(all="ignore"):
+            misfit = weights / mesh.scale - edge_weights(self.piece, mesh.z)
+        return misfit if np.isfinite(misfit).all() else None
+
+    def without(self, matrix: OperatorMatrix, terms: NDArray) -> OperatorMatrix:
+        """The matrix less these terms."""
+        entries, diagonal = matrix.entries.copy(), matrix.diagonal.copy()
+        entries[self.edge] -= terms / 6
+        for end in self.ends.T:
+            diagonal[end] -= terms / 3
+        return replace(matrix, entries=entries, diagonal=diagonal)
+
+    def fits(self, matrix: OperatorMatrix, terms: NDArray, points: NDArray) -> bool:
+        """Whether terms are those of one factor for each loop and of one field, on a mesh with these points."""
+        along = points[self.ends[:, 1]] - points[self.ends[:, 0]]
+        length = np.linalg.norm(along, axis=1)
+        loops = np.where(self.loop[:, None] == np.arange(self.loop[-1] + 1), length[:, None], 0)
+        design = np.column_stack([loops, along[:, 1], -along[:, 0]])
+        solution, _, rank, _ = np.linalg.lstsq(design, terms, rcond=None)
+        rest = np.abs(design @ solution - terms)
+        row = matrix.row_size[self.ends].min(axis=1)
+        return bool(len(terms) > rank and (rest <= CERTIFIED * row).all())

@@ -1,0 +1,186 @@
+"""Whether a matrix is a mass matrix, of whatever elements and unknowns: its eigenvalues and its couplings say so.
+
+Scaled to identity blocks at its nodes, a consistent mass matrix has eigenvalues between bounds that depend on the
+element alone, not on the mesh or on densities (Wathen 1987); those of a stiffness matrix come near to zero. And a rigid
+translation feels all masses at once, so that the couplings of most unknowns add up in one vector, where those of
+stiffnesses are against each other.
+
+A. J. Wathen, Realistic eigenvalue bounds for the Galerkin mass matrix, IMA J. Numer. Anal. 7 (1987), 449-457.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
+
+from ..errors import GeometryError
+from ..matrix import OperatorMatrix
+from ..nodes.grouping import same_pattern
+from ..nodes.unknowns import nodes_of_pattern
+from ..structures.layouts import SPACE
+from ..tolerances import HARDLY_ANY, LITTLE, NEARLY_ALL, ROUNDED, SUMMED
+from ..topology import components
+from ..words import count_of
+from .cliques import CELLS, cells_of, often
+from .kinds import LENGTHS, UNREAD, Diagnosis
+
+_SIMPLICES = {1: "segments", 2: "triangles", 3: "tetrahedra"}
+
+
+def refuse_masses(matrix: OperatorMatrix, *, planar: bool) -> None:
+    """Raise an error that names a mass matrix which recovery does not read; as :func:`mass_matrix`.
+
+    Raises
+    ------
+    GeometryError
+    """
+    mass = mass_matrix(matrix, planar=planar)
+    if mass is not None and mass.unread:
+        raise GeometryError(mass.sentence())
+
+
+def mass_matrix(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis | None:
+    """What kind of mass matrix this is; None where it is none.
+
+    Parameters
+    ----------
+    matrix : OperatorMatrix
+    planar : bool
+        Whether it may still be that of a mesh in the plane, which are read with much mass beside little stiffness.
+    """
+    # Most matrices of meshes in the plane are seen to be none by their signs alone, which takes no time.
+    sign, nothing = np.sign(matrix.diagonal[np.abs(matrix.diagonal).argmax()]), ROUNDED * np.abs(matrix.entries).max()
+    if planar and len(matrix.edges) <= 3 * matrix.n and (sign * matrix.entries < -nothing).any():
+        return None
+    masses = _Masses.of(matrix)
+    if masses is None:
+        return None
+    if dimension := masses.simplices:
+        ratio = {1: "twice", 2: "once", 3: "two thirds of"}[dimension]
+        advice = {1: LENGTHS, 2: "" if planar else UNREAD["mass"], 3: UNREAD["mass"]}[dimension]
+        exact = f"each diagonal entry is {ratio} the sum of the others in its row, and all are of one sign"
+        name = f"a mass matrix of linear elements on {_SIMPLICES[dimension]}"
+        return Diagnosis("mass", name, (exact, *masses.without), advice)
+    if masses.quadratic:
+        exact = "rows add up to zero, or to 15/8 of their diagonal entry, as those of corners and of middles of sides"
+        return Diagnosis("mass", "a mass matrix of quadratic elements on triangles", (exact,), UNREAD["mass"])
+    crowded = masses.M.nnz > 7 * masses.M.shape[0] - 12  # twice 3 n - 6, and the diagonal
+    bounds = masses.bounds if crowded or not planar else None
+    if bounds is None:
+        return None
+    shown = (
+        f"scaled to identity blocks its least eigenvalue is {bounds[0]:.2g}, where those of stiffnesses near zero",
+        f"its couplings add up in one vector, to a largest eigenvalue of {bounds[1]:.2g}, as under a translation",
+    )
+    return Diagnosis("mass", f"a consistent mass matrix{masses.unknowns}", (*shown, *masses.without), UNREAD["mass"])
+
+
+@dataclass(frozen=True, eq=False)
+class _Masses:
+    """A matrix with diagonal entries of one sign, made positive, without the rows of zeros.
+
+    Attributes
+    ----------
+    M : (k, k) sparse
+    n_massless : int
+        Rows of zeros: unknowns without a mass, or points inside of a mesh whose boundary has one.
+    """
+
+    M: sp.csr_array
+    n_massless: int
+
+    @classmethod
+    def of(cls, matrix: OperatorMatrix) -> _Masses | None:
+        """Those of a matrix, if it may be one of masses at all: rows of stiffnesses may add up to zero."""
+        nothing = ROUNDED * np.abs(matrix.diagonal).max()
+        used = np.abs(matrix.diagonal) > nothing
+        if not used.any() or np.ptp(np.sign(matrix.diagonal[used])):
+            return None
+        whole = np.sign(matrix.diagonal[used][0]) * matrix.csr()
+        whole.data[np.abs(whole.data) <= nothing] = 0
+        whole.eliminate_zeros()
+        M = whole[used][:, used]
+        return cls(M, int((~used).sum())) if M.nnz == whole.nnz and M.shape[0] > 2 else None
+
+    @property
+    def without(self) -> tuple[str, ...]:
+        """The sentence on rows of zeros."""
+        return (f"{count_of(self.n_massless, 'row is', 'rows are')} zero",) if self.n_massless else ()
+
+    @cached_property
+    def simplices(self) -> int:
+        """Dimension of the simplices whose mass matrix with linear elements this is; 0 for none.
+
+        A simplex of volume V in d dimensions adds 2 V / ((d + 1) (d + 2)) to each diagonal entry and half as much to
+        each of d off-diagonal ones in the same row.
+        """
+        if not (self.M.data > 0).all():
+            return 0
+        diagonal = self.M.diagonal()
+        others = self.M.sum(axis=1) - diagonal
+        return next((d for d in _SIMPLICES if np.allclose(d * diagonal, 2 * others, rtol=SUMMED, atol=0)), 0)
+
+    @cached_property
+    def quadratic(self) -> bool:
+        """Whether this is the mass matrix of quadratic triangles: corners have no integral, middles (16 + 16 - 4) / 32.
+
+        Of an element of area 180 the rows are 6, -1, -1, 0, 0, -4 and 32, 16, 16, 0, 0, -4.
+        """
+        sums, diagonal = self.M.sum(axis=1), self.M.diagonal()
+        corners, middles = (np.abs(sums - part * diagonal) <= SUMMED * diagonal for part in (0, 15 / 8))
+        return bool((corners | middles).all() and corners.any() and middles.any())
+
+    @cached_property
+    def bounds(self) -> tuple[float, float] | None:
+        """Least and largest eigenvalue, scaled to identity blocks; None for other matrices than those of masses."""
+        root = sp.diags_array(1 / np.sqrt(self.M.diagonal()))
+        scaled = (root @ self.M @ root).tocsr()
+        couplings = scaled - sp.eye_array(scaled.shape[0])
+        if not couplings.maximum(0).sum() > LITTLE * abs(couplings).sum():
+            return None  # on a graph with two colours, a grid's, the signs of one colour may be turned
+        together, all_of_them = _extreme(couplings, "LA"), _extreme(abs(couplings), "LA")
+        # The share of masses is 0.94 and more; that of as much stiffness beside them 0.8.
+        if together is None or all_of_them is None or together < NEARLY_ALL * all_of_them:
+            return None
+        # Masses of beams have 0.08, of hexahedra 1/8, of quadrilaterals 1/4, of triangles and tetrahedra 1/2.
+        least = _extreme(scaled, "SA", _blocks(scaled))
+        return None if least is None or least < HARDLY_ANY else (least, 1 + together)
+
+    @property
+    def unknowns(self) -> str:
+        """Of which elements, or of how many unknowns per node, as far as the graph shows that."""
+        upper = sp.triu(self.M, 1).tocoo()
+        edges = np.column_stack([upper.row, upper.col]).astype(np.int64)
+        cells = cells_of(self.M.shape[0], edges)
+        n_parts = len(components(self.M.shape[0], edges))
+        if (cells.nodes, cells.shared) in CELLS and n_parts == 1:
+            return f" of {CELLS[cells.nodes, cells.shared][1]}"
+        several = n_parts > 1 or often(cells.twins) or nodes_of_pattern(self.M) is not None
+        return " of several unknowns per node" if several else ""
+
+
+def _blocks(scaled: sp.csr_array) -> sp.csc_array:
+    """The diagonal blocks of unknowns of one node, which are coupled to the same rows."""
+    group = same_pattern(scaled)
+    one = scaled.tocoo()
+    few = np.bincount(group)[group] <= SPACE.block_size
+    here = ((group[one.row] == group[one.col]) & few[one.row]) | (one.row == one.col)
+    return sp.csc_array((one.data[here], (one.row[here], one.col[here])), shape=scaled.shape)
+
+
+def _extreme(A: sp.csr_array, which: str, blocks: sp.csc_array | None = None) -> float | None:
+    """The largest (``"LA"``) or least (``"SA"``) eigenvalue, relative to blocks; None where it does not show soon."""
+    more: dict[str, object] = {}
+    start: NDArray[np.float64] = np.random.default_rng(0).standard_normal(A.shape[0])
+    try:
+        if blocks is not None:
+            more = {"M": blocks, "Minv": LinearOperator(A.shape, splu(blocks).solve)}
+        found = eigsh(A, k=1, which=which, v0=start, tol=LITTLE**2, maxiter=20, return_eigenvectors=False, **more)
+    except (ArpackError, RuntimeError):  # no convergence, so no gap to zero; or singular blocks
+        return None
+    return float(found[0])
