@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from .errors import GeometryError, InputError, RecoveryError
 from .matrix import OperatorMatrix
 from .matrix.digits import Digits
-from .tolerances import ROUNDED
+from .tolerances import CANCELLED, ROUNDED
 from .topology import components
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, tuple[sp.csr_array, Ro
 def _truss(whole: sp.csr_array, exact: tuple[sp.csr_array, Rounding] | None, reason: str) -> VectorReading | None:
     from .structures import truss_numbering
 
-    found = truss_numbering(whole)
+    found = truss_numbering(whole, allowed=exact[1].spread if exact else CANCELLED)
     if found is None:
         return None
     bars = f"{found.n_nodes} nodes with {found.block_size} unknowns each, {found.kind}, whose blocks are those of bars"

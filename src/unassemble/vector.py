@@ -15,6 +15,7 @@ from .recovery import Recovery
 from .structures import Beam, StructuralNumbering, serve_beam, serve_structure
 from .structures.bars import bars_of
 from .structures.trusses import serve_truss
+from .tolerances import CANCELLED
 from .vector_laplacian import Scalar, parts_of, recover_directions
 
 
@@ -58,8 +59,8 @@ def recover_vector(
     if uncoupled(nodal):
         found = recover_directions(parts_of(whole, nodal, numbering), matrix, anchors, scalar)
         return replace(found, choice=choice, timings=clock.timings)
-    bars = bars_of(nodal)
+    bars = bars_of(nodal, rounding.spread if rounding else CANCELLED)
     if bars is not None:
-        return serve_truss(matrix, nodal, numbering, bars, clock, anchors=anchors, choice=choice)
+        return serve_truss(matrix, nodal, numbering, bars, clock, anchors=anchors, choice=choice, exact=reading.exact)
     del whole  # of a large body, memory that the long work can use
     return serve_body(matrix, nodal, numbering, clock, Request(anchors, cells, choice, rounding))

@@ -18,7 +18,7 @@ from .layouts import PLANE
 from .nodes import Nodes
 
 
-def members_and_cells(nodes: Nodes, points: NDArray[np.float64]) -> dict[str, NDArray[np.int64]]:
+def members_and_cells(nodes: Nodes, points: NDArray[np.float64], allowed: float) -> dict[str, NDArray[np.int64]]:
     """Straight members between two nodes, and triangles and quadrilaterals between more.
 
     Cells are cliques of pairs that are no members; a pair of which none is part of a cell is a member too.
@@ -28,6 +28,8 @@ def members_and_cells(nodes: Nodes, points: NDArray[np.float64]) -> dict[str, ND
     nodes : Nodes
     points : (n, d) float64
         NaN where not determined.
+    allowed : float
+        What is left of forces that balance, relative to them.
 
     Returns
     -------
@@ -37,13 +39,13 @@ def members_and_cells(nodes: Nodes, points: NDArray[np.float64]) -> dict[str, ND
     """
     pairs = np.column_stack(sp.triu(nodes.graph, 1).nonzero()).astype(np.int64)
     pairs = pairs[determined(points)[pairs].all(axis=1)]
-    alone = np.logical_and(*_balanced(nodes, points, *pairs.T))
+    alone = np.logical_and(*_balanced(nodes, points, *pairs.T, allowed))
     triangles, quads = shell_cells(graph_of(nodes.n, pairs[~alone]), points)
     alone |= ~graph_of(nodes.n, triangles, quads).coupled(*pairs.T)
     return {"lines": pairs[alone], "triangles": triangles, "quads": quads}
 
 
-def mispaired(nodes: Nodes, points: NDArray[np.float64]) -> tuple[int, int] | None:
+def mispaired(nodes: Nodes, points: NDArray[np.float64], allowed: float) -> tuple[int, int] | None:
     """Two nodes that are not coupled as elements couple them, if there are any.
 
     The equations for coordinates add up the columns of each direction, and so hardly tell which row of one direction
@@ -58,6 +60,8 @@ def mispaired(nodes: Nodes, points: NDArray[np.float64]) -> tuple[int, int] | No
     nodes : Nodes
     points : (n, dim) float64
         NaN where not determined.
+    allowed : float
+        What is left of forces that balance, relative to them.
     """
     n, b = nodes.n, nodes.layout.block_size
     coo, size = nodes.matrix.tocoo(), np.minimum(np.abs(nodes.matrix.diagonal()), row_sizes(nodes.matrix))
@@ -71,7 +75,7 @@ def mispaired(nodes: Nodes, points: NDArray[np.float64]) -> tuple[int, int] | No
         pattern = (near > 0).astype(np.int32)
         degree, common = np.diff(near.indptr), np.asarray((pattern @ pattern)[first, second]).ravel()
         twins = (common == degree[first]) & (common == degree[second])
-        balanced, whole = _balanced(nodes, points, first, second)
+        balanced, whole = _balanced(nodes, points, first, second, allowed)
         strange |= twins | (whole & ~balanced)
     k = int(np.argmax(strange)) if strange.any() else None
     return None if k is None else (int(first[k]), int(second[k]))
@@ -81,7 +85,7 @@ def _counts(i: NDArray, j: NDArray, n: int) -> sp.csr_array:
     return sp.csr_array((np.ones(len(i), np.int32), (i, j)), shape=(n, n))
 
 
-def _balanced(nodes: Nodes, points: NDArray, i: NDArray, j: NDArray) -> tuple[NDArray, NDArray]:
+def _balanced(nodes: Nodes, points: NDArray, i: NDArray, j: NDArray, allowed: float) -> tuple[NDArray, NDArray]:
     """Pairs whose block is a member's, whatever its section; and those that are known as a whole.
 
     Forces at both ends balance for every motion of one of them: with T the motion of node i that goes with one of node
@@ -97,4 +101,4 @@ def _balanced(nodes: Nodes, points: NDArray, i: NDArray, j: NDArray) -> tuple[ND
     off = np.abs(left - left.transpose(0, 2, 1)).max(axis=(1, 2), initial=0)
     whole = (nodes.present[i] & nodes.present[j]).all(axis=1) & determined(points)[i] & determined(points)[j]
     size = (np.abs(turn) @ np.abs(block)).max(axis=(1, 2), initial=0)
-    return off <= 10 * CANCELLED * size, whole
+    return off <= 10 * allowed * size, whole

@@ -111,7 +111,13 @@ def covered(rows: NDArray[np.bool_], columns: NDArray[np.bool_]) -> str:
     return f"{rows.mean():.0%} of the rows say so, of {columns.mean():.0%} of the unknowns"
 
 
-def placed(operator: sp.csr_array, d: int, edges: NDArray[np.int64], solve: Callable[[Piece], Positions]) -> Placed:
+def placed(
+    operator: sp.csr_array,
+    d: int,
+    edges: NDArray[np.int64],
+    solve: Callable[[Piece], Positions],
+    allowed: float = CERTIFIED,
+) -> Placed:
     """Positions from equations that others would contradict; where too few are left, or all contradict, from all.
 
     Equations that would be disturbed without being noticed are left out, and what only they determine with them.
@@ -124,6 +130,8 @@ def placed(operator: sp.csr_array, d: int, edges: NDArray[np.int64], solve: Call
         Coupled nodes.
     solve : callable
         Positions of one piece.
+    allowed : float
+        Residual up to which equations do not contradict each other.
 
     Raises
     ------
@@ -131,7 +139,7 @@ def placed(operator: sp.csr_array, d: int, edges: NDArray[np.int64], solve: Call
         If no node is determined.
     """
     best = every = _placed(operator, d, edges, solve, np.ones(operator.shape[0], dtype=bool))
-    while best.residual <= CERTIFIED and best.unnoticed.any():
+    while best.residual <= allowed and best.unnoticed.any():
         try:
             best = _placed(operator, d, edges, solve, best.used & ~best.unnoticed)
         except GeometryError:

@@ -22,10 +22,13 @@ from .redundancy import unnoticed
 from .straight import Straight
 
 
-def turning_positions(nodes: Nodes, members: Straight) -> tuple[Placed, NDArray[np.bool_]]:
+def turning_positions(
+    nodes: Nodes, members: Straight, allowed: float = CERTIFIED
+) -> tuple[Placed, NDArray[np.bool_]]:
     """Positions from all rows; where these contradict or do not check each other, from those that no spring spoils.
 
-    What `members` tell by themselves comes on top.
+    What `members` tell by themselves comes on top. Equations contradict each other if residuals exceed what is
+    `allowed`.
 
     Returns
     -------
@@ -47,24 +50,24 @@ def turning_positions(nodes: Nodes, members: Straight) -> tuple[Placed, NDArray[
         if springs:
             counted[:, len(layout.displacements) :] = False
         try:
-            found = placed(given.operator, layout.dim, edges, partial(_positions, given, layout))
+            found = placed(given.operator, layout.dim, edges, partial(_positions, given, layout), allowed)
         except GeometryError as error:
             failure = failure or error
             continue
         left = given[~found.used & (given.row >= 0)]
         counted.reshape(-1, counted.shape[2])[left.row, left.rotation] = False
         attempts.append((found, counted))
-        if not any(_doubts(found)[:3]) and found.used.all():
+        if not any(_doubts(found, allowed)[:3]) and found.used.all():
             break
     if not attempts and failure:
         raise failure
-    return min(attempts, key=lambda one: _doubts(one[0]))
+    return min(attempts, key=lambda one: _doubts(one[0], allowed))
 
 
-def _doubts(found: Placed) -> tuple[bool, bool, bool, int, float]:
+def _doubts(found: Placed, allowed: float) -> tuple[bool, bool, bool, int, float]:
     """What speaks against positions, the gravest first."""
     free, lost = found.null_dimension > found.points.shape[1], int(np.count_nonzero(found.component < 0))
-    return found.residual > CERTIFIED, free, bool(found.unnoticed.any()), lost, found.residual
+    return found.residual > allowed, free, bool(found.unnoticed.any()), lost, found.residual
 
 
 def _positions(given: Equations, layout: Layout, piece: Piece) -> Positions:
