@@ -54,13 +54,14 @@ def recover_vector(
     if isinstance(numbering, StructuralNumbering):
         return serve_structure(matrix, numbering, clock, anchors=anchors, choice=choice, cells=cells)
     with clock("numbering"):
-        whole, rounding = reading.exact or (matrix.csr(), None)
+        rounding = reading.rounding
+        whole = rounding.exact if rounding else matrix.csr()
         nodal = nodal_matrix(whole, numbering)
     if uncoupled(nodal):
         found = recover_directions(parts_of(whole, nodal, numbering), matrix, anchors, scalar)
         return replace(found, choice=choice, timings=clock.timings)
     bars = bars_of(nodal, rounding.spread if rounding else CANCELLED)
     if bars is not None:
-        return serve_truss(matrix, nodal, numbering, bars, clock, anchors=anchors, choice=choice, exact=reading.exact)
+        return serve_truss(matrix, nodal, numbering, bars, clock, anchors=anchors, choice=choice, rounding=rounding)
     del whole  # of a large body, memory that the long work can use
     return serve_body(matrix, nodal, numbering, clock, Request(anchors, cells, choice, rounding))

@@ -33,6 +33,8 @@ class Rounding:
         Digits, decimals or single precision; see :class:`~unassemble.matrix.digits.Digits`.
     level : float
         How far entries may be off, relative to their size, as half of the rows have it.
+    exact : (N, N) sparse
+        The matrix, with exact sums.
     unit : (N, N) sparse
         Of the last place of each entry.
     direction : (N,) int64
@@ -43,6 +45,7 @@ class Rounding:
 
     name: str
     level: float
+    exact: sp.csr_array
     unit: sp.csr_array
     direction: NDArray[np.int64]
     zero: NDArray[np.bool_]
@@ -52,30 +55,11 @@ class Rounding:
         """What an identity, or a sum of forces, may be off by, relative to what makes it up."""
         return SIGMAS * self.level
 
-    def redrawn(self, exact: sp.csr_array, seed: int) -> sp.csr_array:
-        """The matrix, whose sums are `exact`, off by what rounding may have done to each entry, with exact sums again.
-
-        Parameters
-        ----------
-        exact : (N, N) sparse
-            Of :func:`with_exact_sums`.
-        seed : int
-        """
+    def redrawn(self, seed: int) -> sp.csr_array:
+        """The matrix off by what rounding may have done to each entry, with exact sums again."""
         upper = sp.triu(self.unit, format="csr")
         upper.data *= np.random.default_rng(seed).uniform(-0.5, 0.5, upper.nnz)
-        return self.without_sums(sp.csr_array(exact + upper + sp.triu(upper, 1).T))
-
-    def without_sums(self, matrix: sp.csr_array) -> sp.csr_array:
-        """The matrix after sums that make up zero were taken off the largest entry of each row and direction."""
-        entry = matrix.tocoo(copy=True)
-        b = self.zero.shape[1]
-        excess = np.where(self.zero, matrix @ (self.direction[:, None] == np.arange(b)).astype(float), 0.0)
-        key = entry.row * (b + 1) + self.direction[entry.col]
-        order = np.lexsort((np.abs(entry.data), key))
-        last = order[np.append(np.diff(key[order]) > 0, True)]
-        last = last[self.direction[entry.col[last]] >= 0]
-        entry.data[last] -= excess[entry.row[last], self.direction[entry.col[last]]]
-        return sp.csr_array(entry)
+        return _without_sums(sp.csr_array(self.exact + upper + sp.triu(upper, 1).T), self.direction, self.zero)
 
 
 def with_exact_sums(
@@ -103,7 +87,6 @@ def with_exact_sums(
     size, error = abs(matrix), unit / 2
     total, of_row = (np.asarray(part.sum(axis=1)).ravel() for part in (size, error))
     off = of_row / np.where(total > 0, total, np.inf)
-    level = float(np.median(off))
     best, most, excess = None, HARDLY_ANY, 0.0
     for direction, b in chain(_readings(matrix, np.maximum(off, CANCELLED)), candidates):
         labels = (direction[:, None] == np.arange(b)).astype(float)
@@ -111,11 +94,12 @@ def with_exact_sums(
         zero = (np.abs(sums) <= error @ labels + LAST_DIGITS * total[:, None]) & (sizes > LAST_DIGITS * total[:, None])
         share = max(float(zero[:, :moves].all(axis=1).mean()) for moves in _LAYOUTS[b])
         if share > most:
-            best, most = Rounding(digits.name, level, unit, direction, zero), share
+            best, most = (direction, zero), share
             excess = float((np.abs(np.where(zero, sums, 0.0)) / np.where(total > 0, total, 1)[:, None]).max())
     if best is None or excess <= LAST_DIGITS:  # dyadic numbers are exact, few digits or not
         return matrix, None
-    return best.without_sums(matrix), best
+    exact = _without_sums(matrix, *best)
+    return exact, Rounding(digits.name, float(np.median(off)), exact, unit, *best)
 
 
 def _readings(matrix: sp.csr_array, off: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.int64], int]]:
@@ -134,3 +118,16 @@ def _readings(matrix: sp.csr_array, off: NDArray[np.float64]) -> Iterator[tuple[
             direction = np.full(order, -1)
             direction[live] = found
             yield direction, d
+
+
+def _without_sums(matrix: sp.csr_array, direction: NDArray[np.int64], zero: NDArray[np.bool_]) -> sp.csr_array:
+    """The matrix after sums that make up zero were taken off the largest entry of each row and direction."""
+    entry = matrix.tocoo(copy=True)
+    b = zero.shape[1]
+    excess = np.where(zero, matrix @ (direction[:, None] == np.arange(b)).astype(float), 0.0)
+    key = entry.row * (b + 1) + direction[entry.col]
+    order = np.lexsort((np.abs(entry.data), key))
+    last = order[np.append(np.diff(key[order]) > 0, True)]
+    last = last[direction[entry.col[last]] >= 0]
+    entry.data[last] -= excess[entry.row[last], direction[entry.col[last]]]
+    return sp.csr_array(entry)

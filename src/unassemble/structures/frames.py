@@ -13,12 +13,12 @@ from ..clock import Clock
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..nodes.anchoring import anchored, checked_anchors, digits_lost, near_enough
+from ..nodes.redrawn import known_to
 from ..nodes.rounded import Rounding, with_exact_sums
 from ..recovery import Structure
 from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SUMMED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
 from .certificate import forces, members_misfits
-from .few_digits import known_to
 from .members import members_and_cells, mispaired
 from .nodes import Nodes, nodes_of
 from .placed import Placed, covered
@@ -71,9 +71,16 @@ def serve_structure(
         ends, misfit = members_misfits(members, layout, found.points)
         used |= np.isin(node, ends)
         error = float(np.concatenate([force, misfit]).max()) if used.any() else float("inf")
-        doubt = _doubt(error, found, whole, numbering, rounding)
-        status, reason = _verdict(error, max(CERTIFIED, spread), doubt, found, len(misfit), rounding.name if rounding else "")
-        pair = mispaired(nodes, found.points, max(CANCELLED, spread)) if status == "certified" and numbering.kind != "given" else None
+        doubt = _doubt(error, found, numbering, rounding)
+        status, reason = _verdict(
+            error, max(CERTIFIED, spread), doubt, found, len(misfit), rounding.name if rounding else ""
+        )
+        inner: NDArray[np.bool_] = np.asarray(valid[:, : len(layout.displacements)].all(axis=(1, 2)))
+        pair = (
+            mispaired(nodes, found.points, inner, max(CANCELLED, spread))
+            if status == "certified" and numbering.kind != "given"
+            else None
+        )
     if pair is not None:
         first, second = (np.flatnonzero(node == one)[0] for one in pair)
         status = "uncertified"
@@ -127,12 +134,16 @@ def _edge_length(nodes: Nodes, found: Placed) -> float:
     return float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
 
 
-def _doubt(
-    error: float, found: Placed, whole: sp.csr_array, numbering: StructuralNumbering, rounding: Rounding | None
-) -> float:
+def _doubt(error: float, found: Placed, numbering: StructuralNumbering, rounding: Rounding | None) -> float:
     """How far positions may be off, relative to the size; without rounding if each equation were off by as much."""
     if rounding is not None:
-        return known_to(found, whole, rounding, lambda other: _placed(other, numbering, rounding)[2])
+        return known_to(
+            found.points,
+            found.component,
+            rounding,
+            lambda other: _placed(other, numbering, rounding)[2].points,
+            sized=True,
+        )
     loosest = min(found.evidence, key=lambda one: one.gap / np.sqrt(one.rows))
     return float(error * np.sqrt(loosest.rows) / loosest.gap)
 
@@ -148,7 +159,9 @@ def _placed(
         return nodes, members, *turning_positions(nodes, members, max(CERTIFIED, spread))
 
 
-def _verdict(error: float, allowed: float, doubt: float, found: Placed, members: int, digits: str) -> tuple[str, Reason]:
+def _verdict(
+    error: float, allowed: float, doubt: float, found: Placed, members: int, digits: str
+) -> tuple[str, Reason]:
     d = found.points.shape[1]
     if found.null_dimension > d:
         return "uncertified", Reason(

@@ -45,7 +45,9 @@ def members_and_cells(nodes: Nodes, points: NDArray[np.float64], allowed: float)
     return {"lines": pairs[alone], "triangles": triangles, "quads": quads}
 
 
-def mispaired(nodes: Nodes, points: NDArray[np.float64], allowed: float) -> tuple[int, int] | None:
+def mispaired(
+    nodes: Nodes, points: NDArray[np.float64], inner: NDArray[np.bool_], allowed: float
+) -> tuple[int, int] | None:
     """Two nodes that are not coupled as elements couple them, if there are any.
 
     The equations for coordinates add up the columns of each direction, and so hardly tell which row of one direction
@@ -53,13 +55,15 @@ def mispaired(nodes: Nodes, points: NDArray[np.float64], allowed: float) -> tupl
     directions or in none. In space each coordinate acts on two directions, which contradict each other where their rows
     are not one node's; the coordinates of a plate act on one direction. Those of a plane frame have a direction each,
     so that all depends on the pairing: its nodes have to be joined by members, and no two of them to have the same
-    neighbours.
+    neighbours. What was condensed joins the nodes next to it otherwise; these need a member to another node.
 
     Parameters
     ----------
     nodes : Nodes
     points : (n, dim) float64
         NaN where not determined.
+    inner : (n,) bool
+        Nodes whose forces are not touched by supports, or by what was condensed.
     allowed : float
         What is left of forces that balance, relative to them.
     """
@@ -76,7 +80,10 @@ def mispaired(nodes: Nodes, points: NDArray[np.float64], allowed: float) -> tupl
         degree, common = np.diff(near.indptr), np.asarray((pattern @ pattern)[first, second]).ravel()
         twins = (common == degree[first]) & (common == degree[second])
         balanced, whole = _balanced(nodes, points, first, second, allowed)
-        strange |= twins | (whole & ~balanced)
+        joined = np.zeros(n, dtype=bool)
+        joined[first[whole & balanced]] = joined[second[whole & balanced]] = True
+        excused = ~inner[first] & ~inner[second] & joined[first] & joined[second]
+        strange |= twins | (whole & ~balanced & ~excused)
     k = int(np.argmax(strange)) if strange.any() else None
     return None if k is None else (int(first[k]), int(second[k]))
 

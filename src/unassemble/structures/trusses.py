@@ -20,13 +20,13 @@ from ..matrix import OperatorMatrix
 from ..nodes.anchoring import anchored, checked_anchors, digits_lost, near_enough
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix
 from ..nodes.numbering import Numbering
+from ..nodes.redrawn import known_to
 from ..nodes.rounded import Rounding
 from ..nodes.shape import in_gauge, shape
 from ..recovery import Evidence, Structure
 from ..tolerances import ALIKE, CERTIFIED, SINGULAR, SMALL
 from ..words import Reason, count_of
 from .bars import Bars, bars_of
-from .few_digits import known_to
 from .placed import Piece, Placed, Positions, covered, placed
 from .positions import least_squares
 
@@ -40,7 +40,7 @@ def serve_truss(
     *,
     anchors: Sequence[Any] | None,
     choice: str,
-    exact: tuple[sp.csr_array, Rounding] | None = None,
+    rounding: Rounding | None = None,
 ) -> Structure:
     """Recover a truss, up to the size of each piece.
 
@@ -53,7 +53,7 @@ def serve_truss(
     """
     known = checked_anchors(anchors, numbering.node_of_row, nodal.dim)
     with clock("solve"):
-        found = place_joints(bars, nodal.n, exact[1].spread if exact else CERTIFIED)
+        found = place_joints(bars, nodal.n, rounding.spread if rounding else CERTIFIED)
     with clock("certify"):
         error = largest_misfit(nodal, found.points)
     loose = found.component < 0
@@ -64,7 +64,7 @@ def serve_truss(
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: the point reflection of a truss has the same matrix")
     lost = digits_lost(points, found.points, found.component, factor)
-    status, reason = _verdict(error, found, *_rounded(found, numbering, exact))
+    status, reason = _verdict(error, found, *_rounded(found, numbering, rounding))
     if status == "certified":
         rows = ~loose[numbering.node_of_row]
         reason = Reason(f"{reason.text}: {covered(rows, rows)}")
@@ -85,22 +85,19 @@ def serve_truss(
     )
 
 
-def _rounded(
-    found: Placed, numbering: Numbering, exact: tuple[sp.csr_array, Rounding] | None
-) -> tuple[float, float, str]:
+def _rounded(found: Placed, numbering: Numbering, rounding: Rounding | None) -> tuple[float, float, str]:
     """What bars may leave of blocks, how far positions may be off, relative to the size, and digits of the entries."""
-    if exact is None:
+    if rounding is None:
         return CERTIFIED, max(one.residual / one.gap for one in found.evidence), ""
-    rounding = exact[1]
     allowed = rounding.spread
 
-    def place(matrix: sp.csr_array) -> Placed:
+    def place(matrix: sp.csr_array) -> NDArray[np.float64]:
         bars = bars_of(nodal_matrix(matrix, numbering), allowed)
         if bars is None:
             raise GeometryError("blocks are no longer those of bars")
-        return place_joints(bars, numbering.n_nodes, allowed)
+        return place_joints(bars, numbering.n_nodes, allowed).points
 
-    return allowed, known_to(found, *exact, place), rounding.name
+    return allowed, known_to(found.points, found.component, rounding, place, sized=False), rounding.name
 
 
 def _verdict(error: float, found: Placed, allowed: float, doubt: float, digits: str) -> tuple[str, Reason]:

@@ -22,9 +22,7 @@ from .redundancy import unnoticed
 from .straight import Straight
 
 
-def turning_positions(
-    nodes: Nodes, members: Straight, allowed: float = CERTIFIED
-) -> tuple[Placed, NDArray[np.bool_]]:
+def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIED) -> tuple[Placed, NDArray[np.bool_]]:
     """Positions from all rows; where these contradict or do not check each other, from those that no spring spoils.
 
     What `members` tell by themselves comes on top. Equations contradict each other if residuals exceed what is
