@@ -39,7 +39,7 @@ def members_and_cells(nodes: Nodes, points: NDArray[np.float64], allowed: float)
     """
     pairs = np.column_stack(sp.triu(nodes.graph, 1).nonzero()).astype(np.int64)
     pairs = pairs[determined(points)[pairs].all(axis=1)]
-    alone = np.logical_and(*_balanced(nodes, points, *pairs.T, allowed))
+    alone = np.logical_and(*_balanced(nodes, points, pairs[:, 0], pairs[:, 1], allowed))
     triangles, quads = shell_cells(graph_of(nodes.n, pairs[~alone]), points)
     alone |= ~graph_of(nodes.n, triangles, quads).coupled(*pairs.T)
     return {"lines": pairs[alone], "triangles": triangles, "quads": quads}
