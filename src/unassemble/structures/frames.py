@@ -162,13 +162,6 @@ def _placed(
 def _verdict(
     error: float, allowed: float, doubt: float, found: Placed, members: int, digits: str
 ) -> tuple[str, Reason]:
-    d = found.points.shape[1]
-    if found.null_dimension > d:
-        return "uncertified", Reason(
-            f"the null space has dimension {found.null_dimension} where {d} translations are expected: supports leave "
-            "too few whole rows",
-            WITHOUT_SUPPORTS,
-        )
     if not error <= allowed or doubt > ALIKE:
         gap = min(one.gap for one in found.evidence)
         of = f" of entries rounded to {digits}" if digits else ""

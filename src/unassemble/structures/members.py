@@ -74,6 +74,7 @@ def mispaired(
     near, meeting = _counts(i, j, n), _counts(i[one == other], j[one == other], n)
     first, second = sp.triu(near, 1).nonzero()
     shared = (nodes.present[first] & nodes.present[second]).sum(axis=1)
+    known = determined(points)
     strange = np.asarray(meeting[first, second]).ravel() < np.minimum(shared, 2)
     if nodes.layout == PLANE:
         pattern = (near > 0).astype(np.int32)
@@ -84,6 +85,7 @@ def mispaired(
         joined[first[whole & balanced]] = joined[second[whole & balanced]] = True
         excused = ~inner[first] & ~inner[second] & joined[first] & joined[second]
         strange |= twins | (whole & ~balanced & ~excused)
+    strange &= known[first] | known[second]
     k = int(np.argmax(strange)) if strange.any() else None
     return None if k is None else (int(first[k]), int(second[k]))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from ..nodes.nodal import determined
 from ..nodes.numbering import Numbering
 from ..recovery import Evidence
 from ..tolerances import CERTIFIED
+from ..words import count_of
 from .recognise import StructuralNumbering
 
 
@@ -104,6 +105,37 @@ class Placed:
     def null_dimension(self) -> int:
         """Largest dimension of the null space of a piece."""
         return max(one.null_dimension for one in self.evidence)
+
+
+def without_free(found: Placed, most: int) -> Placed:
+    """Positions of the pieces whose null space has no larger dimension; of others they mean nothing.
+
+    Raises
+    ------
+    GeometryError
+        If no piece is left.
+    """
+    free = [k for k, one in enumerate(found.evidence) if one.null_dimension > most]
+    if not free:
+        return found
+    largest = found.null_dimension
+    said = f"the null space has dimension {largest} where {most} is expected"
+    if len(free) == len(found.evidence):
+        raise GeometryError(
+            f"no positions were found: {said}. Supports leave too few whole rows, or unknowns of nodes are along axes "
+            "of their own, as in cylindrical coordinates"
+        )
+    kept = np.setdiff1d(np.arange(len(found.evidence)), free)
+    place = np.full(len(found.evidence) + 1, -1)
+    place[kept] = np.arange(len(kept))
+    component = place[found.component]
+    return replace(
+        found,
+        points=np.where(component[:, None] < 0, np.nan, found.points),
+        component=component,
+        evidence=tuple(found.evidence[k] for k in kept),
+        notes=(*found.notes, f"{said} in {count_of(len(free), 'piece')}, which were left out"),
+    )
 
 
 def covered(rows: NDArray[np.bool_], columns: NDArray[np.bool_]) -> str:

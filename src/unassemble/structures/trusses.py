@@ -27,7 +27,7 @@ from ..recovery import Evidence, Structure
 from ..tolerances import ALIKE, CERTIFIED, SINGULAR, SMALL
 from ..words import Reason, count_of
 from .bars import Bars, bars_of
-from .placed import Piece, Placed, Positions, covered, placed
+from .placed import Piece, Placed, Positions, covered, placed, without_free
 from .positions import least_squares
 
 
@@ -101,8 +101,6 @@ def _rounded(found: Placed, numbering: Numbering, rounding: Rounding | None) -> 
 
 
 def _verdict(error: float, found: Placed, allowed: float, doubt: float, digits: str) -> tuple[str, Reason]:
-    if found.null_dimension > found.points.shape[1] + 1:
-        return "uncertified", Reason("the directions of the bars leave more free than translations and size")
     if not error <= allowed:
         return "uncertified", Reason(f"a block differs from that of a bar by {error:.1e} of the row's largest entry")
     if found.unnoticed.any():
@@ -147,7 +145,7 @@ def place_joints(bars: Bars, n: int, allowed: float = CERTIFIED) -> Placed:
         evidence = Evidence(one.dimension, float(values[d]), float(gap[0]) if len(gap) else float("inf"), len(which))
         return Positions(in_gauge(one.points, links), evidence, np.repeat(blind, d))
 
-    return placed(_across(ends, directions, n), d, ends, solve, allowed)
+    return without_free(placed(_across(ends, directions, n), d, ends, solve, allowed), d + 1)
 
 
 def _across_one(directions: NDArray[np.float64]) -> NDArray[np.float64]:

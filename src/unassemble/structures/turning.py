@@ -16,7 +16,7 @@ from ..tolerances import CANCELLED, CERTIFIED, SINGULAR
 from .equations import Equations, equations, joined, told_by
 from .layouts import Layout
 from .nodes import Nodes
-from .placed import Piece, Placed, Positions, placed
+from .placed import Piece, Placed, Positions, placed, without_free
 from .positions import least_squares
 from .redundancy import unnoticed
 from .straight import Straight
@@ -37,7 +37,7 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     Raises
     ------
     GeometryError
-        If no node is determined.
+        If no node is determined, or more is free than translations.
     """
     attempts: list[tuple[Placed, NDArray[np.bool_]]] = []
     failure: GeometryError | None = None
@@ -59,7 +59,8 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
             break
     if not attempts and failure:
         raise failure
-    return min(attempts, key=lambda one: _doubts(one[0], allowed))
+    found, counted = min(attempts, key=lambda one: _doubts(one[0], allowed))
+    return without_free(found, layout.dim), counted
 
 
 def _doubts(found: Placed, allowed: float) -> tuple[bool, bool, bool, int, float]:
