@@ -65,7 +65,7 @@ def serve_structure(
     with clock("solve"):
         nodes, members, found, valid = _placed(whole, numbering, rounding)
     with clock("certify"):
-        counted = np.zeros((len(node), len(layout.rotations)), dtype=bool)
+        counted = np.zeros((len(node), len(layout.turning)), dtype=bool)
         counted[nodes.row_of[nodes.present]] = valid[nodes.present]
         force, used = forces(whole, layout, node, direction, found.points, counted)
         ends, misfit = members_misfits(members, layout, found.points)
@@ -73,7 +73,13 @@ def serve_structure(
         error = float(np.concatenate([force, misfit]).max()) if used.any() else float("inf")
         doubt = _doubt(error, found, numbering, rounding)
         status, reason = _verdict(
-            error, max(CERTIFIED, spread), doubt, found, len(misfit), rounding.name if rounding else ""
+            error,
+            max(CERTIFIED, spread),
+            doubt,
+            found,
+            len(misfit),
+            rounding.name if rounding else "",
+            sized=bool(layout.rotations),
         )
         inner: NDArray[np.bool_] = np.asarray(valid[:, : len(layout.displacements)].all(axis=(1, 2)))
         pair = (
@@ -93,12 +99,15 @@ def serve_structure(
         reason = Reason(f"{reason.text}: {covered(used, abs(whole[used]).sum(axis=0) > 0)}")
     notes = list(found.notes)
     placed = np.pad(found.points, ((0, 0), (0, layout.space - layout.dim)))
+    points, factor, more = anchored(placed, found.component, len(found.evidence), known, sized=bool(layout.rotations))
     fields: dict[str, Any] = {}
+    if np.isnan(factor).any():
+        notes.append("size and sign are free: nodes have no rotations, from which angles would tell lengths")
     if cells and error < ALIKE:
         with clock("members"):
             fields = members_and_cells(nodes, placed, max(CANCELLED, spread))
         notes.append("members and cells were read off the graph: what is certified is the coordinates")
-    if not valid[:, len(layout.displacements) :].any():
+    if layout.rotations and not valid[:, len(layout.displacements) :].any():
         notes.append("moments are not used alone: springs between rotations and the ground, as against drilling, would "
                      "spoil them")  # fmt: skip
     untold = np.unique(node[direction < 0])
@@ -108,7 +117,6 @@ def serve_structure(
     if (found.component < 0).any():
         notes.append(f"{(found.component < 0).sum()} of {count_of(nodes.n, 'node')} cannot be determined: at supports, "
                      "or tied to these only")  # fmt: skip
-    points, factor, more = anchored(placed, found.component, len(found.evidence), known, sized=True)
     lost = digits_lost(points, placed, found.component, factor) / _edge_length(nodes, found)
     status, reason = near_enough(status, reason, lost)
     return Structure(
@@ -142,7 +150,7 @@ def _doubt(error: float, found: Placed, numbering: StructuralNumbering, rounding
             found.component,
             rounding,
             lambda other: _placed(other, numbering, rounding)[2].points,
-            sized=True,
+            sized=bool(numbering.layout.rotations),
         )
     loosest = min(found.evidence, key=lambda one: one.gap / np.sqrt(one.rows))
     return float(error * np.sqrt(loosest.rows) / loosest.gap)
@@ -160,7 +168,7 @@ def _placed(
 
 
 def _verdict(
-    error: float, allowed: float, doubt: float, found: Placed, members: int, digits: str
+    error: float, allowed: float, doubt: float, found: Placed, members: int, digits: str, *, sized: bool
 ) -> tuple[str, Reason]:
     if not error <= allowed or doubt > ALIKE:
         gap = min(one.gap for one in found.evidence)
@@ -181,6 +189,5 @@ def _verdict(
             f"rigid rotations of the nodes cause no more forces than entries rounded to {digits} leave{blocks}, "
             f"so that positions are known to {doubt:.0e} of the size"
         )
-    return "certified", Reason(
-        f"rigid rotations of the nodes cause no forces{blocks}, and only translations change nothing"
-    )
+    nothing = "translations change" if sized else "translations and a change of size change"
+    return "certified", Reason(f"rigid rotations of the nodes cause no forces{blocks}, and only {nothing} nothing")

@@ -17,6 +17,8 @@ from ..tolerances import CANCELLED
 from .layouts import PLANE
 from .nodes import Nodes
 
+MOST_PER_NODE = 4  # triangles of surfaces, of which two are a quadrilateral: by Euler two a node, more where they meet
+
 
 def members_and_cells(nodes: Nodes, points: NDArray[np.float64], allowed: float) -> dict[str, NDArray[np.int64]]:
     """Straight members between two nodes, and triangles and quadrilaterals between more.
@@ -41,6 +43,9 @@ def members_and_cells(nodes: Nodes, points: NDArray[np.float64], allowed: float)
     pairs = pairs[determined(points)[pairs].all(axis=1)]
     alone = np.logical_and(*_balanced(nodes, points, pairs[:, 0], pairs[:, 1], allowed))
     triangles, quads = shell_cells(graph_of(nodes.n, pairs[~alone]), points)
+    if len(triangles) + 2 * len(quads) > MOST_PER_NODE * nodes.n:  # faces of solids, and planes through them
+        triangles, quads = triangles[:0], quads[:0]
+        return {"lines": pairs[alone], "triangles": triangles, "quads": quads}
     alone |= ~graph_of(nodes.n, triangles, quads).coupled(*pairs.T)
     return {"lines": pairs[alone], "triangles": triangles, "quads": quads}
 
@@ -76,6 +81,8 @@ def mispaired(
     shared = (nodes.present[first] & nodes.present[second]).sum(axis=1)
     known = determined(points)
     strange = np.asarray(meeting[first, second]).ravel() < np.minimum(shared, 2)
+    if not nodes.layout.rotations:  # bars along an axis have one direction
+        strange &= ~_balanced(nodes, points, first, second, allowed)[0]
     if nodes.layout == PLANE:
         pattern = (near > 0).astype(np.int32)
         degree, common = np.diff(near.indptr), np.asarray((pattern @ pattern)[first, second]).ravel()
@@ -107,6 +114,7 @@ def _balanced(nodes: Nodes, points: NDArray, i: NDArray, j: NDArray, allowed: fl
                                     np.broadcast_to(columns, (len(i), b, b)).ravel()]).reshape(-1, b, b)  # fmt: skip
     turn = nodes.layout.rigid_motions(points[i] - points[j]).transpose(0, 2, 1)
     left = turn @ block
+    left = np.pad(left, ((0, 0), (0, 0), (0, left.shape[1] - left.shape[2])))  # what no rotation takes up has to vanish
     off = np.abs(left - left.transpose(0, 2, 1)).max(axis=(1, 2), initial=0)
     whole = (nodes.present[i] & nodes.present[j]).all(axis=1) & determined(points)[i] & determined(points)[j]
     size = (np.abs(turn) @ np.abs(block)).max(axis=(1, 2), initial=0)

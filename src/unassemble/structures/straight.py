@@ -48,6 +48,8 @@ def straight_members(nodes: Nodes, allowed: float = SUMMED) -> Straight:
     """Members between two nodes that have all their unknowns; up to an allowed misfit."""
     b = nodes.layout.block_size
     whole: NDArray[np.bool_] = np.asarray(nodes.present.all(axis=1))
+    if not nodes.layout.rotations:
+        return Straight(np.empty((0, 2), np.int64), np.empty((0, nodes.layout.dim)), np.empty((0, b, b)))
     bsr = nodes.matrix.tobsr((b, b))
     i = np.repeat(np.arange(nodes.n), np.diff(bsr.indptr))
     j = bsr.indices.astype(np.int64)
