@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .clock import Clock
-from .diagnosis import explained, judged, refuse_masses
+from .diagnosis import explained, indefinite, judged, refuse_masses, seeming
 from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
@@ -209,7 +209,14 @@ class _Task:
             if found is not None and found.certified:
                 return found
         at_sight = vector_valued(self.matrix)
-        return self._first_that_fits() if at_sight is None else self._as_vector(at_sight)
+        if at_sight is None:
+            return self._first_that_fits()
+        try:
+            return self._as_vector(at_sight)
+        except RecoveryError as error:
+            if said := indefinite(self.matrix):
+                raise GeometryError(said) from error
+            raise
 
     @cached_property
     def _readings(self) -> ScalarReadings:
@@ -233,8 +240,9 @@ class _Task:
             other = self._as_second_reading() if curved is None else _unless_planar(curved)
             if other is not None:
                 return other
-            nodes = about_translations(self.matrix) if isinstance(error, NotPlanarError) else ""
-            raise explained(error, self.matrix, nodes) from error
+            other_graph = isinstance(error, NotPlanarError)
+            nodes = indefinite(self.matrix) or about_translations(self.matrix) or seeming(self.matrix)
+            raise explained(error, self.matrix, nodes if other_graph else "") from error
         if found.certified:
             return found
         curved = self._as_certified_surface() if found.status == "uncertified" else None
