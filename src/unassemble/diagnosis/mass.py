@@ -31,6 +31,8 @@ from .kinds import LENGTHS, UNREAD, Diagnosis
 
 _SIMPLICES = {1: "segments", 2: "triangles", 3: "tetrahedra"}
 
+_OR_HELD = ", or the stiffness matrix of a body of a few nodes that is held all around, which recovery tells"
+
 
 def refuse_masses(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) -> None:
     """Raise an error that names a mass matrix which recovery does not read; as :func:`mass_matrix`.
@@ -163,7 +165,10 @@ class _Masses:
         if (cells.nodes, cells.shared) in CELLS and n_parts == 1:
             return f" of {CELLS[cells.nodes, cells.shared][1]}"
         several = n_parts > 1 or often(cells.twins) or nodes_of_pattern(self.M) is not None
-        return " of several unknowns per node" if several else ""
+        if not several:
+            return ""
+        # Stiffnesses of a body that is held all around keep as far from zero while it has a few dozen nodes.
+        return " of several unknowns per node" + (_OR_HELD if self.M.shape[0] < 150 else "")
 
 
 def _blocks(scaled: sp.csr_array) -> sp.csc_array:
