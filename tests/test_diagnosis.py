@@ -162,6 +162,43 @@ def test_a_strongly_varying_coefficient():
     assert "noise" not in found.advice
 
 
+QUADS = moved(fem.MeshQuad().refined(3))
+
+
+def with_terms(element, mesh=QUADS):
+    """Matrices of elements whose terms are not read."""
+    K = stiffness(mesh, element)
+    inside = fem.Basis(mesh, element).complement_dofs(fem.Basis(mesh, element).get_dofs())
+    varying = fem.BilinearForm(lambda u, v, w: (1 + 3 * w.x[0] ** 2) * dot(grad(u), grad(v)))
+    return {
+        "masses": (K + masses(mesh, element), "assemble the stiffness matrix alone"),
+        "unknowns gone": (K[inside][:, inside], "keep all rows and columns"),
+        "coefficient": (varying.assemble(fem.Basis(mesh, element)), "see whether a coefficient varies"),
+    }
+
+
+@pytest.mark.parametrize("which", with_terms(fem.ElementQuad1()))
+@pytest.mark.parametrize("element", [fem.ElementQuad1(), fem.ElementTriP2()], ids=["Q1", "P2"])
+def test_what_else_a_matrix_of_other_elements_has(element, which):
+    """Neither promised without a condition nor refused as if its elements were not read."""
+    A, advice = with_terms(element, QUADS if isinstance(element, fem.ElementQuad1) else DISC)[which]
+    A = shuffled(A)
+    facts = inspect_matrix(A)
+    found, said = outcome(A)
+    if found is not None and found.certified:  # recovery has learnt to read them
+        return
+    assert advice in said.lower()
+    assert "for this is" not in said
+    assert said.count(". ") <= 1
+    if facts.advice:
+        assert facts.advice in facts.recoverable
+        assert facts.advice in said.lower()
+    else:
+        assert which == "coefficient"
+    if found is not None:
+        assert facts.evidence[-1].lower() in found.reason.lower()
+
+
 def boundary_conditions():
     K, D = stiffness(DISC, fem.ElementTriP1()), DISC.boundary_nodes()
     rows = K.tolil(copy=True)
@@ -238,7 +275,10 @@ def beams(n=12, length=0.7):
 MASSES = {
     "quadratic triangles": (lambda: masses(DISC, fem.ElementTriP2()), "quadratic elements on triangles"),
     "quadrilaterals": (lambda: masses(moved(fem.MeshQuad().refined(3)), fem.ElementQuad1()), "bilinear elements"),
+    "biquadratic quadrilaterals": (lambda: masses(QUADS, fem.ElementQuad2()), "biquadratic elements"),
     "hexahedra": (lambda: masses(fem.MeshHex().refined(2), fem.ElementHex1()), "trilinear elements on hexahedra"),
+    "triquadratic hexahedra": (lambda: masses(fem.MeshHex().refined(1), fem.ElementHex2()), "triquadratic elements"),
+    "Crouzeix-Raviart": (lambda: masses(DISC, fem.ElementTriCR()), "a lumped mass matrix"),  # beside it only rounding
     "vectors": (lambda: vector_masses(TETS, fem.ElementTetP1()), "of several unknowns per node"),
     "vectors on quadrilaterals": (lambda: vector_masses(moved(fem.MeshQuad().refined(3)), fem.ElementQuad1()), "of"),
     "beams": (beams, "a consistent mass matrix"),

@@ -170,11 +170,11 @@ class Inspection:
         if self.n_nodes:
             return "what each direction's scalar matrix holds"
         if self.surface:
-            return f"lengths of {count_of(self.n_edges, 'edge')} up to size; {_IF}"
+            return f"lengths of {count_of(self.n_edges, 'edge')} up to size, {_IF}{self._or_else}"
         if self.element:
             return (
                 f"{mesh_text(self)} on {self.n_rows - self.n_isolated:,} points, up to position, rotation, size and "
-                f"mirror image, {_IF}"
+                f"mirror image, {_IF}{self._or_else}"
             )
         if self.kind == "mass" and not self.advice:
             return f"areas of {mesh_text(self)}, up to the density, and no positions: a mass matrix has no shape"
@@ -187,6 +187,10 @@ class Inspection:
             return f"{mesh}, but no positions that could be certified: look at row {self.mixed_signs[0]}"
         each = f", each of the {self.n_pieces:,} pieces by itself" if self.n_pieces > 1 else ""
         return f"{mesh}, up to position, rotation, size and mirror image{each}, {_IF}"
+
+    @property
+    def _or_else(self) -> str:
+        return f" (where they do not, {self.advice})" if self.advice else ""
 
     def to_dict(self) -> dict[str, Any]:
         """All attributes, ready for JSON."""
