@@ -355,4 +355,18 @@ def test_masses_among_classics(name):
         with pytest.raises(MatrixError, match="as a lumped mass matrix is"):
             inspect_matrix(CLASSICS / name)
         return
-    assert (inspect_matrix(CLASSICS / name).kind == "mass") == name.startswith(matrices)
+    facts = inspect_matrix(CLASSICS / name)
+    assert (facts.kind == "mass") == name.startswith(matrices)
+    if facts.kind == "mass" and facts.advice:
+        with pytest.raises(RecoveryError, match=facts.name):
+            recover(CLASSICS / name)
+
+
+@pytest.mark.parametrize(("name", "said"), [("bcsstk02", "annihilate translations"), ("bcsstk22", "plane frame")])
+def test_nodes_among_classics_that_only_a_second_look_shows(name, said):
+    if not (path := CLASSICS / f"{name}.mtx.gz").exists():
+        pytest.skip("no classics")
+    facts = inspect_matrix(path)
+    found, why = outcome(path)
+    assert said in str(facts)
+    assert said in (why if found is None else found.operator)

@@ -66,7 +66,7 @@ class Sums:
 
     @property
     def remedy(self) -> str:
-        """What to assemble, so that all rows add up to zero; empty where they do, up to penalties, or by chance only."""
+        """What to assemble, so that all rows add up to zero; empty where penalties alone do not."""
         if self.eliminated:
             return KEEP_ALL
         return WITHOUT_MASS if self.rest.any() and (self.zero.any() or self.sign) else ""
