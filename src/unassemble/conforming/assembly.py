@@ -52,11 +52,13 @@ class Entries:
         return z if self._whole is None else np.asarray(self._whole @ z)
 
     def weights(self, z: NDArray) -> NDArray[np.float64]:
-        """(e,) -K_ab of the part's edges."""
+        """(e,) -K_ab of the part's edges; not finite where a cell is flat."""
         z, total = self.nodes(z), np.zeros(len(self._part.edges))
         for block in self._blocks:
             for some, at in block.parts(z):
-                total -= np.bincount(block.places[some].ravel(), block.products(*at.metric).ravel(), len(total))
+                with np.errstate(all="ignore"):
+                    products = block.products(*at.metric)
+                total -= np.bincount(block.places[some].ravel(), products.ravel(), len(total))
         return total
 
     def roundings(self, z: NDArray) -> NDArray[np.float64]:
@@ -68,14 +70,15 @@ class Entries:
         for block in self._blocks:
             a, b = np.triu_indices(block.cells.shape[1], 1)
             for some, at in block.parts(z):
-                size = np.sqrt(np.abs(block.squares(*at.metric)))
+                with np.errstate(all="ignore"):  # flat cells
+                    size = np.sqrt(np.abs(block.squares(*at.metric)))
                 total += np.bincount(block.places[some].ravel(), (size[:, a] * size[:, b]).ravel(), len(total))
         return total
 
     def flipped(self, z: NDArray) -> int:
         """Cells that are not right side out at some point of the quadrature."""
         z = self.nodes(z)
-        turned = [(at.determinant <= 0).any(axis=1).sum() for block in self._blocks for _, at in block.parts(z)]
+        turned = [(~(at.determinant > 0)).any(axis=1).sum() for block in self._blocks for _, at in block.parts(z)]
         return int(sum(turned))
 
     def jacobian(self, z: NDArray, spread: NDArray) -> EntriesJacobian:
@@ -133,8 +136,9 @@ class _Block:
         """Some cells at a time."""
         for first in range(0, len(self.cells), _CELLS):
             some = slice(first, first + _CELLS)
-            corner = z[self.cells[some]]
-            s, t = (_matmul(corner, slopes.T) for slopes in (self._p, self._r))
+            moved = z[self.moved[some]]
+            moved = moved - moved[:, :1]  # digits of differences, not of coordinates
+            s, t = (_matmul(moved, slopes.T) for slopes in self.slopes)
             yield some, _Local(s, t, s.real * t.imag - s.imag * t.real, self._weights)
 
     def products(self, first: NDArray, mixed: NDArray, last: NDArray) -> NDArray:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..elements.reference import planar_rules
 from ..errors import SolverError
-from ..planar.polish import polish
+from ..planar.polish import errors_of_one_size, polish
 from ..tolerances import CERTIFIED, LAST_DIGITS, ROUNDED
 from .assembly import Entries
 from .parts import Part
@@ -176,8 +176,8 @@ def _rules(part: Part, *, straight: bool) -> Iterator[dict[str, str]]:
 def _polished(start: Fitted, weights: NDArray, scale: float | None, noise: NDArray | None) -> Fitted:
     """Gauss-Newton; where it cannot be done the part stays as it is, with a note.
 
-    Unless the noise is known, errors are taken to be those of assembly, or, where the misfit is beyond that, of one
-    size.
+    Unless the noise is known, errors are taken to be those of assembly, or, where the misfit is beyond that and more
+    likely to be such, of one size.
     """
     entries = start.entries
     if entries.flipped(start.z):
@@ -186,7 +186,7 @@ def _polished(start: Fitted, weights: NDArray, scale: float | None, noise: NDArr
         found = polish(entries, weights, start.z, scale=scale, spread=start.spread)
         spread = start.spread
         misfit = weights - found.scale * entries.weights(found.z)
-        if noise is None and not np.sqrt(np.mean((misfit / found.scale / spread) ** 2)) < ROUNDED:
+        if noise is None and errors_of_one_size(misfit / found.scale, spread):
             spread = np.ones(len(weights))
             found = polish(entries, weights, found.z, scale=scale, spread=spread)
             misfit = weights - found.scale * entries.weights(found.z)
