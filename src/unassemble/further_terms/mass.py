@@ -12,17 +12,22 @@ from numpy.typing import NDArray
 
 from ..certify import Terms
 from ..clock import Clock
+from ..errors import RecoveryError
 from ..matrix import OperatorMatrix
-from ..reaction import MetricFit, Skeleton, areas_of_mass, fit_metric
+from ..planar.conformal import conformal_map
+from ..reaction import Metric, MetricFit, Skeleton, areas_of_mass, fit_metric
 from ..recovery import PlanarMesh
-from ..tolerances import ALIKE, CERTIFIED
+from ..tolerances import ALIKE, CERTIFIED, MOST, ROUNDED
 from ..topology import Topology
+from ..topology.pieces import planar_pieces
 from ..words import sentences
 from .again import Held, Plain, areas_of
 from .row_sums import RowSums
 
 _HOLES = 8
 """Holes of three edges that are looked for, each for the price of a fit."""
+_TURNS = 4
+"""Embeddings from which the fit of edge lengths goes on: on meshes graded over eight orders of magnitude two do."""
 _NO_SHAPE = "a mass matrix has no shape: it depends on the areas of the triangles alone, and any that have them will do"
 _OTHER = (
     "that no other areas, with another c, fit as well is not proved: the fit of edge lengths was started once, and at "
@@ -93,6 +98,11 @@ def _fit(skeleton: Skeleton, entries: NDArray, sums: RowSums) -> MetricFit | Non
     before = np.inf
     for _ in range(_HOLES + 1):
         fit = fit_metric(skeleton, entries, sums.positive(), sums.trust())
+        for _ in range(_TURNS if fit is not None and fit.residual > ROUNDED else 0):
+            again = _embedded_and_fitted(skeleton, entries, sums, fit)
+            if again is None or again.residual > MOST * fit.residual:
+                break
+            fit = again
         if fit is None or fit.residual < ALIKE:
             return fit
         excess = skeleton.at_vertices @ fit.metric.areas / (3 * sums.positive()) - 1
@@ -105,6 +115,26 @@ def _fit(skeleton: Skeleton, entries: NDArray, sums: RowSums) -> MetricFit | Non
         before = fit.residual
         skeleton = skeleton.without(worst)
     return None
+
+
+def _embedded_and_fitted(skeleton: Skeleton, entries: NDArray, sums: RowSums, fit: MetricFit) -> MetricFit | None:
+    """The fit from lengths in the plane, those of the Laplacian that is left if areas are right; None without a plane.
+
+    The fit knows sizes where they stand, and is slow about flat triangles; their areas hardly matter to entries, and
+    the embedding, a linear problem, finds their shapes at once.
+    """
+    weights = (skeleton.at_edges @ fit.metric.areas / 12 - entries) / fit.scale
+    u = fit.metric.u.copy()
+    for piece in planar_pieces(skeleton.n, skeleton.edges, skeleton.triangles, skeleton.opposite) or ():
+        try:
+            z = conformal_map(piece, weights[piece.edge_rows]).z
+        except RecoveryError:
+            return None
+        a, b, c = z[piece.triangles].T
+        size = 2 * sums.positive()[piece.vertices].sum() / np.abs(((b - a).conj() * (c - a)).imag).sum()
+        u[piece.edge_rows] = size * np.abs(z[piece.edges[:, 0]] - z[piece.edges[:, 1]]) ** 2
+    start = replace(fit, metric=Metric(skeleton, u))
+    return fit_metric(skeleton, entries, sums.positive(), sums.trust(), start=start)
 
 
 def _without_mass(matrix: OperatorMatrix, sign: int, fit: MetricFit) -> OperatorMatrix:

@@ -126,7 +126,12 @@ class Equations:
 
 
 def fit_metric(
-    skeleton: Skeleton, entries: NDArray, sums: NDArray, trust: NDArray, options: MetricOptions | None = None
+    skeleton: Skeleton,
+    entries: NDArray,
+    sums: NDArray,
+    trust: NDArray,
+    options: MetricOptions | None = None,
+    start: MetricFit | None = None,
 ) -> MetricFit | None:
     """The metric and the factor c with which a mesh has these entries; None where the iteration breaks down.
 
@@ -141,11 +146,13 @@ def fit_metric(
     trust : (n,) float64
         Weights of the row sums, relative to those of entries: less than 1 where they have lost digits.
     options : MetricOptions, optional
+    start : MetricFit, optional
+        Where to begin; with circles about the vertices unless told.
     """
     options = options or MetricOptions()
     equations = Equations(skeleton, entries, sums, trust)
     with np.errstate(all="ignore"):  # of a misfit that is not finite nothing comes
-        metric, c = equations.start()
+        metric, c = (start.metric, start.scale) if start else equations.start()
         try:
             return _descended(equations, metric, c, options) if c else None
         except SolverError:
