@@ -1,6 +1,7 @@
 """A few of the inputs of ``benchmarks/hostile.py``, always the same."""
 
 import time
+import warnings
 from contextlib import suppress
 
 import networkx as nx
@@ -13,7 +14,7 @@ from skfem.models import laplace, mass
 
 from families import HOPELESS
 from meshes import random_mesh
-from unassemble import RecoveryError, SolverError, recover
+from unassemble import MatrixError, RecoveryError, SolverError, TopologyError, recover
 from unassemble.linalg import UpperTriangle, factorisation
 
 
@@ -75,3 +76,46 @@ def test_connected_rows_out_of_all_proportion_are_refused():
     entries = sp.diags_array([[-1.0, -1e40, -1e40]] * 2, offsets=[-1, 1], shape=(4, 4))
     with pytest.raises(RecoveryError, match=r"rows 1 and 0 .* 1e\+40 and 1"):
         recover(entries)
+
+
+def _random(n, share, seed=0):
+    rng = np.random.default_rng(seed)
+    half = rng.standard_normal((n, n)) * (rng.random((n, n)) < share)
+    return sp.csr_array(half + half.T)
+
+
+def test_dense_matrices_are_refused_at_once():
+    start = time.process_time()
+    with pytest.raises(MatrixError, match="dense: a row has 999"):
+        recover(_random(1000, 1.0))
+    assert time.process_time() - start < 1
+
+
+@pytest.mark.parametrize(("n", "share"), [(370, 1.0), (1000, 0.15), (1000, 0.005)])
+def test_random_matrices_of_many_entries_are_refused_soon(n, share):
+    """As many entries as elements may have, and far more 3-cycles."""
+    start = time.process_time()
+    with pytest.raises(RecoveryError):
+        recover(_random(n, share))
+    assert time.process_time() - start < SECONDS
+
+
+def test_a_surface_needs_few_handles():
+    with pytest.raises(TopologyError, match="more handles than half its rows"):
+        recover(_random(60, 0.5), operator="surface")
+
+
+@pytest.mark.parametrize("size", [1e-250, 1.0, 1e200])
+def test_products_of_huge_entries_do_not_overflow(size):
+    """Blocks of beams are told by products of entries."""
+    chain = sp.diags_array([[1.0, -2.0, 3.0, -1.0]] * 2, offsets=[-1, 1], shape=(5, 5)) + 4 * sp.eye_array(5)
+    with warnings.catch_warnings(), suppress(RecoveryError):
+        warnings.simplefilter("error")
+        assert not recover(sp.csr_array(size * chain)).certified
+
+
+def test_changes_that_leave_no_map_are_passed_over():
+    """Products of what is left of positions overflow."""
+    kinds = ("mesh", "glued", "damaged", "scalar", "hopeless", "symmetric", "strange", "file")
+    _, _, outcome, _, said = tried(101, 56, kinds)
+    assert outcome == "refused", said

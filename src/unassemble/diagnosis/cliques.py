@@ -16,6 +16,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
+from ..budget import AT_ONCE
 from ..tolerances import MOST, NEARLY_ALL
 
 _OFTEN = 0.15  # share of pairs that show their cell: a fifth of those of quadratic tetrahedra, more of all others
@@ -79,6 +80,7 @@ def cells_of(n: int, edges: NDArray[np.int64], most: int = 1500) -> Cells:
     inner = np.diff(near.indptr) == np.diff(graph.indptr)[rows]  # those with all of their neighbours
     pairs = np.column_stack(sp.triu(near, 1).nonzero())
     pairs = pairs[inner[pairs].any(axis=1)] if inner.any() else pairs
+    most = min(most, max(100, int(AT_ONCE / max(np.diff(near.indptr).mean(), 1) ** 2)))  # each takes a degree squared
     pairs = np.random.default_rng(0).permutation(pairs)[:most]  # every second one may be all of one kind, on a grid
     others = [set(near.indices[a:b].tolist()) for a, b in zip(near.indptr[:-1], near.indptr[1:], strict=True)]
     found: Counter[int] = Counter()

@@ -44,9 +44,9 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
     InputError
         If `drop_zeros` or `noise` is out of range.
     MatrixError
-        If the matrix is not square, empty, without numbers, not finite, diagonal, not symmetric, or has far more
-        rows than entries, or connected rows out of all proportion. Both triangles may differ by 1e-10 of the largest
-        off-diagonal entry of the two rows, or by a convection: an antisymmetric part whose rows add up to zero.
+        If the matrix is not square, empty, without numbers, not finite, diagonal, dense, not symmetric, or has far
+        more rows than entries, or connected rows out of all proportion. Both triangles may differ by 1e-10 of the
+        largest off-diagonal entry of the two rows, or by a convection: an antisymmetric part whose rows add up to zero.
 
     Examples
     --------
@@ -72,6 +72,7 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
     if drop_zeros is not None:
         edges, entries, dropped = _without_zeros(csr.shape[0], edges, entries, drop_zeros)
         warnings += dropped
+    _check_density(csr.shape[0], edges)
     _check_proportions(csr.shape[0], edges, entries)
     return OperatorMatrix(csr.shape[0], edges, entries, csr.diagonal(), asymmetry, warnings, replaced=replaced)
 
@@ -162,6 +163,19 @@ def _real(csr: sp.csr_array) -> tuple[sp.csr_array, tuple[str, ...]]:
     i, j = place(csr, int(np.argmax(imaginary)))
     note = f"the matrix is complex, and its real part was taken: row {i}, column {j}, for one, is {csr[i, j]:.6g}"
     return real, (note,)
+
+
+def _check_density(n: int, edges: NDArray[np.int64]) -> None:
+    """Refuse matrices that are dense, as those of condensation and of boundary elements are.
+
+    None of the elements that are read fills rows more, in the mean, than triquadratic hexahedra.
+    """
+    fullest = 3 * 5**3 - 1  # off-diagonal entries in a row of triquadratic hexahedra, with three unknowns to a node
+    if 2 * len(edges) > fullest * n:
+        raise MatrixError(
+            f"the matrix is dense: a row has {2 * len(edges) / n:.0f} off-diagonal entries in the mean, and no finite "
+            f"element matrix that is read has more than {fullest}"
+        )
 
 
 def _check_proportions(n: int, edges: NDArray[np.int64], entries: NDArray[np.float64]) -> None:

@@ -56,6 +56,7 @@ def recover_surface(
         If no piece has edge lengths with these entries.
     """
     with clock("topology"):
+        _require_few_handles(matrix)
         used, notes = _used(matrix)
         cycles = Cycles.of(used.n, used.edges)
         if triangles is None:
@@ -74,6 +75,16 @@ def recover_surface(
         with clock("deviations"):
             deviations = _deviations(best, options.noise)
     return _report(used, best, verdict, notes, clock, deviations)
+
+
+def _require_few_handles(matrix: OperatorMatrix) -> None:
+    """Refuse graphs that have no surface of few handles, before 3-cycles are listed: dense ones have most of all.
+
+    A closed surface of n vertices and g handles has 3 n - 6 + 6 g edges (Euler's formula), and one with holes fewer.
+    """
+    if len(matrix.edges) > 6 * matrix.n:
+        edges, rows = (count_of(k, word) for k, word in ((len(matrix.edges), "edge"), (matrix.n, "row")))
+        raise TopologyError(f"{edges} on {rows} are those of no surface, unless it has more handles than half its rows")
 
 
 def _deviations(found: _Found, sigma: float) -> NDArray[np.float64]:

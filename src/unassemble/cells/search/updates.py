@@ -162,14 +162,15 @@ class Updates:
         after = np.tile(labels[:, None], count)
         after[np.concatenate(moves), np.repeat(np.arange(count), [len(move) for move in moves])] ^= True
         left = np.full(count, np.inf)
-        hopeful = np.all(np.isfinite(z), axis=0)
+        hopeful = np.all(np.abs(z) < 1 / np.finfo(float).eps, axis=0)  # else the changed pencil is singular
         if most < np.inf:  # few edges tell of nearly all that they leave more
             edges = np.arange(0, len(self._weights), -(-len(self._weights) // 24))  # as many are enough
             few = np.any(np.isin(sheet.row, edges), axis=1)
             w = self._fitted(z[:, hopeful], after[:, hopeful], few)[edges]
             hopeful[hopeful] = _misfits(w, self._weights[edges]).sum(axis=0) <= most * len(self._weights)
         w = self._fitted(z[:, hopeful], after[:, hopeful])
-        left[hopeful] = _misfits(self._scales(w) * w, self._weights).mean(axis=0)
+        with np.errstate(all="ignore"):  # flat triangles beside small entries, or nothing at all, have no scale
+            left[hopeful] = _misfits(self._scales(w) * w, self._weights).mean(axis=0)
         return left
 
     def _fitted(
@@ -193,8 +194,7 @@ class Updates:
         used = np.clip(w, -5.0, 5.0)  # more belongs to flat triangles
         for _ in range(3):
             c = (self._weights @ used) / np.maximum((used * used).sum(axis=0), np.finfo(float).tiny)
-            with np.errstate(all="ignore"):  # a change that leaves nothing has no scale
-                used = np.where(np.abs(c * w - self._weights[:, None]) < 0.5, w, 0.0)
+            used = np.where(np.abs(c * w - self._weights[:, None]) < 0.5, w, 0.0)
         return np.asarray(c)
 
 
