@@ -26,7 +26,6 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from conforming.assembled import Assembled, assembled, cell_sets  # noqa: E402
 from meshes import largest_error_of_pieces, specimen  # noqa: E402
-
 from unassemble import RecoveryError, recover  # noqa: E402
 
 CASES = ("P2", "P3", "Q1", "Q2", "S2", "mass")
@@ -51,7 +50,9 @@ def main() -> int:
                 right.setdefault(kind, []).append(good)
                 wrong += bad
                 print(f"{case:4} {name:30} {label:20} {len(known.points):7,} {line}{'  WRONG' * bad}", flush=True)
-        sums += [f"{case:4} {kind:8} {sum(some):4} of {len(some):4} certified and right" for kind, some in right.items()]
+        sums += [
+            f"{case:4} {kind:8} {sum(some):4} of {len(some):4} certified and right" for kind, some in right.items()
+        ]
     print(*sums, sep="\n")
     return int(wrong > 0)
 

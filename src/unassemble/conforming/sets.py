@@ -181,9 +181,9 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
     common = Common(matrix)
     for order, k in ((3, 10), (2, 9), (2, 8), (2, 6)):
         found = common.sets(k)
+        if order == 3 and not _cover(common, [found]):
+            found = common.bubbles()
         if _cover(common, [found]):
-            yield NodeSets(order, (found,))
-        elif order == 3 and _cover(common, [found := common.bubbles()]):
             yield NodeSets(order, (found,))
     choices = list(_choices(common, common.sets(4)))
     for quads in choices:

@@ -98,12 +98,14 @@ def _fit(skeleton: Skeleton, entries: NDArray, sums: RowSums) -> MetricFit | Non
     before = np.inf
     for _ in range(_HOLES + 1):
         fit = fit_metric(skeleton, entries, sums.positive(), sums.trust())
-        for _ in range(_TURNS if fit is not None and fit.residual > ROUNDED else 0):
+        if fit is None:
+            return None
+        for _ in range(_TURNS if fit.residual > ROUNDED else 0):
             again = _embedded_and_fitted(skeleton, entries, sums, fit)
             if again is None or again.residual > MOST * fit.residual:
                 break
             fit = again
-        if fit is None or fit.residual < ALIKE:
+        if fit.residual < ALIKE:
             return fit
         excess = skeleton.at_vertices @ fit.metric.areas / (3 * sums.positive()) - 1
         least = np.where(
