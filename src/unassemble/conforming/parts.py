@@ -13,6 +13,7 @@ from ..errors import TopologyError
 from ..topology import Piece
 from ..topology.keys import distinct, with_sides
 from ..topology.pieces import planar_pieces
+from .roles import Cells
 from .sets import pairs_of
 
 Blocks = dict[Kind, NDArray[np.int64]]
@@ -74,14 +75,20 @@ class Part:
         return sp.csr_array((np.concatenate(values), place), shape=(self.n, self.n_corners))
 
 
-def parts_of(n: int, blocks: Blocks) -> list[Part]:
+def parts_of(shown: Cells) -> list[Part]:
     """The parts of cells in any orientation, in order of their lowest row.
+
+    Nodes are numbered in the order that the cells come with.
 
     Raises
     ------
     TopologyError
         If cells do not glue together to surfaces in the plane.
     """
+    n = len(shown.order)
+    number = np.empty(n, dtype=np.int64)
+    number[shown.order] = np.arange(n)
+    blocks = {kind: number[cells] for kind, cells in shown.blocks.items()}
     triangles, owner = _divided(blocks)
     edges, _, opposite = with_sides(n, np.empty((0, 2), np.int64), triangles)
     pieces = planar_pieces(n, edges, triangles, opposite)
@@ -91,10 +98,10 @@ def parts_of(n: int, blocks: Blocks) -> list[Part]:
     key = label[triangles].sum(axis=1)
     order = np.argsort(key)
     which, turned = np.empty(len(triangles), np.int64), np.empty(len(triangles), dtype=bool)
-    for number, piece in enumerate(pieces):
+    for k, piece in enumerate(pieces):
         found = piece.vertices[piece.triangles]
         row = order[np.searchsorted(key, label[found].sum(axis=1), sorter=order)]
-        which[row] = number
+        which[row] = k
         start = (found == triangles[row, :1]).argmax(axis=1)
         turned[row] = found[np.arange(len(row)), (start + 1) % 3] != triangles[row, 1]
     oriented, piece_of, first = {}, {}, 0
@@ -106,8 +113,8 @@ def parts_of(n: int, blocks: Blocks) -> list[Part]:
         first += len(cells) * (kind.corners - 2)
     return sorted(
         (
-            _part(n, piece, {kind: cells[piece_of[kind] == number] for kind, cells in oriented.items()})
-            for number, piece in enumerate(pieces)
+            _part(shown.order, piece, {kind: cells[piece_of[kind] == k] for kind, cells in oriented.items()})
+            for k, piece in enumerate(pieces)
         ),
         key=lambda part: int(part.piece.vertices.min()),
     )
@@ -131,11 +138,11 @@ def _divided(blocks: Blocks) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return np.concatenate(triangles), np.concatenate(owner)
 
 
-def _part(n: int, piece: Piece, blocks: Blocks) -> Part:
+def _part(order: NDArray[np.int64], piece: Piece, blocks: Blocks) -> Part:
     """A part in a numbering of its own, corners as the piece has them and all other nodes after these."""
     blocks = {kind: cells for kind, cells in blocks.items() if len(cells)}
     corners = piece.vertices
-    number = np.full(n, -1)
+    number = np.full(len(order), -1)
     number[corners] = np.arange(len(corners))
     rest = distinct(np.concatenate([cells[:, kind.corners :].ravel() for kind, cells in blocks.items()]))
     number[rest] = len(corners) + np.arange(len(rest))
@@ -149,7 +156,7 @@ def _part(n: int, piece: Piece, blocks: Blocks) -> Part:
     sides = distinct(np.concatenate([some.reshape(-1, 2) for some in around]) @ [count, 1])
     whole = replace(
         piece,
-        vertices=np.concatenate([corners, rest]),
+        vertices=order[np.concatenate([corners, rest])],
         edges=np.column_stack([sides // count, sides % count]),
     )
     return Part(whole, len(corners), piece.n_holes, local, np.column_stack([keys // count, keys % count]))
