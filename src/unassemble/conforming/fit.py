@@ -19,6 +19,8 @@ from .positions import corner_positions
 
 _ALIKE = 1.01  # ratio of misfits of rules between which only rounding or noise decides
 
+_FITS = ROUNDED**0.75  # size of the misfit of the right rule, before the polish
+
 _NEARLY = 10.0  # ratio of misfits of rules that a polish may change
 
 
@@ -122,8 +124,11 @@ def _settled(start: Fitted, scale: float | None, noise: NDArray | None) -> Fitte
     if best.size < LAST_DIGITS:
         return best
     for rule in _rules(best.part, straight=best.straight):
-        other = _with_rule(best.part, best.weights, best.z, best.scale, noise, rule, straight=best.straight)
-        if rule != best.rule and other.size < _NEARLY * best.size and not np.array_equal(other.misfit, best.misfit):
+        given = best.part, best.weights, best.z, best.scale
+        if rule == best.rule or _least_size(*given, rule, straight=best.straight) > _NEARLY * best.size:
+            continue
+        other = _with_rule(*given, noise, rule, straight=best.straight)
+        if other.size < _NEARLY * best.size and not np.array_equal(other.misfit, best.misfit):
             other = _polished(other, start.weights, scale, noise)
             best = other if other.size < _ALIKE / 2 * best.size else best
     return best
@@ -144,19 +149,35 @@ def _by_best_rule(
     straight: bool,
 ) -> Fitted:
     """With the quadrature that fits best; of those that fit alike the first."""
-    trials: list[Fitted] = []
-    for rule in _rules(part, straight=straight):
-        trials.append(_with_rule(part, weights, z, c, noise, rule, straight=straight))
-        if trials[-1].size <= ROUNDED**0.75:
-            return trials[-1]
+    rules, found = list(_rules(part, straight=straight)), dict[int, Fitted]()
+    for k, rule in enumerate(rules):
+        if _least_size(part, weights, z, c, rule, straight=straight) <= _FITS:
+            found[k] = _with_rule(part, weights, z, c, noise, rule, straight=straight)
+            if found[k].size <= _FITS:
+                return found[k]
+    trials = [
+        found.get(k) or _with_rule(part, weights, z, c, noise, rule, straight=straight) for k, rule in enumerate(rules)
+    ]
     least = min(trial.size for trial in trials)
     return next((trial for trial in trials if trial.size <= _ALIKE * least), trials[0])
+
+
+def _least_size(part: Part, weights: NDArray, z: NDArray, c: float, rule: dict[str, str], *, straight: bool) -> float:
+    """What the size of the misfit is at least: that of some entries, which belong to one cell each."""
+    few, alone = part.few
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        misfit = (weights / c - _entries(few, rule, straight).weights(z))[alone]
+    return float(np.sqrt(np.sum(misfit**2) / len(weights)))
+
+
+def _entries(part: Part, rule: dict[str, str], straight: bool) -> Entries:
+    return Entries(part, {kind: planar_rules(kind)[rule[kind.name]] for kind in part.blocks}, straight=straight)
 
 
 def _with_rule(
     part: Part, weights: NDArray, z: NDArray, c: float, noise: NDArray | None, rule: dict[str, str], *, straight: bool
 ) -> Fitted:
-    entries = Entries(part, {kind: planar_rules(kind)[rule[kind.name]] for kind in part.blocks}, straight=straight)
+    entries = _entries(part, rule, straight)
     spread = entries.roundings(z) if noise is None else noise
     with np.errstate(invalid="ignore", over="ignore"):
         misfit = weights - c * entries.weights(z)
