@@ -12,14 +12,12 @@ from numpy.typing import NDArray
 from ..elements.reference import planar_rules
 from ..errors import SolverError
 from ..planar.polish import errors_of_one_size, polish
-from ..tolerances import CERTIFIED, LAST_DIGITS, ROUNDED
+from ..tolerances import AGREED, CERTIFIED, LAST_DIGITS, ROUNDED
 from .assembly import Entries
 from .parts import Part
 from .positions import corner_positions
 
 _ALIKE = 1.01  # ratio of misfits of rules between which only rounding or noise decides
-
-_FITS = ROUNDED**0.75  # size of the misfit of the right rule, before the polish
 
 _NEARLY = 10.0  # ratio of misfits of rules that a polish may change
 
@@ -151,9 +149,9 @@ def _by_best_rule(
     """With the quadrature that fits best; of those that fit alike the first."""
     rules, found = list(_rules(part, straight=straight)), dict[int, Fitted]()
     for k, rule in enumerate(rules):
-        if _least_size(part, weights, z, c, rule, straight=straight) <= _FITS:
+        if _least_size(part, weights, z, c, rule, straight=straight) <= AGREED:
             found[k] = _with_rule(part, weights, z, c, noise, rule, straight=straight)
-            if found[k].size <= _FITS:
+            if found[k].size <= AGREED:
                 return found[k]
     trials = [
         found.get(k) or _with_rule(part, weights, z, c, noise, rule, straight=straight) for k, rule in enumerate(rules)
