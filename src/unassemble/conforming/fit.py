@@ -12,14 +12,12 @@ from numpy.typing import NDArray
 from ..elements.reference import planar_rules
 from ..errors import SolverError
 from ..planar.polish import errors_of_one_size, polish
-from ..tolerances import AGREED, CERTIFIED, LAST_DIGITS, ROUNDED
+from ..tolerances import AGREED, CERTIFIED, LAST_DIGITS, LITTLE
 from .assembly import Entries
 from .parts import Part
 from .positions import corner_positions
 
 _ALIKE = 1.01  # ratio of misfits of rules between which only rounding or noise decides
-
-_NEARLY = 10.0  # ratio of misfits of rules that a polish may change
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,10 +121,10 @@ def _settled(start: Fitted, scale: float | None, noise: NDArray | None) -> Fitte
         return best
     for rule in _rules(best.part, straight=best.straight):
         given = best.part, best.weights, best.z, best.scale
-        if rule == best.rule or _least_size(*given, rule, straight=best.straight) > _NEARLY * best.size:
-            continue
+        if rule == best.rule or LITTLE * _least_size(*given, rule, straight=best.straight) > best.size:
+            continue  # no polish changes that
         other = _with_rule(*given, noise, rule, straight=best.straight)
-        if other.size < _NEARLY * best.size and not np.array_equal(other.misfit, best.misfit):
+        if LITTLE * other.size < best.size and not np.array_equal(other.misfit, best.misfit):
             other = _polished(other, start.weights, scale, noise)
             best = other if other.size < _ALIKE / 2 * best.size else best
     return best
