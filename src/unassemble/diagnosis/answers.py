@@ -34,7 +34,7 @@ def explained(error: RecoveryError, matrix: OperatorMatrix, otherwise: str = "")
             said = found.sentence(f"{begun}, for this is")
         else:
             like = replace(found, advice=where_nothing_fits(found, matrix))
-            said = like.sentence("no mesh that was found has these entries, though the graph is that of")
+            said = like.sentence(f"{begun}, and no mesh that was found has these entries, though the graph is that of")
         return NotPlanarError(said, error.witness, error.why)
     return (
         GeometryError(found.sentence("no planar mesh has these entries: they are those of")) if found.unread else error
