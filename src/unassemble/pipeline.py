@@ -178,9 +178,19 @@ class _Task:
     realise: bool = False
 
     def answer(self) -> Recovery:
+        """What is asked for; mass matrices that are not read are refused by name."""
+        refuse_masses(self.matrix, planar=not self.about.names_nodes, exact=True)
+        try:
+            found = self._as_asked()
+        except RecoveryError:
+            refuse_masses(self.matrix, planar=False)
+            raise
+        if not (found.certified or isinstance(found, PlanarMesh)):
+            refuse_masses(self.matrix, planar=False)
+        return found
+
+    def _as_asked(self) -> Recovery:
         """As the operator that is named; else as the one that the graph shows, or else the first that fits."""
-        with self.clock("check"):
-            refuse_masses(self.matrix, planar=not self.about.names_nodes)
         if self.about.names_nodes:
             self._refuse_scalar_options()
             with self.clock("numbering"):
@@ -304,18 +314,19 @@ class _Task:
         from .vector import recover_vector
 
         self._refuse_scalar_options()
+        about, anchors = self.about, self.frame.anchors
         return recover_vector(
-            self.matrix,
-            reading,
-            self.clock,
-            anchors=self.frame.anchors,
-            cells=self.about.cells,
-            scalar=self._as_scalar,
+            self.matrix, reading, self.clock, anchors=anchors, cells=about.cells, scalar=self._as_scalar
         )
 
     def _check_scale(self, part: OperatorMatrix) -> None:
-        if self.planar.scale is not None:
-            _check_proportion(self.planar.scale, float(np.abs(part.entries).max(initial=0.0)))
+        """Refuse a factor next to which entries vanish or overflow: no triangle has such angles."""
+        scale, largest = self.planar.scale, float(np.abs(part.entries).max(initial=0.0))
+        with np.errstate(over="ignore", under="ignore"):
+            ratio = 1.0 if scale is None else abs(np.float64(scale)) / largest
+        if not np.finfo(float).eps ** 2 < ratio < np.finfo(float).eps ** -2:
+            said = f"the scale {scale:g} is out of all proportion to the entries of the matrix, whose largest is "
+            raise GeometryError(f"{said}{largest:.3g}")
 
     def _refuse_scalar_options(self) -> None:
         if self.given:
@@ -337,13 +348,3 @@ def _unless_planar(surface: Surface) -> Surface:
         "has as many lengths as entries. If it is one in space, say so by `operator='surface'`"
     )
     return replace(surface, status="uncertified", uniqueness=None, reason=reason)
-
-
-def _check_proportion(scale: float, largest: float) -> None:
-    """Refuse a factor next to which entries vanish or overflow: no triangle has such angles."""
-    with np.errstate(over="ignore", under="ignore"):
-        ratio = abs(np.float64(scale)) / largest
-    if not np.finfo(float).eps ** 2 < ratio < np.finfo(float).eps ** -2:
-        raise GeometryError(
-            f"the scale {scale:g} is out of all proportion to the entries of the matrix, whose largest is {largest:.3g}"
-        )

@@ -32,19 +32,19 @@ from .kinds import LENGTHS, UNREAD, Diagnosis
 _SIMPLICES = {1: "segments", 2: "triangles", 3: "tetrahedra"}
 
 
-def refuse_masses(matrix: OperatorMatrix, *, planar: bool) -> None:
+def refuse_masses(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) -> None:
     """Raise an error that names a mass matrix which recovery does not read; as :func:`mass_matrix`.
 
     Raises
     ------
     GeometryError
     """
-    mass = mass_matrix(matrix, planar=planar)
+    mass = mass_matrix(matrix, planar=planar, exact=exact)
     if mass is not None and mass.unread:
         raise GeometryError(mass.sentence())
 
 
-def mass_matrix(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis | None:
+def mass_matrix(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) -> Diagnosis | None:
     """What kind of mass matrix this is; None where it is none.
 
     Parameters
@@ -52,6 +52,8 @@ def mass_matrix(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis | None:
     matrix : OperatorMatrix
     planar : bool
         Whether it may still be that of a mesh in the plane, which are read with much mass beside little stiffness.
+    exact : bool
+        Whether only equations count: small bodies that are held all around have such eigenvalues as well.
     """
     # Most matrices of meshes in the plane are seen to be none by their signs alone, which takes no time.
     sign, nothing = np.sign(matrix.diagonal[np.abs(matrix.diagonal).argmax()]), ROUNDED * np.abs(matrix.entries).max()
@@ -63,14 +65,14 @@ def mass_matrix(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis | None:
     if dimension := masses.simplices:
         ratio = {1: "twice", 2: "once", 3: "two thirds of"}[dimension]
         advice = {1: LENGTHS, 2: "" if planar else UNREAD["mass"], 3: UNREAD["mass"]}[dimension]
-        exact = f"each diagonal entry is {ratio} the sum of the others in its row, and all are of one sign"
+        shares = f"each diagonal entry is {ratio} the sum of the others in its row, and all are of one sign"
         name = f"a mass matrix of linear elements on {_SIMPLICES[dimension]}"
-        return Diagnosis("mass", name, (exact, *masses.without), advice)
+        return Diagnosis("mass", name, (shares, *masses.without), advice)
     if masses.quadratic:
-        exact = "rows add up to zero, or to 15/8 of their diagonal entry, as those of corners and of middles of sides"
-        return Diagnosis("mass", "a mass matrix of quadratic elements on triangles", (exact,), UNREAD["mass"])
+        sums = "rows add up to zero, or to 15/8 of their diagonal entry, as those of corners and of middles of sides"
+        return Diagnosis("mass", "a mass matrix of quadratic elements on triangles", (sums,), UNREAD["mass"])
     crowded = masses.M.nnz > 7 * masses.M.shape[0] - 12  # twice 3 n - 6, and the diagonal
-    bounds = masses.bounds if crowded or not planar else None
+    bounds = masses.bounds if not exact and (crowded or not planar) else None
     if bounds is None:
         return None
     shown = (

@@ -16,8 +16,6 @@ from .operator import OperatorMatrix, row_sizes
 from .replaced import from_columns
 from .symmetry import symmetric_entries, triangles
 
-_FULLEST = 375 - 1  # off-diagonal entries in a row of triquadratic hexahedra, with three unknowns to a node
-
 
 def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None = None) -> OperatorMatrix:
     """Check that a matrix has what every supported operator has, and store it as a weighted graph.
@@ -172,10 +170,11 @@ def _check_density(n: int, edges: NDArray[np.int64]) -> None:
 
     None of the elements that are read fills rows more, in the mean, than triquadratic hexahedra.
     """
-    if 2 * len(edges) > _FULLEST * n:
+    fullest = 3 * 5**3 - 1  # off-diagonal entries in a row of triquadratic hexahedra, with three unknowns to a node
+    if 2 * len(edges) > fullest * n:
         raise MatrixError(
             f"the matrix is dense: a row has {2 * len(edges) / n:.0f} off-diagonal entries in the mean, and no finite "
-            f"element matrix that is read has more than {_FULLEST}"
+            f"element matrix that is read has more than {fullest}"
         )
 
 

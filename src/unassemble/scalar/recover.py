@@ -65,22 +65,26 @@ def recover_scalar(
     task = Task(options=options, placement=placement, noise=noise, squared_lengths=squared_lengths)
     if options.scale is None:
         return _by_digits(stored, clock, task)
+    found = None
     with suppress(RecoveryError):
-        found = _by_digits(stored, clock, replace(task, search=False))
+        found = _by_digits(stored, clock, replace(task, search=noise is not None))
         if found.status != "uncertified":
             return found
     # Where no cells fit, a search for them does not come to an end soon: first see whether another scale does.
-    return _with_other_scale(stored, clock, task, options.scale) or _by_digits(stored, clock, task)
+    free = _of_any_scale(stored, clock, replace(task, options=replace(options, scale=None)))
+    other = None if free is None else of_other_scale(free, options.scale)
+    if other is not None:
+        return other if found is None else replace(found, reason=other.reason, advice=other.advice)
+    return _by_digits(stored, clock, task) if found is None or noise is None else found
 
 
-def _with_other_scale(stored: OperatorMatrix, clock: Clock, task: Task, scale: float) -> PlanarMesh | None:
-    """The mesh of a scale that fits in place of the given one, which says so; None where there is none."""
-    free = replace(task, options=replace(task.options, scale=None))
+def _of_any_scale(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh | None:
+    """The certified mesh of a matrix whose scale is free, if there is one; cells that the graph shows come first."""
     for search in (False, True):
         with suppress(RecoveryError):
-            found = _by_digits(stored, clock, replace(free, search=search))
+            found = _by_digits(stored, clock, replace(task, search=search))
             if found.certified:
-                return of_other_scale(found, scale)
+                return found
     return None
 
 
