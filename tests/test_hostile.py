@@ -124,8 +124,17 @@ def test_a_surface_needs_few_handles():
         recover(_random(60, 0.5), operator="surface")
 
 
-@pytest.mark.parametrize("size", [1e-250, 1.0, 1e200])
-def test_products_of_huge_entries_do_not_overflow(size):
+@pytest.mark.parametrize("size", [1e-250, 1e200])
+def test_entries_whose_products_overflow_are_refused(size):
+    chain = sp.diags_array([[1.0, -2.0, 3.0, -1.0]] * 2, offsets=[-1, 1], shape=(5, 5)) + 4 * sp.eye_array(5)
+    with pytest.raises(MatrixError, match="too far from 1 .* multiply the matrix by a number"):
+        recover(sp.csr_array(size * chain))
+    with pytest.raises(MatrixError, match="too far from 1"):
+        recover(sp.csr_array(chain + sp.diags_array([1e200, 0, 0, 0, 0])))
+
+
+@pytest.mark.parametrize("size", [1e-60, 1.0, 1e60])
+def test_products_of_large_entries_do_not_overflow(size):
     """Blocks of beams are told by products of entries."""
     chain = sp.diags_array([[1.0, -2.0, 3.0, -1.0]] * 2, offsets=[-1, 1], shape=(5, 5)) + 4 * sp.eye_array(5)
     with warnings.catch_warnings(), suppress(RecoveryError):
