@@ -9,10 +9,6 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, get_lapack_funcs
 from ..errors import SolverError
 from .upper import UpperTriangle
 
-SMALL = 200
-"""Order, counted in entries, up to which matrices are dense here: up to there faster than PARDISO, and as safe with
-entries out of all proportion, which spoil its memory."""
-
 
 class DenseFactorisation:
     """The same interface as :class:`~unassemble.linalg.pardiso.PardisoFactorisation`.
@@ -24,6 +20,11 @@ class DenseFactorisation:
         dtype = np.complex128 if np.iscomplexobj(matrix.data) else np.float64
         self._dtype, self._definite = dtype, definite
         self._getrf, self._getrs = get_lapack_funcs(("getrf", "getrs"), dtype=dtype)
+
+    @staticmethod
+    def suits(matrix: UpperTriangle) -> bool:
+        """Whether a matrix is so small that this is faster than PARDISO; entries out of proportion do it no harm."""
+        return matrix.n * matrix.block <= 200
 
     def factorise(self, matrix: UpperTriangle) -> None:
         """Factorise."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from . import pardiso
-from .dense import SMALL, DenseFactorisation
+from .dense import DenseFactorisation
 from .superlu import SuperLUFactorisation
 from .upper import UpperTriangle
 
@@ -48,7 +48,7 @@ def backend() -> str:
 
 def factorisation(matrix: UpperTriangle, *, definite: bool = False) -> Factorisation:
     """Analyse the pattern of a Hermitian matrix for factorisation; see :class:`Factorisation`."""
-    if matrix.n * matrix.block <= SMALL:
+    if DenseFactorisation.suits(matrix):
         return DenseFactorisation(matrix, definite=definite)
     if backend() == "pardiso":
         return pardiso.PardisoFactorisation(matrix, definite=definite)

@@ -45,8 +45,9 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
         If `drop_zeros` or `noise` is out of range.
     MatrixError
         If the matrix is not square, empty, without numbers, not finite, diagonal, dense, not symmetric, or has far
-        more rows than entries, entries out of all units, or connected rows out of all proportion. Both triangles may differ by 1e-10 of the
-        largest off-diagonal entry of the two rows, or by a convection: an antisymmetric part whose rows add up to zero.
+        more rows than entries, entries whose products overflow, or connected rows out of all proportion. Both
+        triangles may differ by 1e-10 of the largest off-diagonal entry of the two rows, or by a convection: an
+        antisymmetric part whose rows add up to zero.
 
     Examples
     --------
