@@ -120,7 +120,7 @@ def test_random_matrices_of_many_entries_are_refused_soon(n, share):
 
 
 def test_a_surface_needs_few_handles():
-    with pytest.raises(TopologyError, match="more handles than half its rows"):
+    with pytest.raises(TopologyError, match="more handles than a sixth of its rows"):
         recover(_random(60, 0.5), operator="surface")
 
 
