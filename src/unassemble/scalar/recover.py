@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..cells import SEARCHED_ROWS, Alternative, alternatives, components_of
 from ..certify import certify
 from ..clock import Clock
-from ..errors import RecoveryError, TopologyError
+from ..errors import RecoveryError
 from ..linalg import AnalysisAhead, Factorisation, UpperTriangle, blas_threads, factorisation
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
@@ -60,14 +60,7 @@ def recover_scalar(
     options : ScalarOptions
     squared_lengths : (e,) float64, optional
         Of the edges, where they are known from elsewhere: they give pieces their relative sizes.
-
-    Raises
-    ------
-    TopologyError
-        If the graph is a forest.
     """
-    if len(stored.edges) + components_of(stored).max() < stored.n:
-        raise TopologyError("no cells can be put on the graph: it has no cycle")
     noise = Noise.known(stored, options.noise)
     task = Task(options=options, placement=placement, noise=noise, squared_lengths=squared_lengths)
     if options.scale is None:
