@@ -233,11 +233,13 @@ class _Task:
 
         A straight beam's rows, for one, fall apart into planar graphs.
         """
+        from .metric import unless_planar
+
         try:
             found = self._as_scalar(self.matrix, self.frame.anchors)
         except RecoveryError as error:
             curved = self._as_certified_surface()
-            other = self._as_second_reading() if curved is None else _unless_planar(curved)
+            other = self._as_second_reading() if curved is None else unless_planar(curved)
             if other is not None:
                 return other
             other_graph = isinstance(error, NotPlanarError)
@@ -249,7 +251,7 @@ class _Task:
         if curved is not None:
             noise, little = found.estimated_noise, LARGEST_NOISE * np.abs(found.scale).min()
             if curved.fits_no_plane or (not found.missing_term and (noise is None or noise > little)):
-                return _unless_planar(curved)
+                return unless_planar(curved)
             note = "a surface in space has exactly these entries, as one has nearly any: see `operator='surface'`"
             found = replace(found, warnings=(*found.warnings, note))
         if not (found.node_status.any() or isinstance(found, ConformingMesh)):
@@ -342,15 +344,3 @@ class _Task:
                 f"`{self.given[0]}` is for scalar matrices, and this one is read as vector-valued: leave it out, or "
                 "choose `operator='laplacian'`"
             )
-
-
-def _unless_planar(surface: Surface) -> Surface:
-    """A surface that was not asked for, certified only where no mesh in the plane has its triangles.
-
-    It has as many lengths as entries, so that nearly any matrix on these triangles is that of one.
-    """
-    if surface.fits_no_plane:
-        return surface
-    reason = "the lengths give every entry back, but so may a coefficient that varies in the plane"
-    advice = "say so by `operator='surface'` if it is one in space, or else assemble it with a constant coefficient"
-    return replace(surface, status="uncertified", uniqueness=None, reason=reason, advice=advice)

@@ -8,8 +8,6 @@ from ..matrix import OperatorMatrix
 from ..tolerances import LITTLE, SMALL
 from ..words import GIVE_NUMBERING, count_of, words_of
 
-_HUB = 5  # times the entries that half of the rows have at most: nodes of meshes have two or three times as many
-
 
 def indefinite(matrix: OperatorMatrix) -> str:
     """That the matrix has eigenvalues of both signs, where two rows show it; empty where none do.
@@ -48,13 +46,14 @@ def seeming(matrix: OperatorMatrix) -> str:
 def _tied(matrix: OperatorMatrix) -> str:
     """That some rows are coupled to many more than others."""
     degree = np.bincount(matrix.edges[matrix.entries != 0].ravel(), minlength=matrix.n)
-    hubs = np.flatnonzero(degree > _HUB * max(np.median(degree), 1))
+    usual = int(max(np.median(degree), 1))
+    hubs = np.flatnonzero(LITTLE * degree > usual)  # those of the widest nodes of meshes have three times as many
     if not len(hubs):
         return ""
     rows = words_of(hubs[:3].tolist()) + (", ..." if len(hubs) > 3 else "")
     return (
-        f"{count_of(len(hubs), 'row is', 'rows are')} coupled to more than {_HUB} times as many as half of the rows "
-        f"are (rows {rows}), as constraints or rigid parts leave them"
+        f"{count_of(len(hubs), 'row is', 'rows are')} coupled to {degree[hubs].min()} others and more, and half of "
+        f"all rows to {usual} at most (rows {rows}): constraints or rigid parts leave such"
     )
 
 
