@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .clock import Clock
-from .diagnosis import explained, indefinite, judged, refuse_masses, seeming
-from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
+from .diagnosis import explained, indefinite, judged, refuse_masses
+from .errors import GeometryError, InputError, RecoveryError
 from .linalg import threads as thread_limit
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
-from .operators import VectorReading, about_translations, asked_for, second_reading, vector_valued
+from .operators import VectorReading, asked_for, second_reading, vector_valued
 from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, listed_anchors
 from .outputs import ConformingMesh, PlanarMesh, Recovery, Surface
 from .progress import StageDisplay
@@ -233,22 +233,22 @@ class _Task:
 
         A straight beam's rows, for one, fall apart into planar graphs.
         """
-        from .metric import unless_planar
-
         try:
             found = self._as_scalar(self.matrix, self.frame.anchors)
         except RecoveryError as error:
+            from .metric import unless_planar
+
             curved = self._as_certified_surface()
             other = self._as_second_reading() if curved is None else unless_planar(curved)
             if other is not None:
                 return other
-            other_graph = isinstance(error, NotPlanarError)
-            nodes = indefinite(self.matrix) or about_translations(self.matrix) or seeming(self.matrix)
-            raise explained(error, self.matrix, nodes if other_graph else "") from error
+            raise explained(error, self.matrix) from error
         if found.certified:
             return found
         curved = self._as_certified_surface() if found.status == "uncertified" else None
         if curved is not None:
+            from .metric import unless_planar
+
             noise, little = found.estimated_noise, LARGEST_NOISE * np.abs(found.scale).min()
             if curved.fits_no_plane or (not found.missing_term and (noise is None or noise > little)):
                 return unless_planar(curved)

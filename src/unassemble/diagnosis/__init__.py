@@ -4,7 +4,7 @@ from .answers import explained, judged
 from .kinds import PLANAR, UNKNOWN, Diagnosis
 from .mass import mass_matrix, refuse_masses
 from .scalar import diagnosed, further_terms
-from .structural import indefinite, seeming
+from .structural import indefinite
 
 __all__ = [
     "PLANAR",
@@ -17,5 +17,4 @@ __all__ = [
     "judged",
     "mass_matrix",
     "refuse_masses",
-    "seeming",
 ]

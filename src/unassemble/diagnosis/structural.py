@@ -5,8 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from ..matrix import OperatorMatrix
+from ..operators import about_translations
 from ..tolerances import LITTLE, SMALL
 from ..words import GIVE_NUMBERING, count_of, words_of
+
+
+def saddle_point(matrix: OperatorMatrix) -> str:
+    """That coupled rows have diagonals of exactly zero; empty where none do."""
+    coupled = np.zeros(matrix.n, dtype=bool)
+    coupled[matrix.edges[matrix.entries != 0]] = True
+    empty = coupled & (matrix.diagonal == 0)
+    if not empty.any():
+        return ""
+    rows = count_of(int(empty.sum()), "diagonal entry of coupled rows is", "diagonal entries of coupled rows are")
+    return (
+        f"{rows} zero (row {int(empty.argmax())}): a saddle point, as of pressures beside velocities, or of "
+        "multipliers that hold constraints"
+    )
 
 
 def indefinite(matrix: OperatorMatrix) -> str:
@@ -15,23 +30,13 @@ def indefinite(matrix: OperatorMatrix) -> str:
     A matrix without negative eigenvalues has no entry with a_ij^2 > a_ii a_jj, as every block of two rows is one.
     """
     i, j = matrix.edges.T
-    own = matrix.diagonal
-    coupled = np.zeros(matrix.n, dtype=bool)
-    coupled[matrix.edges[matrix.entries != 0]] = True
-    empty = coupled & (own == 0)
-    if empty.any():
-        rows = count_of(int(empty.sum()), "diagonal entry of coupled rows is", "diagonal entries of coupled rows are")
-        return (
-            f"{rows} zero (row {int(empty.argmax())}): a saddle point, as of pressures beside velocities, or of "
-            "multipliers that hold constraints"
-        )
-    size = np.sqrt(np.abs(own))
+    own, size = matrix.diagonal, np.sqrt(np.abs(matrix.diagonal))
     over = np.flatnonzero((np.abs(matrix.entries) > (1 + SMALL) * size[i] * size[j]) | (own[i] * own[j] < 0))
     if not len(over):
         return ""
     some = min(len(np.unique(i[over])), len(np.unique(j[over])))
     k = over[0]
-    return (
+    return saddle_point(matrix) or (
         f"the matrix has eigenvalues of both signs: {count_of(some, 'row is', 'rows are')} coupled to others by more "
         f"than both diagonals allow, as rows {i[k]} and {j[k]}. Stiffness matrices have none, so that entries are "
         "damaged, or those of initial stresses or of a saddle point were added"
@@ -40,7 +45,17 @@ def indefinite(matrix: OperatorMatrix) -> str:
 
 def seeming(matrix: OperatorMatrix) -> str:
     """What the matrix seems to be, and what is missing; empty where nothing shows."""
-    return indefinite(matrix) or _tied(matrix) or _uneven(matrix)
+    return indefinite(matrix) or _condensed(matrix) or about_translations(matrix) or _tied(matrix) or _uneven(matrix)
+
+
+def _condensed(matrix: OperatorMatrix) -> str:
+    """That all rows are coupled to all."""
+    if np.count_nonzero(matrix.entries) < matrix.n * (matrix.n - 1) / 2:
+        return ""
+    return (
+        "every row is coupled to every other, as where other unknowns were condensed: each feels the supports then, so "
+        "that rows do not annihilate translations, which is what tells positions"
+    )
 
 
 def _tied(matrix: OperatorMatrix) -> str:
