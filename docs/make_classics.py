@@ -259,6 +259,8 @@ def page(results: list[Read]) -> str:
 
 def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER
+    for old in PICTURES.glob("*.png"):
+        old.unlink()
     results = [read(path) for path in sorted(folder.glob("*.mtx.gz"))]
     (HERE / "gallery.md").write_text(page(results), encoding="utf-8")
     for one in results:
