@@ -15,6 +15,7 @@ from .clock import Clock
 from .diagnosis import explained, indefinite, judged, refuse_masses
 from .errors import GeometryError, InputError, RecoveryError
 from .linalg import threads as thread_limit
+from .masses import weighed
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
 from .operators import VectorReading, asked_for, second_reading, vector_valued
 from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, listed_anchors
@@ -45,6 +46,7 @@ def recover(
     numbering: Any = None,
     cells: bool = True,
     realise: bool = False,
+    mass: Any = None,
     variable: str | None = None,
     threads: int | None = None,
     progress: Callable[[str], None] | bool | None = None,
@@ -104,6 +106,9 @@ def recover(
         Vector-valued matrices: look for elements too, not for coordinates only.
     realise : bool
         Surfaces: look for coordinates in space that have the edge lengths.
+    mass : sparse matrix or array, ndarray, or path, optional
+        The mass matrix of the same mesh, which tells its size, or with `anchors` its density; see
+        :func:`unassemble.masses.weighed`.
     variable : str, optional
         Name of the variable in a ``.mat`` file.
     threads : int, optional
@@ -159,10 +164,14 @@ def recover(
         clock = Clock(progress if callable(progress) else display if progress else None)
         with clock("read"):
             matrix = read_matrix(A, variable=variable) if is_file(A) else A
-        with clock("check"):
-            checked = check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
-        with thread_limit(threads):
+
+        def answer(matrix: Any) -> Recovery:
+            with clock("check"):
+                checked = check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
             return _Task(checked, clock, about, frame, planar, given, realise).answer()
+
+        with thread_limit(threads):
+            return answer(matrix) if mass is None else weighed(answer, matrix, mass, anchored=bool(frame.anchors))
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,7 +233,7 @@ class _Task:
 
     def _readings_of(self, part: OperatorMatrix, anchors: Sequence[Any]) -> ScalarReadings:
         frame = self.frame
-        self._check_scale(part)
+        self.planar.check_scale(part.entries)
         placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
         return ScalarReadings(part, placement, self.clock, self.planar)
 
@@ -317,7 +326,7 @@ class _Task:
             raise InputError(
                 f"`{unfit[0]}` is not for surfaces in space: leave it out, or choose `operator='laplacian'`"
             )
-        self._check_scale(self.matrix)
+        self.planar.check_scale(self.matrix.entries)
         return recover_surface(self.matrix, self.clock, self.planar, triangles)
 
     def _as_vector(self, reading: VectorReading) -> Recovery:
@@ -328,15 +337,6 @@ class _Task:
         return recover_vector(
             self.matrix, reading, self.clock, anchors=anchors, cells=about.cells, scalar=self._as_scalar
         )
-
-    def _check_scale(self, part: OperatorMatrix) -> None:
-        """Refuse a factor next to which entries vanish or overflow: no triangle has such angles."""
-        scale, largest = self.planar.scale, float(np.abs(part.entries).max(initial=0.0))
-        with np.errstate(over="ignore", under="ignore"):
-            ratio = 1.0 if scale is None else abs(np.float64(scale)) / largest
-        if not np.finfo(float).eps ** 2 < ratio < np.finfo(float).eps ** -2:
-            said = f"the scale {scale:g} is out of all proportion to the entries of the matrix, whose largest is "
-            raise GeometryError(f"{said}{largest:.3g}")
 
     def _refuse_scalar_options(self) -> None:
         if self.given:
