@@ -105,7 +105,7 @@ def test_the_size_and_the_modulus_of_a_body(name, supported):
     placed = found.points[found.node_of_row[rows]]
     np.testing.assert_allclose(distances(placed), times * distances(true[rows]), rtol=1e-8)
     np.testing.assert_allclose(found.scale, MODULUS / 2.6 / times ** (found.dim - 2), rtol=1e-8)
-    assert ("supports leave whole" in found.reason) == supported
+    assert ("all cells of which" in found.reason) == supported
 
 
 def test_few_digits():

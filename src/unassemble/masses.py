@@ -83,7 +83,7 @@ def weighed(recover: Callable[[Any], Recovery], stiffness: Any, mass: Any, *, an
             "diagonals of their rows. The mesh of the stiffness matrix alone is certified"
         )
     said = f"the mass matrix assembled on it again is the one given to {misfit:.1e}"
-    said += "" if whole.all() else f", in the {whole.mean():.0%} of its rows that supports leave whole"
+    said += "" if whole.all() else f", in the {whole.mean():.0%} of its rows all cells of which are determined"
     return replace(found, density=density, reason=sentences([found.reason.split(". ")[0], said]))
 
 
@@ -95,9 +95,9 @@ def _with_zeros(A: sp.csr_array, M: sp.csr_array) -> sp.csr_array:
 
 
 def _whole(A: sp.csr_array, found: Recovery) -> NDArray[np.bool_]:
-    """(N,) rows of determined nodes all of whose cells the mesh has: those that annihilate constants.
+    """(N,) rows of nodes all of whose cells the mesh has, with positions that are determined.
 
-    All rows of determined nodes where hardly any do so, as with an unknown diagonal.
+    They annihilate constants; where hardly any row does so, as with an unknown diagonal, that is not asked for.
     """
     if found.node_of_row is None or found.direction_of_row is None:
         node, direction = np.arange(A.shape[0]), np.zeros(A.shape[0], dtype=np.int64)
@@ -105,7 +105,8 @@ def _whole(A: sp.csr_array, found: Recovery) -> NDArray[np.bool_]:
         node, direction = found.node_of_row, found.direction_of_row
     labels = (direction[:, None] == np.arange(direction.max() + 1)).astype(float)
     still = np.asarray((np.abs(A @ labels) <= SUMMED * (abs(A) @ labels)).all(axis=1))
-    determined = (found.node_status[node] == 0) & (direction >= 0)
+    loose = (found.node_status[node] != 0) | (direction < 0)
+    determined = ~loose & (abs(A) @ loose.astype(float) == 0)
     return determined & still if still.mean() > HARDLY_ANY else determined
 
 
@@ -114,7 +115,8 @@ def _assembled(found: Recovery, lumped: bool) -> sp.csr_array:
     cells = found.cells
     if found.n_polygons:
         raise GeometryError(
-            "the stiffness matrix leaves cells undivided, and a lumped mass matrix does not tell into which triangles"
+            "the stiffness matrix leaves cells undivided, and `mass` does not tell into which triangles: it is lumped, or "
+            "that of another mesh"
         )
     other = [kind for kind in cells if kind not in (*_SIMPLICES, *_CORNERS)]
     if other or not (cells and isinstance(found, PlanarMesh | Body)):

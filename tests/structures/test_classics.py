@@ -1,5 +1,6 @@
 """Famous matrices of structures, whose meshes no collection has: what is certified of them, and what they look like."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -72,6 +73,23 @@ def test_the_shells_are_cylinders(name, off):
         radius = np.linalg.norm(across - centre, axis=1)
         spread.append(np.ptp(radius) / radius.mean())
     assert min(spread) < off  # the nodes of the last lie between an arc and its chords
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "mass", "rows"),
+    [("rail_109_S", "rail_109_M", 109), ("rail_371_S", "rail_371_M", 371), ("rail_371_A", "rail_371_E", 186)],
+)
+def test_a_rail_and_its_masses(stiffness, mass, rows):
+    """Both matrices are on one mesh, though either was read alone; the last has a Robin condition along its boundary."""
+    masses = CLASSICS / f"{mass}.mtx.gz"
+    if not masses.exists():
+        pytest.skip("the classics are not here")
+    found = recover(CLASSICS / f"{stiffness}.mtx.gz", mass=masses)
+    assert found.certified
+    assert found.density == 1.0
+    assert float(re.search(r"is the one given to (\S+?)(,|$)", found.reason)[1]) < 1e-12
+    share = re.search(r"in the (\d+)% of its rows", found.reason)
+    assert (100 if share is None else int(share[1])) == round(100 * rows / found.n_points)
 
 
 def test_a_bridge_is_its_own_mirror_image():
