@@ -73,7 +73,7 @@ class InsideOptions:
     steepest: float = 3.0
     band: int = 5
     settling: int = 6
-    newton: FitOptions = field(default_factory=lambda: FitOptions(steps=1, last_steps=8, damping=1e-15))
+    newton: FitOptions = field(default_factory=lambda: FitOptions(steps=1, last_steps=8, damping=1e-15, exact=1e-12))
     held: float = 2.3
     rounds: int = 8
     peaks: float = 0.25
