@@ -50,8 +50,9 @@ class InsideOptions:
         so that any damping would hold them.
     held : float
         Whole entries to a vertex, at least, where the rim is taken off as a whole: three far inside, two determine.
-    rounds : int
-        Fits, with fewer vertices at the rim each; and those with more of them.
+    rounds, patience : int
+        Fits, with fewer vertices at the rim each, and those with more of them; and how many come before the rim is
+        taken off as a whole in a small mesh, which loses more of it.
     peaks : float
         Part of the largest misfit above which there are places to peel.
     growing : tuple of (float, int)
@@ -76,8 +77,9 @@ class InsideOptions:
     newton: FitOptions = field(default_factory=lambda: FitOptions(steps=1, last_steps=8, damping=1e-15, exact=1e-12))
     held: float = 2.3
     rounds: int = 8
+    patience: int = 3
     peaks: float = 0.25
-    growing: tuple[tuple[float, int], ...] = ((1e-2, 6), (1e-4, 6), (0.0, 12))
+    growing: tuple[tuple[float, int], ...] = ((1e-3, 10), (0.0, 25))
     grown: int = 3
     fits: float = 1e-7
     regrown: int = 4
@@ -185,12 +187,13 @@ def _core(problem: WholeEntries, rim: Rim, options: InsideOptions) -> tuple[Fit,
     found, conformal = None, _conformal(problem)
     for fading, start in ((options.fading, conformal), (options.slowly, None)):
         fit = _settled(problem, rim, conformal, options) if start is not None else None
+        patience = 0 if fit else options.patience
         if fit is None:
             first = _start(problem, rim, fading[0], options, start)
             fit = None if first is None else problem.faded(first.z, first.scale, rim.whole, fading[1:])
         if fit is None:
             continue
-        found = _shrunk(problem, rim, fit, options)
+        found = _shrunk(problem, rim, fit, patience, options)
         if found[0].misfit <= options.exact:
             break
     return found
@@ -225,13 +228,13 @@ def _bare(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -> 
     return replace(found, z=moved), bare
 
 
-def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -> tuple[Fit, Rim]:
-    """Fits with fewer vertices at the rim each, until one has all whole entries."""
-    for _ in range(options.rounds):
+def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, options: InsideOptions) -> tuple[Fit, Rim]:
+    """Fits with fewer vertices at the rim each, until one has all whole entries; after a few without the rim."""
+    for turn in range(options.rounds):
         _log.debug("%d whole entries: misfit %.1e", rim.whole.sum(), fit.misfit)
         if fit.misfit <= options.exact:
             break
-        if bare := _bare(problem, rim, fit, options):
+        if turn >= patience and (bare := _bare(problem, rim, fit, options)):
             return bare
         misfit = np.abs(problem.misfits(fit.z, fit.scale))
         peeled = rim.peeled(misfit, options.peaks * float(misfit[rim.whole].max(initial=0.0)))

@@ -91,7 +91,7 @@ def _given(piece: Piece, matrix: OperatorMatrix, whole: NDArray[np.bool_] | None
 
 
 def _nothing_gone(piece: Piece, matrix: OperatorMatrix, mesh: InsideMesh, scale: float | None) -> bool:
-    """Whether the other entries of a piece are those of its triangles as well, by what is determined, or else by a map."""
+    """Whether the other entries of a piece are whole as well: on what is determined, or else by a conformal map."""
     weights = -matrix.entries[piece.edge_rows]
     others = ~mesh.given & mesh.determined[piece.stencil].all(axis=0)
     if others.any():
