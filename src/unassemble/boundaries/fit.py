@@ -167,7 +167,6 @@ class WholeEntries:
             if better is None:
                 break
             z, scale, misfit, shape, share = better
-            _log.debug("  step %.1e share %.2f", np.linalg.norm(misfit), share)
             before, cost = cost, float(misfit @ misfit + shape @ shape)
             damping = max(damping / 10, 1e-15) if share == 1 else 1.5 * damping
             small = small + 1 if cost > (1 - options.gain) * before else 0
