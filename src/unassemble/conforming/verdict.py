@@ -11,7 +11,7 @@ from ..matrix import OperatorMatrix
 from ..scalar.solving import Task
 from ..scalar.verdict import Held
 from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE, SUSPICIOUS
-from ..topology.keys import pair_keys
+from ..topology.keys import contains, pair_keys
 from ..words import count_of, sentences
 from .fit import Fitted
 
@@ -100,7 +100,7 @@ def _obstacle(fits: Sequence[Fitted], near: Held, task: Task) -> str:
 def _bare(stored: OperatorMatrix, fits: Sequence[Fitted]) -> str:
     """A stored entry of no cell; empty if there is none."""
     covered = [pair_keys(stored.n, *fit.part.piece.vertices[fit.part.edges].T) for fit in fits]
-    bare = np.flatnonzero(~np.isin(stored.edges @ [stored.n, 1], np.concatenate(covered)))
+    bare = np.flatnonzero(~contains(np.sort(np.concatenate(covered)), stored.edges @ [stored.n, 1]))
     if not len(bare):
         return ""
     i, j = stored.edges[bare[0]]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..topology.boundary import loops
+from ..topology.keys import contains
 from .kinds import KINDS, Kind
 
 Blocks = Mapping[str, NDArray[np.int64]]  # cells by kind
@@ -60,12 +61,11 @@ def outer_facets(blocks: Blocks) -> list[NDArray[np.int64]]:
     """
     facets = _facets(blocks)
     for size, some in facets.items():
-        _, which, count = np.unique(np.sort(some, axis=1), axis=0, return_inverse=True, return_counts=True)
-        facets[size] = some[count[which.ravel()] == 1]
+        facets[size] = some[~_repeated(_labels(some))]
     if {3, 4} <= facets.keys():
-        halves = np.sort(facets[4][:, [[0, 1, 2], [1, 2, 3], [2, 3, 0], [3, 0, 1]]], axis=2)
-        covered = _rows_among(halves.reshape(-1, 3), np.sort(facets[3], axis=1)).reshape(-1, 4).any(axis=1)
-        inner = _rows_among(np.sort(facets[3], axis=1), halves[covered].reshape(-1, 3))
+        halves = facets[4][:, [[0, 1, 2], [1, 2, 3], [2, 3, 0], [3, 0, 1]]]
+        covered = _among(halves.reshape(-1, 3), facets[3]).reshape(-1, 4).any(axis=1)
+        inner = _among(facets[3], halves[covered].reshape(-1, 3))
         facets = {3: facets[3][~inner], 4: facets[4][~covered]}
     return list(facets.values())
 
@@ -86,16 +86,30 @@ def outer_nodes(blocks: Blocks) -> NDArray[np.int64]:
         kind = KINDS[name]
         for k, some in enumerate(kind.between):
             if kind.dim == 3 and len(some) == 4:  # in the middle of a facet of a hexahedron
-                facets = np.sort(cells[:, list(some)], axis=1)
                 (outside,) = outer_facets({kind.base: cells[:, : kind.corners]})
-                nodes.append(cells[_rows_among(facets, np.sort(outside, axis=1)), kind.corners + k])
+                nodes.append(cells[_among(cells[:, list(some)], outside), kind.corners + k])
     return np.unique(np.concatenate(nodes))
 
 
-def _rows_among(rows: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(m,) whether each row is one of the others."""
-    _, label = np.unique(np.vstack([rows, others]), axis=0, return_inverse=True)
-    return np.isin(label.ravel()[: len(rows)], label.ravel()[len(rows) :])
+def _labels(sets: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """(m,) a number for each set (m, k), the sum of random ones of its members: sorted several times faster."""
+    n = int(sets.max(initial=-1)) + 1
+    return np.asarray(np.random.default_rng(0).integers(0, 2**63, n, dtype=np.uint64)[sets].sum(axis=1))
+
+
+def _among(sets: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(m,) whether each set is one of the others."""
+    label = _labels(np.vstack([sets, others]))
+    return contains(np.sort(label[len(sets) :]), label[: len(sets)])
+
+
+def _repeated(label: NDArray) -> NDArray[np.bool_]:
+    """(m,) labels that occur more than once."""
+    order = np.argsort(label)
+    same = label[order[1:]] == label[order[:-1]]
+    several = np.zeros(len(label), dtype=bool)
+    several[order[1:][same]] = several[order[:-1][same]] = True
+    return several
 
 
 def tiles(blocks: Blocks) -> bool:

@@ -73,7 +73,7 @@ def element_facts(matrix: OperatorMatrix) -> dict[str, Any]:
     """Of a scalar matrix whose rows form cells of other elements than linear triangles; empty where they form none."""
     try:
         cells = next(shown_cells(matrix), None)
-        parts = [] if cells is None else parts_of(matrix.n, cells.blocks)
+        parts = [] if cells is None else parts_of(cells)
     except TopologyError:
         return {}
     if cells is None or typical_misfit(matrix, cells.blocks) > _LIKE:

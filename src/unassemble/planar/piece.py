@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..linalg import Factorisation, UpperTriangle
-from ..tolerances import LARGEST_NOISE, LAST_DIGITS, ROUNDED, SIGMAS
+from ..tolerances import LARGEST_NOISE, LAST_DIGITS, SIGMAS
 from ..topology import Piece
 from .cautious import CautiousOptions, cautious_polish, count_flipped
 from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
 from .hinged import Hinged
-from .polish import PolishedMesh, polish
+from .polish import PolishedMesh, errors_of_one_size, polish
 from .robust import ASIDE
 from .side_by_side import SideBySide
 
@@ -115,7 +115,11 @@ def refined(
         spread = _set_aside(mesh.aside, len(weights), spread)
     try:
         found = _polished(piece, weights, mesh.z, scale, spread, pins)
-        if rounding and spread is not None and _is_uniform_noise(piece, weights, found, spread):
+        if (
+            rounding
+            and spread is not None
+            and errors_of_one_size(weights / found.scale - edge_weights(piece, found.z), spread)
+        ):
             spread = noise
             found = _polished(piece, weights, found.z, scale, spread, pins)
     except SolverError as error:
@@ -228,15 +232,3 @@ def collapsed(piece: Piece, z: NDArray) -> str:
 def _shortest(piece: Piece, z: NDArray) -> float:
     """Length of the shortest edge, relative to the extent."""
     return float(np.abs(z[piece.edges[:, 0]] - z[piece.edges[:, 1]]).min() / np.abs(z - z.mean()).max())
-
-
-def _is_uniform_noise(piece: Piece, weights: NDArray, found: PolishedMesh, spread: NDArray) -> bool:
-    """Whether the misfit is beyond rounding, and normal errors of one size are likelier than those of sizes `spread`.
-
-    Both likelihoods are at their greatest over the common factor.
-    """
-    misfit = weights / found.scale - edge_weights(piece, found.z)
-    even, uneven = (float(np.linalg.norm(r)) / np.sqrt(len(r)) for r in (misfit, misfit / spread))
-    if not (np.isfinite(uneven) and uneven > ROUNDED):
-        return False
-    return bool(np.log(even) < np.log(uneven) + np.mean(np.log(spread)))

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tolerances import LAST_DIGITS
+from ..tolerances import LAST_DIGITS, ROUNDED
 from ..topology import Piece
 from .cotangent import edge_weights
 from .iterative import IterativeNormalEquations
@@ -187,6 +187,24 @@ def polish(
     if system is not None:
         system.release()
     return PolishedMesh(fit.z * extent, fit.scale, fit.norm, steps, factorisations, converged, length)
+
+
+def errors_of_one_size(misfit: NDArray, spread: NDArray) -> bool:
+    """Whether a misfit is beyond rounding, and normal errors of one size are likelier than those of sizes `spread`.
+
+    Both likelihoods are at their greatest over the common factor.
+
+    Parameters
+    ----------
+    misfit : (e,) float64
+        a / c - w.
+    spread : (e,) float64
+        Rounding errors, in units of the machine precision.
+    """
+    even, uneven = (float(np.linalg.norm(r)) / np.sqrt(len(r)) for r in (misfit, misfit / spread))
+    if not (np.isfinite(uneven) and uneven > ROUNDED):
+        return False
+    return bool(np.log(even) < np.log(uneven) + np.mean(np.log(spread)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,6 @@
 
 from .areas import areas_of_mass
 from .fit import MetricFit, MetricOptions, fit_metric
-from .metric import Skeleton
+from .metric import Metric, Skeleton
 
-__all__ = ["MetricFit", "MetricOptions", "Skeleton", "areas_of_mass", "fit_metric"]
+__all__ = ["Metric", "MetricFit", "MetricOptions", "Skeleton", "areas_of_mass", "fit_metric"]

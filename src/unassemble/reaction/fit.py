@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..linalg import UpperTriangle, factorisation
+from ..tolerances import HARDLY_ANY
 from .metric import Metric, Skeleton
 
 _log = logging.getLogger(__name__)
@@ -38,7 +39,7 @@ class MetricOptions:
     damping : float
         The first; relative to the diagonal of the normal equations.
     nearly : float
-        Share of the way to the first flat triangle that a step may go.
+        Share of the way to a flat triangle that a step may go.
     tolerance : float
         Root mean square of the equations' residuals at which nothing but rounding is left.
     """
@@ -63,12 +64,15 @@ class MetricFit:
     residual : float
         Root mean square of the equations' residuals: cosines, and relative areas.
     steps : int
+    held : bool
+        Whether at its end flat triangles were in the way: no minimum then.
     """
 
     metric: Metric
     scale: float
     residual: float
     steps: int
+    held: bool
 
 
 def _cosine(x: NDArray) -> NDArray[np.float64]:
@@ -126,7 +130,12 @@ class Equations:
 
 
 def fit_metric(
-    skeleton: Skeleton, entries: NDArray, sums: NDArray, trust: NDArray, options: MetricOptions | None = None
+    skeleton: Skeleton,
+    entries: NDArray,
+    sums: NDArray,
+    trust: NDArray,
+    options: MetricOptions | None = None,
+    start: MetricFit | None = None,
 ) -> MetricFit | None:
     """The metric and the factor c with which a mesh has these entries; None where the iteration breaks down.
 
@@ -141,11 +150,13 @@ def fit_metric(
     trust : (n,) float64
         Weights of the row sums, relative to those of entries: less than 1 where they have lost digits.
     options : MetricOptions, optional
+    start : MetricFit, optional
+        Where to begin; with circles about the vertices unless told.
     """
     options = options or MetricOptions()
     equations = Equations(skeleton, entries, sums, trust)
     with np.errstate(all="ignore"):  # of a misfit that is not finite nothing comes
-        metric, c = equations.start()
+        metric, c = (start.metric, start.scale) if start else equations.start()
         try:
             return _descended(equations, metric, c, options) if c else None
         except SolverError:
@@ -155,30 +166,32 @@ def fit_metric(
 def _descended(equations: Equations, metric: Metric, c: float, options: MetricOptions) -> MetricFit:
     residual = equations.residual(metric, c)
     root = float(np.sqrt(len(residual)))
-    damping, step, history = options.damping, 0, [float(np.linalg.norm(residual))]
+    damping, step, stopped, history = options.damping, 0, 0.0, [float(np.linalg.norm(residual))]
     for step in range(1, options.steps + 1):
         before = float(np.linalg.norm(residual))
         derivative, by_c = equations.derivative(metric, c)
         moved = None
         while moved is None and damping < 1e8:
-            change, change_c = _solved(derivative, by_c, residual, damping)
-            reach = min(1.0, options.nearly * metric.farthest(change * metric.u))
-            moved = _shortened(equations, metric, c, change * metric.u, change_c, reach, before)
+            log_u, log_c = _solved(derivative, by_c, residual, damping)
+            wanted = log_u * metric.u
+            change = metric.within(wanted, options.nearly)
+            moved = _shortened(equations, metric, c, change, log_c, before)
             damping = damping * 8 if moved is None else damping
         if moved is None:
             break
         metric, c, residual = moved
-        # A step that went to its end calls for less damping; one that triangles stopped, for a little more.
-        damping = max(damping / 10, 1e-14) if reach == 1 else damping * 1.5
+        # A step that no triangle stops calls for less damping; one that many stop, for a little more.
+        stopped = float(np.mean(change != wanted))
+        damping = max(damping / 10, 1e-14) if not stopped else damping * 1.5 if stopped > HARDLY_ANY else damping
         left = float(np.linalg.norm(residual))
-        _log.debug("metric step %d: residual %.1e, reach %.2g, c %.6g", step, left / root, reach, c)
+        _log.debug("metric step %d: residual %.1e, stopped %.2g, c %.6g", step, left / root, stopped, c)
         history.append(left)
         if step > options.patience and left > 0.8 * history[-1 - options.patience]:
             break
-        settled = reach == 1 and left > 0.5 * before and left < 1e-9 * root
+        settled = not stopped and left > 0.5 * before and left < 1e-9 * root
         if left < options.tolerance * root or settled:
             break
-    return MetricFit(metric, c, float(np.linalg.norm(residual)) / root, step)
+    return MetricFit(metric, c, float(np.linalg.norm(residual)) / root, step, stopped > 0)
 
 
 def _solved(derivative: sp.csr_array, by_c: NDArray, residual: NDArray, damping: float) -> tuple[NDArray, float]:
@@ -200,14 +213,13 @@ def _solved(derivative: sp.csr_array, by_c: NDArray, residual: NDArray, damping:
 
 
 def _shortened(
-    equations: Equations, metric: Metric, c: float, change: NDArray, log_c: float, reach: float, before: float
+    equations: Equations, metric: Metric, c: float, change: NDArray, log_c: float, before: float
 ) -> tuple[Metric, float, NDArray] | None:
     """The longest of a step and some shorter ones that lowers the residual."""
-    for _ in range(5):
+    for reach in 0.4 ** np.arange(5):
         trial = Metric(metric.skeleton, metric.u + reach * change)
         factor = c * np.exp(np.clip(reach * log_c, -2, 2))
         residual = equations.residual(trial, factor)
         if np.linalg.norm(residual) < before:
             return trial, factor, residual
-        reach *= 0.4
     return None

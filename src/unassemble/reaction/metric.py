@@ -83,7 +83,7 @@ class Skeleton:
 class Metric:
     """Squared lengths u (e,) of the edges of a skeleton.
 
-    Every triangle has an area: see :meth:`farthest`.
+    Every triangle has an area: see :meth:`within`.
     """
 
     skeleton: Skeleton
@@ -118,8 +118,23 @@ class Metric:
         place = np.repeat(np.arange(m), 3), opposite.ravel()
         return weights, sp.coo_array(((u[:, 0] * g / 2).ravel(), place), shape=(m, e)).tocsr()
 
-    def farthest(self, change: NDArray) -> float:
-        """How far along u + t change (e,) all triangles keep an area, and all edges a length: the least positive root.
+    def within(self, change: NDArray, nearly: float) -> NDArray[np.float64]:
+        """(e,) a change of u (e,), less where it would take a triangle's area, which keeps a part of it: 1 - nearly.
+
+        Edges of such triangles change by as much less, but no others: one flat triangle holds up its neighbours only.
+        """
+        share = np.ones(len(change))
+        for _ in range(30):  # of neighbours that a triangle holds up
+            part = np.minimum(1.0, nearly * self._farthest(share * change))
+            if part.min(initial=1.0) == 1:
+                return share * change
+            least = np.ones(len(change))
+            np.minimum.at(least, self.skeleton.opposite.ravel(), np.repeat(part, 3))
+            share *= least
+        return share * change * min(1.0, nearly * float(self._farthest(share * change).min(initial=np.inf)))
+
+    def _farthest(self, change: NDArray) -> NDArray[np.float64]:
+        """(m,) how far along u + t change (e,) triangles keep an area, and their edges a length: least positive roots.
 
         The square of each area is a quadratic in t.
         """
@@ -129,5 +144,5 @@ class Metric:
         c = u.sum(axis=1) ** 2 - 2 * (u * u).sum(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
             root = np.sqrt(b * b - a * c)  # not a number where the area never vanishes
-            ends = np.concatenate([c / (root - b), c / (-root - b), (-self.u / change)])
-        return float(ends[ends > 0].min(initial=np.inf))
+            ends = np.column_stack([c / (root - b), c / (-root - b), -u / d])
+        return np.asarray(np.where(ends > 0, ends, np.inf).min(axis=1))

@@ -56,6 +56,7 @@ class Noise:
         # An error between -u / 2 and u / 2, evenly distributed, has the standard deviation u / sqrt(12).
         error = np.maximum(unit, SMALL * largest) / np.sqrt(12)
         rounded = unit > 0
+        error = np.maximum(error, SMALL * error[rounded].min())  # rows of whole numbers show no rounding at all
         sigma = float(np.median(error[rounded]))
         count = np.unique(np.abs(matrix.entries[rounded]), return_counts=True)[1]
         repeats, different = np.sum(count**2) / np.sum(count), len(count) / np.sum(count)

@@ -25,7 +25,7 @@ _ROWS = 6  # at most, named as those that hold nearly all of a misfit
 _MANY = 50  # entries, of which it can be said what their misfit looks like
 
 _CHECK_MODEL = "see what `inspect_matrix` says the matrix is: a wrong model leaves a misfit everywhere"
-_ONE_COEFFICIENT = "see whether a coefficient varies, the surface is curved or it is a network: all rows add up to zero"
+_ONE_COEFFICIENT = "see whether a coefficient varies from cell to cell, the surface is curved or it is a network"
 _KEEP_ROWS = "keep the rows and columns of all unknowns, those on the boundary too: some rows do not add up to zero"
 _GIVE_NOISE = "if the entries are measured, give the standard deviation of their errors as `noise`"
 
@@ -66,7 +66,7 @@ def misfit(f: Findings, notes: Sequence[str]) -> Reason:
         return Reason.of(
             differs,
             "all rows add up to zero, which errors of single entries would not leave",
-            advice="see whether a coefficient varies from cell to cell: it must be constant",
+            advice=_ONE_COEFFICIENT,
         )
     if remark:
         return Reason.of(remark, differs, *notes, advice=_GIVE_NOISE)
@@ -77,13 +77,15 @@ def lacking(f: Findings, term: Term) -> Reason:
     """The reason of a misfit that a term explains which the model does not have."""
     share = f"{term.share:.0%}" if term.share < 0.995 else "nearly all"
     begun = f"the misfit is no noise, since a term that the model lacks explains {share} of its square"
-    if term.name == MASS:
-        sums = "" if _adds_up(f.stored) else ", and the rows do not add up to zero"
-        which = f"it has the form of a mass matrix{sums}: A = c L + s M"
-        return Reason.of(begun, which, advice="assemble the stiffness matrix alone, or lump the mass matrix")
-    if term.name == COEFFICIENT:
-        which = "it has the form of a coefficient that varies in space, and a constant one is assumed"
+    varies = "a coefficient that varies in space, and a constant one is assumed"
+    if term.name == COEFFICIENT or _adds_up(f.stored):  # with a mass matrix, or one number added, rows do not
+        which = f"it has the form of {varies}"
+        if term.name != COEFFICIENT:
+            which = f"all rows add up to zero, as with {varies}"
         return Reason.of(begun, which, advice="assemble the matrix with a constant coefficient")
+    if term.name == MASS:
+        which = "it has the form of a mass matrix, and the rows do not add up to zero: A = c L + s M"
+        return Reason.of(begun, which, advice="assemble the stiffness matrix alone, or lump the mass matrix")
     assert term.name == ONE_SIGN
     return Reason.of(begun, "most entries are off in one direction", advice=_CHECK_MODEL)
 

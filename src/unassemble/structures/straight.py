@@ -23,8 +23,6 @@ from ..tolerances import LAST_DIGITS, SUMMED
 from .layouts import Layout
 from .nodes import Nodes
 
-_ANY_SIZE = np.errstate(over="ignore", invalid="ignore")  # entries may be of no member, and of any size
-
 
 @dataclass(frozen=True, eq=False)
 class Straight:
@@ -44,21 +42,22 @@ class Straight:
     blocks: NDArray[np.float64]
 
 
-def straight_members(nodes: Nodes) -> Straight:
-    """Members between two nodes that have all their unknowns."""
+def straight_members(nodes: Nodes, allowed: float = SUMMED) -> Straight:
+    """Members between two nodes that have all their unknowns; up to an allowed misfit."""
     b = nodes.layout.block_size
     whole: NDArray[np.bool_] = np.asarray(nodes.present.all(axis=1))
+    if not nodes.layout.rotations:
+        return Straight(np.empty((0, 2), np.int64), np.empty((0, nodes.layout.dim)), np.empty((0, b, b)))
     bsr = nodes.matrix.tobsr((b, b))
     i = np.repeat(np.arange(nodes.n), np.diff(bsr.indptr))
     j = bsr.indices.astype(np.int64)
     upper = (i < j) & whole[i] & whole[j]
     ends, blocks = np.column_stack([i[upper], j[upper]]), bsr.data[upper]
     vectors = told_by_blocks(blocks, nodes.layout)
-    good = np.flatnonzero(misfits(blocks, vectors, nodes.layout) <= SUMMED)
+    good = np.flatnonzero(misfits(blocks, vectors, nodes.layout) <= allowed)
     return Straight(ends[good], vectors[good], blocks[good])
 
 
-@_ANY_SIZE
 def told_by_blocks(blocks: NDArray[np.float64], layout: Layout) -> NDArray[np.float64]:
     """(m, dim) position of the first node less that of the second, as V = U D / 2 has it; zero where it tells nothing.
 
@@ -77,7 +76,6 @@ def told_by_blocks(blocks: NDArray[np.float64], layout: Layout) -> NDArray[np.fl
     return np.asarray(np.einsum("mkr,mr->mk", np.linalg.pinv(sides, rcond=LAST_DIGITS), right))
 
 
-@_ANY_SIZE
 def misfits(blocks: NDArray[np.float64], vectors: NDArray[np.float64], layout: Layout) -> NDArray[np.float64]:
     """(m,) how far blocks are from those of members along given vectors, relative to the size of each part.
 
