@@ -115,8 +115,8 @@ def _assembled(found: Recovery, lumped: bool) -> sp.csr_array:
     cells = found.cells
     if found.n_polygons:
         raise GeometryError(
-            "the stiffness matrix leaves cells undivided, and `mass` does not tell into which triangles: it is lumped, or "
-            "that of another mesh"
+            "the stiffness matrix leaves cells undivided, and `mass` does not tell into which triangles: it is lumped, "
+            "or that of another mesh"
         )
     other = [kind for kind in cells if kind not in (*_SIMPLICES, *_CORNERS)]
     if other or not (cells and isinstance(found, PlanarMesh | Body)):

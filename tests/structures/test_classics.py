@@ -80,7 +80,7 @@ def test_the_shells_are_cylinders(name, off):
     [("rail_109_S", "rail_109_M", 109), ("rail_371_S", "rail_371_M", 371), ("rail_371_A", "rail_371_E", 186)],
 )
 def test_a_rail_and_its_masses(stiffness, mass, rows):
-    """Both matrices are on one mesh, though either was read alone; the last has a Robin condition along its boundary."""
+    """Both are of one mesh, though each is read alone elsewhere; the last has a Robin condition on its boundary."""
     masses = CLASSICS / f"{mass}.mtx.gz"
     if not masses.exists():
         pytest.skip("the classics are not here")
