@@ -148,16 +148,16 @@ def mast(levels: int = 9) -> Specimen:
     rng = np.random.default_rng(1976)
     along = np.diff(points[bars], axis=1)[:, 0]
     length = np.linalg.norm(along, axis=1)
-    rows = np.concatenate([along, -along], axis=1) * np.sqrt(rng.uniform(1, 3, len(bars)) / length**3)[:, None]
+    ends = np.concatenate([along, -along], axis=1) * np.sqrt(rng.uniform(1, 3, len(bars)) / length**3)[:, None]
     strain = np.zeros((len(bars), len(points), 3))
-    np.put_along_axis(strain, bars[:, :, None], -rows.reshape(-1, 2, 3), axis=1)
+    np.put_along_axis(strain, bars[:, :, None], ends.reshape(-1, 2, 3), axis=1)
     free = rng.permutation(np.arange(4, len(points)))
-    strain = strain[:, free].reshape(len(bars), -1)
+    felt = strain[:, free].reshape(len(bars), -1)
     points = points[free]
     return Specimen(
         "mast",
         "a lattice mast, held at its feet, nodes shuffled, of which two are known, so that it stands upright",
-        sp.coo_array(strain.T @ strain),
+        sp.coo_array(felt.T @ felt),
         points,
         tuple((3 * k, *points[k]) for k in range(2)),
     )
