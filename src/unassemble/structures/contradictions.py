@@ -29,7 +29,8 @@ def contradicted(given: Equations, nodes: Nodes) -> tuple[NDArray[np.bool_], NDA
     """Equations to leave out, and the nodes whose rows contradict others; None where that are too many, or none.
 
     By least squares, with weights that fall with the deviations of the round before, these of not less than a bound that
-    falls from round to round. Off is what misses by more than half of the digits; with it go all equations of its node.
+    falls from round to round. Off is what misses by more than half of the digits; with it go all equations of its node, and
+    those of several rows, or of members, in which the node occurs.
 
     Parameters
     ----------
@@ -50,7 +51,9 @@ def contradicted(given: Equations, nodes: Nodes) -> tuple[NDArray[np.bool_], NDA
         weight = 1 / np.maximum(off, least) ** 1.5
     wrong = off > ALIKE * lengths
     spoiled = np.unique(given.row[wrong & (given.row >= 0)] // b)
-    out = np.asarray(wrong | ((given.row >= 0) & np.isin(given.row // b, spoiled)))
+    theirs = np.isin(np.arange(A.shape[1]) // nodes.layout.dim, spoiled)
+    touched = abs(A) @ theirs.astype(float) > 0
+    out = np.asarray(wrong | np.where(given.row < 0, touched, np.isin(given.row // b, spoiled)))
     return (out, spoiled) if out.any() and out.mean() <= 1 - MOST else None
 
 

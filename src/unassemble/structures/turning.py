@@ -45,7 +45,9 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     failure: GeometryError | None = None
     layout, valid = nodes.layout, nodes.whole()
     edges = np.column_stack(sp.triu(nodes.moving, 1).nonzero())
-    ways = ((False, False), (False, True), (True, False), (True, True)) if layout.rotations else ((False, False),)
+    ways = [(False, False), (False, True), (True, False)] if layout.rotations else [(False, False)]
+    if layout.rotations and layout.dim == 3:  # where nothing drills, forces alone are too few to leave any out
+        ways.append((True, True))
     for but_for_some, springs in ways:
         if but_for_some and (allowed > CERTIFIED or any(found.residual <= allowed for found, _ in attempts)):
             break  # of entries with few digits other ones would be left out each time that these are drawn anew
