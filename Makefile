@@ -66,6 +66,7 @@ lint: $(INSTALLED)
 # For instance: make bench BENCH='--sizes 10000,100000'
 bench: $(INSTALLED)
 	$(BIN)/python benchmarks/planar.py $(BENCH)
+	$(BIN)/python benchmarks/elements.py $(BENCH)
 
 docs: $(DOCS_INSTALLED)
 	$(BIN)/sphinx-build --fail-on-warning --keep-going -b html docs docs/_build/html

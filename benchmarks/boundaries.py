@@ -92,7 +92,8 @@ def unit(matrix: sp.csr_array) -> float:
     """Processor seconds of one direct solve with a definite matrix of this pattern: analysis, factors, solution."""
     off = -abs(sp.triu(matrix, 1) + sp.tril(matrix, -1).T)
     off = off + off.T
-    upper = sp.triu(off + sp.diags_array(1.001 * abs(off).sum(axis=1)), format="csr")
+    size = abs(off).sum(axis=1)
+    upper = sp.triu(off + sp.diags_array(np.where(size > 0, 1.001 * size, 1.0)), format="csr")
     upper.sort_indices()
     held = UpperTriangle(upper.data, upper.indices, upper.indptr)
     start = time.process_time()

@@ -11,6 +11,7 @@ import pytest
 import scipy.sparse as sp
 import skfem as fem
 from skfem.helpers import dot, grad
+from skfem.models.elasticity import lame_parameters, linear_elasticity
 from skfem.models.poisson import laplace, mass
 
 from unassemble import MatrixError, NotPlanarError, RecoveryError, inspect_matrix, recover
@@ -161,6 +162,43 @@ def test_a_strongly_varying_coefficient():
     assert "noise" not in found.advice
 
 
+QUADS = moved(fem.MeshQuad().refined(3))
+
+
+def with_terms(element, mesh=QUADS):
+    """Matrices of elements whose terms are not read."""
+    K = stiffness(mesh, element)
+    inside = fem.Basis(mesh, element).complement_dofs(fem.Basis(mesh, element).get_dofs())
+    varying = fem.BilinearForm(lambda u, v, w: (1 + 3 * w.x[0] ** 2) * dot(grad(u), grad(v)))
+    return {
+        "masses": (K + masses(mesh, element), "assemble the stiffness matrix alone"),
+        "unknowns gone": (K[inside][:, inside], "keep all rows and columns"),
+        "coefficient": (varying.assemble(fem.Basis(mesh, element)), "see whether a coefficient varies"),
+    }
+
+
+@pytest.mark.parametrize("which", with_terms(fem.ElementQuad1()))
+@pytest.mark.parametrize("element", [fem.ElementQuad1(), fem.ElementTriP2()], ids=["Q1", "P2"])
+def test_what_else_a_matrix_of_other_elements_has(element, which):
+    """Neither promised without a condition nor refused as if its elements were not read."""
+    A, advice = with_terms(element, QUADS if isinstance(element, fem.ElementQuad1) else DISC)[which]
+    A = shuffled(A)
+    facts = inspect_matrix(A)
+    found, said = outcome(A)
+    if found is not None and found.certified:  # recovery has learnt to read them
+        return
+    assert advice in said.lower()
+    assert "for this is" not in said
+    assert said.count(". ") <= 1
+    if facts.advice:
+        assert facts.advice in facts.recoverable
+        assert facts.advice in said.lower()
+    else:
+        assert which == "coefficient"
+    if found is not None:
+        assert facts.evidence[-1].lower() in found.reason.lower()
+
+
 def boundary_conditions():
     K, D = stiffness(DISC, fem.ElementTriP1()), DISC.boundary_nodes()
     rows = K.tolil(copy=True)
@@ -237,7 +275,10 @@ def beams(n=12, length=0.7):
 MASSES = {
     "quadratic triangles": (lambda: masses(DISC, fem.ElementTriP2()), "quadratic elements on triangles"),
     "quadrilaterals": (lambda: masses(moved(fem.MeshQuad().refined(3)), fem.ElementQuad1()), "bilinear elements"),
+    "biquadratic quadrilaterals": (lambda: masses(QUADS, fem.ElementQuad2()), "biquadratic elements"),
     "hexahedra": (lambda: masses(fem.MeshHex().refined(2), fem.ElementHex1()), "trilinear elements on hexahedra"),
+    "triquadratic hexahedra": (lambda: masses(fem.MeshHex().refined(1), fem.ElementHex2()), "triquadratic elements"),
+    "Crouzeix-Raviart": (lambda: masses(DISC, fem.ElementTriCR()), "a lumped mass matrix"),  # beside it only rounding
     "vectors": (lambda: vector_masses(TETS, fem.ElementTetP1()), "of several unknowns per node"),
     "vectors on quadrilaterals": (lambda: vector_masses(moved(fem.MeshQuad().refined(3)), fem.ElementQuad1()), "of"),
     "beams": (beams, "a consistent mass matrix"),
@@ -257,6 +298,15 @@ def test_masses_of_every_element_are_named(name):
             recover(A, operator=operator)
         assert facts.name in str(caught.value)
         assert facts.advice.split(":")[0] in str(caught.value).lower()
+
+
+def test_a_small_body_held_all_around_may_pass_for_masses_and_is_read():
+    basis = fem.Basis(fem.MeshTri.init_tensor(*2 * [np.linspace(0, 1, 7)]), fem.ElementVector(fem.ElementTriP1()))
+    K = linear_elasticity(*lame_parameters(1.0, 0.3)).assemble(basis)
+    inside = basis.complement_dofs(basis.get_dofs())
+    A = sp.csr_array(K[inside][:, inside])
+    assert "or the stiffness matrix of a body" in inspect_matrix(A).name
+    assert recover(A).certified
 
 
 def test_masses_of_a_boundary_are_those_of_segments():
@@ -305,4 +355,18 @@ def test_masses_among_classics(name):
         with pytest.raises(MatrixError, match="as a lumped mass matrix is"):
             inspect_matrix(CLASSICS / name)
         return
-    assert (inspect_matrix(CLASSICS / name).kind == "mass") == name.startswith(matrices)
+    facts = inspect_matrix(CLASSICS / name)
+    assert (facts.kind == "mass") == name.startswith(matrices)
+    if facts.kind == "mass" and facts.advice:
+        with pytest.raises(RecoveryError, match=facts.name):
+            recover(CLASSICS / name)
+
+
+@pytest.mark.parametrize(("name", "said"), [("bcsstk02", "annihilate translations"), ("bcsstk22", "plane frame")])
+def test_nodes_among_classics_that_only_a_second_look_shows(name, said):
+    if not (path := CLASSICS / f"{name}.mtx.gz").exists():
+        pytest.skip("no classics")
+    facts = inspect_matrix(path)
+    found, why = outcome(path)
+    assert said in str(facts)
+    assert said in (why if found is None else found.operator)

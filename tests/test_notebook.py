@@ -47,6 +47,12 @@ def test_a_result_has_a_picture(result):
     assert len(image.convert("RGB").getcolors(1 << 24)) > 20
 
 
+def test_masses_have_no_picture():
+    html = lake(areas=np.ones(2))._repr_html_()
+    assert "certified" in html
+    assert "<img" not in html
+
+
 @pytest.mark.parametrize("result", [lake(), BODY])
 def test_drawn_into_axes_of_the_caller(result):
     figure, (left, right) = plt.subplots(1, 2)

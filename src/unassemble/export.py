@@ -77,15 +77,13 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
 
 def arrays(recovery: Recovery) -> dict[str, Any]:
     """What the ``.npz`` holds, by key; what there is nothing of has no key."""
-    content: dict[str, Any] = {} if _without_points(recovery) else {"points": recovery.points}
+    content: dict[str, Any] = {} if without_points(recovery) else {"points": recovery.points}
     for name in ("triangles", "quads", "tetrahedra", "hexahedra", "mid_nodes", "lines"):
         cells = getattr(recovery, name, None)  # each kind of result has its own
         if cells is not None and cells.size:
             content[name] = cells
     if isinstance(recovery, PlanarMesh):
         content |= _planar_arrays(recovery)
-        if recovery.areas is not None:
-            del content["points"]
     if isinstance(recovery, Surface):
         content |= {"edges": recovery.edges, "edge_lengths": recovery.edge_lengths, "curvature": recovery.curvature}
         if recovery.length_deviations is not None:
@@ -120,9 +118,11 @@ def worth(recovery: Recovery) -> dict[str, NDArray]:
     }
 
 
-def _without_points(recovery: Recovery) -> bool:
-    """Whether there are edge lengths only."""
-    return isinstance(recovery, Surface) and not np.isfinite(recovery.points).any()
+def without_points(recovery: Recovery) -> bool:
+    """Whether there are edge lengths only, or areas, which no format but ``.npz`` holds."""
+    if isinstance(recovery, Surface):
+        return not np.isfinite(recovery.points).any()
+    return isinstance(recovery, PlanarMesh) and recovery.areas is not None
 
 
 def to_meshio(recovery: Recovery) -> meshio.Mesh:
@@ -209,13 +209,11 @@ def _boundary_flag(recovery: Recovery) -> NDArray[np.int64]:
 def _check_content(recovery: Recovery, suffix: str, mesh_format: MeshFormat) -> None:
     if not mesh_format.name:
         return
-    if _without_points(recovery):
-        raise FormatError(
-            f"the format {suffix} holds coordinates, and the matrix of a surface tells edge lengths only: write .npz, "
-            "or ask for coordinates with `realise=True`"
-        )
-    if isinstance(recovery, PlanarMesh) and recovery.areas is not None:
-        raise FormatError(f"the format {suffix} holds points, and a mass matrix tells areas only: write .npz")
+    if without_points(recovery):
+        what = "the matrix of a surface tells edge lengths only: write .npz, or ask for coordinates with `realise=True`"
+        if isinstance(recovery, PlanarMesh):
+            what = "a mass matrix tells areas only: write .npz"
+        raise FormatError(f"the format {suffix} holds coordinates, and {what}")
     kinds = set(_cells(recovery)) - mesh_format.cells
     if kinds:
         what = "nodes without cells" if kinds == {"vertex"} else f"cells of kind {', '.join(sorted(kinds))}"

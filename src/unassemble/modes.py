@@ -30,7 +30,7 @@ def modes_of(recovery: Recovery) -> NDArray[np.float64]:
     InputError
         If the matrix is scalar.
     """
-    from .structures.layouts import layout_named
+    from .structures.layouts import PINNED, layout_named
 
     node, direction = recovery.node_of_row, recovery.direction_of_row
     if node is None or direction is None:
@@ -38,7 +38,7 @@ def modes_of(recovery: Recovery) -> NDArray[np.float64]:
     layout = layout_named(recovery.operator)
     if layout is not None:
         return _turning_modes(layout, recovery.points, node, direction)
-    if isinstance(recovery, Body) or recovery.operator == "truss":
+    if isinstance(recovery, Body) or recovery.operator in ("truss", PINNED.name):
         return rigid_body_modes(recovery.points, node, direction)
     return (direction[:, None] == np.arange(direction.max() + 1)).astype(np.float64)
 

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from .errors import GeometryError, InputError, RecoveryError
 from .matrix import OperatorMatrix
 from .matrix.digits import Digits
-from .tolerances import ROUNDED
+from .tolerances import CANCELLED, ROUNDED
 from .topology import components
 
 if TYPE_CHECKING:
@@ -30,14 +30,13 @@ class VectorReading:
         Of solids, or of frames, shells and plates, whose nodes have rotations too.
     why : str
         What speaks for it; empty where the caller asked for it.
-    exact : ((N, N) sparse, Rounding), optional
-        Of entries with few digits: the matrix, whose rows annihilate translations exactly where they did up to
-        rounding, and that rounding.
+    rounding : Rounding, optional
+        Of entries with few digits.
     """
 
     numbering: Numbering | StructuralNumbering
     why: str
-    exact: tuple[sp.csr_array, Rounding] | None = None
+    rounding: Rounding | None = None
 
 
 def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) -> VectorReading:
@@ -64,26 +63,26 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
     beam = _beam(matrix) if numbering is None and block_size is None else None
     if beam is not None:
         return VectorReading(beam, "")
-    whole, exact = _exact(matrix)
+    whole, rounding = _exact(matrix)
     if numbering is None or isinstance(numbering, str):
         if numbering not in (None, *ORDERS):
             raise InputError(f"`numbering` is {' or '.join(map(repr, ORDERS))}, not {numbering!r}")
         structure = find_structure(whole, numbering, block_size)
         if structure is not None:
-            return VectorReading(structure, "", exact)
+            return VectorReading(structure, "", rounding)
         if block_size == SPACE.block_size:
             raise GeometryError(
                 "with 6 unknowns per node, three displacements and three rotations, no row annihilates translations"
             )
         try:
             if numbering is None:
-                return VectorReading(find_numbering(whole, block_size), "", exact)
-            return VectorReading(regular_numbering(whole, numbering, block_size), "", exact)
+                return VectorReading(find_numbering(whole, block_size), "", rounding)
+            return VectorReading(regular_numbering(whole, numbering, block_size), "", rounding)
         except RecoveryError:
             truss = truss_numbering(whole, block_size, numbering)
             if truss is None:
                 raise
-            return VectorReading(truss, "", exact)
+            return VectorReading(truss, "", rounding)
     try:
         node, direction = numbering
     except (TypeError, ValueError) as error:
@@ -91,7 +90,7 @@ def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) ->
     found = given_structure(whole, node, direction) or given_numbering(whole, node, direction)
     if block_size not in (None, found.block_size):
         raise InputError(f"`numbering` has {found.block_size} directions, and `block_size` is {block_size}")
-    return VectorReading(found, "", exact)
+    return VectorReading(found, "", rounding)
 
 
 def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
@@ -108,16 +107,16 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
     from .nodes.unknowns import numbering_at_sight
     from .structures import find_structure
 
-    whole, exact = _exact(matrix)
+    whole, rounding = _exact(matrix)
     structure = find_structure(whole) if crowded else None
     if structure is not None:
         why = f"the graph has more edges than a planar one can have, and {_evidence(structure)}"
-        return VectorReading(structure, why, exact)
+        return VectorReading(structure, why, rounding)
     found = numbering_at_sight(whole)
     if not _convinces(found):
-        return _truss(whole, exact, "the graph has more edges than a planar one can have") if crowded else None
+        return _truss(whole, rounding, "the graph has more edges than a planar one can have") if crowded else None
     graph = "the graph has more edges than a planar one can have" if crowded else "no even row is coupled to an odd one"
-    return VectorReading(found, f"{graph}, and {_evidence(found)}", exact)
+    return VectorReading(found, f"{graph}, and {_evidence(found)}", rounding)
 
 
 def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
@@ -129,17 +128,17 @@ def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     one_sign = matrix.entries.min(initial=0.0) >= 0 or matrix.entries.max(initial=0.0) <= 0
     if not matrix.diagonal.all() or (one_sign and len(components(matrix.n, matrix.edges)) == 1):
         return None
-    whole, exact = _exact(matrix)
+    whole, rounding = _exact(matrix)
     structure = find_structure(whole)
     if structure is not None:
-        return VectorReading(structure, f"it is no planar mesh, and {_evidence(structure)}", exact)
+        return VectorReading(structure, f"it is no planar mesh, and {_evidence(structure)}", rounding)
     try:
         found = find_numbering(whole)
     except RecoveryError:
         found = None
     if not _convinces(found):
-        return _truss(whole, exact, "it is no planar mesh")
-    return VectorReading(found, f"it is no planar mesh, and {_evidence(found)}", exact)
+        return _truss(whole, rounding, "it is no planar mesh")
+    return VectorReading(found, f"it is no planar mesh, and {_evidence(found)}", rounding)
 
 
 def about_translations(matrix: OperatorMatrix) -> str:
@@ -164,22 +163,22 @@ def _beam(matrix: OperatorMatrix) -> Beam | None:
     return find_beam(matrix.csr()) if full.max() <= MOST else None
 
 
-def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, tuple[sp.csr_array, Rounding] | None]:
-    """The matrix to look at, and of entries with few digits what a reading keeps of it."""
+def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, Rounding | None]:
+    """The matrix to look at, and the rounding of entries with few digits."""
     from .nodes.rounded import with_exact_sums
+    from .structures.recognise import directions_with_gaps
 
-    whole, rounding = with_exact_sums(matrix.csr())
-    return whole, (whole, rounding) if rounding else None
+    return with_exact_sums(matrix.csr(), directions_with_gaps(matrix.csr()))
 
 
-def _truss(whole: sp.csr_array, exact: tuple[sp.csr_array, Rounding] | None, reason: str) -> VectorReading | None:
+def _truss(whole: sp.csr_array, rounding: Rounding | None, reason: str) -> VectorReading | None:
     from .structures import truss_numbering
 
-    found = truss_numbering(whole)
+    found = truss_numbering(whole, allowed=rounding.spread if rounding else CANCELLED)
     if found is None:
         return None
     bars = f"{found.n_nodes} nodes with {found.block_size} unknowns each, {found.kind}, whose blocks are those of bars"
-    return VectorReading(found, f"{reason}, and its rows form {bars}", exact)
+    return VectorReading(found, f"{reason}, and its rows form {bars}", rounding)
 
 
 def _convinces(found: Numbering | None) -> TypeGuard[Numbering]:

@@ -43,11 +43,13 @@ def report(recovery: Recovery, path: str | PathLike[str] | None = None) -> dict[
 
 
 def as_html(recovery: Recovery) -> str:
-    """For notebooks: status, reason and sizes in a table, with a picture of the mesh."""
+    """For notebooks: status, reason and sizes in a table, with a picture of the mesh if it has a shape."""
     import base64
     import io
 
     rows = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in table(recovery))
+    if isinstance(recovery, PlanarMesh) and recovery.areas is not None:
+        return f"<table>{rows}</table>"
     stream = io.BytesIO()
     plot(recovery).savefig(stream, format="png", dpi=72)
     picture = base64.b64encode(stream.getvalue()).decode()

@@ -343,8 +343,6 @@ def _unless_planar(surface: Surface) -> Surface:
     """
     if surface.fits_no_plane:
         return surface
-    reason = (
-        "the lengths give every entry back, but a coefficient that varies in the plane may do so as well: a surface "
-        "has as many lengths as entries. If it is one in space, say so by `operator='surface'`"
-    )
-    return replace(surface, status="uncertified", uniqueness=None, reason=reason)
+    reason = "the lengths give every entry back, but so may a coefficient that varies in the plane"
+    advice = "say so by `operator='surface'` if it is one in space, or else assemble it with a constant coefficient"
+    return replace(surface, status="uncertified", uniqueness=None, reason=reason, advice=advice)

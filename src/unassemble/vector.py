@@ -6,15 +6,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from .clock import Clock
 from .elasticity.serving import Request, serve_body
+from .errors import RecoveryError
 from .matrix import OperatorMatrix
+from .nodes import Numbering
 from .nodes.nodal import nodal_matrix, uncoupled
 from .operators import VectorReading
 from .recovery import Recovery
 from .structures import Beam, StructuralNumbering, serve_beam, serve_structure
 from .structures.bars import bars_of
+from .structures.layouts import PINNED
 from .structures.trusses import serve_truss
+from .tolerances import CANCELLED
 from .vector_laplacian import Scalar, parts_of, recover_directions
 
 
@@ -53,13 +59,44 @@ def recover_vector(
     if isinstance(numbering, StructuralNumbering):
         return serve_structure(matrix, numbering, clock, anchors=anchors, choice=choice, cells=cells)
     with clock("numbering"):
-        whole, rounding = reading.exact or (matrix.csr(), None)
+        rounding = reading.rounding
+        whole = rounding.exact if rounding else matrix.csr()
         nodal = nodal_matrix(whole, numbering)
     if uncoupled(nodal):
         found = recover_directions(parts_of(whole, nodal, numbering), matrix, anchors, scalar)
         return replace(found, choice=choice, timings=clock.timings)
-    bars = bars_of(nodal)
+    bars = bars_of(nodal, rounding.spread if rounding else CANCELLED)
     if bars is not None:
-        return serve_truss(matrix, nodal, numbering, bars, clock, anchors=anchors, choice=choice)
+        return serve_truss(matrix, nodal, numbering, bars, clock, anchors=anchors, choice=choice, rounding=rounding)
     del whole  # of a large body, memory that the long work can use
-    return serve_body(matrix, nodal, numbering, clock, Request(anchors, cells, choice, rounding))
+    try:
+        body = serve_body(matrix, nodal, numbering, clock, Request(anchors, cells, choice, rounding))
+    except RecoveryError:
+        other = _by_rotations(matrix, numbering, clock, anchors, choice, cells=cells)
+        if other is None:
+            raise
+        return other
+    return body if body.certified else _by_rotations(matrix, numbering, clock, anchors, choice, cells=cells) or body
+
+
+def _by_rotations(
+    matrix: OperatorMatrix,
+    numbering: Numbering,
+    clock: Clock,
+    anchors: Sequence[Any] | None,
+    choice: str,
+    *,
+    cells: bool,
+) -> Recovery | None:
+    """Nodes in space by rigid rotations alone, of any material and element; None where these certify nothing."""
+    if numbering.block_size != PINNED.dim:
+        return None
+    direction = numbering.direction_of_row
+    if numbering.unnamed is not None:
+        direction = np.where(numbering.unnamed, -1, direction)
+    same = StructuralNumbering(PINNED, numbering.node_of_row, direction, numbering.kind, numbering.share)
+    try:
+        found = serve_structure(matrix, same, clock, anchors=anchors, choice=choice, cells=cells)
+    except RecoveryError:
+        return None
+    return found if found.certified else None

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import gzip
 
+import numpy as np
 import pytest
+import scipy.sparse as sp
 from click.testing import CliRunner
 
 from unassemble import InputError, recover
@@ -119,6 +121,18 @@ def test_the_words_recover_and_o_may_be_left_out(work, words, out):
     result = work.run(*words)
     assert result.exit_code == 0, result.stderr
     assert (work.folder / out).is_file()
+
+
+def test_areas_go_beside_the_matrix_where_nothing_is_said(work):
+    """No mesh format holds them, but .npz; the matrix may have that name."""
+    i, j, k = work.true.triangles.T
+    every = np.concatenate([[a, b] for a in (i, j, k) for b in (i, j, k)], axis=1)
+    masses = sp.coo_array((np.where(every[0] == every[1], 2.0, 1.0), every)).tocsr()
+    sp.save_npz(work.folder / "M.npz", masses)
+    result = work.run("M.npz")
+    assert result.exit_code == 0, result.stderr
+    assert "M.mesh.npz" in result.stdout
+    np.testing.assert_allclose(work.mesh("M.mesh.npz")["areas"], 12)
 
 
 def test_standard_input_without_a_name_for_the_mesh(work):

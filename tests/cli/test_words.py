@@ -23,9 +23,9 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 def test_arguments_become_flags():
     recover, inspect = main.commands["recover"], main.commands["inspect"]
-    said = "give `noise`, `noise=1e-6` or `operator='laplacian'`, `drop_zeros`, `not_one_of_ours`"
+    said = "give `noise`, `noise=1e-6` or `operator='laplacian'`, `drop_zeros`, `realise=True`, `not_one_of_ours`"
     assert as_typed(said, [recover]) == (
-        "give --noise, --noise 1e-6 or --operator laplacian, --drop-zeros, `not_one_of_ours`"
+        "give --noise, --noise 1e-6 or --operator laplacian, --drop-zeros, --realise, `not_one_of_ours`"
     )
     assert as_typed("give `noise`", [inspect, recover]) == "give --noise (an option of recover)"
     assert {"anchors", "variable", "tensor", "block_size"} <= set(flags_of(recover))

@@ -15,7 +15,7 @@ from unassemble.nodes.rounded import with_exact_sums
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "structures"))
 from built import error as size_and_error
-from built import frame, plane_frame
+from built import frame, plane_frame, truss
 
 ROUNDED = {
     "single precision": lambda values: values.astype(np.float32).astype(float),
@@ -98,9 +98,20 @@ def test_structures_too(make, how):
     case = make()
     found = recover(rounded(case.matrix, how))
     assert found.operator in ("frame or shell", "plane frame")
-    assert found.status == "uncertified"
+    assert found.certified == (how != "6 digits")
     assert f"rounded to {how}" in found.reason
-    assert size_and_error(found.points, case.points) < LEVEL[how]
+    promised = re.search(r"(?:known to|off by) (\S+) of the size", found.reason)
+    assert size_and_error(found.points, case.points) < min(LEVEL[how], float(promised.group(1)))
+
+
+@pytest.mark.parametrize("how", ROUNDED)
+def test_trusses_too(how):
+    case = truss(3, 40)
+    found = recover(rounded(case.matrix, how))
+    assert found.operator == "truss"
+    assert found.certified == (how != "6 digits")
+    promised = re.search(r"to (?:about )?(\S+) of the size", found.reason)
+    assert size_and_error(found.points, case.points, scaled=True) < float(promised.group(1))
 
 
 def test_full_precision_is_left_alone():

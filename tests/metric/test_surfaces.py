@@ -79,7 +79,7 @@ def test_auto_on_a_bent_disc():
     found = recover(known.matrix)
     assert isinstance(found, Surface)
     assert (found.status, found.loops.tolist()) == ("uncertified", [1])
-    assert "operator='surface'" in found.reason  # a coefficient that varies in the plane may have the same matrix
+    assert "operator='surface'" in found.advice  # a coefficient that varies in the plane may have the same matrix
     assert largest_error(found, known.points) <= 1e-9
 
 

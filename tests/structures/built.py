@@ -230,7 +230,7 @@ def sound(matrix, true, **options) -> bool:
     if not found.certified:
         return False
     rows = np.flatnonzero(np.isin(found.direction_of_row, range({"plate": 1, "plane frame": 2}.get(found.operator, 3))))
-    free_size = found.operator in ("truss", "elasticity")
+    free_size = found.operator in ("truss", "elasticity", "structure")
     points, piece = found.points[found.node_of_row[rows]], found.component[found.node_of_row[rows]]
     for one in range(found.n_components):
         assert error(points[piece == one], true[rows][piece == one], scaled=free_size) < 1e-6

@@ -83,7 +83,7 @@ class Fit:
     scale: float
     misfit: float
     prior: float
-    factorisations: int
+    factorisations: int = 0
 
 
 class WholeEntries:
@@ -98,10 +98,20 @@ class WholeEntries:
         Weights that are about right where they are not whole: these count as the prior does.
     scale : float, optional
         c, where it is known.
+    free : (n,) bool, optional
+        Vertices that move; all others stay, and entries that only these have a part in are left out.
     """
 
-    def __init__(self, piece: Piece, weights: NDArray, guessed: NDArray[np.bool_], scale: float | None = None):
+    def __init__(
+        self, piece: Piece, weights: NDArray, guessed: NDArray[np.bool_], scale: float | None = None,
+        free: NDArray[np.bool_] | None = None,
+    ):  # fmt: skip
         self.piece, self.weights, self.guessed, self.known_scale = piece, weights, guessed, scale
+        self.free = np.ones(piece.n_vertices, dtype=bool) if free is None else free
+        self.asked = self.free[piece.stencil].any(axis=0)
+        count = int(self.free.sum())
+        self.place = np.where(self.free, np.cumsum(self.free) - 1, count)  # one column of zeros for all that stay
+        self.columns = count + (count < len(self.free))
         self._factor: Factorisation | None = None
 
     def release(self) -> None:
@@ -139,7 +149,7 @@ class WholeEntries:
         options = options or FitOptions()
         prior = ShapePrior.of(self.piece, ~whole)
         count, damping, small, factorisations = max(int(whole.sum()), 1), options.damping, 0, 0
-        misfit, shape = self._residuals(z, scale, whole, prior, mu)
+        misfit, shape = self.residuals(z, scale, whole, prior, mu)
         cost = float(misfit @ misfit + shape @ shape)
         for _ in range(options.steps if mu else options.last_steps):
             if not mu and misfit @ misfit <= count * options.exact**2:
@@ -177,15 +187,24 @@ class WholeEntries:
             z, scale, work = found.z, found.scale, work + found.factorisations
         return replace(found, factorisations=work)
 
-    def _trust(self, whole: NDArray, mu: float) -> NDArray[np.float64]:
-        return np.where(whole, 1.0, min(FitOptions.guess * mu, FitOptions.most_guess) * self.guessed)
+    def trust(self, whole: NDArray, mu: float) -> NDArray[np.float64]:
+        """(e,) weights of entries."""
+        return np.where(whole, 1.0, min(FitOptions.guess * mu, FitOptions.most_guess) * (self.guessed & self.asked))
 
-    def _residuals(
+    def residuals(
         self, z: NDArray, scale: float, whole: NDArray, prior: ShapePrior, mu: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return self._trust(whole, mu) * self.misfits(z, scale), mu * prior.residual(z)
+        """Misfits of entries (e,) and of the prior, weighted."""
+        return self.trust(whole, mu) * self.misfits(z, scale), mu * prior.residual(z)
 
-    def _step(self, system: _System, damping: float) -> tuple[NDArray, float] | None:
+    def step(
+        self, z: NDArray, scale: float, whole: NDArray, prior: ShapePrior, mu: float, misfit: NDArray, shape: NDArray,
+        damping: NDArray,
+    ) -> tuple[NDArray, float] | None:  # fmt: skip
+        """Displacement and change of log c; None where the normal matrix cannot be factorised."""
+        return self._step(_System(self, z, scale, whole, prior, mu, misfit, shape), damping)
+
+    def _step(self, system: _System, damping: float | NDArray) -> tuple[NDArray, float] | None:
         """Displacement and change of log c; None where the normal matrix cannot be factorised."""
         matrix = system.damped(damping)
         if self._factor is None:
@@ -201,6 +220,7 @@ class WholeEntries:
             left = system.size - system.slope @ response
             move = float((system.along - system.slope @ gradient) / max(left, 1e-12 * system.size))
         step = np.ascontiguousarray(gradient - move * response).view(np.complex128)
+        step = np.append(step, 0)[np.where(self.free, self.place, len(step))]
         return (step, move) if np.isfinite(step).all() and np.isfinite(move) else None
 
     def _along(
@@ -208,11 +228,13 @@ class WholeEntries:
         cost: float,
     ) -> tuple[NDArray, float, NDArray, NDArray, float] | None:  # fmt: skip
         """The longest part of a step, of a few, that turns no triangle over and lowers the cost."""
-        share = min(1.0, 0.5 / max(abs(move), 1e-300), 0.9 * first_flip(self.piece, z, step))
+        fitted = self.piece.triangles[(whole[self.piece.opposite] | (mu > 0)).any(axis=1)]
+        flip = float(first_flips(fitted, z, step).min(initial=np.inf))
+        share = min(1.0, 0.5 / max(abs(move), 1e-300), 0.9 * flip)
         for _ in range(5):
             there, c = z + share * step, scale * float(np.exp(share * move))
             with np.errstate(all="ignore"):
-                misfit, shape = self._residuals(there, c, whole, prior, mu)
+                misfit, shape = self.residuals(there, c, whole, prior, mu)
                 if misfit @ misfit + shape @ shape < cost:
                     return there, c, misfit, shape, share
             share *= 0.4
@@ -226,11 +248,12 @@ class _System:
         self, problem: WholeEntries, z: NDArray, scale: float, whole: NDArray, prior: ShapePrior, mu: float,
         misfit: NDArray, shape: NDArray,
     ):  # fmt: skip
-        piece, n = problem.piece, len(z)
-        trust = problem._trust(whole, mu)
-        entries = trust * weight_gradient(piece, z)
-        gradient = mu * prior.gradient(z)
-        jacobian = jacobian_rows(n, [(entries, piece.stencil), (gradient, prior.corners)])
+        piece, free = problem.piece, problem.free
+        trust = problem.trust(whole, mu)
+        entries = trust * np.where(free[piece.stencil], weight_gradient(piece, z), 0)
+        gradient = mu * np.where(free[prior.corners], prior.gradient(z), 0)
+        parts = [(entries, problem.place[piece.stencil]), (gradient, problem.place[prior.corners])]
+        jacobian = jacobian_rows(problem.columns, parts)
         product = jacobian.T.tobsr() @ jacobian
         self._upper = UpperTriangle.of(product)
         fitted = trust * problem.weights / scale  # what a / c changes by with -log c
@@ -238,11 +261,11 @@ class _System:
         self.slope = jacobian.T @ np.concatenate([fitted, np.zeros(len(shape))])
         self.size, self.along = float(fitted @ fitted), float(fitted @ misfit)
 
-    def damped(self, damping: float) -> UpperTriangle:
+    def damped(self, damping: float | NDArray) -> UpperTriangle:
         """The matrix with its diagonal enlarged."""
         data, start = self._upper.data.copy(), self._upper.indptr[:-1]
         diagonal = np.diagonal(data[start], axis1=1, axis2=2)
-        more = damping * diagonal + 1e-14 * np.median(diagonal)
+        more = np.reshape(damping, (-1, 1)) * diagonal + 1e-14 * np.median(diagonal)
         data[start] += more[:, :, None] * np.eye(2)
         return self._upper.with_data(data)
 
@@ -257,13 +280,13 @@ def jacobian_rows(n: int, parts: list[tuple[NDArray, NDArray]]) -> sp.bsr_array:
     return sp.bsr_array((np.concatenate(blocks), np.concatenate(vertices), indptr), shape=shape)
 
 
-def first_flip(piece: Piece, z: NDArray, step: NDArray) -> float:
-    """The least t > 0 at which a triangle of z + t step is flat; infinite if there is none."""
-    (a, b, c), (da, db, dc) = z[piece.triangles].T, step[piece.triangles].T
+def first_flips(triangles: NDArray, z: NDArray, step: NDArray) -> NDArray[np.float64]:
+    """(m,) the least t > 0 at which each triangle of z + t step is flat; infinite if there is none, or it is folded."""
+    (a, b, c), (da, db, dc) = z[triangles].T, step[triangles].T
     u, v, du, dv = b - a, c - a, db - da, dc - da
     constant, square = (np.conj(u) * v).imag, (np.conj(du) * dv).imag
     linear = (np.conj(u) * dv + np.conj(du) * v).imag
     root = linear**2 - 4 * square * constant
     with np.errstate(all="ignore"):
         times = 2 * constant / (np.stack([np.sqrt(root), -np.sqrt(root)]) - linear)
-    return float(times[times > 0].min(initial=np.inf))
+        return np.asarray(np.where((times > 0) & (constant > 0), times, np.inf).min(axis=0))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
 
@@ -12,11 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeometryError, SolverError
-from ..planar.conformal import conformal_map
+from ..planar.conformal import conformal_map, estimate_scale
+from ..planar.cotangent import weight_roundings
 from ..topology import Piece
 from .embedding import tutte
 from .fit import Fit, FitOptions, WholeEntries
 from .judge import determined
+from .local import fit_near
+from .patch import distance, nearest
 from .rim import Rim
 
 _log = logging.getLogger(__name__)
@@ -28,9 +31,9 @@ class InsideOptions:
 
     Attributes
     ----------
-    fading, slowly, again, regrowing : tuple of float
+    fading, slowly, again : tuple of float
         Weights of the prior, one after the other: from the start, from the start once more, with fewer vertices at the
-        rim, with more of them.
+        rim.
     unknown : float
         Guess of the weight of an edge that has no guess, in units of typical ones.
     outlines : int
@@ -40,11 +43,23 @@ class InsideOptions:
         loop inside out it is far larger.
     steepest : float
         The largest guess of a weight, in units of typical ones.
+    band, settling : int
+        In edges, how deep the rim is that is fitted by itself in a large mesh, and steps of that.
+    newton : FitOptions
+        Steps of all vertices that start near: smooth displacements are stiff only in the fourth power of their length,
+        so that any damping would hold them.
+    held : float
+        Whole entries to a vertex, at least, where the rim is taken off as a whole: three far inside, two determine.
     rounds : int
-        Fits, with fewer vertices at the rim each.
-    grown, quick : int
-        Fits with vertices at the rim that were taken off before, and their steps: all else fits already, so that they
-        take few or lead nowhere.
+        Fits, with fewer vertices at the rim each; and those with more of them.
+    peaks : float
+        Part of the largest misfit above which there are places to peel.
+    growing : tuple of (float, int)
+        Weights of the prior and steps for vertices at the rim, while those inside stay.
+    grown, fits : float
+        Distance in edges up to which vertices move again, and misfit up to which they need not, in units of rounding.
+    regrown : int
+        Fits of all that has grown together.
     exact : float
         Root mean square misfit of whole entries that is none, in units of typical ones.
     """
@@ -52,14 +67,20 @@ class InsideOptions:
     fading: tuple[float, ...] = (0.1, 0.01, 1e-3, 0.0)
     slowly: tuple[float, ...] = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
     again: tuple[float, ...] = (0.03, 1e-3, 0.0)
-    regrowing: tuple[float, ...] = (1e-3, 0.0)
     unknown: float = 0.5
     outlines: int = 4
     near: float = 0.01
     steepest: float = 3.0
-    rounds: int = 15
-    grown: int = 4
-    quick: int = 10
+    band: int = 5
+    settling: int = 6
+    newton: FitOptions = field(default_factory=lambda: FitOptions(steps=1, last_steps=8, damping=1e-15))
+    held: float = 2.3
+    rounds: int = 8
+    peaks: float = 0.25
+    growing: tuple[tuple[float, int], ...] = ((1e-2, 6), (1e-4, 6), (0.0, 12))
+    grown: int = 3
+    fits: float = 1e-7
+    regrown: int = 4
     exact: float = 1e-12
 
 
@@ -79,7 +100,6 @@ class InsideMesh:
         Whether all that were fitted fit.
     determined : (n,) bool
         These vertices, up to a similarity of all of them; none where entries do not fit.
-    factorisations : int
     """
 
     z: NDArray[np.complex128]
@@ -88,7 +108,6 @@ class InsideMesh:
     entries: NDArray[np.bool_]
     exact: bool
     determined: NDArray[np.bool_]
-    factorisations: int
 
 
 def fit_inside(
@@ -116,78 +135,158 @@ def fit_inside(
     options : InsideOptions, optional
     """
     options = options or InsideOptions()
-    start = rim = Rim.of(piece, given)
+    rim = Rim.of(piece, given)
     if not rim.whole.any():
         return None
-    core, work = None, 0
     unit = float(np.median(np.abs(weights[rim.whole]))) * (1 if weights[rim.whole].sum() > 0 else -1)
-    shared = np.zeros_like(given) if shared is None else shared & ~given
-    halved = np.where(shared, weights / 2, weights) / unit
-    likely = (halved > 0) & (halved < options.steepest)  # others have terms of another kind
-    problem = WholeEntries(piece, halved, given | (shared & likely), None if scale is None else scale / unit)
+    guess, likely = _guessed(piece, weights / unit, given, shared, options)
+    problem = WholeEntries(piece, guess, given | likely, None if scale is None else scale / unit)
     try:
-        for fading, conformal in ((options.fading, True), (options.slowly, False)):
-            first = _start(problem, start, fading[0], options, conformal=conformal)
-            if first is None:
-                continue
-            core, rim, done = _shrunk(problem, start, first, fading[1:], options)
-            work += done
-            if core.misfit <= options.exact:
-                break
+        core = _core(problem, rim, options)
         if core is None:
             return None
-        whole = rim.whole
-        exact = core.misfit <= options.exact
-        fit = core
-        if exact:
-            grown = Rim(piece, given, np.ones(len(piece.triangles), dtype=bool))
-            for _ in range(options.grown):
-                quick = FitOptions(last_steps=options.quick)
-                tried = problem.faded(core.z, core.scale, grown.whole, options.regrowing, quick)
-                work += tried.factorisations
-                _log.debug("grown to %d whole entries: misfit %.1e", grown.whole.sum(), tried.misfit)
-                if tried.misfit <= options.exact:
-                    fit, whole = tried, grown.whole
-                    break
-                less = grown.peeled(np.abs(problem.misfits(tried.z, tried.scale)), keep=rim.left)
-                if less is None:
-                    break
-                grown = less
+        exact = core[0].misfit <= options.exact
+        fit, rim = _grown(problem, *core, options) if exact else core
+        z, whole = fit.z, rim.whole
     finally:
         problem.release()
-    known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(whole)
+    known, entries = np.zeros(len(z), dtype=bool), np.zeros_like(whole)
     if exact:
-        known, entries = determined(piece, fit.z, whole, known_scale=scale is not None)
+        known, entries = determined(piece, z, whole, known_scale=scale is not None)
         if entries.sum() <= 2 * known.sum() - (4 if scale is not None else 3):  # nothing that checks them as a whole
             known, entries = np.zeros_like(known), np.zeros_like(entries)
-    return InsideMesh(fit.z, fit.scale * unit, given, entries, exact, known, work)
+    return InsideMesh(z, fit.scale * unit, given, entries, exact, known)
 
 
-def _shrunk(
-    problem: WholeEntries, rim: Rim, fit: Fit, fading: Sequence[float], options: InsideOptions
-) -> tuple[Fit, Rim, int]:
+def _guessed(
+    piece: Piece, weights: NDArray, given: NDArray, shared: NDArray | None, options: InsideOptions
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """(e,) weights, guessed where they are not given, and (e,) where the entry itself has a part in the guess.
+
+    Halves of weights are about those g of one triangle, and g1 g2 + g2 g3 + g3 g1 = c^2 / 4 in each. A guess that is
+    too low makes some map of the rim have no energy, and the conformal map then has a fold there; of two guesses the
+    larger one counts.
+    """
+    shared = np.zeros_like(given) if shared is None else shared & ~given
+    halved = np.where(shared, weights / 2, weights)
+    likely = shared & (halved > 0) & (halved < options.steepest)  # others have terms of another kind
+    c = estimate_scale(piece, np.where(given, weights, options.unknown))
+    corner = piece.facing[:, 0]
+    triangle, place = np.divmod(corner, 3)
+    one, other = (weights[piece.opposite[triangle, (place + turn) % 3]] / 2 for turn in (1, 2))
+    third = (c**2 / 4 - one * other) / np.maximum(one + other, 0.05)
+    third = np.where(piece.inner, options.unknown, np.clip(third, 0.0, 2.0))
+    guess = np.maximum(third, np.where(likely, halved, options.unknown))
+    return np.where(given, weights, guess), likely
+
+
+def _core(problem: WholeEntries, rim: Rim, options: InsideOptions) -> tuple[Fit, Rim] | None:
+    """A fit of all entries that some rim has whole, or else the last one; None where there is no drawing."""
+    found, conformal = None, _conformal(problem)
+    for fading, start in ((options.fading, conformal), (options.slowly, None)):
+        fit = _settled(problem, rim, conformal, options) if start is not None else None
+        if fit is None:
+            first = _start(problem, rim, fading[0], options, start)
+            fit = None if first is None else problem.faded(first.z, first.scale, rim.whole, fading[1:])
+        if fit is None:
+            continue
+        found = _shrunk(problem, rim, fit, options)
+        if found[0].misfit <= options.exact:
+            break
+    return found
+
+
+def _settled(problem: WholeEntries, rim: Rim, z: NDArray, options: InsideOptions) -> Fit | None:
+    """A fit from near, in a large mesh: steps of the rim by itself and of all vertices in turn."""
+    band = distance(problem.piece, rim.opened, options.band) <= options.band
+    if 2 * band.sum() >= len(band) or not _upright(problem.piece, z):
+        return None
+    fit = Fit(z, problem.best_scale(z, rim.whole), np.inf, 0.0)
+    for mu in options.fading[:-1]:
+        z = fit_near(problem, fit.z, fit.scale, rim.whole, band, ((mu, options.settling),))
+        fit = problem.fit(z, fit.scale, rim.whole, mu, options.newton)
+    return fit
+
+
+def _bare(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -> tuple[Fit, Rim] | None:
+    """A fit without the vertices of the rim, which entries hold well; None where few vertices are left, or it fails.
+
+    What is wrong at the rim then bends nothing inside.
+    """
+    bare = rim.bared()
+    if bare.whole.sum() <= options.held * bare.inside.sum():
+        return None
+    found = problem.fit(fit.z, fit.scale, bare.whole, 0.0, options.newton)
+    if found.misfit > options.exact:
+        return None
+    inside = bare.inside
+    _, label = nearest(problem.piece, np.where(inside, np.arange(len(inside)), -1), len(inside))
+    moved = np.where(inside, found.z, fit.z + (found.z - fit.z)[label])  # the rim as the nearest vertex inside
+    return replace(found, z=moved), bare
+
+
+def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -> tuple[Fit, Rim]:
     """Fits with fewer vertices at the rim each, until one has all whole entries."""
-    work = fit.factorisations
-    for turn in range(options.rounds):
-        fit = problem.faded(fit.z, fit.scale, rim.whole, options.again if turn else fading)
-        work += fit.factorisations
-        _log.debug("%d whole entries: misfit %.1e after %d factorisations", rim.whole.sum(), fit.misfit, work)
-        peeled = None if fit.misfit <= options.exact else rim.peeled(np.abs(problem.misfits(fit.z, fit.scale)))
+    for _ in range(options.rounds):
+        _log.debug("%d whole entries: misfit %.1e", rim.whole.sum(), fit.misfit)
+        if fit.misfit <= options.exact:
+            break
+        if bare := _bare(problem, rim, fit, options):
+            return bare
+        misfit = np.abs(problem.misfits(fit.z, fit.scale))
+        peeled = rim.peeled(misfit, options.peaks * float(misfit[rim.whole].max(initial=0.0)))
         peeled = None if peeled is None else peeled.pruned()
         if peeled is None or not peeled.whole.any():
             break
-        rim = peeled
-    return fit, rim, work
+        rim, fit = peeled, problem.faded(fit.z, fit.scale, peeled.whole, options.again)
+    return fit, rim
 
 
-def _start(problem: WholeEntries, rim: Rim, weight: float, options: InsideOptions, *, conformal: bool) -> Fit | None:
+def _grown(problem: WholeEntries, core: Fit, rim: Rim, options: InsideOptions) -> tuple[Fit, Rim]:
+    """A core that fits, and what fits of the vertices outside of it: first by themselves, then with the core."""
+    piece, z = problem.piece, core.z
+    movable = ~rim.inside
+    folded = np.zeros(piece.n_vertices, dtype=bool)
+    folded[piece.triangles[_areas(piece, z) <= 0]] = True
+    grown = Rim(piece, rim.given, rim.left | ~folded[piece.triangles].any(axis=1))
+    free = movable
+    for _ in range(options.rounds):
+        if not free.any():
+            break
+        z = fit_near(problem, z, core.scale, grown.whole, free, options.growing)
+        misfit = np.abs(problem.misfits(z, core.scale)) / weight_roundings(piece, z)
+        bad = grown.whole & ~(misfit <= options.fits)
+        _log.debug("grown to %d whole entries: %d do not fit", grown.whole.sum(), bad.sum())
+        if not bad.any():
+            break
+        less = grown.peeled(np.where(bad, misfit, 0.0), 0.0, keep=rim.left)
+        if less is None:
+            return core, rim
+        near = np.zeros(piece.n_vertices, dtype=bool)
+        near[piece.edges[bad]] = True
+        grown, free = less, movable & (distance(piece, near, options.grown) <= options.grown)
+    for _ in range(options.regrown):
+        fit = problem.fit(z, core.scale, grown.whole, 0.0, options.newton)
+        if fit.misfit <= options.exact:
+            return fit, grown
+        misfit = np.abs(problem.misfits(fit.z, fit.scale))
+        less = grown.peeled(misfit, options.peaks * float(misfit[grown.whole].max()), keep=rim.left)
+        if less is None:
+            break
+        grown = less
+    return core, rim
+
+
+def _start(
+    problem: WholeEntries, rim: Rim, weight: float, options: InsideOptions, conformal: NDArray | None
+) -> Fit | None:
     """The best first fit from drawings without crossings.
 
     The conformal map of guessed entries is the nearest one, if its ring is not inside out; where it turns triangles
     over, or there are several loops, drawings with one or another of them as the outline are tried.
     """
     piece, whole, best, least = problem.piece, rim.whole, None, np.inf
-    drawings: Iterable[NDArray[np.complex128]] = [_conformal(problem)] if conformal else []
+    drawings: Iterable[NDArray[np.complex128]] = [] if conformal is None else [conformal]
     if piece.n_loops > 1 or not any(map(partial(_upright, piece), drawings)):
         loops = np.argsort(-np.diff(piece.loop_offsets), kind="stable")[: options.outlines]
         drawings = chain(drawings, (tutte(piece, loop) for loop in loops.tolist()))
@@ -207,9 +306,8 @@ def _start(problem: WholeEntries, rim: Rim, weight: float, options: InsideOption
 def _conformal(problem: WholeEntries) -> NDArray[np.complex128]:
     """The conformal map of entries that are whole or guessed, its triangles of mean area 1/2; 0 where there is none."""
     piece = problem.piece
-    weights = np.where(problem.guessed, problem.weights, InsideOptions.unknown)
     try:
-        z = conformal_map(piece, weights, scale=problem.known_scale, sharp=False).z
+        z = conformal_map(piece, problem.weights, scale=problem.known_scale, sharp=False).z
     except (GeometryError, SolverError):
         return np.zeros(piece.n_vertices, dtype=np.complex128)
     area = float(_areas(piece, z).mean())

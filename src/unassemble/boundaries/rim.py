@@ -12,11 +12,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from ..topology import Piece
+from .patch import nearest
 
 
 @dataclass(frozen=True)
@@ -27,14 +26,11 @@ class RimOptions:
     ----------
     row : int
         Vertices of the rim in a row that are looked at together.
-    peaks : float
-        Part of the largest misfit above which there are other places to peel.
     apart, reach : int
         Distances in edges: of such places from each other, and of vertices of the rim from them.
     """
 
     row: int = 4
-    peaks: float = 0.25
     apart: int = 4
     reach: int = 6
 
@@ -109,28 +105,48 @@ class Rim:
                     yield from row
                     break
 
-    def peeled(self, misfit: NDArray, keep: NDArray[np.bool_] | None = None) -> Rim | None:
-        """Without the vertices of the rim that are nearest to the largest misfits (e,); None where there are none.
+    @property
+    def opened(self) -> NDArray[np.bool_]:
+        """(n,) vertices of edges without a whole entry."""
+        opened = np.zeros(self.piece.n_vertices, dtype=bool)
+        opened[self.piece.edges[self._open]] = True
+        return opened
 
-        Triangles marked in `keep`, (m,) bool, stay.
+    @property
+    def inside(self) -> NDArray[np.bool_]:
+        """(n,) vertices of triangles that are left."""
+        inside = np.zeros(self.piece.n_vertices, dtype=bool)
+        inside[self.piece.triangles[self.left]] = True
+        return inside
+
+    def bared(self) -> Rim:
+        """Without all vertices of the rim."""
+        left = self.left & ~self.opened[self.piece.triangles].any(axis=1)
+        return Rim(self.piece, self.given, left).pruned()
+
+    def peeled(self, misfit: NDArray, least: float, keep: NDArray[np.bool_] | None = None) -> Rim | None:
+        """Without the vertices of the rim that are nearest to peaks of misfits (e,); None where there are none.
+
+        Triangles marked in `keep`, (m,) bool, stay. Peaks are larger than `least`, and than all others near.
         """
-        n, edges = self.piece.n_vertices, self.piece.edges
-        opened = np.zeros(n, dtype=bool)
-        opened[edges[self._open]] = True
-        graph = sp.coo_array((np.ones(len(edges), np.int8), edges.T), shape=(n, n)).tocsr()
+        piece, opened = self.piece, self.opened
         rest = np.where(self.whole, misfit, 0.0)
-        least, gone = RimOptions.peaks * rest.max(), np.zeros(n, dtype=bool)
-        for _ in range(max(3, n // 300)):
-            if rest.max() < least or not rest.max():
-                break
-            ends = edges[rest.argmax()]
-            far = csgraph.dijkstra(
-                graph, directed=False, unweighted=True, indices=ends, limit=RimOptions.reach, min_only=True
-            )
-            rest[(far[edges] <= RimOptions.apart).any(axis=1)] = 0
-            near = far[opened]
-            if near.min(initial=np.inf) <= RimOptions.reach:
-                gone |= opened & (far <= near.min())
+        hot = np.zeros(piece.n_vertices)
+        for end in piece.edges.T:
+            np.maximum.at(hot, end, rest)
+        top = hot
+        for _ in range(RimOptions.apart):
+            here, there = top[piece.edges].T
+            top = top.copy()
+            np.maximum.at(top, piece.edges[:, 0], there)
+            np.maximum.at(top, piece.edges[:, 1], here)
+        peak = (hot == top) & (hot > least) & (hot > 0)
+        far, label = nearest(piece, np.where(peak, np.arange(piece.n_vertices), -1), RimOptions.reach)
+        reached = np.flatnonzero(opened & (label >= 0))
+        first = np.full(piece.n_vertices, RimOptions.reach + 1)
+        np.minimum.at(first, label[reached], far[reached])
+        gone = np.zeros(piece.n_vertices, dtype=bool)
+        gone[reached] = far[reached] <= first[label[reached]]
         stay = False if keep is None else keep
         left = self.left & (~gone[self.piece.triangles].any(axis=1) | stay)
         return Rim(self.piece, self.given, left) if (left != self.left).any() else None

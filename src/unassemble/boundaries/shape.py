@@ -28,6 +28,10 @@ class ShapePrior:
         triangle, apex = np.nonzero(unknown[piece.opposite])
         return cls(np.stack([piece.triangles[triangle, (apex + turn) % 3] for turn in (1, 2, 0)]))
 
+    def about(self, vertices: NDArray[np.bool_]) -> ShapePrior:
+        """Of triangles with one of these vertices, (n,) bool."""
+        return ShapePrior(self.corners[:, vertices[self.corners].any(axis=0)])
+
     def _sides(self, z: NDArray) -> NDArray[np.complex128]:
         a, b, c = z[self.corners]
         return np.stack([b - a, c - b, a - c])

@@ -56,7 +56,7 @@ def nodes_options(command: _Command) -> _Command:
     return command
 
 
-def target(matrix: str, word: str | None, option: str | None) -> str:
+def target(matrix: str, word: str | None, option: str | None, suffix: str = ".vtu") -> str:
     """The file that the mesh goes to: as named by a word or an option, or else beside the matrix.
 
     Raises
@@ -69,10 +69,10 @@ def target(matrix: str, word: str | None, option: str | None) -> str:
     named = option if word is None else word
     if named is not None:
         return named
-    beside = Path("mesh.vtu") if matrix == "-" else Path(matrix)
+    beside = Path("mesh" if matrix == "-" else matrix)
     while beside.suffix.lower() in (".gz", *_MATRICES):
         beside = beside.with_suffix("")
-    beside = beside.with_name(beside.name + ".vtu") if matrix != "-" else beside
+    beside = beside.with_name(beside.name + suffix)
     if beside.exists():
         name = click.format_filename(beside)
         raise click.UsageError(f"{name!r} is there already, and was not named: replace it by -o {name}")

@@ -64,12 +64,13 @@ def recover(
 
     MATRIX is Matrix Market (also .gz), scipy's .npz, NumPy's .npy, MATLAB's .mat, or lines of row, column and entry; -
     reads Matrix Market from standard input. Rows count from 0. Without OUT the mesh goes to a .vtu beside MATRIX, if
-    there is none yet.
+    there is none yet; lengths or areas without positions to a .mesh.npz.
     """
+    unnamed = out is None and output is None
     out = target(matrix, out, output)
     options["numbering"] = spelled_numbering(options["numbering"])
     options["refine"] = not options.pop("no_refine")
-    from ..export import check_output
+    from ..export import check_output, without_points
     from ..plot.canvas import check_plot
     from ..progress import StageDisplay
     from ..report import check_report, write_report
@@ -77,6 +78,8 @@ def recover(
     check_files(matrix, {"OUT": (out, check_output), "--report": (report, check_report), "--plot": (plot, check_plot)})
     with StageDisplay(enabled=not quiet) as display:
         recovery = recovered(matrix, report, progress=display, **options)
+        if unnamed and without_points(recovery):
+            out = target(matrix, None, None, ".mesh.npz")
         display("write")
         recovery.save(out)
         if report is not None:

@@ -32,7 +32,7 @@ def as_typed(text: str, commands: Iterable[click.Command]) -> str:
         name, value = match.groups()
         for k, (command, flags) in enumerate(known):
             if name in flags:
-                words = f"{flags[name]} {value.strip(chr(39))}" if value else flags[name]
+                words = f"{flags[name]} {value.strip(chr(39))}" if value not in (None, "True") else flags[name]
                 return words if k == 0 else f"{words} (an option of {command})"
         return match[0]
 

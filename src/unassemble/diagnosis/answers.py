@@ -6,12 +6,12 @@ from dataclasses import replace
 
 from ..errors import GeometryError, NotPlanarError, RecoveryError
 from ..matrix import OperatorMatrix
-from ..recovery import PlanarMesh
+from ..recovery import ConformingMesh, PlanarMesh
 from ..tolerances import CERTIFIED
 from ..words import sentences
 from .kinds import UNKNOWN
 from .mass import mass_matrix
-from .scalar import diagnosed
+from .scalar import diagnosed, where_nothing_fits
 
 
 def explained(error: RecoveryError, matrix: OperatorMatrix, otherwise: str = "") -> RecoveryError:
@@ -30,8 +30,11 @@ def explained(error: RecoveryError, matrix: OperatorMatrix, otherwise: str = "")
         begun = "the graph of the matrix is not planar"
         if found.kind == UNKNOWN:
             said = sentences([begun + (f": {error.why}" if error.why else ""), otherwise or found.advice])
-        else:
+        elif found.unread:
             said = found.sentence(f"{begun}, for this is")
+        else:
+            like = replace(found, advice=where_nothing_fits(found, matrix))
+            said = like.sentence("no mesh that was found has these entries, though the graph is that of")
         return NotPlanarError(said, error.witness, error.why)
     return (
         GeometryError(found.sentence("no planar mesh has these entries: they are those of")) if found.unread else error
@@ -48,9 +51,13 @@ def judged(mesh: PlanarMesh, matrix: OperatorMatrix) -> PlanarMesh:
     """
     if mesh.status != "uncertified" or mesh.backward_error <= CERTIFIED:
         return mesh
-    found = mass_matrix(matrix, planar=False) or diagnosed(matrix, planar=True)
+    linear = not isinstance(mesh, ConformingMesh)
+    found = mass_matrix(matrix, planar=False) or diagnosed(matrix, planar=linear)
     if found.kind in ("mass", "segments"):
         raise GeometryError(found.sentence())
     if not found.unread:
-        return mesh
+        if linear or mesh.chi_square is not None:
+            return mesh
+        advice = where_nothing_fits(found, matrix)
+        return replace(mesh, reason=sentences([mesh.reason, *found.evidence[-1:]]), advice=advice)
     return replace(mesh, reason=sentences([f"the matrix is {found.name}", *found.evidence]), advice=found.advice)

@@ -19,6 +19,12 @@ UNREAD: Mapping[str, str] = {
 }
 """What to do with kinds that :func:`unassemble.recover` refuses; who builds the recovery of one takes its line out."""
 
+KEEP_ALL = "keep all rows and columns, those on the boundary too"
+WITHOUT_MASS = "assemble the stiffness matrix alone, without a mass matrix"
+TERMS = "see which elements and terms it was assembled with"
+CONSTANT = "see whether a coefficient varies from cell to cell: it must be constant"
+"""What to do about terms that are read of linear triangles only, or not at all."""
+
 LENGTHS = "the length of each segment is six times its entry, over the density, with nothing left to solve"
 """What to do with the mass matrix of linear elements on segments, a boundary's for one."""
 
@@ -38,7 +44,7 @@ class Diagnosis:
     evidence : tuple of str
         What speaks for it, the strongest first.
     advice : str
-        What to do next; empty where recovery is.
+        What to do next; empty where recovery is. Of cells that are read: what to do where the entries fit none.
     """
 
     kind: str

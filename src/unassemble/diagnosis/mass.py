@@ -3,7 +3,7 @@
 Scaled to identity blocks at its nodes, a consistent mass matrix has eigenvalues between bounds that depend on the
 element alone, not on the mesh or on densities (Wathen 1987); those of a stiffness matrix come near to zero. And a rigid
 translation feels all masses at once, so that the couplings of most unknowns add up in one vector, where those of
-stiffnesses are against each other.
+stiffnesses are against each other. Those of cubic elements do neither, and are not told.
 
 A. J. Wathen, Realistic eigenvalue bounds for the Galerkin mass matrix, IMA J. Numer. Anal. 7 (1987), 449-457.
 """
@@ -23,13 +23,15 @@ from ..matrix import OperatorMatrix
 from ..nodes.grouping import same_pattern
 from ..nodes.unknowns import nodes_of_pattern
 from ..structures.layouts import SPACE
-from ..tolerances import HARDLY_ANY, LITTLE, NEARLY_ALL, ROUNDED, SUMMED
+from ..tolerances import HARDLY_ANY, LAST_DIGITS, LITTLE, NEARLY_ALL, ROUNDED, SUMMED
 from ..topology import components
 from ..words import count_of
 from .cliques import CELLS, cells_of, often
 from .kinds import LENGTHS, UNREAD, Diagnosis
 
 _SIMPLICES = {1: "segments", 2: "triangles", 3: "tetrahedra"}
+
+_OR_HELD = ", or the stiffness matrix of a body of a few nodes that is held all around, which recovery tells"
 
 
 def refuse_masses(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) -> None:
@@ -59,6 +61,8 @@ def mass_matrix(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) ->
     sign, nothing = np.sign(matrix.diagonal[np.abs(matrix.diagonal).argmax()]), ROUNDED * np.abs(matrix.entries).max()
     if planar and len(matrix.edges) <= 3 * matrix.n and (sign * matrix.entries < -nothing).any():
         return None
+    if not exact and _is_lumped(matrix):
+        return Diagnosis("mass", "a lumped mass matrix", ("all but its diagonal is rounding",), UNREAD["mass"])
     masses = _Masses.of(matrix)
     if masses is None:
         return None
@@ -80,6 +84,12 @@ def mass_matrix(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) ->
         f"its couplings add up in one vector, to a largest eigenvalue of {bounds[1]:.2g}, as under a translation",
     )
     return Diagnosis("mass", f"a consistent mass matrix{masses.unknowns}", (*shown, *masses.without), UNREAD["mass"])
+
+
+def _is_lumped(matrix: OperatorMatrix) -> bool:
+    """Whether nothing but rounding stands beside the diagonal, as where functions are orthogonal (Crouzeix-Raviart)."""
+    root = np.sqrt(np.abs(matrix.diagonal))
+    return bool((np.abs(matrix.entries) <= LAST_DIGITS * root[matrix.edges[:, 0]] * root[matrix.edges[:, 1]]).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +117,7 @@ class _Masses:
         whole.data[np.abs(whole.data) <= nothing] = 0
         whole.eliminate_zeros()
         M = whole[used][:, used]
-        return cls(M, int((~used).sum())) if M.nnz == whole.nnz and M.shape[0] > 2 else None
+        return cls(M, int((~used).sum())) if M.shape[0] < M.nnz == whole.nnz and M.shape[0] > 2 else None
 
     @property
     def without(self) -> tuple[str, ...]:
@@ -146,8 +156,12 @@ class _Masses:
         if not couplings.maximum(0).sum() > LITTLE * abs(couplings).sum():
             return None  # on a graph with two colours, a grid's, the signs of one colour may be turned
         together, all_of_them = _extreme(couplings, "LA"), _extreme(abs(couplings), "LA")
-        # The share of masses is 0.94 and more; that of as much stiffness beside them 0.8.
-        if together is None or all_of_them is None or together < NEARLY_ALL * all_of_them:
+        if together is None or all_of_them is None:
+            return None
+        # The share of masses is 0.94 and more; that of as much stiffness beside them 0.8. Biquadratic and triquadratic
+        # elements have couplings of both signs, and equal weights come to 0.97 of the largest eigenvalue instead.
+        constant = self.M.sum() / self.M.diagonal().sum()
+        if together < NEARLY_ALL * all_of_them and constant < NEARLY_ALL * (1 + together):
             return None
         # Masses of beams have 0.08, of hexahedra 1/8, of quadrilaterals 1/4, of triangles and tetrahedra 1/2.
         least = _extreme(scaled, "SA", _blocks(scaled))
@@ -163,7 +177,10 @@ class _Masses:
         if (cells.nodes, cells.shared) in CELLS and n_parts == 1:
             return f" of {CELLS[cells.nodes, cells.shared][1]}"
         several = n_parts > 1 or often(cells.twins) or nodes_of_pattern(self.M) is not None
-        return " of several unknowns per node" if several else ""
+        if not several:
+            return ""
+        # Stiffnesses of a body that is held all around keep as far from zero while it has a few dozen nodes.
+        return " of several unknowns per node" + (_OR_HELD if self.M.shape[0] < 150 else "")
 
 
 def _blocks(scaled: sp.csr_array) -> sp.csc_array:

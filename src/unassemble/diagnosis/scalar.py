@@ -12,7 +12,7 @@ from ..matrix import OperatorMatrix
 from ..tolerances import MOST, ROUNDED, SMALL, SUMMED
 from ..words import count_of
 from .cliques import CELLS, Cells, cells_of, mostly, often
-from .kinds import PLANAR, UNKNOWN, UNREAD, Diagnosis
+from .kinds import CONSTANT, KEEP_ALL, PLANAR, TERMS, UNKNOWN, UNREAD, WITHOUT_MASS, Diagnosis
 from .mass import mass_matrix
 
 LINEAR = "a stiffness matrix of linear elements on triangles"
@@ -55,6 +55,23 @@ class Sums:
         return cls(zero, alone, alone & (matrix.diagonal != 0), penalised, sign)
 
     @property
+    def rest(self) -> NDArray[np.bool_]:
+        """Rows with a sum that calls for a reason."""
+        return ~(self.alone | self.zero | self.penalised)
+
+    @property
+    def eliminated(self) -> bool:
+        """Whether sums are as next to unknowns that are gone: few, beside others that are zero."""
+        return bool(self.zero.any() and 0 < self.rest.sum() <= MOST * (~self.alone).sum())
+
+    @property
+    def remedy(self) -> str:
+        """What to assemble, so that all rows add up to zero; empty where penalties alone do not."""
+        if self.eliminated:
+            return KEEP_ALL
+        return WITHOUT_MASS if self.rest.any() and (self.zero.any() or self.sign) else ""
+
+    @property
     def evidence(self) -> tuple[str, ...]:
         """What they say of boundary conditions and further terms, the strongest first."""
         used = ~self.alone
@@ -71,11 +88,10 @@ class Sums:
         elif (self.zero | self.penalised)[used].all():
             said.append("all other rows add up to zero")
         elif self.zero.any():
-            rest = used & ~self.zero & ~self.penalised
-            most = rest.sum() > MOST * used.sum()
-            cause = "where a mass matrix or a diagonal was added" if most else "next to unknowns that were eliminated"
-            rows = f"{int(rest.sum()):,} of {int(used.sum()):,} rows do not add up to zero"
-            said.append(f"{rows}, as {cause} (row {_first(rest)})")
+            added = "where a mass matrix or a diagonal was added"
+            cause = "next to unknowns that were eliminated" if self.eliminated else added
+            rows = f"{int(self.rest.sum()):,} of {int(used.sum()):,} rows do not add up to zero"
+            said.append(f"{rows}, as {cause} (row {_first(self.rest)})")
         else:
             one = f"all sums are {'positive' if self.sign > 0 else 'negative'}" if self.sign else "sums have both signs"
             said.append(f"no row adds up to zero, and {one}")
@@ -96,12 +112,10 @@ def diagnosed(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis:
         return mass
     degree = np.bincount(matrix.edges.ravel(), minlength=matrix.n)
     if degree.max() <= 2 and matrix.n >= _SMALL:
-        return _of_kind(
-            "segments", "a stiffness matrix on a line", "no row is coupled to more than two", *sums.evidence
-        )
+        return _of_kind("segments", "a stiffness matrix on a line", "no row is coupled to more than two", sums)
     if _is_graph(matrix, sums):
         equal = "all off-diagonal entries are equal, and on a mesh those of the boundary have one cell and others two"
-        return _of_kind("graph", "the Laplacian of a graph without weights", equal, *sums.evidence)
+        return _of_kind("graph", "the Laplacian of a graph without weights", equal, sums)
     if planar:
         return Diagnosis(PLANAR, LINEAR + further_terms(matrix), sums.evidence)
     if not (sums.zero.any() or sums.sign):  # as of no stiffness matrix, whatever its graph looks like
@@ -121,20 +135,20 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
         doubtful = {"quadrilaterals": cells.often < 1 - MOST, "hexahedra": several and cells.nodes == 8}
         if kind and not doubtful.get(kind):
             shown = f"rows form cliques of {cells.nodes}, neighbours of which share {cells.shared} rows"
-            return _of_kind(kind, f"{operator} of {name}", shown, *sums.evidence)
+            return _of_kind(kind, f"{operator} of {name}", shown, sums)
         if not (often(cells.often) or several) and mostly(cells.in_fours):
             shown = f"{cells.in_fours:.0%} of the coupled pairs of rows lie in a clique of four"
-            return _of_kind("tetrahedra", f"{operator} of linear elements on tetrahedra", shown, *sums.evidence)
+            return _of_kind("tetrahedra", f"{operator} of linear elements on tetrahedra", shown, sums)
         if _has_middles(matrix):
             shown = "most rows have the entries of middles of sides, four times those of the ends and of the other sign"
-            return _of_kind("quadratic", "a stiffness matrix of quadratic elements on triangles", shown, *sums.evidence)
+            return _of_kind("quadratic", "a stiffness matrix of quadratic elements on triangles", shown, sums)
         if not (often(cells.in_fours) or several) and mostly(cells.in_threes) and len(edges) >= 2.5 * matrix.n:
             shown = f"{cells.in_threes:.0%} of the coupled pairs of rows lie in triangles, few in a clique of four"
             name = f"{operator} of linear elements on triangles, on a surface that cannot be laid flat"
-            return _of_kind("surface", name, shown, *sums.evidence)
+            return _of_kind("surface", name, shown, sums)
         if _is_grid(matrix.n, edges, cells):
             shown = "no three rows are coupled to each other, and most rows are coupled to six"
-            return _of_kind("grid in space", "that of a grid in space, a seven-point stencil", shown, *sums.evidence)
+            return _of_kind("grid in space", "that of a grid in space, a seven-point stencil", shown, sums)
     return _unknown(sums)
 
 
@@ -143,13 +157,17 @@ def _unknown(sums: Sums) -> Diagnosis:
         UNKNOWN,
         "no scalar matrix of a kind that is known",
         ("neither its graph nor its sums show one", *sums.evidence),
-        "see which elements and terms it was assembled with",
+        TERMS,
     )
 
 
-def _of_kind(kind: str, name: str, *evidence: str) -> Diagnosis:
-    without = "keep all rows and columns, those on the boundary too" if "eliminated" in evidence[-1] else ""
-    return Diagnosis(kind, name, evidence, UNREAD.get(kind, without))
+def _of_kind(kind: str, name: str, shown: str, sums: Sums) -> Diagnosis:
+    return Diagnosis(kind, name, (shown, *sums.evidence), UNREAD.get(kind, sums.remedy))
+
+
+def where_nothing_fits(found: Diagnosis, matrix: OperatorMatrix) -> str:
+    """What to do about a matrix whose graph is that of cells which are read, while no mesh has its entries."""
+    return found.advice or (TERMS if Sums.of(matrix).rest.any() else CONSTANT)
 
 
 def further_terms(matrix: OperatorMatrix) -> str:

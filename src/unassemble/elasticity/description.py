@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from ..clock import Clock
 from ..nodes.nodal import NodalMatrix, determined
 from ..nodes.numbering import Numbering
+from ..nodes.redrawn import known_to
 from ..nodes.rounded import Rounding
 from ..tolerances import ALIKE
 from .doubts import guessed_directions, unborne, unconfirmed
@@ -27,6 +32,7 @@ def described(
     *,
     cells: bool,
     rounding: Rounding | None,
+    placed_again: Callable[[sp.csr_array], NDArray[np.float64]],
 ) -> ElasticityRecovery:
     """The recovery, with its certificate, material and cells, and the sentences that go with them.
 
@@ -40,6 +46,8 @@ def described(
         Look for elements too.
     rounding : Rounding, optional
         Of the entries, where they have few digits.
+    placed_again : callable
+        Points (n, d) from another matrix that may have been rounded to the given one.
     """
     with clock("certify"):
         error = largest_residual(nodal, solution.valid, solution.points, solution.ratio)
@@ -50,11 +58,15 @@ def described(
         with clock("cells"):
             found = recognise_cells(nodal, solution.points, ratio)
     if solution.cautious is not None and not found.certified:
-        return described(nodal, numbering, solution.cautious, clock, cells=cells, rounding=rounding)
+        return described(
+            nodal, numbering, solution.cautious, clock, cells=cells, rounding=rounding, placed_again=placed_again
+        )
     backward = found.backward_error if found.certified else error
     status, reason = verdict(nodal, solution, error, found, numbering)
     if rounding and near and not any(solution.freedoms):
-        status, reason = of_few_digits(nodal, solution, error, numbering, rounding)
+        with clock("certify"):
+            doubt = known_to(solution.points, solution.component, rounding, placed_again, sized=False)
+        status, reason = of_few_digits(nodal, solution, error, numbering, rounding, doubt)
     elif rounding:
         reason = hidden(reason, rounding)
     withheld = np.zeros(nodal.n, dtype=bool)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from ..clock import Clock
 from ..errors import GeometryError, RecoveryError
@@ -87,4 +89,10 @@ def place_nodes(
         why = about_made_up_nodes(nodal, numbering, solution, rounding) if numbering.inferred else ""
         if why:
             raise GeometryError(no_positions(why))
-    return described(nodal, numbering, solution, clock, cells=cells, rounding=rounding)
+
+    def placed_again(matrix: sp.csr_array) -> NDArray[np.float64]:
+        other = with_doubts(without_springs(nodal_matrix(matrix, numbering)), numbering)
+        with blas_threads(1):
+            return solve(other, patch).points
+
+    return described(nodal, numbering, solution, clock, cells=cells, rounding=rounding, placed_again=placed_again)

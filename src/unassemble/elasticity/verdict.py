@@ -12,7 +12,7 @@ from ..nodes.nodal import NodalMatrix, without_trace
 from ..nodes.numbering import Numbering
 from ..nodes.rounded import Rounding
 from ..nodes.shape import SOFT
-from ..tolerances import ALIKE, CERTIFIED, SIGMAS
+from ..tolerances import ALIKE, CERTIFIED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, sentences
 from .materials.cells import Cells
 from .nullspace.solution import Solution
@@ -65,19 +65,14 @@ def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solu
 
 
 def of_few_digits(
-    nodal: NodalMatrix, solution: Solution, error: float, numbering: Numbering, rounding: Rounding
+    nodal: NodalMatrix, solution: Solution, error: float, numbering: Numbering, rounding: Rounding, doubt: float
 ) -> tuple[str, Reason]:
-    """Status and reason where the entries are rounded, which is an error bar.
-
-    Rounding moves the null vector by what it adds to the equations over the singular value of the next field; the
-    residual that is left shows how much that is, but for the few parts in which the null vector could follow.
-    """
+    """Status and reason where the entries are rounded, which is an error bar: the `doubt` about positions."""
     objection = _to_positions(nodal, solution, numbering, exact=False) or _to_identities(nodal, solution, numbering)
     if objection.text:
         return "uncertified", hidden(objection, rounding)
     if np.isnan(error):
         return "uncertified", NOTHING_LEFT
-    doubt = SIGMAS * max(one.residual / one.gap if one.gap > 0 else np.inf for one in solution.evidence)
     holds = f"the entries are rounded to {rounding.name}, and the identities hold to {error:.1e}"
     if not error <= max(rounding.spread, CERTIFIED):
         return "uncertified", Reason(

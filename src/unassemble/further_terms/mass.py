@@ -25,8 +25,6 @@ from ..words import sentences
 from .again import Held, Plain, areas_of
 from .row_sums import RowSums
 
-_TURNS = 12
-"""Other starts of the fit of edge lengths: one for each hole of three edges, six on meshes graded over eight orders."""
 _NO_SHAPE = "a mass matrix has no shape: it depends on the areas of the triangles alone, and any that have them will do"
 _OTHER = (
     "that no other areas, with another c, fit as well is not proved: the fit of edge lengths was started once, and at "
@@ -94,7 +92,7 @@ def with_consistent_mass(
 def _fit(skeleton: Skeleton, entries: NDArray, sums: RowSums) -> MetricFit | None:
     """The metric; where the fit ends elsewhere, anew without a hole of three edges or from an embedding."""
     fit = fit_metric(skeleton, entries, sums.positive(), sums.trust())
-    for _ in range(_TURNS):
+    for _ in range(12):
         if fit is None or fit.residual < ROUNDED:
             break
         better = (new for new in _other_starts(fit, entries, sums) if new.residual < NEARLY_ALL * fit.residual)

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import guessed
-from ..diagnosis import PLANAR, Diagnosis, diagnosed, further_terms, mass_matrix
+from ..diagnosis import PLANAR, UNKNOWN, Diagnosis, diagnosed, further_terms, mass_matrix
 from ..errors import NotPlanarError, RecoveryError
 from ..matrix import OperatorMatrix, load
-from ..operators import VectorReading, second_reading, vector_valued
+from ..operators import VectorReading, about_translations, second_reading, vector_valued
 from ..quiet import quiet_libraries
+from ..tolerances import MOST
 from ..topology import Topology, components, located, require_planar, surfaces
 from ..words import count_of
 from .facts import element_facts, matrix_facts, mesh_facts, nodes_facts, surface_facts
@@ -161,7 +162,7 @@ class Inspection:
         """What :func:`unassemble.recover` may make of the matrix; only that tells whether its entries are a mesh's."""
         if self.structure:
             size = "up to position and size" if self.structure == "truss" else "in true size, up to position"
-            return f"coordinates of {count_of(self.n_nodes, 'node')} {size}; members and cells"
+            return f"coordinates of {count_of(self.n_nodes, 'node')} {size}, members and cells, {_IF}"
         if self.n_nodes and self.coupled:
             return (
                 f"coordinates of {count_of(self.n_nodes, 'node')} in {self.block_size}D, up to position and size, "
@@ -170,11 +171,11 @@ class Inspection:
         if self.n_nodes:
             return "what each direction's scalar matrix holds"
         if self.surface:
-            return f"lengths of {count_of(self.n_edges, 'edge')} up to size; {_IF}"
+            return f"lengths of {count_of(self.n_edges, 'edge')} up to size, {_IF}{self._or_else}"
         if self.element:
             return (
                 f"{mesh_text(self)} on {self.n_rows - self.n_isolated:,} points, up to position, rotation, size and "
-                f"mirror image, {_IF}"
+                f"mirror image, {_IF}{self._or_else}"
             )
         if self.kind == "mass" and not self.advice:
             return f"areas of {mesh_text(self)}, up to the density, and no positions: a mass matrix has no shape"
@@ -187,6 +188,10 @@ class Inspection:
             return f"{mesh}, but no positions that could be certified: look at row {self.mixed_signs[0]}"
         each = f", each of the {self.n_pieces:,} pieces by itself" if self.n_pieces > 1 else ""
         return f"{mesh}, up to position, rotation, size and mirror image{each}, {_IF}"
+
+    @property
+    def _or_else(self) -> str:
+        return f" (where they do not, {self.advice})" if self.advice else ""
 
     def to_dict(self) -> dict[str, Any]:
         """All attributes, ready for JSON."""
@@ -254,10 +259,12 @@ def _inspected(matrix: OperatorMatrix) -> Inspection:
             if vector is not None:
                 return _vector_valued(matrix, facts, vector)
             facts |= _diagnosis(matrix, planar=planar)
+            if not planar and facts["kind"] == UNKNOWN:  # as recovery says it
+                facts["advice"] = about_translations(matrix) or facts["advice"]
             witness = getattr(error, "witness", ())
             return Inspection(**facts, planar=planar, obstacle=str(error or _NO_CELLS), witness=witness)
     found = mesh_facts(read, topology)
-    if found["mixed_signs"]:  # other readings, as in recovery where no mesh fits
+    if found["mixed_signs"] or found["n_undetermined"] > MOST * matrix.n:  # as in recovery where no mesh fits
         if (mass := mass_matrix(matrix, planar=False)) is not None:
             return _masses(facts, mass)
         if (vector := second_reading(matrix)) is not None:

@@ -45,7 +45,7 @@ _MESHES = (
 )
 # Two row and column numbers and an entry, after comments at most.
 _TRIPLET = re.compile(
-    rb"\s*(?:[%#][^\n]*\n\s*)*[+]?\d+(?:\.0*)?(?:[eE][+]?\d+)?[ \t,;]+[+]?\d+(?:\.0*)?(?:[eE][+]?\d+)?[ \t,;]+"
+    rb"\s*(?:[%#][^\n]*\n\s*)*[+]?\d+(?:\.\d*)?(?:[eE][+]?\d+)?[ \t,;]+[+]?\d+(?:\.\d*)?(?:[eE][+]?\d+)?[ \t,;]+"
     rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?[ \t]*\r?(?:\n|$)"
 )
 _HDF5 = b"\x89HDF\r\n\x1a\n"

@@ -7,8 +7,9 @@ row that a support touched stands out as clearly as in a matrix of full precisio
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 import scipy.sparse as sp
@@ -22,7 +23,7 @@ from .searching import directions_in_order, live_part
 _LAYOUTS = {3: (3, 2, 1), 2: (2,), 6: (3,), 4: (2,)}  # unknowns of a node, and how many of these may be displacements
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rounding:
     """What the entries of a matrix were rounded to.
 
@@ -32,23 +33,45 @@ class Rounding:
         Digits, decimals or single precision; see :class:`~unassemble.matrix.digits.Digits`.
     level : float
         How far entries may be off, relative to their size, as half of the rows have it.
+    exact : (N, N) sparse
+        The matrix, with exact sums.
+    unit : (N, N) sparse
+        Of the last place of each entry.
+    direction : (N,) int64
+        Of each row; -1 where not known.
+    zero : (N, b) bool
+        Rows and directions that add up to zero, but for rounding.
     """
 
     name: str
     level: float
+    exact: sp.csr_array
+    unit: sp.csr_array
+    direction: NDArray[np.int64]
+    zero: NDArray[np.bool_]
 
     @property
     def spread(self) -> float:
         """What an identity, or a sum of forces, may be off by, relative to what makes it up."""
         return SIGMAS * self.level
 
+    def redrawn(self, seed: int) -> sp.csr_array:
+        """The matrix off by what rounding may have done to each entry, with exact sums again."""
+        upper = sp.triu(self.unit, format="csr")
+        upper.data *= np.random.default_rng(seed).uniform(-0.5, 0.5, upper.nnz)
+        return _without_sums(sp.csr_array(self.exact + upper + sp.triu(upper, 1).T), self.direction, self.zero)
 
-def with_exact_sums(matrix: sp.csr_array) -> tuple[sp.csr_array, Rounding | None]:
+
+def with_exact_sums(
+    matrix: sp.csr_array, candidates: Iterable[tuple[NDArray[np.int64], int]] = ()
+) -> tuple[sp.csr_array, Rounding | None]:
     """Take the rounding out of rows that annihilate translations, if unknowns stand in one of the usual orders.
 
     Parameters
     ----------
     matrix : (N, N) sparse
+    candidates : iterable of ((N,) int64, int)
+        Further directions of rows to try, -1 where not known, and how many there are.
 
     Returns
     -------
@@ -60,22 +83,23 @@ def with_exact_sums(matrix: sp.csr_array) -> tuple[sp.csr_array, Rounding | None
     digits = Digits.of(matrix.data)
     if digits is None:
         return matrix, None
-    error = sp.csr_array((digits.unit / 2, matrix.indices, matrix.indptr), shape=matrix.shape)
-    size = abs(matrix)
+    unit = sp.csr_array((digits.unit, matrix.indices, matrix.indptr), shape=matrix.shape)
+    size, error = abs(matrix), unit / 2
     total, of_row = (np.asarray(part.sum(axis=1)).ravel() for part in (size, error))
     off = of_row / np.where(total > 0, total, np.inf)
-    rounding = Rounding(digits.name, float(np.median(off)))
-    best, most = None, HARDLY_ANY
-    for direction, b in _readings(matrix, np.maximum(off, CANCELLED)):
+    best, most, excess = None, HARDLY_ANY, 0.0
+    for direction, b in chain(_readings(matrix, np.maximum(off, CANCELLED)), candidates):
         labels = (direction[:, None] == np.arange(b)).astype(float)
         sums, sizes = matrix @ labels, size @ labels
         zero = (np.abs(sums) <= error @ labels + LAST_DIGITS * total[:, None]) & (sizes > LAST_DIGITS * total[:, None])
         share = max(float(zero[:, :moves].all(axis=1).mean()) for moves in _LAYOUTS[b])
         if share > most:
-            best, most = (direction, np.where(zero, sums, 0.0)), share
-    if best is None or np.abs(best[1]).max() <= LAST_DIGITS * size.max():  # dyadic numbers are exact, few digits or not
+            best, most = (direction, zero), share
+            excess = float((np.abs(np.where(zero, sums, 0.0)) / np.where(total > 0, total, 1)[:, None]).max())
+    if best is None or excess <= LAST_DIGITS:  # dyadic numbers are exact, few digits or not
         return matrix, None
-    return _without(matrix, *best), rounding
+    exact = _without_sums(matrix, *best)
+    return exact, Rounding(digits.name, float(np.median(off)), exact, unit, *best)
 
 
 def _readings(matrix: sp.csr_array, off: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.int64], int]]:
@@ -96,10 +120,11 @@ def _readings(matrix: sp.csr_array, off: NDArray[np.float64]) -> Iterator[tuple[
             yield direction, d
 
 
-def _without(matrix: sp.csr_array, direction: NDArray[np.int64], excess: NDArray[np.float64]) -> sp.csr_array:
-    """The matrix after sums (N, b) of rows and directions were taken off the largest entry of each."""
+def _without_sums(matrix: sp.csr_array, direction: NDArray[np.int64], zero: NDArray[np.bool_]) -> sp.csr_array:
+    """The matrix after sums that make up zero were taken off the largest entry of each row and direction."""
     entry = matrix.tocoo(copy=True)
-    b = excess.shape[1]
+    b = zero.shape[1]
+    excess = np.where(zero, matrix @ (direction[:, None] == np.arange(b)).astype(float), 0.0)
     key = entry.row * (b + 1) + direction[entry.col]
     order = np.lexsort((np.abs(entry.data), key))
     last = order[np.append(np.diff(key[order]) > 0, True)]

@@ -19,8 +19,6 @@ from numpy.typing import NDArray
 from ..topology import Piece
 from ..topology.together import Together
 
-_ROUNDS = 30  # of neighbours that a triangle holds up
-
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
@@ -126,7 +124,7 @@ class Metric:
         Edges of such triangles change by as much less, but no others: one flat triangle holds up its neighbours only.
         """
         share = np.ones(len(change))
-        for _ in range(_ROUNDS):
+        for _ in range(30):  # of neighbours that a triangle holds up
             part = np.minimum(1.0, nearly * self._farthest(share * change))
             if part.min(initial=1.0) == 1:
                 return share * change

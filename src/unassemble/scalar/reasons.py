@@ -25,7 +25,7 @@ _ROWS = 6  # at most, named as those that hold nearly all of a misfit
 _MANY = 50  # entries, of which it can be said what their misfit looks like
 
 _CHECK_MODEL = "see what `inspect_matrix` says the matrix is: a wrong model leaves a misfit everywhere"
-_ONE_COEFFICIENT = "see whether a coefficient varies, the surface is curved or it is a network: all rows add up to zero"
+_ONE_COEFFICIENT = "see whether a coefficient varies from cell to cell, the surface is curved or it is a network"
 _KEEP_ROWS = "keep the rows and columns of all unknowns, those on the boundary too: some rows do not add up to zero"
 _GIVE_NOISE = "if the entries are measured, give the standard deviation of their errors as `noise`"
 
@@ -66,7 +66,7 @@ def misfit(f: Findings, notes: Sequence[str]) -> Reason:
         return Reason.of(
             differs,
             "all rows add up to zero, which errors of single entries would not leave",
-            advice="see whether a coefficient varies from cell to cell: it must be constant",
+            advice=_ONE_COEFFICIENT,
         )
     if remark:
         return Reason.of(remark, differs, *notes, advice=_GIVE_NOISE)

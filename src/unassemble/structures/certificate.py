@@ -72,4 +72,6 @@ def members_misfits(
     """
     some = determined(points)[members.ends].all(axis=1)
     ends = members.ends[some]
+    if not len(ends):
+        return ends, np.empty(0)
     return ends, misfits(members.blocks[some], points[ends[:, 0]] - points[ends[:, 1]], layout)

@@ -7,21 +7,23 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from ..clock import Clock
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..nodes.anchoring import anchored, checked_anchors, digits_lost, near_enough
+from ..nodes.redrawn import known_to
 from ..nodes.rounded import Rounding, with_exact_sums
 from ..recovery import Structure
-from ..tolerances import ALIKE, CERTIFIED
+from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SUMMED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
 from .certificate import forces, members_misfits
 from .members import members_and_cells, mispaired
 from .nodes import Nodes, nodes_of
 from .placed import Placed, covered
 from .recognise import StructuralNumbering
-from .straight import straight_members
+from .straight import Straight, straight_members
 from .turning import turning_positions
 
 
@@ -58,20 +60,33 @@ def serve_structure(
     layout = numbering.layout
     node, direction = numbering.node_of_row, numbering.direction_of_row
     known = checked_anchors(anchors, node, layout.space)
-    whole, rounding = with_exact_sums(matrix.csr())
-    nodes = nodes_of(whole, layout, node, direction)
-    with clock("solve"), blas_threads(1):
-        members = straight_members(nodes)
-        found, valid = turning_positions(nodes, members)
+    whole, rounding = with_exact_sums(matrix.csr(), [(direction, layout.block_size)])
+    spread = rounding.spread if rounding else 0.0
+    with clock("solve"):
+        nodes, members, found, valid = _placed(whole, numbering, rounding)
     with clock("certify"):
-        counted = np.zeros((len(node), len(layout.rotations)), dtype=bool)
+        counted = np.zeros((len(node), len(layout.turning)), dtype=bool)
         counted[nodes.row_of[nodes.present]] = valid[nodes.present]
         force, used = forces(whole, layout, node, direction, found.points, counted)
         ends, misfit = members_misfits(members, layout, found.points)
         used |= np.isin(node, ends)
         error = float(np.concatenate([force, misfit]).max()) if used.any() else float("inf")
-        status, reason = _verdict(error, found, rounding, len(misfit))
-        pair = mispaired(nodes, found.points) if status == "certified" and numbering.kind != "given" else None
+        doubt = _doubt(error, found, numbering, rounding)
+        status, reason = _verdict(
+            error,
+            max(CERTIFIED, spread),
+            doubt,
+            found,
+            len(misfit),
+            rounding.name if rounding else "",
+            sized=bool(layout.rotations),
+        )
+        inner: NDArray[np.bool_] = np.asarray(valid[:, : len(layout.displacements)].all(axis=(1, 2)))
+        pair = (
+            mispaired(nodes, found.points, inner, max(CANCELLED, spread))
+            if status == "certified" and numbering.kind != "given"
+            else None
+        )
     if pair is not None:
         first, second = (np.flatnonzero(node == one)[0] for one in pair)
         status = "uncertified"
@@ -84,12 +99,15 @@ def serve_structure(
         reason = Reason(f"{reason.text}: {covered(used, abs(whole[used]).sum(axis=0) > 0)}")
     notes = list(found.notes)
     placed = np.pad(found.points, ((0, 0), (0, layout.space - layout.dim)))
+    points, factor, more = anchored(placed, found.component, len(found.evidence), known, sized=bool(layout.rotations))
     fields: dict[str, Any] = {}
+    if np.isnan(factor).any():
+        notes.append("size and sign are free: nodes have no rotations, from which angles would tell lengths")
     if cells and error < ALIKE:
         with clock("members"):
-            fields = members_and_cells(nodes, placed)
+            fields = members_and_cells(nodes, placed, max(CANCELLED, spread))
         notes.append("members and cells were read off the graph: what is certified is the coordinates")
-    if not valid[:, len(layout.displacements) :].any():
+    if layout.rotations and not valid[:, len(layout.displacements) :].any():
         notes.append("moments are not used alone: springs between rotations and the ground, as against drilling, would "
                      "spoil them")  # fmt: skip
     untold = np.unique(node[direction < 0])
@@ -99,7 +117,6 @@ def serve_structure(
     if (found.component < 0).any():
         notes.append(f"{(found.component < 0).sum()} of {count_of(nodes.n, 'node')} cannot be determined: at supports, "
                      "or tied to these only")  # fmt: skip
-    points, factor, more = anchored(placed, found.component, len(found.evidence), known, sized=True)
     lost = digits_lost(points, placed, found.component, factor) / _edge_length(nodes, found)
     status, reason = near_enough(status, reason, lost)
     return Structure(
@@ -125,23 +142,40 @@ def _edge_length(nodes: Nodes, found: Placed) -> float:
     return float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
 
 
-def _verdict(error: float, found: Placed, rounding: Rounding | None, members: int) -> tuple[str, Reason]:
-    d = found.points.shape[1]
-    if found.null_dimension > d:
-        return "uncertified", Reason(
-            f"the null space has dimension {found.null_dimension} where {d} translations are expected: supports leave "
-            "too few whole rows",
-            WITHOUT_SUPPORTS,
+def _doubt(error: float, found: Placed, numbering: StructuralNumbering, rounding: Rounding | None) -> float:
+    """How far positions may be off, relative to the size; without rounding if each equation were off by as much."""
+    if rounding is not None:
+        return known_to(
+            found.points,
+            found.component,
+            rounding,
+            lambda other: _placed(other, numbering, rounding)[2].points,
+            sized=bool(numbering.layout.rotations),
         )
     loosest = min(found.evidence, key=lambda one: one.gap / np.sqrt(one.rows))
-    allowed = max(CERTIFIED, rounding.spread) if rounding else CERTIFIED
-    off = max(error, rounding.spread) if rounding else error
-    doubt = off * np.sqrt(loosest.rows) / loosest.gap  # each equation may be off by as much
+    return float(error * np.sqrt(loosest.rows) / loosest.gap)
+
+
+def _placed(
+    matrix: sp.csr_array, numbering: StructuralNumbering, rounding: Rounding | None
+) -> tuple[Nodes, Straight, Placed, NDArray[np.bool_]]:
+    """Nodes, straight members, positions, and on which rows and rotations these rest."""
+    spread, level = (rounding.spread, rounding.level) if rounding else (0.0, 0.0)
+    nodes = nodes_of(matrix, numbering.layout, numbering.node_of_row, numbering.direction_of_row)
+    with blas_threads(1):
+        members = straight_members(nodes, max(SUMMED, level))
+        return nodes, members, *turning_positions(nodes, members, max(CERTIFIED, spread))
+
+
+def _verdict(
+    error: float, allowed: float, doubt: float, found: Placed, members: int, digits: str, *, sized: bool
+) -> tuple[str, Reason]:
     if not error <= allowed or doubt > ALIKE:
-        digits = f" of entries rounded to {rounding.name}" if rounding else ""
+        gap = min(one.gap for one in found.evidence)
+        of = f" of entries rounded to {digits}" if digits else ""
         return "uncertified", Reason(
-            f"rigid rotations of the nodes cause forces of {error:.1e} of those{digits} that make them up, and another "
-            f"field, no translation, only {loosest.gap:.1e}: positions may be off by {doubt:.0e} of the size"
+            f"rigid rotations of the nodes cause forces of {error:.1e} of those{of} that make them up, and another "
+            f"field, no translation, only {gap:.1e}: positions may be off by {doubt:.0e} of the size"
         )
     if found.unnoticed.any():
         count = count_of(int(np.count_nonzero(found.unnoticed)), "equation has", "equations have")
@@ -150,11 +184,10 @@ def _verdict(error: float, found: Placed, rounding: Rounding | None, members: in
             WITHOUT_SUPPORTS,
         )
     blocks = f", {count_of(members, 'block is that', 'blocks are those')} of straight members" if members else ""
-    if rounding:
+    if digits:
         return "certified", Reason(
-            f"rigid rotations of the nodes cause no more forces than entries rounded to {rounding.name} leave{blocks}, "
+            f"rigid rotations of the nodes cause no more forces than entries rounded to {digits} leave{blocks}, "
             f"so that positions are known to {doubt:.0e} of the size"
         )
-    return "certified", Reason(
-        f"rigid rotations of the nodes cause no forces{blocks}, and only translations change nothing"
-    )
+    nothing = "translations change" if sized else "translations and a change of size change"
+    return "certified", Reason(f"rigid rotations of the nodes cause no forces{blocks}, and only {nothing} nothing")

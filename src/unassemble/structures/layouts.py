@@ -20,7 +20,7 @@ class Layout:
     displacements : tuple of int
         Axis of each displacement; direction k of a node is ``displacements[k]``.
     rotations : tuple of int
-        Axes of the rotations, which follow the displacements.
+        Axes of the rotations, which follow the displacements; none where nodes have displacements only.
     """
 
     name: str
@@ -37,6 +37,16 @@ class Layout:
     def block_size(self) -> int:
         """Unknowns per node."""
         return len(self.displacements) + len(self.rotations)
+
+    @property
+    def turning(self) -> tuple[int, ...]:
+        """Axes of the rigid rotations that nodes follow."""
+        return self.rotations or (0, 1, 2)
+
+    @property
+    def free(self) -> int:
+        """Fields of coordinates that no matrix determines: translations and, without rotations, the size."""
+        return self.dim + (not self.rotations)
 
     @property
     def space(self) -> int:
@@ -67,9 +77,9 @@ class Layout:
     def rigid_motions(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n, block size, motions) translations, then rotations about the origin, of nodes at `points` (n, dim)."""
         moves = len(self.displacements)
-        motions = np.zeros((len(points), self.block_size, self.block_size))
+        motions = np.zeros((len(points), self.block_size, moves + len(self.turning)))
         motions[:, range(self.block_size), range(self.block_size)] = 1
-        for k, axis in enumerate(self.rotations, start=moves):
+        for k, axis in enumerate(self.turning, start=moves):
             for direction, coordinate, sign in self.turned(axis):
                 motions[:, direction, k] = sign * points[:, coordinate]
         return motions
@@ -79,6 +89,7 @@ SPACE = Layout("frame or shell", 3, (0, 1, 2), (0, 1, 2))
 PLANE = Layout("plane frame", 2, (0, 1), (2,))
 PLATE = Layout("plate", 2, (2,), (0, 1))
 BEAM = Layout("beam", 1, (1, 2), (1, 2))  # straight along x, bending in two planes that do not know of each other
+PINNED = Layout("structure", 3, (0, 1, 2), ())  # bars, membranes and solids, of any material, in one
 LAYOUTS = (SPACE, PLANE, PLATE, BEAM)
 
 

@@ -17,8 +17,10 @@ from ..tolerances import CANCELLED
 from .layouts import PLANE
 from .nodes import Nodes
 
+MOST_PER_NODE = 4  # triangles of surfaces, of which two are a quadrilateral: by Euler two a node, more where they meet
 
-def members_and_cells(nodes: Nodes, points: NDArray[np.float64]) -> dict[str, NDArray[np.int64]]:
+
+def members_and_cells(nodes: Nodes, points: NDArray[np.float64], allowed: float) -> dict[str, NDArray[np.int64]]:
     """Straight members between two nodes, and triangles and quadrilaterals between more.
 
     Cells are cliques of pairs that are no members; a pair of which none is part of a cell is a member too.
@@ -28,6 +30,8 @@ def members_and_cells(nodes: Nodes, points: NDArray[np.float64]) -> dict[str, ND
     nodes : Nodes
     points : (n, d) float64
         NaN where not determined.
+    allowed : float
+        What is left of forces that balance, relative to them.
 
     Returns
     -------
@@ -37,13 +41,18 @@ def members_and_cells(nodes: Nodes, points: NDArray[np.float64]) -> dict[str, ND
     """
     pairs = np.column_stack(sp.triu(nodes.graph, 1).nonzero()).astype(np.int64)
     pairs = pairs[determined(points)[pairs].all(axis=1)]
-    alone = np.logical_and(*_balanced(nodes, points, *pairs.T))
+    alone = np.logical_and(*_balanced(nodes, points, pairs[:, 0], pairs[:, 1], allowed))
     triangles, quads = shell_cells(graph_of(nodes.n, pairs[~alone]), points)
+    if len(triangles) + 2 * len(quads) > MOST_PER_NODE * nodes.n:  # faces of solids, and planes through them
+        triangles, quads = triangles[:0], quads[:0]
+        return {"lines": pairs[alone], "triangles": triangles, "quads": quads}
     alone |= ~graph_of(nodes.n, triangles, quads).coupled(*pairs.T)
     return {"lines": pairs[alone], "triangles": triangles, "quads": quads}
 
 
-def mispaired(nodes: Nodes, points: NDArray[np.float64]) -> tuple[int, int] | None:
+def mispaired(
+    nodes: Nodes, points: NDArray[np.float64], inner: NDArray[np.bool_], allowed: float
+) -> tuple[int, int] | None:
     """Two nodes that are not coupled as elements couple them, if there are any.
 
     The equations for coordinates add up the columns of each direction, and so hardly tell which row of one direction
@@ -51,13 +60,17 @@ def mispaired(nodes: Nodes, points: NDArray[np.float64]) -> tuple[int, int] | No
     directions or in none. In space each coordinate acts on two directions, which contradict each other where their rows
     are not one node's; the coordinates of a plate act on one direction. Those of a plane frame have a direction each,
     so that all depends on the pairing: its nodes have to be joined by members, and no two of them to have the same
-    neighbours.
+    neighbours. What was condensed joins the nodes next to it otherwise; these need a member to another node.
 
     Parameters
     ----------
     nodes : Nodes
     points : (n, dim) float64
         NaN where not determined.
+    inner : (n,) bool
+        Nodes whose forces are not touched by supports, or by what was condensed.
+    allowed : float
+        What is left of forces that balance, relative to them.
     """
     n, b = nodes.n, nodes.layout.block_size
     coo, size = nodes.matrix.tocoo(), np.minimum(np.abs(nodes.matrix.diagonal()), row_sizes(nodes.matrix))
@@ -66,13 +79,20 @@ def mispaired(nodes: Nodes, points: NDArray[np.float64]) -> tuple[int, int] | No
     near, meeting = _counts(i, j, n), _counts(i[one == other], j[one == other], n)
     first, second = sp.triu(near, 1).nonzero()
     shared = (nodes.present[first] & nodes.present[second]).sum(axis=1)
+    known = determined(points)
     strange = np.asarray(meeting[first, second]).ravel() < np.minimum(shared, 2)
+    if not nodes.layout.rotations:  # bars along an axis have one direction
+        strange &= ~_balanced(nodes, points, first, second, allowed)[0]
     if nodes.layout == PLANE:
         pattern = (near > 0).astype(np.int32)
         degree, common = np.diff(near.indptr), np.asarray((pattern @ pattern)[first, second]).ravel()
         twins = (common == degree[first]) & (common == degree[second])
-        balanced, whole = _balanced(nodes, points, first, second)
-        strange |= twins | (whole & ~balanced)
+        balanced, whole = _balanced(nodes, points, first, second, allowed)
+        joined = np.zeros(n, dtype=bool)
+        joined[first[whole & balanced]] = joined[second[whole & balanced]] = True
+        excused = ~inner[first] & ~inner[second] & joined[first] & joined[second]
+        strange |= twins | (whole & ~balanced & ~excused)
+    strange &= known[first] | known[second]
     k = int(np.argmax(strange)) if strange.any() else None
     return None if k is None else (int(first[k]), int(second[k]))
 
@@ -81,7 +101,7 @@ def _counts(i: NDArray, j: NDArray, n: int) -> sp.csr_array:
     return sp.csr_array((np.ones(len(i), np.int32), (i, j)), shape=(n, n))
 
 
-def _balanced(nodes: Nodes, points: NDArray, i: NDArray, j: NDArray) -> tuple[NDArray, NDArray]:
+def _balanced(nodes: Nodes, points: NDArray, i: NDArray, j: NDArray, allowed: float) -> tuple[NDArray, NDArray]:
     """Pairs whose block is a member's, whatever its section; and those that are known as a whole.
 
     Forces at both ends balance for every motion of one of them: with T the motion of node i that goes with one of node
@@ -94,7 +114,8 @@ def _balanced(nodes: Nodes, points: NDArray, i: NDArray, j: NDArray) -> tuple[ND
                                     np.broadcast_to(columns, (len(i), b, b)).ravel()]).reshape(-1, b, b)  # fmt: skip
     turn = nodes.layout.rigid_motions(points[i] - points[j]).transpose(0, 2, 1)
     left = turn @ block
+    left = np.pad(left, ((0, 0), (0, 0), (0, left.shape[1] - left.shape[2])))  # what no rotation takes up has to vanish
     off = np.abs(left - left.transpose(0, 2, 1)).max(axis=(1, 2), initial=0)
     whole = (nodes.present[i] & nodes.present[j]).all(axis=1) & determined(points)[i] & determined(points)[j]
     size = (np.abs(turn) @ np.abs(block)).max(axis=(1, 2), initial=0)
-    return off <= 10 * CANCELLED * size, whole
+    return off <= 10 * allowed * size, whole

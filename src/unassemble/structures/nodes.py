@@ -85,11 +85,11 @@ class Nodes:
         still = np.asarray(zero[:, :moves, :moves].all(axis=(1, 2)) & sound[:, :moves].all(axis=1))
         sound[:, :moves] &= zero[:, range(moves), range(moves)]
         sound[:, moves:] &= still[:, None]
-        valid = np.zeros((self.n, b, len(layout.rotations)), dtype=bool)
-        for k, axis in enumerate(layout.rotations):
+        valid = np.zeros((self.n, b, len(layout.turning)), dtype=bool)
+        for k, axis in enumerate(layout.turning):
             across = [direction for direction, _, _ in layout.turned(axis)]
-            rows = zero[:, :, across].all(axis=2) & sound
-            valid[:, :, k] = rows & ~lacking[:, [*across, moves + k]].any(axis=1)[:, None]
+            needed = [*across, moves + k] if layout.rotations else across
+            valid[:, :, k] = zero[:, :, across].all(axis=2) & sound & ~lacking[:, needed].any(axis=1)[:, None]
         return valid
 
     def _penalised(self) -> NDArray[np.bool_]:

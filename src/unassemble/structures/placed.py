@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from ..nodes.nodal import determined
 from ..nodes.numbering import Numbering
 from ..recovery import Evidence
 from ..tolerances import CERTIFIED
+from ..words import count_of
 from .recognise import StructuralNumbering
 
 
@@ -106,12 +107,49 @@ class Placed:
         return max(one.null_dimension for one in self.evidence)
 
 
+def without_free(found: Placed, most: int) -> Placed:
+    """Positions of the pieces whose null space has no larger dimension; of others they mean nothing.
+
+    Raises
+    ------
+    GeometryError
+        If no piece is left.
+    """
+    free = [k for k, one in enumerate(found.evidence) if one.null_dimension > most]
+    if not free:
+        return found
+    largest = found.null_dimension
+    said = f"the null space has dimension {largest} where {most} is expected"
+    if len(free) == len(found.evidence):
+        raise GeometryError(
+            f"no positions were found: {said}. Supports leave too few whole rows, or unknowns of nodes are along axes "
+            "of their own, as in cylindrical coordinates"
+        )
+    kept = np.setdiff1d(np.arange(len(found.evidence)), free)
+    place = np.full(len(found.evidence) + 1, -1)
+    place[kept] = np.arange(len(kept))
+    component = place[found.component]
+    return replace(
+        found,
+        points=np.where(component[:, None] < 0, np.nan, found.points),
+        component=component,
+        evidence=tuple(found.evidence[k] for k in kept),
+        notes=(*found.notes, f"{said} in {count_of(len(free), 'piece')}, which were left out"),
+    )
+
+
 def covered(rows: NDArray[np.bool_], columns: NDArray[np.bool_]) -> str:
     """How much of a matrix speaks for the coordinates, in words: masks of its rows, and of the unknowns they touch."""
     return f"{rows.mean():.0%} of the rows say so, of {columns.mean():.0%} of the unknowns"
 
 
-def placed(operator: sp.csr_array, d: int, edges: NDArray[np.int64], solve: Callable[[Piece], Positions]) -> Placed:
+def placed(
+    operator: sp.csr_array,
+    d: int,
+    edges: NDArray[np.int64],
+    solve: Callable[[Piece], Positions],
+    allowed: float = CERTIFIED,
+) -> Placed:
     """Positions from equations that others would contradict; where too few are left, or all contradict, from all.
 
     Equations that would be disturbed without being noticed are left out, and what only they determine with them.
@@ -124,6 +162,8 @@ def placed(operator: sp.csr_array, d: int, edges: NDArray[np.int64], solve: Call
         Coupled nodes.
     solve : callable
         Positions of one piece.
+    allowed : float
+        Residual up to which equations do not contradict each other.
 
     Raises
     ------
@@ -131,7 +171,7 @@ def placed(operator: sp.csr_array, d: int, edges: NDArray[np.int64], solve: Call
         If no node is determined.
     """
     best = every = _placed(operator, d, edges, solve, np.ones(operator.shape[0], dtype=bool))
-    while best.residual <= CERTIFIED and best.unnoticed.any():
+    while best.residual <= allowed and best.unnoticed.any():
         try:
             best = _placed(operator, d, edges, solve, best.used & ~best.unnoticed)
         except GeometryError:

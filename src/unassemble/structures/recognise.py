@@ -6,7 +6,7 @@ all the same and without displacements, bend everything. This tells the layouts 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -164,6 +164,13 @@ def _share(matrix: sp.csr_array, layout: Layout, direction: NDArray) -> float:
     kinds = [kind & tells for kind in (turning, ~turning) if kind.any()]
     share = float(min(good[kind].mean() if kind.any() else 0.0 for kind in kinds))
     return 0.0 if layout.rotations and own[turning].mean() > (LITTLE + layout.twisting) * share else share
+
+
+def directions_with_gaps(matrix: sp.csr_array) -> Iterator[tuple[NDArray[np.int64], int]]:
+    """Directions of rows (N,) where some nodes lack unknowns, -1 where not told, and how many there are."""
+    if matrix.diagonal().all():
+        for b in (6, 3):
+            yield _with_gaps(matrix, b)[1], b
 
 
 def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

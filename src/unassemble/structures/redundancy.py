@@ -47,7 +47,7 @@ def unnoticed(
     (m,) bool
     """
     blind = _small(probes)
-    b, moves, turns = layout.block_size, len(layout.displacements), len(layout.rotations)
+    b, moves, turns = layout.block_size, len(layout.displacements), len(layout.turning)
     inside = np.flatnonzero(given.row >= 0)
     place = np.full((len(points), b, turns), -1)  # of rows without equation the last, which has no weight
     place[given.row[inside] // b, given.row[inside] % b, given.rotation[inside]] = inside
@@ -64,7 +64,7 @@ def unnoticed(
         np.add.at(pull, edges[:, 0], step[:, a])
         np.add.at(pull, edges[:, 1], -step[:, a])
         _blind_together(blind, place[:, a], pull, weighted)
-    for k in range(turns):
+    for k in range(len(layout.rotations)):
         _blind_together(blind, place[:, moves + k, k], np.ones(len(points)), weighted)
     return blind
 

@@ -44,17 +44,19 @@ class Straight:
     blocks: NDArray[np.float64]
 
 
-def straight_members(nodes: Nodes) -> Straight:
-    """Members between two nodes that have all their unknowns."""
+def straight_members(nodes: Nodes, allowed: float = SUMMED) -> Straight:
+    """Members between two nodes that have all their unknowns; up to an allowed misfit."""
     b = nodes.layout.block_size
     whole: NDArray[np.bool_] = np.asarray(nodes.present.all(axis=1))
+    if not nodes.layout.rotations:
+        return Straight(np.empty((0, 2), np.int64), np.empty((0, nodes.layout.dim)), np.empty((0, b, b)))
     bsr = nodes.matrix.tobsr((b, b))
     i = np.repeat(np.arange(nodes.n), np.diff(bsr.indptr))
     j = bsr.indices.astype(np.int64)
     upper = (i < j) & whole[i] & whole[j]
     ends, blocks = np.column_stack([i[upper], j[upper]]), bsr.data[upper]
     vectors = told_by_blocks(blocks, nodes.layout)
-    good = np.flatnonzero(misfits(blocks, vectors, nodes.layout) <= SUMMED)
+    good = np.flatnonzero(misfits(blocks, vectors, nodes.layout) <= allowed)
     return Straight(ends[good], vectors[good], blocks[good])
 
 

@@ -15,16 +15,19 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..clock import Clock
+from ..errors import GeometryError
 from ..matrix import OperatorMatrix
 from ..nodes.anchoring import anchored, checked_anchors, digits_lost, near_enough
-from ..nodes.nodal import NodalMatrix, determined
+from ..nodes.nodal import NodalMatrix, determined, nodal_matrix
 from ..nodes.numbering import Numbering
+from ..nodes.redrawn import known_to
+from ..nodes.rounded import Rounding
 from ..nodes.shape import in_gauge, shape
 from ..recovery import Evidence, Structure
 from ..tolerances import ALIKE, CERTIFIED, SINGULAR, SMALL
 from ..words import Reason, count_of
-from .bars import Bars
-from .placed import Piece, Placed, Positions, covered, placed
+from .bars import Bars, bars_of
+from .placed import Piece, Placed, Positions, covered, placed, without_free
 from .positions import least_squares
 
 
@@ -37,6 +40,7 @@ def serve_truss(
     *,
     anchors: Sequence[Any] | None,
     choice: str,
+    rounding: Rounding | None = None,
 ) -> Structure:
     """Recover a truss, up to the size of each piece.
 
@@ -49,7 +53,7 @@ def serve_truss(
     """
     known = checked_anchors(anchors, numbering.node_of_row, nodal.dim)
     with clock("solve"):
-        found = place_joints(bars, nodal.n)
+        found = place_joints(bars, nodal.n, rounding.spread if rounding else CERTIFIED)
     with clock("certify"):
         error = largest_misfit(nodal, found.points)
     loose = found.component < 0
@@ -60,7 +64,7 @@ def serve_truss(
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: the point reflection of a truss has the same matrix")
     lost = digits_lost(points, found.points, found.component, factor)
-    status, reason = _verdict(error, found)
+    status, reason = _verdict(error, found, *_rounded(found, numbering, rounding))
     if status == "certified":
         rows = ~loose[numbering.node_of_row]
         reason = Reason(f"{reason.text}: {covered(rows, rows)}")
@@ -81,26 +85,40 @@ def serve_truss(
     )
 
 
-def _verdict(error: float, found: Placed) -> tuple[str, Reason]:
-    if found.null_dimension > found.points.shape[1] + 1:
-        return "uncertified", Reason("the directions of the bars leave more free than translations and size")
-    if not error <= CERTIFIED:
+def _rounded(found: Placed, numbering: Numbering, rounding: Rounding | None) -> tuple[float, float, str]:
+    """What bars may leave of blocks, how far positions may be off, relative to the size, and digits of the entries."""
+    if rounding is None:
+        return CERTIFIED, max(one.residual / one.gap for one in found.evidence), ""
+    allowed = rounding.spread
+
+    def place(matrix: sp.csr_array) -> NDArray[np.float64]:
+        bars = bars_of(nodal_matrix(matrix, numbering), allowed)
+        if bars is None:
+            raise GeometryError("blocks are no longer those of bars")
+        return place_joints(bars, numbering.n_nodes, allowed).points
+
+    return allowed, known_to(found.points, found.component, rounding, place, sized=False), rounding.name
+
+
+def _verdict(error: float, found: Placed, allowed: float, doubt: float, digits: str) -> tuple[str, Reason]:
+    if not error <= allowed:
         return "uncertified", Reason(f"a block differs from that of a bar by {error:.1e} of the row's largest entry")
     if found.unnoticed.any():
         return "uncertified", Reason(
             "supports leave parts of bars only, and nothing contradicts other directions of these"
         )
-    worst = max(found.evidence, key=lambda one: one.residual / one.gap)
-    if worst.residual > ALIKE * worst.gap:
+    if doubt > ALIKE:
         return "uncertified", Reason(
-            f"the directions of the bars contradict each other by {worst.residual:.1e}, and a field that is neither "
-            f"translation nor enlargement does so only by {worst.gap:.1e}: positions are known to about "
-            f"{worst.residual / worst.gap:.0e} of the size"
+            f"the directions of the bars contradict each other by {found.residual:.1e}: positions are known to about "
+            f"{doubt:.0e} of the size"
         )
-    return "certified", Reason("bars along these directions re-assemble to the matrix, and these determine the nodes")
+    known = f", to {doubt:.0e} of the size as entries rounded to {digits} leave it" if digits else ""
+    return "certified", Reason(
+        f"bars along these directions re-assemble to the matrix, and these determine the nodes{known}"
+    )
 
 
-def place_joints(bars: Bars, n: int) -> Placed:
+def place_joints(bars: Bars, n: int, allowed: float = CERTIFIED) -> Placed:
     """Find positions for which all bars have their directions.
 
     Whole blocks are those of bars or not, but a block of which only one row or column is left is that of a bar for any
@@ -127,7 +145,7 @@ def place_joints(bars: Bars, n: int) -> Placed:
         evidence = Evidence(one.dimension, float(values[d]), float(gap[0]) if len(gap) else float("inf"), len(which))
         return Positions(in_gauge(one.points, links), evidence, np.repeat(blind, d))
 
-    return placed(_across(ends, directions, n), d, ends, solve)
+    return without_free(placed(_across(ends, directions, n), d, ends, solve, allowed), d + 1)
 
 
 def _across_one(directions: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,22 +10,23 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from ..nodes.shape import set_aside
+from ..nodes.shape import in_gauge, set_aside, shape
 from ..recovery import Evidence
 from ..tolerances import CANCELLED, CERTIFIED, SINGULAR
 from .equations import Equations, equations, joined, told_by
 from .layouts import Layout
 from .nodes import Nodes
-from .placed import Piece, Placed, Positions, placed
+from .placed import Piece, Placed, Positions, placed, without_free
 from .positions import least_squares
 from .redundancy import unnoticed
 from .straight import Straight
 
 
-def turning_positions(nodes: Nodes, members: Straight) -> tuple[Placed, NDArray[np.bool_]]:
+def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIED) -> tuple[Placed, NDArray[np.bool_]]:
     """Positions from all rows; where these contradict or do not check each other, from those that no spring spoils.
 
-    What `members` tell by themselves comes on top.
+    What `members` tell by themselves comes on top. Equations contradict each other if residuals exceed what is
+    `allowed`.
 
     Returns
     -------
@@ -36,35 +37,37 @@ def turning_positions(nodes: Nodes, members: Straight) -> tuple[Placed, NDArray[
     Raises
     ------
     GeometryError
-        If no node is determined.
+        If no node is determined, or more is free than translations.
     """
     attempts: list[tuple[Placed, NDArray[np.bool_]]] = []
     failure: GeometryError | None = None
     layout, valid = nodes.layout, nodes.whole()
     edges = np.column_stack(sp.triu(nodes.moving, 1).nonzero())
-    for springs in (False, True):
+    for springs in (False, True) if layout.rotations else (False,):
         given, counted = joined(equations(nodes, valid, springs=springs), told_by(members, nodes)), valid.copy()
         if springs:
             counted[:, len(layout.displacements) :] = False
         try:
-            found = placed(given.operator, layout.dim, edges, partial(_positions, given, layout))
+            solve = partial(_positions if layout.rotations else _shape, given, layout)
+            found = placed(given.operator, layout.dim, edges, solve, allowed)
         except GeometryError as error:
             failure = failure or error
             continue
         left = given[~found.used & (given.row >= 0)]
         counted.reshape(-1, counted.shape[2])[left.row, left.rotation] = False
         attempts.append((found, counted))
-        if not any(_doubts(found)[:3]) and found.used.all():
+        if not any(_doubts(found, allowed)[:3]) and found.used.all():
             break
     if not attempts and failure:
         raise failure
-    return min(attempts, key=lambda one: _doubts(one[0]))
+    found, counted = min(attempts, key=lambda one: _doubts(one[0], allowed))
+    return without_free(found, layout.free), counted
 
 
-def _doubts(found: Placed) -> tuple[bool, bool, bool, int, float]:
+def _doubts(found: Placed, allowed: float) -> tuple[bool, bool, bool, int, float]:
     """What speaks against positions, the gravest first."""
     free, lost = found.null_dimension > found.points.shape[1], int(np.count_nonzero(found.component < 0))
-    return found.residual > CERTIFIED, free, bool(found.unnoticed.any()), lost, found.residual
+    return found.residual > allowed, free, bool(found.unnoticed.any()), lost, found.residual
 
 
 def _positions(given: Equations, layout: Layout, piece: Piece) -> Positions:
@@ -88,12 +91,35 @@ def _positions(given: Equations, layout: Layout, piece: Piece) -> Positions:
     loose = np.zeros(n, dtype=bool)
     if null.shape[2] > d:
         null, loose = set_aside(null, d)
-    place = np.searchsorted(piece.nodes, part.row // b)
-    own = (part.row >= 0) & (
-        piece.nodes[np.minimum(place, n - 1)] == part.row // b
-    )  # a row may not depend on its own node
-    local = replace(part, operator=piece.operator, row=np.where(own, place * b + part.row % b, -1))
-    blind = unnoticed(local, residuals[:, 1:], layout, x, piece.edges) & (part.rotation >= 0)
+    blind = unnoticed(_local(part, piece, b), residuals[:, 1:], layout, x, piece.edges) & (part.rotation >= 0)
     residual = float(np.abs(residuals[:, 0]).max()) / span
     evidence = Evidence(null.shape[2], residual, float(gap[0]) if len(gap) else float("inf"), m)
     return Positions(np.where(loose[:, None], np.nan, x - x[~loose].mean(axis=0)), evidence, blind)
+
+
+def _shape(given: Equations, layout: Layout, piece: Piece) -> Positions:
+    """Coordinates of one piece whose nodes have displacements only, up to its size.
+
+    Raises
+    ------
+    GeometryError
+        If more is free than translations and size.
+    """
+    d, m = layout.dim, len(piece.rows)
+    order = len(piece.nodes)
+    _, residuals, fields, values = least_squares(piece.operator, np.zeros(m), d)
+    one = shape(fields, values, np.zeros(order, dtype=bool))
+    links = sp.csr_array((np.ones(len(piece.edges)), piece.edges.T), shape=(order, order))
+    points, gap = in_gauge(one.points, sp.csr_array(links + links.T)), values[values > SINGULAR]
+    local = _local(given[piece.rows], piece, layout.block_size)
+    blind = unnoticed(local, residuals[:, 1:], layout, np.nan_to_num(points), piece.edges)
+    evidence = Evidence(one.dimension, float(values[d]), float(gap[0]) if len(gap) else float("inf"), m)
+    return Positions(points, evidence, blind)
+
+
+def _local(part: Equations, piece: Piece, b: int) -> Equations:
+    """Equations of a piece, rows counted by its own nodes."""
+    place = np.searchsorted(piece.nodes, part.row // b)
+    known = piece.nodes[np.minimum(place, len(piece.nodes) - 1)] == part.row // b  # a row may not depend on its node
+    own = (part.row >= 0) & known
+    return replace(part, operator=piece.operator, row=np.where(own, place * b + part.row % b, -1))

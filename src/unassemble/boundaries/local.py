@@ -1,0 +1,109 @@
+"""Levenberg-Marquardt where only vertices near the rim move, each with a damping of its own.
+
+Far from each other they have nothing to do with each other, and one place that comes to no end must not hold up the
+others: each vertex has a damping, and a step counts where it lowers the squares of the entries near.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..topology import Piece
+from .fit import WholeEntries, first_flips
+from .patch import Patch
+from .shape import ShapePrior
+
+
+def fit_near(
+    problem: WholeEntries,
+    z: NDArray[np.complex128],
+    scale: float,
+    whole: NDArray[np.bool_],
+    free: NDArray[np.bool_],
+    schedule: tuple[tuple[float, int], ...],
+) -> NDArray[np.complex128]:
+    """Positions of which some are improved; the others, and c, stay.
+
+    Parameters
+    ----------
+    problem : WholeEntries
+    z : (n,) complex128
+    scale : float
+    whole : (e,) bool
+        Entries to be fitted; sides of the others have a prior.
+    free : (n,) bool
+        Vertices that move.
+    schedule : tuple of (float, int)
+        Weights of the prior, one after the other, and numbers of steps with each.
+    """
+    patch = Patch.about(problem.piece, free)
+    part = WholeEntries(patch.piece, problem.weights[patch.edges], problem.guessed[patch.edges], scale, patch.free)
+    moved = z.copy()
+    try:
+        for mu, steps in schedule:
+            moved[patch.vertices] = _fitted(part, moved[patch.vertices], whole[patch.edges], mu, steps)
+    finally:
+        part.release()
+    return moved
+
+
+def _fitted(
+    part: WholeEntries, z: NDArray, whole: NDArray[np.bool_], mu: float, steps: int, first: float = 1e-3
+) -> NDArray[np.complex128]:
+    piece, scale = part.piece, float(part.known_scale or 1.0)
+    prior = ShapePrior.of(piece, ~whole).about(part.free)
+    whole = whole & part.asked
+    fitted = piece.triangles[(whole[piece.opposite] | (mu > 0)).any(axis=1)]
+    damping = np.full(len(z), first)
+    misfit, shape = part.residuals(z, scale, whole, prior, mu)
+    for _ in range(steps):
+        if not (np.abs(misfit) > 1e-14).any():
+            break
+        found = part.step(z, scale, whole, prior, mu, misfit, shape, np.append(damping[part.free], 1.0))
+        if found is None:
+            damping *= 100
+            continue
+        step, _ = found
+        limit = np.ones(len(z))
+        np.minimum.at(limit, fitted.ravel(), np.repeat(0.9 * first_flips(fitted, z, step), 3))
+        step *= _spread(piece, limit, np.minimum, 3)
+        there = z + step
+        with np.errstate(all="ignore"):
+            new, new_shape = part.residuals(there, scale, whole, prior, mu)
+        before, after = (_near(piece, prior, m, s) for m, s in ((misfit, shape), (new, new_shape)))
+        worse = ~(after < before) & ((before > 1e-28) | ~(after < 1e-26))
+        worse[fitted[first_flips(fitted, z, step) < 1]] = True
+        refused = _spread(piece, worse, np.maximum, 2)
+        there = np.where(refused, z, there)
+        if (first_flips(fitted, z, there - z) < 1).any():  # between what was taken and what was not
+            refused[:] = True
+        else:
+            z = there
+            with np.errstate(all="ignore"):
+                misfit, shape = part.residuals(z, scale, whole, prior, mu)
+        damping = np.where(refused, np.minimum(10 * damping, 1e6), np.maximum(damping / 10, 1e-14))
+    return z
+
+
+def _near(piece: Piece, prior: ShapePrior, misfit: NDArray, shape: NDArray) -> NDArray[np.float64]:
+    """(n,) sums of squares of entries, and of the prior, up to two edges from each vertex."""
+    n = piece.n_vertices
+    total = np.zeros(n)
+    for ends, squares in ((piece.stencil, misfit**2), (prior.corners, shape**2)):
+        for end in ends:
+            total += np.bincount(end, squares, n)
+    here, there = total[piece.edges].T
+    return np.asarray(
+        total + np.bincount(piece.edges[:, 0], there, n) + np.bincount(piece.edges[:, 1], here, n), dtype=np.float64
+    )
+
+
+def _spread(piece: Piece, values: NDArray, most: np.ufunc, rounds: int) -> NDArray:
+    """The least, or most, of values (n,) at vertices up to so many edges away."""
+    for _ in range(rounds):
+        here, there = values[piece.edges].T
+        values = values.copy()
+        most.at(values, piece.edges[:, 0], there)
+        most.at(values, piece.edges[:, 1], here)
+    return values
