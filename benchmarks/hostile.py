@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from skfem.models import laplace, mass
 
-from unassemble import ConformingMesh, InputError, RecoveryError, recover
+from unassemble import ConformingMesh, InputError, RecoveryError, Surface, recover
 from unassemble.cli import main as command_line
 from unassemble.matrix import read_matrix
 
@@ -87,10 +87,32 @@ def gives_back(found, matrix: Any) -> bool:
     for part in pieces_of_linear(found, cells["triangle"]) if linear else pieces_of_elements(found, cells):
         part = sp.csr_array(part - sp.diags_array(part.diagonal()))
         total = total + part * (part.multiply(off).sum() / part.multiply(part).sum())
+    return agree(off, total, found.node_status == 0)
+
+
+def agree(off: sp.csr_array, total: sp.csr_array, known: NDArray[np.bool_]) -> bool:
+    """Whether entries between rows that are claimed are the same, relative to their rows."""
     largest = np.maximum(np.abs(off).max(axis=1).toarray().ravel(), 1e-300)
     difference = sp.coo_array(off - total)
     row, column = difference.coords
-    return bool((np.abs(difference.data) <= MISFIT * np.minimum(largest[row], largest[column])).all())
+    wrong = np.abs(difference.data) > MISFIT * np.minimum(largest[row], largest[column])
+    return not (wrong & known[row] & known[column]).any()
+
+
+def lengths_give_back(found: Surface, matrix: sp.csr_array) -> bool:
+    """Whether triangles with these sides, each laid flat by itself, give the entries of claimed rows."""
+    length = sp.coo_array((found.edge_lengths, found.edges.T), shape=matrix.shape).tocsr()
+    length = length + length.T
+    a, b, c = (length[found.triangles[:, (k + 1) % 3], found.triangles[:, (k + 2) % 3]] for k in range(3))
+    x = (b * b + c * c - a * a) / (2 * c)
+    corners = np.stack([0 * c, 0 * c, c, 0 * c, x, np.sqrt(np.maximum(b * b - x * x, 0))], axis=1)
+    flat = skfem.MeshTri(corners.reshape(-1, 2).T.copy(), np.arange(3 * len(c)).reshape(-1, 3).T.copy())
+    part = sp.coo_array(laplace.assemble(skfem.Basis(flat, skfem.ElementTriP1())))
+    rows = found.triangles.ravel()
+    factor = np.repeat(found.scale[found.component[found.triangles].max(axis=1)], 3)[part.row]
+    total = sp.coo_array((part.data * factor, (rows[part.row], rows[part.col])), shape=matrix.shape).tocsr()
+    off, total = (sp.csr_array(one - sp.diags_array(one.diagonal())) for one in (matrix, total))
+    return agree(off, total, found.node_status == 0)
 
 
 def pieces_of_linear(found, triangles: NDArray) -> Iterator[sp.csr_array]:
@@ -151,6 +173,8 @@ def judged(given: Given) -> str:
     found.report()
     if found.status != "certified":
         return "ambiguous" if found.status == "ambiguous" else "uncertified"
+    if isinstance(found, Surface):
+        return "right" if lengths_give_back(found, sp.csr_array(given.matrix, dtype=np.float64)) else "WRONG"
     right = given.pieces is not None and positions_agree(found, given.pieces)
     if not hasattr(found, "divided"):  # bodies and structures
         return "right" if right else "WRONG"

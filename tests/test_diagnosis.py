@@ -133,6 +133,16 @@ def test_a_graph_in_the_plane_is_one_too():
     assert found.advice == facts.advice
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_line_whose_pieces_fit_is_one_too(seed):
+    """In some orders of rows right triangles have its entries, in pieces of different factors."""
+    A = pyamg.gallery.poisson((40,), format="csr")
+    A = shuffled(A, seed) if seed else A
+    assert inspect_matrix(A).kind == "segments"
+    with pytest.raises(RecoveryError, match="on a line"):
+        recover(A)
+
+
 def test_large_matrices_are_diagnosed_from_a_part():
     A = shuffled(stiffness(fem.MeshTet().refined(5), fem.ElementTetP1()))
     assert A.shape[0] > 30_000

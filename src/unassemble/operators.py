@@ -168,7 +168,8 @@ def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, Rounding | None]:
     from .nodes.rounded import with_exact_sums
     from .structures.recognise import directions_with_gaps
 
-    return with_exact_sums(matrix.csr(), directions_with_gaps(matrix.csr()))
+    whole = matrix.csr()
+    return with_exact_sums(whole, directions_with_gaps(whole))
 
 
 def _truss(whole: sp.csr_array, rounding: Rounding | None, reason: str) -> VectorReading | None:

@@ -74,7 +74,7 @@ def test_what_is_said_of_graphs_that_are_no_mesh():
 def test_kites_that_hang_on_vertices_in_other_orders(order):
     """Four with one c: that is all that speaks for it, and there is a mesh in one piece with another."""
     known, _ = member("kites", 3008, order)
-    assert not recover(known.matrix).certified
+    assert answer(known.matrix)[0] != "certified"
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -82,4 +82,4 @@ def test_kites_that_hang_on_vertices_in_other_orders(order):
 def test_pieces_that_may_be_one_are_not_certified(graph, seed):
     """Equal entries make equal factors c in pieces; yet the whole has readings in one piece."""
     assert all_meshes(len(graph), dict.fromkeys(map(tuple, graph.edges), 1.0))
-    assert not recover(laplacian(graph, seed)).certified
+    assert answer(laplacian(graph, seed))[0] != "certified"

@@ -109,3 +109,11 @@ def test_cells_are_among_the_candidates_of_a_scalar_matrix(name):
     found = [block for (block,) in (some for some in candidates(graph, points) if len(some) == 1)]
     found = {frozenset(cell) for block in found if block.kind is kind for cell in block.cells.tolist()}
     assert {frozenset(cell) for cell in cells.tolist()} <= found
+
+
+@pytest.mark.parametrize("name", ["quad", "quad9", "hexahedron"])
+def test_cells_whose_nodes_are_one_point_divide_by_nothing(name):
+    kind = KINDS[name]
+    with np.errstate(all="raise"):
+        cells = ordered(np.arange(kind.nodes)[None], np.ones((kind.nodes, kind.dim)), kind)
+    assert cells.shape[1:] == (kind.nodes,)

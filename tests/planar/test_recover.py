@@ -32,9 +32,9 @@ def test_round_trip(n, seed, exponent, sign, diagonal, refine):
 
 
 @pytest.mark.fallback
-@pytest.mark.parametrize("c", [1.0, -1.0, 1e-3, -250.0, 1e200, 1e-200])
+@pytest.mark.parametrize("c", [1.0, -1.0, 1e-3, -250.0, 1e60, 1e-60])
 def test_scale_is_found_with_its_sign(c):
-    known = specimen(*random_mesh(300), c=c, diagonal=abs(c) < 1e100)
+    known = specimen(*random_mesh(300), c=c, diagonal=abs(c) < 1e50)
     found = recover(known.matrix)
     assert found.certified
     assert found.scale == pytest.approx(c, rel=1e-12)

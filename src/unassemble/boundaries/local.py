@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..topology import Piece
 from .fit import WholeEntries, first_flips
-from .patch import Patch
+from .patch import Patch, spread
 from .shape import ShapePrior
 
 
@@ -67,14 +67,14 @@ def _fitted(
         step, _ = found
         limit = np.ones(len(z))
         np.minimum.at(limit, fitted.ravel(), np.repeat(0.9 * first_flips(fitted, z, step), 3))
-        step *= _spread(piece, limit, np.minimum, 3)
+        step *= spread(piece, limit, np.minimum, 3)
         there = z + step
         with np.errstate(all="ignore"):
             new, new_shape = part.residuals(there, scale, whole, prior, mu)
         before, after = (_near(piece, prior, m, s) for m, s in ((misfit, shape), (new, new_shape)))
         worse = ~(after < before) & ((before > 1e-28) | ~(after < 1e-26))
         worse[fitted[first_flips(fitted, z, step) < 1]] = True
-        refused = _spread(piece, worse, np.maximum, 2)
+        refused = spread(piece, worse, np.maximum, 2)
         there = np.where(refused, z, there)
         if (first_flips(fitted, z, there - z) < 1).any():  # between what was taken and what was not
             refused[:] = True
@@ -97,13 +97,3 @@ def _near(piece: Piece, prior: ShapePrior, misfit: NDArray, shape: NDArray) -> N
     return np.asarray(
         total + np.bincount(piece.edges[:, 0], there, n) + np.bincount(piece.edges[:, 1], here, n), dtype=np.float64
     )
-
-
-def _spread(piece: Piece, values: NDArray, most: np.ufunc, rounds: int) -> NDArray:
-    """The least, or most, of values (n,) at vertices up to so many edges away."""
-    for _ in range(rounds):
-        here, there = values[piece.edges].T
-        values = values.copy()
-        most.at(values, piece.edges[:, 0], there)
-        most.at(values, piece.edges[:, 1], here)
-    return values

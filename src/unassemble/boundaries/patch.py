@@ -66,3 +66,13 @@ def nearest(piece: Piece, label: NDArray[np.int64], most: int) -> tuple[NDArray[
         here, there = both[reached].T
         far[there], label[there] = step, label[here]
     return far, label
+
+
+def spread(piece: Piece, values: NDArray, most: np.ufunc, rounds: int) -> NDArray:
+    """The least, or most, of values (n,) at vertices up to so many edges away."""
+    for _ in range(rounds):
+        here, there = values[piece.edges].T
+        values = values.copy()
+        most.at(values, piece.edges[:, 0], there)
+        most.at(values, piece.edges[:, 1], here)
+    return values

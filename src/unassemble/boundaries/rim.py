@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..topology import Piece
-from .patch import nearest
+from .patch import nearest, spread
 
 
 @dataclass(frozen=True)
@@ -134,13 +134,7 @@ class Rim:
         hot = np.zeros(piece.n_vertices)
         for end in piece.edges.T:
             np.maximum.at(hot, end, rest)
-        top = hot
-        for _ in range(RimOptions.apart):
-            here, there = top[piece.edges].T
-            top = top.copy()
-            np.maximum.at(top, piece.edges[:, 0], there)
-            np.maximum.at(top, piece.edges[:, 1], here)
-        peak = (hot == top) & (hot > least) & (hot > 0)
+        peak = (hot == spread(piece, hot, np.maximum, RimOptions.apart)) & (hot > least) & (hot > 0)
         far, label = nearest(piece, np.where(peak, np.arange(piece.n_vertices), -1), RimOptions.reach)
         reached = np.flatnonzero(opened & (label >= 0))
         first = np.full(piece.n_vertices, RimOptions.reach + 1)

@@ -174,8 +174,8 @@ def _with_rule(
     part: Part, weights: NDArray, z: NDArray, c: float, noise: NDArray | None, rule: dict[str, str], *, straight: bool
 ) -> Fitted:
     entries = _entries(part, rule, straight)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # cells without an area; see `flipped`
-        spread = entries.roundings(z) if noise is None else noise
+    spread = entries.roundings(z) if noise is None else noise
+    with np.errstate(invalid="ignore", over="ignore"):  # cells without an area; see `flipped`
         misfit = weights - c * entries.weights(z)
     return Fitted(part, weights, entries, z, c, rule, straight, spread, misfit)
 

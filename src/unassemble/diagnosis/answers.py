@@ -34,7 +34,7 @@ def explained(error: RecoveryError, matrix: OperatorMatrix, otherwise: str = "")
             said = found.sentence(f"{begun}, for this is")
         else:
             like = replace(found, advice=where_nothing_fits(found, matrix))
-            said = like.sentence("no mesh that was found has these entries, though the graph is that of")
+            said = like.sentence(f"{begun}, and no mesh that was found has these entries, though the graph is that of")
         return NotPlanarError(said, error.witness, error.why)
     return (
         GeometryError(found.sentence("no planar mesh has these entries: they are those of")) if found.unread else error
@@ -42,21 +42,21 @@ def explained(error: RecoveryError, matrix: OperatorMatrix, otherwise: str = "")
 
 
 def judged(mesh: PlanarMesh, matrix: OperatorMatrix) -> PlanarMesh:
-    """A mesh that does not fit, with what the matrix is as the reason, where that shows.
+    """A mesh that does not fit, or proves nothing, with what the matrix is as the reason, where that shows.
 
     Raises
     ------
     GeometryError
         If the matrix is a mass matrix, or one of segments on a line, so that the mesh means nothing.
     """
-    if mesh.status != "uncertified" or mesh.backward_error <= CERTIFIED:
+    if mesh.status != "uncertified":
         return mesh
     linear = not isinstance(mesh, ConformingMesh)
     found = mass_matrix(matrix, planar=False) or diagnosed(matrix, planar=linear)
     if found.kind in ("mass", "segments"):
         raise GeometryError(found.sentence())
     if not found.unread:
-        if linear or mesh.chi_square is not None:
+        if linear or mesh.chi_square is not None or mesh.backward_error <= CERTIFIED:
             return mesh
         advice = where_nothing_fits(found, matrix)
         return replace(mesh, reason=sentences([mesh.reason, *found.evidence[-1:]]), advice=advice)

@@ -111,7 +111,7 @@ def diagnosed(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis:
     if (mass := mass_matrix(matrix, planar=planar)) is not None:
         return mass
     degree = np.bincount(matrix.edges.ravel(), minlength=matrix.n)
-    if degree.max() <= 2 and matrix.n >= _SMALL:
+    if degree.max() <= 2 and (degree == 1).any() and matrix.n >= _SMALL:
         return _of_kind("segments", "a stiffness matrix on a line", "no row is coupled to more than two", sums)
     if _is_graph(matrix, sums):
         equal = "all off-diagonal entries are equal, and on a mesh those of the boundary have one cell and others two"

@@ -92,7 +92,7 @@ def with_consistent_mass(
 def _fit(skeleton: Skeleton, entries: NDArray, sums: RowSums) -> MetricFit | None:
     """The metric; where the fit ends elsewhere, anew without a hole of three edges or from an embedding."""
     fit = fit_metric(skeleton, entries, sums.positive(), sums.trust())
-    for _ in range(12):
+    for _ in range(12):  # one for each hole of three edges, six on meshes graded over eight orders
         if fit is None or fit.residual < ROUNDED:
             break
         better = (new for new in _other_starts(fit, entries, sums) if new.residual < NEARLY_ALL * fit.residual)

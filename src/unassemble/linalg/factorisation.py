@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from . import pardiso
+from .dense import DenseFactorisation
 from .superlu import SuperLUFactorisation
 from .upper import UpperTriangle
 
@@ -47,6 +48,8 @@ def backend() -> str:
 
 def factorisation(matrix: UpperTriangle, *, definite: bool = False) -> Factorisation:
     """Analyse the pattern of a Hermitian matrix for factorisation; see :class:`Factorisation`."""
+    if DenseFactorisation.suits(matrix):
+        return DenseFactorisation(matrix, definite=definite)
     if backend() == "pardiso":
         return pardiso.PardisoFactorisation(matrix, definite=definite)
     return SuperLUFactorisation(matrix, definite=definite)

@@ -45,8 +45,9 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
         If `drop_zeros` or `noise` is out of range.
     MatrixError
         If the matrix is not square, empty, without numbers, not finite, diagonal, dense, not symmetric, or has far
-        more rows than entries, or connected rows out of all proportion. Both triangles may differ by 1e-10 of the
-        largest off-diagonal entry of the two rows, or by a convection: an antisymmetric part whose rows add up to zero.
+        more rows than entries, entries whose products overflow, or connected rows out of all proportion. Both
+        triangles may differ by 1e-10 of the largest off-diagonal entry of the two rows, or by a convection: an
+        antisymmetric part whose rows add up to zero.
 
     Examples
     --------
@@ -73,6 +74,7 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
         edges, entries, dropped = _without_zeros(csr.shape[0], edges, entries, drop_zeros)
         warnings += dropped
     _check_density(csr.shape[0], edges)
+    _check_size(csr.diagonal(), entries)
     _check_proportions(csr.shape[0], edges, entries)
     return OperatorMatrix(csr.shape[0], edges, entries, csr.diagonal(), asymmetry, warnings, replaced=replaced)
 
@@ -175,6 +177,17 @@ def _check_density(n: int, edges: NDArray[np.int64]) -> None:
         raise MatrixError(
             f"the matrix is dense: a row has {2 * len(edges) / n:.0f} off-diagonal entries in the mean, and no finite "
             f"element matrix that is read has more than {fullest}"
+        )
+
+
+def _check_size(diagonal: NDArray[np.float64], entries: NDArray[np.float64]) -> None:
+    """Refuse entries that no units explain: products of a few of them, as everything here takes, would overflow."""
+    largest, limit = np.abs(entries).max(), np.finfo(float).eps ** -4
+    if not (1 / limit < largest < limit and np.abs(diagonal).max() < limit):
+        beyond = max(largest, np.abs(diagonal).max()) if largest > 1 / limit else largest
+        raise MatrixError(
+            f"the largest entries are {beyond:.3g}, too far from 1 for products of them: multiply the matrix by a "
+            f"number that brings them between {1 / limit:.0e} and {limit:.0e}"
         )
 
 

@@ -82,9 +82,11 @@ def _require_few_handles(matrix: OperatorMatrix) -> None:
 
     A closed surface of n vertices and g handles has 3 n - 6 + 6 g edges (Euler's formula), and one with holes fewer.
     """
-    if len(matrix.edges) > 6 * matrix.n:
+    if len(matrix.edges) > 4 * matrix.n:
         edges, rows = (count_of(k, word) for k, word in ((len(matrix.edges), "edge"), (matrix.n, "row")))
-        raise TopologyError(f"{edges} on {rows} are those of no surface, unless it has more handles than half its rows")
+        raise TopologyError(
+            f"{edges} on {rows} are those of no surface, unless it has more handles than a sixth of its rows"
+        )
 
 
 def _deviations(found: _Found, sigma: float) -> NDArray[np.float64]:

@@ -77,13 +77,15 @@ def lacking(f: Findings, term: Term) -> Reason:
     """The reason of a misfit that a term explains which the model does not have."""
     share = f"{term.share:.0%}" if term.share < 0.995 else "nearly all"
     begun = f"the misfit is no noise, since a term that the model lacks explains {share} of its square"
-    if term.name == MASS:
-        sums = "" if _adds_up(f.stored) else ", and the rows do not add up to zero"
-        which = f"it has the form of a mass matrix{sums}: A = c L + s M"
-        return Reason.of(begun, which, advice="assemble the stiffness matrix alone, or lump the mass matrix")
-    if term.name == COEFFICIENT:
-        which = "it has the form of a coefficient that varies in space, and a constant one is assumed"
+    varies = "a coefficient that varies in space, and a constant one is assumed"
+    if term.name == COEFFICIENT or _adds_up(f.stored):  # with a mass matrix, or one number added, rows do not
+        which = f"it has the form of {varies}"
+        if term.name != COEFFICIENT:
+            which = f"all rows add up to zero, as with {varies}"
         return Reason.of(begun, which, advice="assemble the matrix with a constant coefficient")
+    if term.name == MASS:
+        which = "it has the form of a mass matrix, and the rows do not add up to zero: A = c L + s M"
+        return Reason.of(begun, which, advice="assemble the stiffness matrix alone, or lump the mass matrix")
     assert term.name == ONE_SIGN
     return Reason.of(begun, "most entries are off in one direction", advice=_CHECK_MODEL)
 

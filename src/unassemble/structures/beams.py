@@ -72,7 +72,7 @@ def find_beam(matrix: sp.csr_array) -> Beam | None:
     off.eliminate_zeros()
     if order < 4 or np.diff(off.indptr).max(initial=0) > MOST or (matrix.diagonal() <= 0).any():
         return None
-    blocks = _members(sp.csr_array(off / np.abs(off.data).max(initial=np.finfo(float).tiny)))  # products overflow else
+    blocks = _members(sp.csr_array(off))
     deflections = np.unique(np.concatenate([blocks.w, blocks.other_w]))
     partner = np.full(order, -1)
     for w, t in ((blocks.w, blocks.t), (blocks.other_w, blocks.other_t)):

@@ -45,8 +45,8 @@ def members_and_cells(nodes: Nodes, points: NDArray[np.float64], allowed: float)
     triangles, quads = shell_cells(graph_of(nodes.n, pairs[~alone]), points)
     if len(triangles) + 2 * len(quads) > MOST_PER_NODE * nodes.n:  # faces of solids, and planes through them
         triangles, quads = triangles[:0], quads[:0]
-        return {"lines": pairs[alone], "triangles": triangles, "quads": quads}
-    alone |= ~graph_of(nodes.n, triangles, quads).coupled(*pairs.T)
+    else:
+        alone |= ~graph_of(nodes.n, triangles, quads).coupled(*pairs.T)
     return {"lines": pairs[alone], "triangles": triangles, "quads": quads}
 
 

@@ -23,8 +23,6 @@ from ..tolerances import LAST_DIGITS, SUMMED
 from .layouts import Layout
 from .nodes import Nodes
 
-_ANY_SIZE = np.errstate(over="ignore", invalid="ignore")  # entries may be of no member, and of any size
-
 
 @dataclass(frozen=True, eq=False)
 class Straight:
@@ -60,7 +58,6 @@ def straight_members(nodes: Nodes, allowed: float = SUMMED) -> Straight:
     return Straight(ends[good], vectors[good], blocks[good])
 
 
-@_ANY_SIZE
 def told_by_blocks(blocks: NDArray[np.float64], layout: Layout) -> NDArray[np.float64]:
     """(m, dim) position of the first node less that of the second, as V = U D / 2 has it; zero where it tells nothing.
 
@@ -79,7 +76,6 @@ def told_by_blocks(blocks: NDArray[np.float64], layout: Layout) -> NDArray[np.fl
     return np.asarray(np.einsum("mkr,mr->mk", np.linalg.pinv(sides, rcond=LAST_DIGITS), right))
 
 
-@_ANY_SIZE
 def misfits(blocks: NDArray[np.float64], vectors: NDArray[np.float64], layout: Layout) -> NDArray[np.float64]:
     """(m,) how far blocks are from those of members along given vectors, relative to the size of each part.
 

@@ -104,16 +104,16 @@ def surface_readings(cycles: Cycles) -> Iterator[NDArray[np.bool_]]:
         LinearConstraint(incidence, np.maximum(1 - taken, 0), 2 - taken),
         LinearConstraint(incidence.T @ incidence + _LEAST * each, _LEAST - incidence.T @ taken, np.inf),
     ]
-    largest = None
-    while True:
-        # Nodes, not seconds, bound the search.
+    largest, nodes = None, 1000  # nodes, not seconds, bound the search for all of them
+    while nodes > 0:
         found = milp(
             -np.ones(len(rows)),
             integrality=np.ones(len(rows)),
             bounds=Bounds(0, 1),
             constraints=limits,
-            options={"node_limit": 1000},
+            options={"node_limit": nodes},
         )
+        nodes -= max(found.mip_node_count or 0, 1)
         size = None if found.x is None else round(-found.fun)
         if size is None and largest is None:
             worst = at[int(np.argmax(np.asarray(incidence.sum(axis=1)).ravel() + taken))]
