@@ -4,8 +4,8 @@ To first order in sigma the best similarity onto the true mesh takes away the co
 and scaling, so the bound is the trace of P C P, P the projector off these four displacements, C = sigma^2 (K'K)^-1 in
 any gauge, and K = (I - ww'/w'w) J the derivative of the weights with what a change of the unknown scale c could
 explain projected out. P C P = sigma^2 (K'K)^+ since K has no other null vectors. The derivative of linear triangles is
-coded here a second time, from dot and cross products, that of others in noise_elements.py; up to 3,000 edges the trace is exact, above it is the mean over 400 random
-vectors.
+coded here a second time, from dot and cross products, that of others in noise_elements.py; up to 3,000 edges the trace
+is exact, above it is the mean over 400 random vectors.
 """
 
 from __future__ import annotations

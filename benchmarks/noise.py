@@ -64,7 +64,9 @@ def main() -> None:
                 count_channels(size, sigma, int(arguments.draws.split(",")[0]))
         return
     for size, draws in zip(sizes, arguments.draws.split(","), strict=False):
-        for result in measure(arguments.element, size, list(map(float, arguments.sigmas.split(","))), int(draws), results):
+        for result in measure(
+            arguments.element, size, list(map(float, arguments.sigmas.split(","))), int(draws), results
+        ):
             results.append(result)
             if arguments.output:
                 arguments.output.write_text(json.dumps(results, indent=1) + "\n")

@@ -15,7 +15,7 @@ from skfem import Basis, ElementQuad1, ElementTriP1, ElementTriP2, MeshTri
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
-from conforming.assembled import laplace, quadrilaterals, with_hole  # noqa: E402
+from conforming.assembled import laplace, quadrilaterals, with_hole
 
 ORDER = {"P2": 2, "Q1": 3}
 """Of the quadrature: exact, and two points by two."""

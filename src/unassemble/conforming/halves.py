@@ -19,8 +19,6 @@ from ..elements.cliques import Graph
 from ..matrix import OperatorMatrix
 from ..topology.keys import pair_keys
 
-_FALSE = 4  # nodes beside the corners that may be coupled to two sides of a cell: around corners of three cells
-
 
 def halves(matrix: OperatorMatrix, nonzero: Graph) -> tuple[NDArray[np.int64], NDArray[np.int64] | None]:
     """All of these triangles; and with one pair, the one of which the numbers say least, divided the other way.
@@ -71,7 +69,7 @@ def _rings(graph: Graph) -> NDArray[np.int64]:
     several.eliminate_zeros()
     count = np.diff(several.indptr)
     found = [np.empty((0, 9), np.int64)]
-    for size in range(4, 4 + _FALSE + 1):
+    for size in range(4, 9):  # at a corner of three cells the side between the other two is coupled to two of ours, too
         some = np.flatnonzero(count == size)
         nodes = several[some].indices.reshape(-1, size).astype(np.int64)
         for four in combinations(range(size), 4):
