@@ -113,15 +113,15 @@ def verdict(error: BaseException) -> tuple[int, str]:
             )
 
 
-def outcome(recovery: Recovery, written: Sequence[str | None], *, quiet: bool) -> int:
-    """Say what came of a recovery, and return the exit status."""
+def outcome(recovery: Recovery, written: Sequence[str | None], *, quiet: bool, lacking: str = "") -> int:
+    """Say what came of a recovery, and what the files that were written lack; return the exit status."""
     context = click.get_current_context()
     commands = [context.command]
     details = recovery.certified or getattr(context.find_root().command, "debug", False)
     if not quiet:
         from ..summary import summary, three_lines
 
-        files = ", ".join(click.format_filename(name) for name in written if name is not None)
+        files = ", ".join(click.format_filename(name) for name in written if name is not None) + lacking
         text = f"{summary(recovery)}\n  {'written':<15} {files}" if details else three_lines(recovery, files)
         say(as_typed(text, commands))
     elif not recovery.certified:
