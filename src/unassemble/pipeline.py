@@ -184,7 +184,10 @@ class _Task:
             found = self._as_asked()
         except RecoveryError:
             refuse_masses(self.matrix, planar=False)
-            raise
+            apart = self.matrix.without_joining_zeros()
+            if apart is None:
+                raise
+            return replace(self, matrix=apart).answer()
         if not (found.certified or isinstance(found, PlanarMesh)):
             refuse_masses(self.matrix, planar=False)
         return found
@@ -315,9 +318,12 @@ class _Task:
 
         self._refuse_scalar_options()
         about, anchors = self.about, self.frame.anchors
-        return recover_vector(
-            self.matrix, reading, self.clock, anchors=anchors, cells=about.cells, scalar=self._as_scalar
-        )
+        try:
+            return recover_vector(
+                self.matrix, reading, self.clock, anchors=anchors, cells=about.cells, scalar=self._as_scalar
+            )
+        except GeometryError as error:
+            raise GeometryError(f"the matrix is {reading.name}, but {error}") from error
 
     def _check_scale(self, part: OperatorMatrix) -> None:
         """Refuse a factor next to which entries vanish or overflow: no triangle has such angles."""

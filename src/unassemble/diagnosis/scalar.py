@@ -136,7 +136,7 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
         if kind and not doubtful.get(kind):
             shown = f"rows form cliques of {cells.nodes}, neighbours of which share {cells.shared} rows"
             return _of_kind(kind, f"{operator} of {name}", shown, sums)
-        if not (often(cells.often) or several) and mostly(cells.in_fours):
+        if not (often(cells.often) or several) and cells.tetrahedral:
             shown = f"{cells.in_fours:.0%} of the coupled pairs of rows lie in a clique of four"
             return _of_kind("tetrahedra", f"{operator} of linear elements on tetrahedra", shown, sums)
         if _has_middles(matrix):
@@ -149,6 +149,9 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
         if _is_grid(matrix.n, edges, cells):
             shown = "no three rows are coupled to each other, and most rows are coupled to six"
             return _of_kind("grid in space", "that of a grid in space, a seven-point stencil", shown, sums)
+    if (matrix.entries <= 0).all() and (sums.zero | sums.alone).all():
+        shown = "all rows add up to zero, no off-diagonal entry is positive, and no cells show in the graph"
+        return _of_kind("graph", "the Laplacian of a graph with weights", shown, sums)
     return _unknown(sums)
 
 
@@ -190,7 +193,7 @@ def further_terms(matrix: OperatorMatrix) -> str:
 def _has_middles(matrix: OperatorMatrix, most: int = 400) -> bool:
     """Whether rows m have neighbours i, j with A_im = A_jm = -4 A_ij, as middles of the sides of quadratic triangles.
 
-    Both entries are multiples of the same cotangents, so that neither is left out without the other; of zeros that are
+    Middles are coupled to the eight other nodes of two cells at most. Both entries are multiples of the same cotangents, so that neither is left out without the other; of zeros that are
     not stored there is no trace. Looked for in `most` rows.
     """
     A, least = matrix.csr(), ROUNDED * matrix.row_size
@@ -203,7 +206,7 @@ def _has_middles(matrix: OperatorMatrix, most: int = 400) -> bool:
 
     def between(m: int) -> bool:
         ends = sorted((value, i) for i, value in entries(m).items() if i != m)
-        return any(
+        return len(ends) <= 8 and any(
             abs(u - v) <= SUMMED * abs(u) and abs(entries(i).get(j, 0.0) + u / 4) <= SUMMED * abs(u)
             for k, (u, i) in enumerate(ends)
             for v, j in ends[k + 1 : k + 4]

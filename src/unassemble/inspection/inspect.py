@@ -21,6 +21,7 @@ from .facts import element_facts, matrix_facts, mesh_facts, nodes_facts, surface
 from .text import element_text, lines_of, mesh_text
 
 _IF = "if the entries agree, which recovery tells"
+_IF_WHOLE = f"if enough rows are whole, away from supports, and {_IF[3:]}"
 _NO_CELLS = "the graph of the matrix is planar, but no cell shows in it, nor do the entries suggest any"
 
 
@@ -162,11 +163,11 @@ class Inspection:
         """What :func:`unassemble.recover` may make of the matrix; only that tells whether its entries are a mesh's."""
         if self.structure:
             size = "up to position and size" if self.structure == "truss" else "in true size, up to position"
-            return f"coordinates of {count_of(self.n_nodes, 'node')} {size}, members and cells, {_IF}"
+            return f"coordinates of {count_of(self.n_nodes, 'node')} {size}, members and cells, {_IF_WHOLE}"
         if self.n_nodes and self.coupled:
             return (
                 f"coordinates of {count_of(self.n_nodes, 'node')} in {self.block_size}D, up to position and size, "
-                f"and elements that the matrix re-assembles from, {_IF}"
+                f"and elements that the matrix re-assembles from, {_IF_WHOLE}"
             )
         if self.n_nodes:
             return "what each direction's scalar matrix holds"
@@ -229,7 +230,10 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
     """
     with quiet_libraries():
         matrix = A if isinstance(A, OperatorMatrix) else load(A, variable=variable, drop_zeros=drop_zeros)
-        return _inspected(matrix)
+        found = _inspected(matrix)
+        if found.recoverable.startswith("nothing") and (apart := matrix.without_joining_zeros()):  # as recovery does
+            found = _inspected(apart)
+        return found
 
 
 def _inspected(matrix: OperatorMatrix) -> Inspection:

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse import csgraph
 
 from ..tolerances import SUMMED
 
@@ -76,6 +77,23 @@ class OperatorMatrix:
         """The same with some entries, (e,) bool, not stored."""
         errors = None if self.errors is None else self.errors[~gone]
         return replace(self, edges=self.edges[~gone], entries=self.entries[~gone], errors=errors)
+
+    def without_joining_zeros(self) -> OperatorMatrix | None:
+        """The same without stored zeros between parts that no other entry joins; None where there are none.
+
+        They are no structure: a Laplacian annihilates nothing but constants on a connected mesh, so that its entries
+        other than zero connect all of it. Of ``kron(L, I)``, say, they join copies of one mesh.
+        """
+        zero = self.entries == 0
+        graph = sp.coo_array((np.ones(int((~zero).sum())), self.edges[~zero].T), shape=(self.n, self.n))
+        part = csgraph.connected_components(graph, directed=False)[1]
+        alone = (np.bincount(part) == 1)[part]  # rows of the identity, whose zeros tell what was there
+        i, j = self.edges.T
+        joining = zero & (part[i] != part[j]) & ~alone[i] & ~alone[j]
+        if not joining.any():
+            return None
+        note = f"stored zeros that join parts with no other entry between them are left out: {joining.sum():,}"
+        return replace(self.without(joining), warnings=(*self.warnings, note))
 
     def csr(self) -> sp.csr_array:
         """Both triangles and the diagonal, all of it stored."""
