@@ -113,7 +113,7 @@ def diagnosed(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis:
     degree = np.bincount(matrix.edges.ravel(), minlength=matrix.n)
     if degree.max() <= 2 and (degree == 1).any() and matrix.n >= _SMALL:
         return _of_kind("segments", "a stiffness matrix on a line", "no row is coupled to more than two", sums)
-    if _is_graph(matrix, sums):
+    if matrix.unweighted and matrix.n >= _SMALL and matrix.entries[0] < 0:
         equal = "all off-diagonal entries are equal, and on a mesh those of the boundary have one cell and others two"
         return _of_kind("graph", "the Laplacian of a graph without weights", equal, sums)
     if planar:
@@ -193,7 +193,8 @@ def further_terms(matrix: OperatorMatrix) -> str:
 def _has_middles(matrix: OperatorMatrix, most: int = 400) -> bool:
     """Whether rows m have neighbours i, j with A_im = A_jm = -4 A_ij, as middles of the sides of quadratic triangles.
 
-    Middles are coupled to the eight other nodes of two cells at most. Both entries are multiples of the same cotangents, so that neither is left out without the other; of zeros that are
+    Middles are coupled to the eight other nodes of two cells at most. Both entries are multiples of the same
+    cotangents, so that neither is left out without the other; of zeros that are
     not stored there is no trace. Looked for in `most` rows.
     """
     A, least = matrix.csr(), ROUNDED * matrix.row_size
@@ -213,13 +214,6 @@ def _has_middles(matrix: OperatorMatrix, most: int = 400) -> bool:
         )
 
     return sum(map(between, sample)) >= (1 - MOST) * len(sample)
-
-
-def _is_graph(matrix: OperatorMatrix, sums: Sums) -> bool:
-    """Whether all entries are equal and all rows add up to zero."""
-    entries = matrix.entries
-    equal = np.ptp(entries) <= ROUNDED * np.abs(entries).max()
-    return bool(matrix.n >= _SMALL and equal and entries[0] < 0 and (sums.zero | sums.alone).all())
 
 
 def _is_grid(n: int, edges: NDArray[np.int64], cells: Cells) -> bool:

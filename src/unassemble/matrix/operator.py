@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from ..tolerances import SUMMED
+from ..tolerances import ROUNDED, SUMMED
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +62,13 @@ class OperatorMatrix:
             sums += np.bincount(end, self.entries, self.n)
             size += np.bincount(end, np.abs(self.entries), self.n)
         return np.asarray(np.abs(sums) <= SUMMED * size)
+
+    @property
+    def unweighted(self) -> bool:
+        """Whether all entries are equal and all rows add up to zero: the numbers tell no cell from a hole."""
+        size = np.abs(self.entries).max(initial=0.0)
+        alike = len(self.entries) > 0 and np.ptp(self.entries) <= ROUNDED * size
+        return bool(alike and self.adds_up.all())
 
     @property
     def incomplete_rows(self) -> NDArray[np.bool_]:
