@@ -10,7 +10,7 @@ import pyamg
 import pytest
 import scipy.sparse as sp
 import skfem as fem
-from skfem.helpers import dot, grad
+from skfem.helpers import ddot, div, dot, grad
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 from skfem.models.poisson import laplace, mass
 
@@ -458,6 +458,40 @@ def test_masses_among_classics(name):
     if facts.kind == "mass" and facts.advice:
         with pytest.raises(RecoveryError, match=facts.name):
             recover(CLASSICS / name)
+
+
+def stokes():
+    """Flow on triangles, velocities and pressures at random places in one matrix."""
+    mesh = fem.MeshTri().refined(2)
+    velocity = fem.Basis(mesh, fem.ElementVector(fem.ElementTriP2()))
+    pressure = velocity.with_element(fem.ElementTriP1())
+    K = fem.BilinearForm(lambda u, v, w: ddot(grad(u), grad(v))).assemble(velocity)
+    B = -fem.BilinearForm(lambda u, q, w: div(u) * q).assemble(velocity, pressure)
+    return shuffled(sp.block_array([[K, B.T], [B, None]]))
+
+
+def condensed():
+    """A body that is held below, of which the upper side is left."""
+    basis = fem.Basis(moved(fem.MeshHex().refined(2)), fem.ElementVector(fem.ElementHex1()))
+    held = basis.get_dofs(lambda x: x[2] < 0.1).all()
+    A = linear_elasticity(*lame_parameters(1.0, 0.3)).assemble(basis)
+    kept = basis.get_dofs(lambda x: x[2] > 0.9).all()
+    rest = np.setdiff1d(np.arange(A.shape[0]), np.union1d(held, kept))
+    A = A.toarray()
+    return A[np.ix_(kept, kept)] - A[np.ix_(kept, rest)] @ np.linalg.solve(A[np.ix_(rest, rest)], A[np.ix_(rest, kept)])
+
+
+@pytest.mark.parametrize(
+    ("assembled", "said"),
+    [
+        (stokes, "zero .*: a saddle point"),
+        (lambda: shuffled((condensed() + condensed().T) / 2), "Every row is coupled to every other"),
+    ],
+    ids=["Taylor-Hood", "condensed"],
+)
+def test_what_other_matrices_seem_to_be(assembled, said):
+    with pytest.raises(RecoveryError, match=said):
+        recover(assembled())
 
 
 @pytest.mark.parametrize(("name", "said"), [("bcsstk02", "annihilate translations"), ("bcsstk22", "plane frame")])

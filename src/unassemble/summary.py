@@ -75,6 +75,7 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
         rows += _surface_rows(recovery)
     if isinstance(recovery, Mechanical):
         rows += _elastic_rows(recovery)
+    rows += [("density", f"{recovery.density:.10g}")] if recovery.density is not None else []
     rows.append(("backward error", f"{recovery.backward_error:.1e} (relative)"))
     if recovery.uniqueness is not None:
         rows.append(("other meshes", _OTHERS[recovery.uniqueness]))

@@ -175,6 +175,7 @@ def test_settings_reach_the_library(work, monkeypatch):
         "block_size": None,
         "numbering": None,
         "realise": False,
+        "mass": None,
         "variable": None,
         "threads": 2,
     }

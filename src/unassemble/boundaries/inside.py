@@ -50,8 +50,9 @@ class InsideOptions:
         so that any damping would hold them.
     held : float
         Whole entries to a vertex, at least, where the rim is taken off as a whole: three far inside, two determine.
-    rounds : int
-        Fits, with fewer vertices at the rim each; and those with more of them.
+    rounds, patience : int
+        Fits, with fewer vertices at the rim each, and those with more of them; and how many come before the rim is
+        taken off as a whole in a small mesh, which loses more of it.
     peaks : float
         Part of the largest misfit above which there are places to peel.
     growing : tuple of (float, int)
@@ -73,11 +74,12 @@ class InsideOptions:
     steepest: float = 3.0
     band: int = 5
     settling: int = 6
-    newton: FitOptions = field(default_factory=lambda: FitOptions(steps=1, last_steps=8, damping=1e-15))
+    newton: FitOptions = field(default_factory=lambda: FitOptions(steps=1, last_steps=8, damping=1e-15, exact=1e-12))
     held: float = 2.3
     rounds: int = 8
+    patience: int = 3
     peaks: float = 0.25
-    growing: tuple[tuple[float, int], ...] = ((1e-2, 6), (1e-4, 6), (0.0, 12))
+    growing: tuple[tuple[float, int], ...] = ((1e-3, 10), (0.0, 25))
     grown: int = 3
     fits: float = 1e-7
     regrown: int = 4
@@ -139,8 +141,11 @@ def fit_inside(
     if not rim.whole.any():
         return None
     unit = float(np.median(np.abs(weights[rim.whole]))) * (1 if weights[rim.whole].sum() > 0 else -1)
-    guess, likely = _guessed(piece, weights / unit, given, shared, options)
-    problem = WholeEntries(piece, guess, given | likely, None if scale is None else scale / unit)
+    weights = weights / unit
+    shared = np.zeros_like(given) if shared is None else shared & ~given
+    halved = np.where(shared, weights / 2, weights)
+    likely = shared & (halved > 0) & (halved < options.steepest)  # others have terms of another kind
+    problem = WholeEntries(piece, halved, given | likely, None if scale is None else scale / unit)
     try:
         core = _core(problem, rim, options)
         if core is None:
@@ -158,39 +163,33 @@ def fit_inside(
     return InsideMesh(z, fit.scale * unit, given, entries, exact, known)
 
 
-def _guessed(
-    piece: Piece, weights: NDArray, given: NDArray, shared: NDArray | None, options: InsideOptions
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """(e,) weights, guessed where they are not given, and (e,) where the entry itself has a part in the guess.
+def _guessed(problem: WholeEntries, whole: NDArray[np.bool_], options: InsideOptions) -> NDArray[np.float64]:
+    """(e,) weights, guessed where they are not whole.
 
-    Halves of weights are about those g of one triangle, and g1 g2 + g2 g3 + g3 g1 = c^2 / 4 in each. A guess that is
-    too low makes some map of the rim have no energy, and the conformal map then has a fold there; of two guesses the
-    larger one counts.
+    Halves of weights are about those g of one triangle, and g1 g2 + g2 g3 + g3 g1 = c^2 / 4 in each. With guesses that
+    are too low some map has no energy at the rim, and the conformal map a fold there: of two the larger one counts.
     """
-    shared = np.zeros_like(given) if shared is None else shared & ~given
-    halved = np.where(shared, weights / 2, weights)
-    likely = shared & (halved > 0) & (halved < options.steepest)  # others have terms of another kind
-    c = estimate_scale(piece, np.where(given, weights, options.unknown))
-    corner = piece.facing[:, 0]
-    triangle, place = np.divmod(corner, 3)
-    one, other = (weights[piece.opposite[triangle, (place + turn) % 3]] / 2 for turn in (1, 2))
-    third = (c**2 / 4 - one * other) / np.maximum(one + other, 0.05)
-    third = np.where(piece.inner, options.unknown, np.clip(third, 0.0, 2.0))
-    guess = np.maximum(third, np.where(likely, halved, options.unknown))
-    return np.where(given, weights, guess), likely
+    piece = problem.piece
+    given = np.where(problem.guessed, problem.weights, options.unknown)
+    c = estimate_scale(piece, given)
+    triangle, place = np.divmod(piece.facing[:, 0], 3)
+    one, other = (given[piece.opposite[triangle, (place + turn) % 3]] / 2 for turn in (1, 2))
+    third = np.clip((c**2 / 4 - one * other) / np.maximum(one + other, 0.05), 0.0, 2.0)
+    return np.where(whole | piece.inner, given, np.maximum(given, third))
 
 
 def _core(problem: WholeEntries, rim: Rim, options: InsideOptions) -> tuple[Fit, Rim] | None:
     """A fit of all entries that some rim has whole, or else the last one; None where there is no drawing."""
-    found, conformal = None, _conformal(problem)
+    found, conformal = None, _conformal(problem, _guessed(problem, rim.given, options))
     for fading, start in ((options.fading, conformal), (options.slowly, None)):
         fit = _settled(problem, rim, conformal, options) if start is not None else None
+        patience = 0 if fit else options.patience
         if fit is None:
             first = _start(problem, rim, fading[0], options, start)
             fit = None if first is None else problem.faded(first.z, first.scale, rim.whole, fading[1:])
         if fit is None:
             continue
-        found = _shrunk(problem, rim, fit, options)
+        found = _shrunk(problem, rim, fit, patience, options)
         if found[0].misfit <= options.exact:
             break
     return found
@@ -225,13 +224,13 @@ def _bare(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -> 
     return replace(found, z=moved), bare
 
 
-def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -> tuple[Fit, Rim]:
-    """Fits with fewer vertices at the rim each, until one has all whole entries."""
-    for _ in range(options.rounds):
+def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, options: InsideOptions) -> tuple[Fit, Rim]:
+    """Fits with fewer vertices at the rim each, until one has all whole entries; after a few without the rim."""
+    for turn in range(options.rounds):
         _log.debug("%d whole entries: misfit %.1e", rim.whole.sum(), fit.misfit)
         if fit.misfit <= options.exact:
             break
-        if bare := _bare(problem, rim, fit, options):
+        if turn >= patience and (bare := _bare(problem, rim, fit, options)):
             return bare
         misfit = np.abs(problem.misfits(fit.z, fit.scale))
         peeled = rim.peeled(misfit, options.peaks * float(misfit[rim.whole].max(initial=0.0)))
@@ -303,11 +302,11 @@ def _start(
     return best
 
 
-def _conformal(problem: WholeEntries) -> NDArray[np.complex128]:
+def _conformal(problem: WholeEntries, weights: NDArray) -> NDArray[np.complex128]:
     """The conformal map of entries that are whole or guessed, its triangles of mean area 1/2; 0 where there is none."""
     piece = problem.piece
     try:
-        z = conformal_map(piece, problem.weights, scale=problem.known_scale, sharp=False).z
+        z = conformal_map(piece, weights, scale=problem.known_scale, sharp=False).z
     except (GeometryError, SolverError):
         return np.zeros(piece.n_vertices, dtype=np.complex128)
     area = float(_areas(piece, z).mean())

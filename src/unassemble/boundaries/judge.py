@@ -2,16 +2,20 @@
 
 Displacements that change no whole entry, to first order, are the null space of their Jacobian J, the logarithm of c
 taken along. Similarities are in it, of a piece as a whole; what else there is moves the vertices that are not
-determined. It is found by inverse iteration on a block of vectors that grows until its last one is not in it.
+determined.
 
 That is not enough: as many equations as unknowns may have several solutions, and an entry that belongs to no dependency
 among the rows of J, y'J = 0, fits whatever it is. What hangs on such entries is no more than plausible. They show in
 random vectors from which their image under J was taken: what is left there is zero.
+
+So what moves a vertex is a displacement d with J d zero but for unchecked entries, where it is anything. If one does,
+then so does a random one, with probability one: that solves J d = r, with r random there, and x -> x + (J'J)^-1 J'(r -
+J x) leads to it from a random start. A basis of these displacements, one for each vertex that is not determined, is not
+needed, and one factorisation is all there is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,26 +37,26 @@ class JudgeOptions:
     Attributes
     ----------
     shift : float
-        Of J'J, to make it definite.
-    soft : float
-        Eigenvalue below which a displacement counts as free: entries know it to 1e-10 of the length of edges.
+        Of J'J, to make it definite. Displacements with smaller eigenvalues than some hundred times it count as free:
+        entries know these to 1e-10 of the length of edges.
     moves : float
         Part of the length of edges by which a null vector of length 1 may move a vertex that is determined.
     unchecked : float
         What is left of a standard normal number at an entry that nothing checks.
-    solves, probes, most : int
-        Inverse iterations, random vectors, and null vectors at most.
+    probes : int
+        Random vectors.
+    projections, solves : int
+        Iterations that take the image of J from them, and that lead to displacements.
     parts : int
         Vertices far from the rim about which others are looked for that move with them.
     """
 
     shift: float = 1e-14
-    soft: float = 1e-12
     moves: float = 1e-9
     unchecked: float = 1e-6
-    solves: int = 4
-    probes: int = 8
-    most: int = 256
+    probes: int = 4
+    projections: int = 3
+    solves: int = 5
     parts: int = 8
 
 
@@ -80,18 +84,15 @@ def determined(
     size = np.bincount(piece.edges.ravel(), np.repeat(length, 2), n) / np.bincount(piece.edges.ravel(), minlength=n)
     gradient = weight_gradient(piece, z) * size[piece.stencil]
     weights = edge_weights(piece, z) * (not known_scale)
-    nothing = np.zeros(n, dtype=bool), np.zeros(len(whole), dtype=bool)
     try:
-        checked = _Linearised.of(piece, gradient, weights, whole).checked()
-        if not checked.any():
-            return nothing
-        rest = _Linearised.of(piece, gradient, weights, checked)
-        free = rest.null_space()
+        checked, free = _Linearised.of(piece, gradient, weights, whole).judged()
     except SolverError:
-        return nothing
-    if free is None:
-        return nothing
-    vertices = _moving_alike(piece, z, free * size[:, None], size, rest.held)
+        checked, free = np.zeros_like(whole), np.zeros((n, 0), dtype=np.complex128)
+    if not checked.any():
+        return np.zeros(n, dtype=bool), checked
+    held = np.zeros(n, dtype=bool)
+    held[piece.stencil[:, checked]] = True
+    vertices = _moving_alike(piece, z, free * size[:, None], size, held)
     return vertices, checked & vertices[piece.stencil].all(axis=0)
 
 
@@ -122,10 +123,11 @@ class _Linearised:
         jacobian = jacobian_rows(len(held), [(np.where(entries, gradient, 0), piece.stencil)])
         return cls(jacobian, np.where(entries, weights, 0.0), entries, held)
 
-    def _with_inverse(self, use: Callable[[Callable[[NDArray], NDArray], float], NDArray | None]) -> NDArray | None:
-        """What becomes of the inverse of J'J, made definite by a small shift, and its typical diagonal entry.
+    def judged(self) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
+        """(e,) entries that others say something about, and (n, k) displacements that leave these as they are.
 
-        With c free its column is projected out, which is a matter of rank one.
+        The inverse is that of J'J, made definite by a small shift; with c free its column is projected out, which is a
+        matter of rank one.
         """
         product = UpperTriangle.of(self.jacobian.T.tobsr() @ self.jacobian)
         data, start = product.data.copy(), product.indptr[:-1]
@@ -139,52 +141,28 @@ class _Linearised:
             response = solver.solve(pull)
             left = float(self.slope @ self.slope - pull @ response)
 
-            def inverse(block: NDArray) -> NDArray:
-                x = solver.solve(np.ascontiguousarray(block))
+            def preimage(y: NDArray) -> NDArray:
+                x = solver.solve(np.ascontiguousarray(self.jacobian.T @ self._without_slope(y)))
                 return x + np.outer(response, pull @ x) / left if left > 0 else x
 
-            return use(inverse, typical)
+            rng = np.random.default_rng(1)
+            y = rng.standard_normal((len(self.slope), JudgeOptions.probes)) * self.entries[:, None]
+            for _ in range(JudgeOptions.projections):  # what the shift leaves, and rounding
+                y = y - self.jacobian @ preimage(y)
+            y = self._without_slope(y)
+            checked = self.entries & (np.abs(y).max(axis=1) > JudgeOptions.unchecked)
+            right = rng.standard_normal(y.shape) * (self.entries & ~checked)[:, None]
+            x = rng.standard_normal((2 * len(self.held), JudgeOptions.probes)) * np.repeat(self.held, 2)[:, None]
+            for _ in range(JudgeOptions.solves):
+                x = x + preimage(right - self.jacobian @ x)
         finally:
             solver.release()
+        return checked, np.ascontiguousarray((x / np.linalg.norm(x, axis=0)).T).view(np.complex128).T
 
-    def _without_slope(self, image: NDArray) -> NDArray:
+    def _without_slope(self, image: NDArray) -> NDArray[np.float64]:
         """Columns (e, k) less their component along the column of log c."""
         size = float(self.slope @ self.slope)
-        return image - np.outer(self.slope, self.slope @ image) / size if size else image
-
-    def checked(self) -> NDArray[np.bool_]:
-        """(e,) entries that others say something about."""
-
-        def use(inverse: Callable[[NDArray], NDArray], typical: float) -> NDArray:
-            y = np.random.default_rng(1).standard_normal((len(self.slope), JudgeOptions.probes)) * self.entries[:, None]
-            for _ in range(3):  # what the shift leaves, and rounding
-                y = self._without_slope(y)
-                y = y - self._without_slope(self.jacobian @ inverse(self.jacobian.T @ y))
-            return np.asarray(np.abs(y).max(axis=1) > JudgeOptions.unchecked)
-
-        found = self._with_inverse(use)
-        assert found is not None
-        return found
-
-    def null_space(self) -> NDArray[np.complex128] | None:
-        """(n, k) displacements, in lengths of edges; None where there are too many."""
-
-        def use(inverse: Callable[[NDArray], NDArray], typical: float) -> NDArray | None:
-            rng, block, count = np.random.default_rng(0), np.empty((2 * len(self.held), 0)), 16
-            own = np.repeat(self.held, 2)
-            while count <= min(JudgeOptions.most, int(own.sum())):
-                more = rng.standard_normal((len(own), count - block.shape[1])) * own[:, None]
-                block = np.linalg.qr(np.hstack([block, more]))[0]
-                for _ in range(JudgeOptions.solves):
-                    block = np.linalg.qr(inverse(block))[0]
-                _, values, turn = np.linalg.svd(self._without_slope(self.jacobian @ block), full_matrices=False)
-                null = values**2 <= JudgeOptions.soft * typical
-                if not null.all():
-                    return np.ascontiguousarray((block @ turn[null].T).T).view(np.complex128).T
-                count *= 2
-            return None
-
-        return self._with_inverse(use)
+        return np.asarray(image - np.outer(self.slope, self.slope @ image) / size if size else image)
 
 
 def _moving_alike(piece: Piece, z: NDArray, free: NDArray, size: NDArray, held: NDArray[np.bool_]) -> NDArray[np.bool_]:

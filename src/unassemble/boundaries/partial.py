@@ -59,8 +59,6 @@ def recover_partial(
     scale = None if options.scale is None else options.scale * stretch
     with clock("inside"):
         given = [_given(piece, matrix, whole) for piece in topology.pieces]
-        if whole is None and all(_is_whole(piece, matrix, scale) for piece in topology.pieces):
-            return None
         meshes = [
             fit_inside(
                 piece,
@@ -73,6 +71,9 @@ def recover_partial(
         ]
     meshes = [mesh if mesh is not None and mesh.exact else None for mesh in meshes]  # others have no positions
     if not any(mesh is not None and mesh.determined.any() for mesh in meshes):
+        return None
+    pairs = list(zip(topology.pieces, meshes, strict=True))
+    if whole is None and all(mesh is not None and _nothing_gone(piece, matrix, mesh, scale) for piece, mesh in pairs):
         return None
     with clock("place"):
         placed = _Placed.of(topology, meshes, placement, stretch)
@@ -89,15 +90,20 @@ def _given(piece: Piece, matrix: OperatorMatrix, whole: NDArray[np.bool_] | None
     return np.asarray(piece.inner | (incomplete.any() & ~incomplete[piece.edges].all(axis=1)))
 
 
-def _is_whole(piece: Piece, matrix: OperatorMatrix, scale: float | None) -> bool:
-    """Whether a conformal map has all entries of a piece, boundary included."""
+def _nothing_gone(piece: Piece, matrix: OperatorMatrix, mesh: InsideMesh, scale: float | None) -> bool:
+    """Whether the other entries of a piece are whole as well: on what is determined, or else by a conformal map."""
     weights = -matrix.entries[piece.edge_rows]
-    try:
-        mesh = positions(piece, weights, scale=scale, sharp=False, analyse=factorisation)
-    except (GeometryError, SolverError):
-        return False
+    others = ~mesh.given & mesh.determined[piece.stencil].all(axis=0)
+    if others.any():
+        found = mesh.z, mesh.scale
+    else:
+        try:
+            whole = positions(piece, weights, scale=scale, sharp=False, analyse=factorisation)
+        except (GeometryError, SolverError):
+            return False
+        others, found = ~mesh.given, (whole.z, whole.scale)
     with np.errstate(all="ignore"):
-        misfit = np.abs(weights / mesh.scale - edge_weights(piece, mesh.z))
+        misfit = np.abs(weights / found[1] - edge_weights(piece, found[0]))[others]
     return bool((misfit <= ALIKE).all())
 
 

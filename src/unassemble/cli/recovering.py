@@ -48,6 +48,9 @@ from .values import Numbers, OptionalTolerance
 )
 @click.option("--handed", type=click.Choice(["left", "right"]), help="Side of that line on which the centroid lies.")
 @click.option("--realise", is_flag=True, help="Surfaces: coordinates in space.")
+@click.option(
+    "--mass", metavar="FILE", help="The mass matrix of the same mesh: it tells the size, or with anchors the density."
+)
 @click.option("--triangulate", is_flag=True, help="Divide cells that the matrix leaves undivided.")
 @click.option("--standard-deviations", is_flag=True, help="Error bars of the coordinates.")
 @click.option("--report", metavar="FILE", help="Write a report: .json.")

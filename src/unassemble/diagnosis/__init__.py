@@ -4,6 +4,7 @@ from .answers import explained, judged
 from .kinds import PLANAR, UNKNOWN, Diagnosis
 from .mass import mass_matrix, refuse_masses
 from .scalar import diagnosed, further_terms
+from .structural import indefinite
 
 __all__ = [
     "PLANAR",
@@ -12,6 +13,7 @@ __all__ = [
     "diagnosed",
     "explained",
     "further_terms",
+    "indefinite",
     "judged",
     "mass_matrix",
     "refuse_masses",
