@@ -14,6 +14,7 @@ from ..words import count_of
 from .cliques import CELLS, Cells, cells_of, mostly, often
 from .kinds import CONSTANT, KEEP_ALL, PLANAR, TERMS, UNKNOWN, UNREAD, WITHOUT_MASS, Diagnosis
 from .mass import mass_matrix
+from .structural import saddle_point, seeming
 
 LINEAR = "a stiffness matrix of linear elements on triangles"
 _SMALL = 10  # rows: fewer may be a mesh of few triangles, whatever their entries are
@@ -118,8 +119,10 @@ def diagnosed(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis:
         return _of_kind("graph", "the Laplacian of a graph without weights", equal, sums)
     if planar:
         return Diagnosis(PLANAR, LINEAR + further_terms(matrix), sums.evidence)
-    if not (sums.zero.any() or sums.sign):  # as of no stiffness matrix, whatever its graph looks like
-        return _unknown(sums)
+    # Rows of stiffnesses have a diagonal, and some sums are zero or of one sign; blocks form cliques as cells do.
+    saddle = saddle_point(matrix)
+    if saddle or not (sums.zero.any() or sums.sign):
+        return _unknown(matrix, sums, saddle)
     return _by_cells(matrix, sums)
 
 
@@ -152,15 +155,15 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
     if (matrix.entries <= 0).all() and (sums.zero | sums.alone).all():
         shown = "all rows add up to zero, no off-diagonal entry is positive, and no cells show in the graph"
         return _of_kind("graph", "the Laplacian of a graph with weights", shown, sums)
-    return _unknown(sums)
+    return _unknown(matrix, sums)
 
 
-def _unknown(sums: Sums) -> Diagnosis:
+def _unknown(matrix: OperatorMatrix, sums: Sums, seems: str = "") -> Diagnosis:
     return Diagnosis(
         UNKNOWN,
         "no scalar matrix of a kind that is known",
         ("neither its graph nor its sums show one", *sums.evidence),
-        TERMS,
+        seems or seeming(matrix) or TERMS,
     )
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import guessed
-from ..diagnosis import PLANAR, UNKNOWN, Diagnosis, diagnosed, further_terms, mass_matrix
+from ..diagnosis import PLANAR, Diagnosis, diagnosed, further_terms, indefinite, mass_matrix
 from ..errors import NotPlanarError, RecoveryError
 from ..matrix import OperatorMatrix, load
-from ..operators import VectorReading, about_translations, second_reading, vector_valued
+from ..operators import VectorReading, second_reading, vector_valued
 from ..quiet import quiet_libraries
 from ..tolerances import MOST
 from ..topology import Topology, components, located, require_planar, surfaces
@@ -262,11 +262,9 @@ def _inspected(matrix: OperatorMatrix) -> Inspection:
             vector = second_reading(matrix)  # as recovery does
             if vector is not None:
                 return _vector_valued(matrix, facts, vector)
-            facts |= _diagnosis(matrix, planar=planar)
-            if not planar and facts["kind"] == UNKNOWN:  # as recovery says it
-                facts["advice"] = about_translations(matrix) or facts["advice"]
+            read_as = _diagnosis(matrix, planar=planar)
             witness = getattr(error, "witness", ())
-            return Inspection(**facts, planar=planar, obstacle=str(error or _NO_CELLS), witness=witness)
+            return Inspection(**facts, **read_as, planar=planar, obstacle=str(error or _NO_CELLS), witness=witness)
     found = mesh_facts(read, topology)
     if found["mixed_signs"] or found["n_undetermined"] > MOST * matrix.n:  # as in recovery where no mesh fits
         if (mass := mass_matrix(matrix, planar=False)) is not None:
@@ -281,7 +279,9 @@ def _masses(facts: dict[str, Any], mass: Diagnosis) -> Inspection:
 
 
 def _vector_valued(matrix: OperatorMatrix, facts: dict[str, Any], vector: VectorReading) -> Inspection:
-    return Inspection(**facts, planar=False, obstacle=vector.why, **nodes_facts(matrix, vector))
+    read_as = nodes_facts(matrix, vector)
+    read_as["evidence"] += (said,) if (said := indefinite(matrix)) else ()  # where recovery fails it says so
+    return Inspection(**facts, **read_as, planar=False, obstacle=vector.why)
 
 
 def _diagnosis(matrix: OperatorMatrix, *, planar: bool) -> dict[str, Any]:
