@@ -19,7 +19,7 @@ from .masses import weighed
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
 from .operators import VectorReading, asked_for, second_reading, vector_valued
 from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, listed_anchors
-from .outputs import ConformingMesh, PlanarMesh, Recovery, Surface
+from .outputs import PlanarMesh, Recovery, Surface
 from .progress import StageDisplay
 from .quiet import quiet_libraries
 from .readings import ScalarReadings
@@ -265,7 +265,7 @@ class _Task:
                 return unless_planar(curved)
             note = "a surface in space has exactly these entries, as one has nearly any: see `operator='surface'`"
             found = replace(found, warnings=(*found.warnings, note))
-        if not (found.node_status.any() or isinstance(found, ConformingMesh)):
+        if not found.node_status.any():
             return judged(found, self.matrix)
         other = self._as_second_reading()
         better = other is not None and (other.certified or other.node_status.mean() < found.node_status.mean())

@@ -90,7 +90,7 @@ def _obstacle(fits: Sequence[Fitted], near: Held, task: Task) -> str:
         )
         return sentences((differs, *notes))
     for fit in fits if certificate.backward_error > SUSPICIOUS and task.options.refine else ():
-        squares = (fit.misfit / fit.spread) ** 2
+        squares = np.where(fit.weights != 0, (fit.misfit / fit.spread) ** 2, 0.0)  # what vanished is never to blame
         if squares.max() > _STANDS_OUT * squares.sum():
             i, j = fit.part.piece.vertices[fit.part.edges[int(squares.argmax())]]
             return f"the entry of rows {i} and {j} stands out, next to others that fit to rounding level"
