@@ -75,7 +75,7 @@ class CommandLine(click.Group):
     def with_command(self, words: list[str]) -> list[str]:
         """The words with ``recover`` before them, where they begin with a file instead of a command."""
         first = words[0] if words else ""
-        is_file = first == "-" or (not first.startswith("-") and (Path(first).suffix or Path(first).is_file()))
+        is_file = first == "-" or (not first.startswith("-") and (Path(first).suffix or Path(first).exists()))
         return ["recover", *words] if is_file and first not in self.commands else words
 
     def in_use(self, words: Sequence[str]) -> list[click.Command]:
