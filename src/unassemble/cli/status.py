@@ -75,8 +75,8 @@ class CommandLine(click.Group):
     def with_command(self, words: list[str]) -> list[str]:
         """The words with ``recover`` before them, where they begin with a file instead of a command."""
         first = words[0] if words else ""
-        is_file = first == "-" or (not first.startswith("-") and (Path(first).suffix or Path(first).exists()))
-        return ["recover", *words] if is_file and first not in self.commands else words
+        named = first != "" and not first.startswith("-") and (Path(first).suffix or Path(first).exists())
+        return ["recover", *words] if (first == "-" or named) and first not in self.commands else words
 
     def in_use(self, words: Sequence[str]) -> list[click.Command]:
         """All commands, the one that is called first."""
