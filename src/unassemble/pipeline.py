@@ -19,7 +19,7 @@ from .masses import weighed
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
 from .operators import VectorReading, asked_for, second_reading, vector_valued
 from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, listed_anchors
-from .outputs import ConformingMesh, PlanarMesh, Recovery, Surface
+from .outputs import PlanarMesh, Recovery, Surface
 from .progress import StageDisplay
 from .quiet import quiet_libraries
 from .readings import ScalarReadings
@@ -193,7 +193,9 @@ class _Task:
             found = self._as_asked()
         except RecoveryError:
             refuse_masses(self.matrix, planar=False)
-            raise
+            if (apart := self.matrix.without_joining_zeros()) is None:
+                raise
+            return replace(self, matrix=apart).answer()
         if not (found.certified or isinstance(found, PlanarMesh)):
             refuse_masses(self.matrix, planar=False)
         return found
@@ -263,7 +265,7 @@ class _Task:
                 return unless_planar(curved)
             note = "a surface in space has exactly these entries, as one has nearly any: see `operator='surface'`"
             found = replace(found, warnings=(*found.warnings, note))
-        if not (found.node_status.any() or isinstance(found, ConformingMesh)):
+        if not found.node_status.any():
             return judged(found, self.matrix)
         other = self._as_second_reading()
         better = other is not None and (other.certified or other.node_status.mean() < found.node_status.mean())
@@ -305,8 +307,7 @@ class _Task:
         """The matrix as that of a surface that is bent, if it is one without doubt."""
         from .metric import could_be_planar, realised
 
-        entries = self.matrix.entries
-        if np.ptp(entries) <= ROUNDED * np.abs(entries).max(initial=0.0):
+        if np.ptp(self.matrix.entries) <= ROUNDED * self.matrix.row_size.max():
             return None  # the Laplacian of a graph, most likely
         try:
             found = self._lengths()
@@ -333,10 +334,11 @@ class _Task:
         from .vector import recover_vector
 
         self._refuse_scalar_options()
-        about, anchors = self.about, self.frame.anchors
-        return recover_vector(
-            self.matrix, reading, self.clock, anchors=anchors, cells=about.cells, scalar=self._as_scalar
-        )
+        clock, anchors, cells = self.clock, self.frame.anchors, self.about.cells
+        try:
+            return recover_vector(self.matrix, reading, clock, anchors=anchors, cells=cells, scalar=self._as_scalar)
+        except GeometryError as error:
+            raise GeometryError(f"the matrix is {reading.name}, but {error}") from error
 
     def _refuse_scalar_options(self) -> None:
         if self.given:

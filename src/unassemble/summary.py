@@ -44,7 +44,7 @@ def three_lines(recovery: Recovery, files: str = "") -> str:
     mesh += f", {missing:,} of these without a position," if missing else ""
     fits = f"{mesh} give the matrix back to {recovery.backward_error:.1e} of each row's largest entry"
     if isinstance(recovery, PlanarMesh) and 0 < recovery.n_fitting < recovery.n_entries:
-        fits += f", and {recovery.n_fitting:,} of {recovery.n_entries:,} entries to {CERTIFIED:g}"
+        fits += f", and {recovery.n_fitting:,} of {recovery.n_entries:,} entries to {CERTIFIED:g} of it"
     written = f" (written: {files})" if files else ""
     after = recovery.advice or "see `report()` for all that is known"
     return f"{recovery.status}: {fits}{written}\n  why   {recovery.reason}\n  next  {after}"
@@ -147,7 +147,7 @@ def _noise_rows(mesh: PlanarMesh) -> list[tuple[str, str]]:
     if mesh.estimated_noise is not None and mesh.backward_error > SUSPICIOUS:
         rows.append(("noise", f"the misfit is that of a standard deviation of {mesh.estimated_noise:.1e} (absolute)"))
     if mesh.largest_deviation is not None:
-        rows.append(("std deviation", f"at most {mesh.largest_deviation:.1e} in a coordinate"))
+        rows.append(("std deviation", f"at most {mesh.largest_deviation:.1e} in a coordinate (absolute)"))
     return rows
 
 

@@ -39,11 +39,14 @@ class Cells:
         Whether the graph alone tells them, and no entries.
     order : (n,) int64
         All rows, those near each other on the mesh near each other, too.
+    even : bool
+        Whether those that come next are as likely.
     """
 
     blocks: dict[Kind, NDArray[np.int64]]
     told: bool
     order: NDArray[np.int64]
+    even: bool = False
 
 
 @dataclass(frozen=True, eq=False)

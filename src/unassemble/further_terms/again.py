@@ -29,7 +29,7 @@ class Held:
         factor = found.scale[found.component[triangles].max(axis=1)]  # a hinge carries the lowest label
         held = certify(matrix.edges, matrix.entries, found.points, triangles, factor, self.tensor, terms)
         good = held.backward_error <= CERTIFIED and not len(held.flipped)
-        fits = f"{operator} re-assembled on this mesh gives the matrix back to {held.backward_error:.1e}"
+        fits = f"{operator} re-assembled on this mesh gives the matrix back to {held.backward_error:.1e} (relative)"
         worst, misfits = held.worst(0 if good and found.certified else 10)
         return replace(
             found,
