@@ -28,9 +28,9 @@ from .nodes import Nodes
 def contradicted(given: Equations, nodes: Nodes) -> tuple[NDArray[np.bool_], NDArray[np.int64]] | None:
     """Equations to leave out, and the nodes whose rows contradict others; None where that are too many, or none.
 
-    By least squares, with weights that fall with the deviations of the round before, these of not less than a bound that
-    falls from round to round. Off is what misses by more than half of the digits; with it go all equations of its node, and
-    those of several rows, or of members, in which the node occurs.
+    By least squares, with weights that fall with the deviations of the round before, these of not less than a bound
+    that falls from round to round. Off is what misses by more than half of the digits; with it go all equations of its
+    node, and those of several rows, or of members, in which the node occurs.
 
     Parameters
     ----------
@@ -64,7 +64,8 @@ def said_of(nodes: Nodes, spoiled: NDArray[np.int64]) -> str:
     between = f" ({_listed(f'{i}-{j}' for i, j in pairs)})" if len(pairs) else ""
     return (
         f"the rows of {count_of(len(spoiled), 'node')} ({_listed(map(str, spoiled))}) contradict the others and were "
-        f"left out: elements there{between}, or some of them, strain where they move rigidly, as with offsets or springs"
+        f"left out: elements there{between}, or some of them, strain where they move rigidly, as with offsets or "
+        "springs"
     )
 
 
