@@ -5,10 +5,10 @@
 Every mesh of the folders `planar` and `quad` below FOLDER (npz; ``../shared/corpus`` unless told) is assembled by
 scikit-fem, with rows in random order: quadratic and cubic triangles, quadrilaterals with four, eight and nine nodes
 (four beside triangles), zeros stored and dropped, c = 1e-3 and -1e3; and linear and quadratic triangles with
-c L + s M, s h^2 / c = 1e-3, 1 and 100, h^2 twice the mean area. Printed are status, largest error of a piece relative to its diameter, and
-processor time. "Right" has the same cells and an error of at most 1e-9; rectangles of quadratic triangles, whose matrix
-is the same for both diagonals where zeros are dropped, may have another diagonal if the mesh is called ambiguous. Exit
-status 1 where a certified mesh is wrong.
+c L + s M, s h^2 / c = 1e-3, 1 and 100, h^2 twice the mean area. Printed are status, largest error of a piece relative
+to its diameter, and processor time. "Right" has the same cells and an error of at most 1e-9; rectangles of quadratic
+triangles, whose matrix is the same for both diagonals where zeros are dropped, may have another diagonal if the mesh is
+called ambiguous. Exit status 1 where a certified mesh is wrong.
 """
 
 from __future__ import annotations
