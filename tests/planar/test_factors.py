@@ -104,6 +104,7 @@ def test_pieces_that_hold_each_other_are_fitted_as_they_do(sigma, options):
     assert largest_error(found.points, known.points) < 20 * sigma
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("told", [True, False])
 def test_error_bars_of_pieces_that_hold_each_other(told):
     known, sigma = specimen(*with_tied_triangles(80, 2, 1), c=C, seed=3), 3e-8 * C

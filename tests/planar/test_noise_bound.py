@@ -54,7 +54,7 @@ class Setting:
         return points
 
 
-@pytest.fixture(scope="module", params=[500, 5000, 50_000])
+@pytest.fixture(scope="module", params=[500, 5000, pytest.param(50_000, marks=pytest.mark.slow)])
 def setting(request):
     return request.param, Setting(request.param)
 

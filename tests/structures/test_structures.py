@@ -6,6 +6,7 @@ import scipy.sparse as sp
 from built import add_members, assembled, cells_of, error, flat, frame, model_on, plane_frame, plate, shell, truss
 
 from unassemble import InputError, RecoveryError, inspect_matrix, recover
+from unassemble.demo import mast
 
 CASES = {
     "frame": (frame, "frame or shell", 2),
@@ -251,3 +252,11 @@ def test_files_and_pictures(tmp_path):
     report = found.report()
     assert report["block_size"] == 6
     assert report["cells"] == {"line": len(found.lines)}
+
+
+def test_the_mast_of_the_demonstration():
+    true = mast()
+    found = recover(true.matrix, anchors=true.anchors)
+    assert found.certified
+    np.testing.assert_allclose(found.points, true.points, atol=1e-12)
+    assert len(found.lines) == 8 * (4 + 4) + 9 * (4 + 1)

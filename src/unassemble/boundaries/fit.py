@@ -42,8 +42,9 @@ class FitOptions:
         Most of them for one mu.
     last_steps : int
         For mu = 0.
-    gain : float
-        A relative decrease below this ends the iteration.
+    gain, near : float
+        A relative decrease below this ends the iteration; a step that leaves no more than this of the sum of squares is
+        followed by one with the same factor.
     exact : float
         Root mean square misfit, in units of typical weights, that is rounding.
     damping : float
@@ -57,6 +58,7 @@ class FitOptions:
     steps: int = 12
     last_steps: int = 30
     gain: float = 1e-3
+    near: float = 1e-2
     exact: float = 1e-13
     damping: float = 1e-6
     trials: int = 12
@@ -114,6 +116,12 @@ class WholeEntries:
         self.columns = count + (count < len(self.free))
         self._factor: Factorisation | None = None
 
+    def analysed(self, matrix: UpperTriangle) -> Factorisation:
+        """To factorise normal matrices of all entries with."""
+        if self._factor is None:
+            self._factor = factorisation(matrix, definite=True)
+        return self._factor
+
     def release(self) -> None:
         """Give the memory of the factor back."""
         if self._factor is not None:
@@ -168,6 +176,14 @@ class WholeEntries:
                 break
             z, scale, misfit, shape, share = better
             before, cost = cost, float(misfit @ misfit + shape @ shape)
+            last = before
+            while share == 1 and cost <= options.near * last:
+                step = self._solved(system.towards(misfit, shape))  # so near that the same factor does
+                better = None if step is None else self._along(z, scale, *step, whole, prior, mu, cost)
+                if better is None:
+                    break
+                z, scale, misfit, shape, share = better
+                last, cost = cost, float(misfit @ misfit + shape @ shape)
             damping = max(damping / 10, 1e-15) if share == 1 else 1.5 * damping
             small = small + 1 if cost > (1 - options.gain) * before else 0
             if small >= (1 if mu else 4):
@@ -207,13 +223,16 @@ class WholeEntries:
     def _step(self, system: _System, damping: float | NDArray) -> tuple[NDArray, float] | None:
         """Displacement and change of log c; None where the normal matrix cannot be factorised."""
         matrix = system.damped(damping)
-        if self._factor is None:
-            self._factor = factorisation(matrix, definite=True)
         try:
-            self._factor.factorise(matrix)
+            self.analysed(matrix).factorise(matrix)
         except SolverError:
             self.release()
             return None
+        return self._solved(system)
+
+    def _solved(self, system: _System) -> tuple[NDArray, float] | None:
+        """The same with the factor that is there."""
+        assert self._factor is not None
         gradient, response = self._factor.solve(np.column_stack([system.right, system.slope])).T
         move = 0.0
         if self.known_scale is None:
@@ -256,10 +275,17 @@ class _System:
         jacobian = jacobian_rows(problem.columns, parts)
         product = jacobian.T.tobsr() @ jacobian
         self._upper = UpperTriangle.of(product)
-        fitted = trust * problem.weights / scale  # what a / c changes by with -log c
-        self.right = jacobian.T @ np.concatenate([misfit, -shape])
-        self.slope = jacobian.T @ np.concatenate([fitted, np.zeros(len(shape))])
-        self.size, self.along = float(fitted @ fitted), float(fitted @ misfit)
+        self._jacobian = jacobian
+        self._fitted = trust * problem.weights / scale  # what a / c changes by with -log c
+        self.slope = jacobian.T @ np.concatenate([self._fitted, np.zeros(len(shape))])
+        self.size = float(self._fitted @ self._fitted)
+        self.towards(misfit, shape)
+
+    def towards(self, misfit: NDArray, shape: NDArray) -> _System:
+        """With other right-hand sides."""
+        self.right = self._jacobian.T @ np.concatenate([misfit, -shape])
+        self.along = float(self._fitted @ misfit)
+        return self
 
     def damped(self, damping: float | NDArray) -> UpperTriangle:
         """The matrix with its diagonal enlarged."""

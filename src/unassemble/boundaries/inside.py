@@ -73,7 +73,7 @@ class InsideOptions:
     near: float = 0.01
     steepest: float = 3.0
     band: int = 5
-    settling: int = 6
+    settling: int = 3
     newton: FitOptions = field(default_factory=lambda: FitOptions(steps=1, last_steps=8, damping=1e-15, exact=1e-12))
     held: float = 2.3
     rounds: int = 8
@@ -153,13 +153,13 @@ def fit_inside(
         exact = core[0].misfit <= options.exact
         fit, rim = _grown(problem, *core, options) if exact else core
         z, whole = fit.z, rim.whole
+        known, entries = np.zeros(len(z), dtype=bool), np.zeros_like(whole)
+        if exact:
+            known, entries = determined(piece, z, whole, problem.analysed, known_scale=scale is not None)
     finally:
         problem.release()
-    known, entries = np.zeros(len(z), dtype=bool), np.zeros_like(whole)
-    if exact:
-        known, entries = determined(piece, z, whole, known_scale=scale is not None)
-        if entries.sum() <= 2 * known.sum() - (4 if scale is not None else 3):  # nothing that checks them as a whole
-            known, entries = np.zeros_like(known), np.zeros_like(entries)
+    if entries.sum() <= 2 * known.sum() - (4 if scale is not None else 3):  # nothing that checks them as a whole
+        known, entries = np.zeros_like(known), np.zeros_like(entries)
     return InsideMesh(z, fit.scale * unit, given, entries, exact, known)
 
 

@@ -16,6 +16,7 @@ needed, and one factorisation is all there is.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..errors import SolverError
-from ..linalg import UpperTriangle, factorisation
+from ..linalg import Factorisation, UpperTriangle
 from ..planar.cotangent import edge_weights, weight_gradient
 from ..topology import Piece
 from .fit import jacobian_rows
@@ -61,8 +62,9 @@ class JudgeOptions:
 
 
 def determined(
-    piece: Piece, z: NDArray, whole: NDArray[np.bool_], *, known_scale: bool = False
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    piece: Piece, z: NDArray, whole: NDArray[np.bool_], analyse: Callable[[UpperTriangle], Factorisation], *,
+    known_scale: bool = False,
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:  # fmt: skip
     """Vertices, up to a similarity of all of them, and the entries that determine and check them.
 
     Parameters
@@ -71,6 +73,8 @@ def determined(
     z : (n,) complex128
         Positions at which whole entries fit.
     whole : (e,) bool
+    analyse : callable
+        Makes a factorisation from the pattern of the normal matrix of all entries.
     known_scale : bool
         Whether c is given.
 
@@ -85,7 +89,7 @@ def determined(
     gradient = weight_gradient(piece, z) * size[piece.stencil]
     weights = edge_weights(piece, z) * (not known_scale)
     try:
-        checked, free = _Linearised.of(piece, gradient, weights, whole).judged()
+        checked, free = _Linearised.of(piece, gradient, weights, whole).judged(analyse)
     except SolverError:
         checked, free = np.zeros_like(whole), np.zeros((n, 0), dtype=np.complex128)
     if not checked.any():
@@ -123,7 +127,9 @@ class _Linearised:
         jacobian = jacobian_rows(len(held), [(np.where(entries, gradient, 0), piece.stencil)])
         return cls(jacobian, np.where(entries, weights, 0.0), entries, held)
 
-    def judged(self) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
+    def judged(
+        self, analyse: Callable[[UpperTriangle], Factorisation]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
         """(e,) entries that others say something about, and (n, k) displacements that leave these as they are.
 
         The inverse is that of J'J, made definite by a small shift; with c free its column is projected out, which is a
@@ -134,29 +140,26 @@ class _Linearised:
         typical = float(np.median(np.diagonal(data[start][self.held], axis1=1, axis2=2)))
         data[start] += np.where(self.held, JudgeOptions.shift, 1.0)[:, None, None] * typical * np.eye(2)
         matrix = product.with_data(data)
-        solver = factorisation(matrix, definite=True)
-        try:
-            solver.factorise(matrix)
-            pull = self.jacobian.T @ self.slope
-            response = solver.solve(pull)
-            left = float(self.slope @ self.slope - pull @ response)
+        solver = analyse(matrix)
+        solver.factorise(matrix)
+        pull = self.jacobian.T @ self.slope
+        response = solver.solve(pull)
+        left = float(self.slope @ self.slope - pull @ response)
 
-            def preimage(y: NDArray) -> NDArray:
-                x = solver.solve(np.ascontiguousarray(self.jacobian.T @ self._without_slope(y)))
-                return x + np.outer(response, pull @ x) / left if left > 0 else x
+        def preimage(y: NDArray) -> NDArray:
+            x = solver.solve(np.ascontiguousarray(self.jacobian.T @ self._without_slope(y)))
+            return x + np.outer(response, pull @ x) / left if left > 0 else x
 
-            rng = np.random.default_rng(1)
-            y = rng.standard_normal((len(self.slope), JudgeOptions.probes)) * self.entries[:, None]
-            for _ in range(JudgeOptions.projections):  # what the shift leaves, and rounding
-                y = y - self.jacobian @ preimage(y)
-            y = self._without_slope(y)
-            checked = self.entries & (np.abs(y).max(axis=1) > JudgeOptions.unchecked)
-            right = rng.standard_normal(y.shape) * (self.entries & ~checked)[:, None]
-            x = rng.standard_normal((2 * len(self.held), JudgeOptions.probes)) * np.repeat(self.held, 2)[:, None]
-            for _ in range(JudgeOptions.solves):
-                x = x + preimage(right - self.jacobian @ x)
-        finally:
-            solver.release()
+        rng = np.random.default_rng(1)
+        y = rng.standard_normal((len(self.slope), JudgeOptions.probes)) * self.entries[:, None]
+        for _ in range(JudgeOptions.projections):  # what the shift leaves, and rounding
+            y = y - self.jacobian @ preimage(y)
+        y = self._without_slope(y)
+        checked = self.entries & (np.abs(y).max(axis=1) > JudgeOptions.unchecked)
+        right = rng.standard_normal(y.shape) * (self.entries & ~checked)[:, None]
+        x = rng.standard_normal((2 * len(self.held), JudgeOptions.probes)) * np.repeat(self.held, 2)[:, None]
+        for _ in range(JudgeOptions.solves):
+            x = x + preimage(right - self.jacobian @ x)
         return checked, np.ascontiguousarray((x / np.linalg.norm(x, axis=0)).T).view(np.complex128).T
 
     def _without_slope(self, image: NDArray) -> NDArray[np.float64]:

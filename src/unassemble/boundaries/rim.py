@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,18 +58,18 @@ class Rim:
         """All triangles, but for those of vertices with too few entries."""
         return cls(piece, given, np.ones(len(piece.triangles), dtype=bool)).pruned()
 
-    @property
+    @cached_property
     def _sides(self) -> NDArray[np.int64]:
         """(e,) number of triangles left on each edge."""
         return np.bincount(self.piece.opposite[self.left].ravel(), minlength=len(self.piece.edges))
 
-    @property
+    @cached_property
     def whole(self) -> NDArray[np.bool_]:
         """(e,) entries that the triangles left have whole."""
         facing = self.piece.inner + 1
         return np.asarray(self.given & (self._sides == facing))
 
-    @property
+    @cached_property
     def _open(self) -> NDArray[np.bool_]:
         """(e,) edges of triangles that are left, without a whole entry."""
         return np.asarray((self._sides > 0) & ~self.whole)
@@ -77,15 +78,14 @@ class Rim:
         """Without vertices, alone or in rows along the rim, that have no more entries than coordinates."""
         rim = self
         while len(gone := list(rim._loose())):
-            left = rim.left & ~np.isin(rim.piece.triangles, gone).any(axis=1)
+            left = rim.left & ~_marked(rim.piece, gone)[rim.piece.triangles].any(axis=1)
             rim = Rim(rim.piece, rim.given, left)
         return rim
 
     def _loose(self) -> Iterator[int]:
         piece, whole, opened = self.piece, self.whole, self._open
-        vertices = np.unique(piece.edges[opened])
-        near = self.left & np.isin(piece.triangles, vertices).any(axis=1)
-        entries: dict[int, set[int]] = {int(v): set() for v in vertices}
+        near = self.left & self.opened[piece.triangles].any(axis=1)
+        entries: dict[int, set[int]] = {v: set() for v in np.flatnonzero(self.opened).tolist()}
         for corners, sides in zip(piece.triangles[near].tolist(), piece.opposite[near].tolist(), strict=True):
             own = [side for side in sides if whole[side]]
             for v in corners:
@@ -105,19 +105,15 @@ class Rim:
                     yield from row
                     break
 
-    @property
+    @cached_property
     def opened(self) -> NDArray[np.bool_]:
         """(n,) vertices of edges without a whole entry."""
-        opened = np.zeros(self.piece.n_vertices, dtype=bool)
-        opened[self.piece.edges[self._open]] = True
-        return opened
+        return _marked(self.piece, self.piece.edges[self._open])
 
     @property
     def inside(self) -> NDArray[np.bool_]:
         """(n,) vertices of triangles that are left."""
-        inside = np.zeros(self.piece.n_vertices, dtype=bool)
-        inside[self.piece.triangles[self.left]] = True
-        return inside
+        return _marked(self.piece, self.piece.triangles[self.left])
 
     def bared(self) -> Rim:
         """Without all vertices of the rim."""
@@ -144,6 +140,13 @@ class Rim:
         stay = False if keep is None else keep
         left = self.left & (~gone[self.piece.triangles].any(axis=1) | stay)
         return Rim(self.piece, self.given, left) if (left != self.left).any() else None
+
+
+def _marked(piece: Piece, vertices: NDArray | list[int]) -> NDArray[np.bool_]:
+    """(n,) whether a vertex is among some."""
+    marked = np.zeros(piece.n_vertices, dtype=bool)
+    marked[vertices] = True
+    return marked
 
 
 def _rows(v: int, along: dict[int, list[int]]) -> Iterator[list[int]]:

@@ -62,8 +62,8 @@ def recover(
 ) -> int:
     """Recover the mesh of MATRIX and write it to OUT.
 
-    MATRIX belongs to the Laplacian on a planar mesh of triangles or a surface, c L + D, or to isotropic elasticity in
-    the plane or in space.
+    MATRIX belongs to a scalar operator on a mesh of the plane or on a surface, to elasticity in the plane or in space,
+    or to a structure of bars, beams and shells.
 
     MATRIX is Matrix Market (also .gz), scipy's .npz, NumPy's .npy, MATLAB's .mat, or lines of row, column and entry; -
     reads Matrix Market from standard input. Rows count from 0. Without OUT the mesh goes to a .vtu beside MATRIX, if

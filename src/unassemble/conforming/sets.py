@@ -247,8 +247,8 @@ def _beside(common: Common, quads: NDArray[np.int64]) -> NDArray[np.int64]:
     halves = label[quads[:, list(combinations(range(4), 3))]].sum(axis=2)
     triangles = simplices(common.graph, 2)
     triangles = triangles[~np.isin(label[triangles].sum(axis=1), halves)]
-    if not len(triangles):
-        return triangles
+    if not 0 < len(triangles) < 3 * common.n:  # more than a planar graph has (Hakimi and Schmeichel, 1979): of solids
+        return triangles[:0]
     keys = pairs_of(common.n, quads)
     order = np.argsort(keys, axis=None)
     pairs = pairs_of(common.n, triangles)
