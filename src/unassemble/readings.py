@@ -27,7 +27,7 @@ from .options import ScalarOptions
 from .recovery import PlanarMesh
 from .scalar import of_other_scale, recover_scalar
 from .scalar.placement import Placement
-from .tolerances import LITTLE
+from .tolerances import CERTIFIED, LITTLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,8 @@ class ScalarReadings:
         found: PlanarMesh | None = None
         with suppress(RecoveryError):
             found = of_cells(self.matrix, shown_cells(self.matrix))
-        if (found is None or found.status == "uncertified") and not self.placement.tensor:
+        fits = found is not None and (found.status != "uncertified" or found.backward_error <= CERTIFIED)
+        if not (fits or self.placement.tensor):  # an entry that stands out by 1e-10 is no further term
             terms = recover_elements_with_terms(self.matrix, of_cells, self.clock)
             found = terms if terms is not None and terms.status != "uncertified" else found
         return found if found is not None and (found.certified or found.backward_error < LITTLE) else None
