@@ -52,7 +52,7 @@ def three_lines(recovery: Recovery, files: str = "") -> str:
 
 def one_line(recovery: Recovery) -> str:
     """Kind, sizes, status and backward error, for a list or a prompt."""
-    sizes = f"{_points(recovery)} points, {', '.join(counted_cells(recovery))}"
+    sizes = f"{_points(recovery, ' points')}, {', '.join(counted_cells(recovery))}"
     return (
         f"<{type(recovery).__name__}: {recovery.status}, {recovery.operator}, {sizes}, "
         f"backward error {recovery.backward_error:.1e}>"
@@ -175,9 +175,9 @@ def _elastic_rows(recovery: Mechanical) -> list[tuple[str, str]]:
     return rows
 
 
-def _points(recovery: Recovery) -> str:
+def _points(recovery: Recovery, noun: str = "") -> str:
     missing = int(np.count_nonzero(recovery.node_status))
-    return f"{recovery.n_points:,}" + (f", of which {missing:,} not determined" if missing else "")
+    return f"{recovery.n_points:,}{noun}" + (f", of which {missing:,} not determined" if missing else "")
 
 
 def _pieces(recovery: Recovery) -> str:
