@@ -55,8 +55,7 @@ def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]
     from ..structures.bars import bars_of
 
     found = vector.numbering
-    whole = f"sums by direction vanish in {100 * found.share:.0f} % of the cases, as in rows away from supports"
-    shown = {"name": vector.name, "evidence": (whole,)}
+    shown = {"name": vector.name, "evidence": (vector.why,)}
     if isinstance(found, StructuralNumbering):
         return shown | {
             "block_size": found.block_size,
