@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..nodes.nodal import NodalMatrix, determined
@@ -46,7 +47,33 @@ def unborne(nodal: NodalMatrix, solution: Solution, found: Cells) -> NDArray[np.
         return np.zeros(nodal.n, dtype=bool)
     if not found.certified or found.shown is None:
         return solution.hanging
-    return np.asarray(solution.hanging & ~(found.shown | (nodal.row_of < 0)).all(axis=1))
+    firm = determined(solution.firm_points)
+    shown = firm | (found.shown | (nodal.row_of < 0)).all(axis=1)
+    return np.asarray(solution.hanging & ~_held_together(found.among(shown), solution.component, firm))
+
+
+def _held_together(found: Cells, piece: NDArray[np.int64], firm: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(n,) nodes of the most cells of each piece that lie to each other as they do without an assumption.
+
+    Cells re-assemble wherever they lie, and those of the plane in any size. Two nodes that they share fix both; and
+    nodes that are `firm`, (n,), are as good as the nodes of one cell.
+    """
+    held = np.zeros(len(piece), dtype=bool)
+    groups = [cells for block in found.blocks.values() for cells in block]
+    groups += [np.flatnonzero(firm & (piece == k)) for k in range(piece.max() + 1)]
+    count = np.array([len(group) for group in groups])
+    start = np.concatenate([[0], np.cumsum(count)])
+    member = sp.csr_array((np.ones(start[-1], np.int32), np.concatenate(groups), start), shape=(len(groups), len(piece)))
+    shared = member @ member.T
+    label = sp.csgraph.connected_components(sp.csr_array(shared >= 2), directed=False)[1]
+    first = piece[np.array([group[0] if len(group) else 0 for group in groups])]
+    size = np.bincount(label, count)[label]
+    for k in range(piece.max() + 1):
+        here = np.flatnonzero((first == k) & (count > 0))
+        if len(here):
+            best = label[here[np.argmax(size[here])]]
+            held |= np.asarray(member[label == best].sum(axis=0) > 0)
+    return held
 
 
 def guessed_directions(numbering: Numbering, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
