@@ -520,3 +520,13 @@ def test_inspect_and_recover_read_classics_alike(name):
         assert facts.name in said
         assert "whose sums by direction vanish in" in facts.evidence[0]
         assert "if enough rows are whole" in facts.recoverable
+
+
+def test_a_row_that_is_coupled_to_all_others():
+    """A band beside one full row, whose graph is planar and full of separating triangles: an answer in seconds."""
+    n = 2001
+    rng, i = np.random.default_rng(0), np.arange(n - 1)
+    rows, columns = np.concatenate([i[:-1], i[:-2], i]), np.concatenate([i[1:], i[2:], np.full(n - 1, n - 1)])
+    half = sp.csr_array((rng.uniform(-1, 1, len(rows)), (rows, columns)), shape=(n, n))
+    with pytest.raises(RecoveryError, match="none has its entries"):
+        recover(half + half.T + sp.diags_array(np.append(rng.uniform(3, 4, n - 1), 0.0)))
