@@ -13,6 +13,7 @@ from unassemble import recover
 
 calfem = pytest.importorskip("calfem.core")
 importlib.import_module("calfem.matrix_compat").restore_numpy_matrix()  # it puts a class of its own in numpy
+pytestmark = pytest.mark.filterwarnings("ignore:the matrix subclass:PendingDeprecationWarning")
 
 
 def added(points, cells, element, block, unknowns):

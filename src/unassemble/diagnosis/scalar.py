@@ -33,7 +33,7 @@ class Sums:
     penalised : (n,) bool
         Rows whose diagonal is beyond everything else.
     sign : int
-        That of all sums, where none is zero and all have one; else 0.
+        That of all sums that are not zero, where these are not few and all have one; else 0.
     """
 
     zero: NDArray[np.bool_]
@@ -51,8 +51,9 @@ class Sums:
         alone = size == 0
         zero = (np.abs(sums) <= SUMMED * (size + np.abs(matrix.diagonal))) & ~alone
         penalised = (SMALL * np.abs(matrix.diagonal) > size) & ~alone
-        signs = np.unique(np.sign(sums[~alone & ~penalised]))
-        sign = int(signs[0]) if len(signs) == 1 and not (zero & ~alone).any() else 0
+        rest = ~(zero | alone | penalised)
+        signs = np.unique(np.sign(sums[rest]))
+        sign = int(signs[0]) if len(signs) == 1 and rest.sum() > MOST * (zero | rest).sum() else 0
         return cls(zero, alone, alone & (matrix.diagonal != 0), penalised, sign)
 
     @property
@@ -183,7 +184,7 @@ def further_terms(matrix: OperatorMatrix) -> str:
         return ""
     if sums.penalised.any() and (sums.zero | sums.alone | sums.penalised).all():
         return ", plus a diagonal"
-    if sums.zero.any():
+    if sums.zero.any() and not sums.sign:
         return ", plus a diagonal or without some unknowns"
     if np.ptp(matrix.diagonal) <= ROUNDED * np.abs(matrix.diagonal).max():
         return ", plus a diagonal, or with rows and columns scaled to a constant diagonal"
