@@ -113,6 +113,11 @@ UNREAD = {
         lambda: weighted(networkx.watts_strogatz_graph(100, 6, 0.1, seed=2)),
         "with weights",
     ),
+    "weighted graph with a node held": (
+        "graph",
+        lambda: weighted(networkx.random_geometric_graph(60, 0.3, seed=1)).tocsr()[1:, 1:],
+        "with weights, plus a diagonal",
+    ),
     "line": ("segments", lambda: pyamg.gallery.poisson((40,), format="csr"), "on a line"),
 }
 
@@ -395,6 +400,11 @@ def test_masses_of_every_element_are_named(name):
             recover(A, operator=operator)
         assert facts.name in str(caught.value)
         assert facts.advice.split(":")[0] in str(caught.value).lower()
+
+
+def test_a_matrix_without_its_diagonal_is_no_saddle_point():
+    A = networkx.adjacency_matrix(networkx.random_geometric_graph(60, 0.3, seed=1)).astype(float)
+    assert "saddle point" not in str(inspect_matrix(A)) + outcome(A)[1]
 
 
 def test_inner_products_that_are_of_no_element():
