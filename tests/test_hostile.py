@@ -31,6 +31,13 @@ def test_the_same_of_what_takes_longer(kind):
     assert outcome not in ("WRONG", "CRASH", "SLOW"), f"--kinds {kind} --first 0\n{said}"
 
 
+@pytest.mark.parametrize("found", [(601, 1363), (601, 1385), (602, 151)], ids=["exchanged", "apart", "uneven"])
+def test_what_went_wrong_before(found):
+    """Entries exchanged where nothing checks them; cells held together by an assumption; cells of 1e-200 the others."""
+    _, _, outcome, _, said = tried(*found)
+    assert outcome not in ("WRONG", "CRASH", "SLOW"), said
+
+
 def test_rows_that_vanish_beside_others_are_refused():
     """PARDISO ends in a segmentation fault on many of them."""
     part = sp.block_diag([np.array([[1.0, 1], [1, 2]])] * 150 + [np.array([[1e-203]])])  # small ones are dense

@@ -197,7 +197,7 @@ def _polished(start: Fitted, weights: NDArray, scale: float | None, noise: NDArr
     likely to be such, of one size.
     """
     entries = start.entries
-    if entries.flipped(start.z):
+    if entries.flipped(start.z) or not start.spread.min() > np.finfo(float).eps ** 2 * start.spread.max():
         return replace(start, notes=("no polish: cells are flat or turned over",))
     try:
         # Relative to the largest: squares of 1e-15, of what vanished beside noise of 1e-12, are too much to factorise.

@@ -18,10 +18,11 @@ from .doubts import guessed_directions, unborne, unconfirmed
 from .materials.cells import no_cells, recognise_cells
 from .nullspace.certificate import largest_residual
 from .nullspace.material import lame_ratio, poisson_ratio
+from .nullspace.redundancy import checked
 from .nullspace.solution import Solution
 from .remarks import about_assumptions, about_cells, about_directions, about_nodes
 from .results import ElasticityRecovery
-from .verdict import NOTHING_SHOWN, RESTS_ON_PLANES, hidden, of_few_digits, verdict
+from .verdict import NOTHING_CHECKED, NOTHING_SHOWN, RESTS_ON_PLANES, hidden, of_few_digits, verdict
 
 
 def described(
@@ -63,6 +64,10 @@ def described(
         )
     backward = found.backward_error if found.certified else error
     status, reason = verdict(nodal, solution, error, found, numbering)
+    alone = status == "certified" and cells and not found.certified
+    lone = determined(solution.points) & ~checked(nodal, solution) if alone else np.zeros(nodal.n, dtype=bool)
+    if alone and not (determined(solution.points) & ~lone).any():
+        status, reason, lone = "uncertified", NOTHING_CHECKED, np.zeros_like(lone)
     if rounding and near and not any(solution.freedoms):
         with clock("certify"):
             doubt = known_to(solution.points, solution.component, rounding, placed_again, sized=False)
@@ -76,7 +81,7 @@ def described(
     if hanging.any() and (hanging | withheld | ~determined(solution.points)).all():
         status, reason = "uncertified", RESTS_ON_PLANES
         hanging = np.zeros(nodal.n, dtype=bool)  # said of all of them
-    kept = ~(withheld | hanging)
+    kept = ~(withheld | hanging | lone)
     points = np.where(kept[:, None], solution.points, np.nan)
     found = found.among(kept)
     loose = ~determined(points)
@@ -100,7 +105,7 @@ def described(
         warnings=(
             *solution.warnings,
             *(about_cells(found) if cells else ()),
-            *about_nodes(nodal, loose, withheld, hanging),
+            *about_nodes(nodal, loose, withheld, hanging, lone),
             *about_assumptions(solution),
             *about_directions(int(guessed.sum())),
         ),

@@ -63,7 +63,9 @@ def _held_together(found: Cells, piece: NDArray[np.int64], firm: NDArray[np.bool
     groups += [np.flatnonzero(firm & (piece == k)) for k in range(piece.max() + 1)]
     count = np.array([len(group) for group in groups])
     start = np.concatenate([[0], np.cumsum(count)])
-    member = sp.csr_array((np.ones(start[-1], np.int32), np.concatenate(groups), start), shape=(len(groups), len(piece)))
+    member = sp.csr_array(
+        (np.ones(start[-1], np.int32), np.concatenate(groups), start), shape=(len(groups), len(piece))
+    )
     shared = member @ member.T
     label = sp.csgraph.connected_components(sp.csr_array(shared >= 2), directed=False)[1]
     first = piece[np.array([group[0] if len(group) else 0 for group in groups])]

@@ -27,7 +27,11 @@ def about_cells(found: Cells) -> list[str]:
 
 
 def about_nodes(
-    nodal: NodalMatrix, loose: NDArray[np.bool_], withheld: NDArray[np.bool_], hanging: NDArray[np.bool_]
+    nodal: NodalMatrix,
+    loose: NDArray[np.bool_],
+    withheld: NDArray[np.bool_],
+    hanging: NDArray[np.bool_],
+    lone: NDArray[np.bool_],
 ) -> list[str]:
     """Why nodes have no coordinates.
 
@@ -40,6 +44,8 @@ def about_nodes(
         Those that no cell confirms.
     hanging : (n,) bool
         Those whose coordinates rest on an assumption that nothing confirms.
+    lone : (n,) bool
+        Those whose coordinates rest on identities that no others would contradict.
     """
     sprung = (nodal.size == 0) & (nodal.row_of >= 0).any(axis=1)
     told = []
@@ -60,7 +66,12 @@ def about_nodes(
             "across it, or if Poisson's ratio is the same there, which neither another equation nor an element "
             "confirms. No coordinates are given there"
         )
-    rest = int((loose & ~withheld & ~hanging & ~sprung).sum())
+    if lone.any():
+        told.append(
+            f"{count_of(int(lone.sum()), 'node is', 'nodes are')} determined by identities that no others check, nor "
+            "an element. No coordinates are given there"
+        )
+    rest = int((loose & ~withheld & ~hanging & ~lone & ~sprung).sum())
     if rest:
         told.append(
             f"{count_of(rest, 'node is', 'nodes are')} not determined: rows coupled to {'it' if rest == 1 else 'them'} "

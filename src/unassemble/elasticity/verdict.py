@@ -26,6 +26,11 @@ NOTHING_LEFT = Reason(
     "and no elements do",
     WITHOUT_SUPPORTS,
 )
+NOTHING_CHECKED = Reason(
+    "identities have no others to check against, so that wrong entries would go unnoticed, and no elements were found "
+    "that re-assemble to the matrix",
+    WITHOUT_SUPPORTS,
+)
 RESTS_ON_PLANES = Reason(
     "more than translation and scale is free unless nodes that lack a direction lie in planes across it, and no "
     "elements show that they do",

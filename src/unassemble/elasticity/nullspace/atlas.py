@@ -28,7 +28,7 @@ from .charts import Chart, chart, patches
 from .identities import identities
 
 _log = logging.getLogger(__name__)
-_PATCH = {2: 6000, 3: 1900}  # rows per chart: larger ones cost more to factorise, smaller ones overlap more
+PATCH = {2: 6000, 3: 1900}  # rows per chart: larger ones cost more to factorise, smaller ones overlap more
 _MOST = 64  # fields of the whole body to look for, at most
 _LEAST = 8
 
@@ -79,7 +79,7 @@ def null_fields(
     terms : (d, d, d, t) float64, optional
         Unknown boundary terms; see :func:`.identities.identities`.
     """
-    parts = _patches(nodal, body, patch or _PATCH[nodal.dim])
+    parts = _patches(nodal, body, patch or PATCH[nodal.dim])
     made = [chart(nodal, valid, rows, whole=len(parts) == 1, terms=terms) for rows in parts]
     made = [one for one in made if len(one.nodes)]
     _log.debug("%d charts of %s fields", len(made), [len(one.values) for one in made])

@@ -130,9 +130,10 @@ class Identities:
 
     def residual(self, x: NDArray) -> NDArray[np.float64]:
         """(m, d, d, d, k) what sticks out of the boundary terms; zero for the true coordinates."""
-        return self._projected(self.apply(x))
+        return self.outside_terms(self.apply(x))
 
-    def _projected(self, value: NDArray) -> NDArray[np.float64]:
+    def outside_terms(self, value: NDArray) -> NDArray[np.float64]:
+        """(m, d, d, d, k) what sticks out of the boundary terms of such products, which are overwritten."""
         for rows, basis in self._kinds:
             part = np.einsum("cbap,ncbak->npk", basis, value[rows], optimize=True)
             value[rows] -= np.einsum("cbap,npk->ncbak", basis, part, optimize=True)
