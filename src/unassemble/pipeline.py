@@ -193,7 +193,9 @@ class _Task:
             found = self._as_asked()
         except RecoveryError:
             refuse_masses(self.matrix, planar=False)
-            raise
+            if (apart := self.matrix.without_joining_zeros()) is None:
+                raise
+            return replace(self, matrix=apart).answer()
         if not (found.certified or isinstance(found, PlanarMesh)):
             refuse_masses(self.matrix, planar=False)
         return found
@@ -305,8 +307,7 @@ class _Task:
         """The matrix as that of a surface that is bent, if it is one without doubt."""
         from .metric import could_be_planar, realised
 
-        entries = self.matrix.entries
-        if np.ptp(entries) <= ROUNDED * np.abs(entries).max(initial=0.0):
+        if np.ptp(self.matrix.entries) <= ROUNDED * self.matrix.row_size.max():
             return None  # the Laplacian of a graph, most likely
         try:
             found = self._lengths()
@@ -333,10 +334,11 @@ class _Task:
         from .vector import recover_vector
 
         self._refuse_scalar_options()
-        about, anchors = self.about, self.frame.anchors
-        return recover_vector(
-            self.matrix, reading, self.clock, anchors=anchors, cells=about.cells, scalar=self._as_scalar
-        )
+        clock, anchors, cells = self.clock, self.frame.anchors, self.about.cells
+        try:
+            return recover_vector(self.matrix, reading, clock, anchors=anchors, cells=cells, scalar=self._as_scalar)
+        except GeometryError as error:
+            raise GeometryError(f"the matrix is {reading.name}, but {error}") from error
 
     def _refuse_scalar_options(self) -> None:
         if self.given:

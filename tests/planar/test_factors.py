@@ -131,7 +131,10 @@ def test_noise_is_told_beside_holes_that_may_be_filled(sigma):
 def test_a_small_misfit_of_few_entries_is_said_to_be_as_noise_would_leave_it(sigma):
     known = specimen(*with_rings(2, 0, hole=False), c=C, seed=3)
     found = recover(noisy(known.matrix, sigma * C, 1))
-    assert f"noise of standard deviation {found.estimated_noise:.2g} in the entries would leave as much" in found.reason
+    assert (
+        f"noise of standard deviation {found.estimated_noise:.2g} (absolute) in the entries would leave as much"
+        in found.reason
+    )
     assert "no set of cells" not in found.reason
 
 

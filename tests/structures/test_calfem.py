@@ -1,5 +1,7 @@
 """Structures and bodies whose element matrices are CALFEM's (Lund University): certified and right."""
 
+import importlib
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -10,6 +12,8 @@ from scipy.spatial.distance import pdist
 from unassemble import recover
 
 calfem = pytest.importorskip("calfem.core")
+importlib.import_module("calfem.matrix_compat").restore_numpy_matrix()  # it puts a class of its own in numpy
+pytestmark = pytest.mark.filterwarnings("ignore:the matrix subclass:PendingDeprecationWarning")
 
 
 def added(points, cells, element, block, unknowns):

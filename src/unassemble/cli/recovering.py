@@ -74,6 +74,7 @@ def recover(
     options["numbering"] = spelled_numbering(options["numbering"])
     options["refine"] = not options.pop("no_refine")
     from ..export import check_output, without_points
+    from ..formats import lacks_worth
     from ..plot.canvas import check_plot
     from ..progress import StageDisplay
     from ..report import check_report, write_report
@@ -90,4 +91,4 @@ def recover(
         if plot is not None:
             display("plot")
             recovery.plot(plot)
-    return outcome(recovery, [out, report, plot], quiet=quiet)
+    return outcome(recovery, [out, report, plot], quiet=quiet, lacking=lacks_worth(out))

@@ -50,13 +50,13 @@ def verdict(stored: OperatorMatrix, fits: Sequence[Fitted], held: Sequence[Held]
     if not written.passes:
         why = (
             f"the mesh fits, but not as it is written: so far from the origin its coordinates have too few digits, and "
-            f"the matrix is given back to {error:.1e} only"
+            f"the matrix is given back to {error:.1e} (relative) only"
         )
         return Verdict("uncertified", uniqueness, why)
     if written.test and written.by_noise:
         p = written.test.figures["p_value"]
         return Verdict("certified", uniqueness, f"the misfit is that of {written.test.noise} (p = {p:.2g})")
-    fits_well = f"the operator re-assembled on this mesh gives the matrix back to {error:.1e}"
+    fits_well = f"the operator re-assembled on this mesh gives the matrix back to {error:.1e} (relative)"
     return Verdict("certified", uniqueness, fits_well)
 
 

@@ -12,7 +12,6 @@ from ..words import sentences
 from .kinds import UNKNOWN
 from .mass import mass_matrix
 from .scalar import diagnosed, where_nothing_fits
-from .structural import saddle_point, seeming
 
 
 def explained(error: RecoveryError, matrix: OperatorMatrix) -> RecoveryError:
@@ -21,10 +20,8 @@ def explained(error: RecoveryError, matrix: OperatorMatrix) -> RecoveryError:
     found = mass_matrix(matrix, planar=False) or diagnosed(matrix, planar=planar)
     if isinstance(error, NotPlanarError):
         begun = "the graph of the matrix is not planar"
-        saddle = saddle_point(matrix)
-        if found.kind == UNKNOWN or saddle:  # whose blocks of other elements form such cliques by chance
-            seems = saddle or seeming(matrix) or found.advice
-            said = sentences([begun + (f": {error.why}" if error.why else ""), seems])
+        if found.kind == UNKNOWN:
+            said = sentences([begun + (f": {error.why}" if error.why else ""), found.advice])
         elif found.unread:
             said = found.sentence(f"{begun}, for this is")
         else:

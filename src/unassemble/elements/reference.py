@@ -8,6 +8,7 @@ from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import factorial
 
 from .kinds import Kind
 
@@ -48,6 +49,19 @@ def _coefficients(kind: Kind) -> NDArray[np.float64]:
 def shape_functions(kind: Kind, at: NDArray[np.float64]) -> NDArray[np.float64]:
     """(q, k) values of the shape functions at points (q, d) of the reference element."""
     return np.asarray((at[:, None, :] ** _exponents(kind)).prod(axis=2) @ _coefficients(kind))
+
+
+def mass_sums(kind: Kind) -> NDArray[np.float64]:
+    """(k,) sums of the rows of a simplex's mass matrix, over the diagonal: the same on all meshes of straight cells.
+
+    The integral of a monomial over the unit simplex is the product of the factorials of its exponents over that of
+    their sum and d.
+    """
+    power = _exponents(kind)
+    both, C = power[:, None, :] + power, _coefficients(kind)
+    integrals = factorial(both).prod(axis=2) / factorial(both.sum(axis=2) + kind.dim)
+    M = C.T @ integrals @ C
+    return np.asarray(M.sum(axis=1) / M.diagonal())
 
 
 def shape_gradients(kind: Kind, at: NDArray[np.float64]) -> NDArray[np.float64]:

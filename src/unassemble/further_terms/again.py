@@ -28,7 +28,7 @@ class Held:
         """The mesh of the Laplacian as that of the whole matrix, if it gives that back."""
         held = self._held(found, terms)
         good = held.backward_error <= CERTIFIED and not len(held.flipped)
-        fits = f"{operator} re-assembled on this mesh gives the matrix back to {held.backward_error:.1e}"
+        fits = f"{operator} re-assembled on this mesh gives the matrix back to {held.backward_error:.1e} (relative)"
         worst, misfits = held.worst(0 if good and found.certified else 10)
         return replace(
             found,

@@ -61,7 +61,9 @@ def mass_alone(held: Held, topology: Topology, skeleton: Skeleton, sums: RowSums
         node_status=np.ones(matrix.n, dtype=np.int8),
         status="certified",
         uniqueness="proved",
-        reason=sentences((f"the mass matrix of triangles with these areas is the given one to {error:.1e}", _NO_SHAPE)),
+        reason=sentences(
+            (f"the mass matrix of triangles with these areas is the given one to {error:.1e} (relative)", _NO_SHAPE)
+        ),
         operator="mass",
         backward_error=error,
         n_holes=topology.n_holes + int(hole.sum()),

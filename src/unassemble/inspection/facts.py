@@ -55,8 +55,9 @@ def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]
     from ..structures.bars import bars_of
 
     found = vector.numbering
+    shown = {"name": vector.name, "evidence": (vector.why,)}
     if isinstance(found, StructuralNumbering):
-        return {
+        return shown | {
             "block_size": found.block_size,
             "n_nodes": found.n_nodes,
             "numbering": found.kind,
@@ -64,7 +65,7 @@ def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]
         }
     nodal = nodal_matrix(matrix.csr(), found)
     words = {"pattern": "in an order found by the pattern"}
-    return {
+    return shown | {
         "block_size": found.block_size,
         "n_nodes": found.n_nodes,
         "numbering": words.get(found.kind, found.kind),
