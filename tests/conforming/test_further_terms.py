@@ -40,6 +40,18 @@ def test_a_mass_term_gives_the_mesh_a_size(element, ratio, c):
         assert "mass matrix, as of a reaction" in inspect_matrix(known.matrix).operator
 
 
+def test_pieces_have_one_unit_of_length():
+    first, s = with_mass("P2", triangles(60, 0), 1.0)
+    mesh = triangles(60, 1)
+    second = assembled("P2", MeshTri(3 * mesh.p, mesh.t), reaction=s)
+    found = recover(sp.block_diag([first.matrix, second.matrix], format="csr"))
+    assert found.status == "certified", found.reason
+    n = len(first.points)
+    sizes = [np.linalg.norm(some - some.mean(axis=0)) for some in (found.points[:n], found.points[n:])]
+    true = [np.linalg.norm(some - some.mean(axis=0)) for some in (first.points, second.points)]
+    assert sizes[1] / sizes[0] == pytest.approx(true[1] / true[0], rel=1e-9)
+
+
 @pytest.mark.parametrize("relative", [1e-1, 1e-4, 1e-7])
 @pytest.mark.parametrize("element", ["P2"])
 def test_one_entry_changed_beside_a_mass_term(element, relative):
@@ -74,6 +86,7 @@ def test_a_mass_term_on_quadrilaterals(element, ratio):
     assert largest_error(found.points, known.points) < 1e-9
     assert found.scale == pytest.approx(-2.0, rel=1e-7)
     assert np.sign(found.reaction) == -np.sign(ratio)
+    assert found.uniqueness == "searched"
 
 
 def test_much_mass_on_quadrilaterals_is_named_and_never_certified():

@@ -9,15 +9,15 @@ D. G. Anderson, Iterative procedures for nonlinear integral equations, J. ACM 12
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..certify import Terms
 from ..clock import Clock
-from ..conforming.mass import Weights, guessed_from_sums, less, told_by_entries, total, weights_at
+from ..conforming.mass import Blocks, Weights, guessed_from_sums, less, told_by_entries, total, weights_at
 from ..conforming.recover import shown_cells
 from ..conforming.roles import Cells
 from ..errors import RecoveryError
@@ -30,6 +30,7 @@ from .row_sums import RowSums
 from .scaling import unscaled
 
 Of = Callable[[OperatorMatrix, Iterable[Cells]], PlanarMesh]
+Sized = Callable[[OperatorMatrix, Sequence[Cells]], PlanarMesh]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +61,9 @@ def less_mass(matrix: OperatorMatrix) -> LessMass | None:
     return LessMass(less(matrix, cells.blocks, weights), cells, weights)
 
 
-def recover_elements_with_terms(matrix: OperatorMatrix, of_cells: Of, clock: Clock) -> PlanarMesh | None:
+def recover_elements_with_terms(
+    matrix: OperatorMatrix, of_cells: Of, clock: Clock, *, anchored: bool
+) -> PlanarMesh | None:
     """The mesh of c L + s M or S c L S; None where row sums show neither, or nothing comes near.
 
     Parameters
@@ -69,13 +72,20 @@ def recover_elements_with_terms(matrix: OperatorMatrix, of_cells: Of, clock: Clo
     of_cells : callable
         Recovers a matrix c L + D on cells that its rows may form.
     clock : Clock
+    anchored : bool
+        Whether positions are given, so that no piece may change its size.
     """
     sums = RowSums.of(matrix)
     if not sums.there.any():
         return None
+
+    def sized(left: OperatorMatrix, shown: Sequence[Cells]) -> PlanarMesh:
+        found = of_cells(left, shown)
+        return found if anchored else _in_one_size(found, sums.values, shown[0].blocks)
+
     try:
         if (told := less_mass(matrix)) is not None:
-            return _settled(matrix, told.weights, told.cells, of_cells, patience=0)
+            return _settled(matrix, told.weights, told.cells, sized, patience=0)
         cells = next(shown_cells(matrix), None)
         if cells is None:
             return None
@@ -86,13 +96,13 @@ def recover_elements_with_terms(matrix: OperatorMatrix, of_cells: Of, clock: Clo
             return scaled
         guessed = guessed_from_sums(sums.values, cells.blocks)  # serendipity functions have integrals of both signs
         areas = np.concatenate([some.sum(axis=1) for some in guessed.values()])
-        return _settled(matrix, guessed, cells, of_cells) if np.ptp(np.sign(areas)) == 0 else None
+        return _settled(matrix, guessed, cells, sized) if np.ptp(np.sign(areas)) == 0 else None
     except RecoveryError:
         return None
 
 
 def _settled(
-    matrix: OperatorMatrix, start: Weights, cells: Cells, of_cells: Of, *, patience: int = 9
+    matrix: OperatorMatrix, start: Weights, cells: Cells, of_cells: Sized, *, patience: int = 9
 ) -> PlanarMesh | None:
     """The mesh whose mass matrix, taken off, leaves its Laplacian; the nearest where there is none.
 
@@ -123,8 +133,29 @@ def _settled(
     if best is None:
         return None
     found, reaction = best
+    notes = [size_note(reaction)]
+    if patience:  # not told by entries, but found
+        found = replace(found, uniqueness="searched" if found.uniqueness == "proved" else found.uniqueness)
+        notes += ["that no other mesh, with another mass, fits as well is not proved"] if found.certified else []
     operator, terms = "c L + s M, M the consistent mass matrix,", Terms(matrix.diagonal, reaction)
-    return Held(matrix, None).with_terms(found, terms, operator, size_note(reaction))
+    return Held(matrix, None).with_terms(found, terms, operator, *notes)
+
+
+def _in_one_size(found: PlanarMesh, sums: NDArray[np.float64], blocks: Blocks) -> PlanarMesh:
+    """Pieces that share no vertex, each about its centroid in the size that its row sums give it beside the first."""
+    component, n = found.component, len(found.scale)
+    if n == 1 or len(found.hinges) or (component < 0).any():
+        return found
+    areas = weights_at(found.points, blocks)
+    each = sum(np.bincount(component[cells[:, 0]], areas[kind].sum(axis=1), n) for kind, cells in blocks.items())
+    ratio = np.bincount(component, sums, n) / each
+    if not (ratio / ratio[0] > 0).all():
+        return found
+    factor = np.sqrt(ratio / ratio[0])[component, None]
+    count = np.bincount(component)
+    centre = np.column_stack([np.bincount(component, x) / count for x in found.points.T])[component]
+    bars = None if found.standard_deviations is None else factor * found.standard_deviations
+    return replace(found, points=centre + factor * (found.points - centre), standard_deviations=bars)
 
 
 def _mixed(rounds: list[tuple[NDArray, NDArray]]) -> NDArray[np.float64]:
