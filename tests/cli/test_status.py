@@ -112,6 +112,7 @@ def test_3_each_error_is_named_as_absolute_or_relative(work, name, debug):
     work.write("B.mtx", spoil(work.true.matrix))
     result = work.recover(*options, *["--debug"] * debug, matrix="B.mtx")
     assert result.exit_code == 3, result.stderr
+    assert debug or (";" not in result.stdout and len(result.stdout.splitlines()) == 3)
     named = r" \((absolute|relative)\)| of (each|the) row's largest entry| of it\b| is allowed"
     errors = list(re.finditer(r"[^ ]+e-\d\d+", result.stdout.replace("\n", " ")))
     assert errors

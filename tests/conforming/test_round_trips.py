@@ -144,7 +144,8 @@ QUADS = sorted((SHARED / "corpus" / "quad").glob("*.npz"))
 @needs_shared
 @pytest.mark.parametrize("path", QUADS, ids=lambda path: path.stem)
 def test_third_party_quadrilaterals(path):
-    data = np.load(path)
+    with np.load(path) as file:
+        data = dict(file)
     points = np.ascontiguousarray(data["points"][:, :2].T)
     kinds = {"triangles": MeshTri, "quads": MeshQuad}
     meshes = [

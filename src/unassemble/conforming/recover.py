@@ -107,8 +107,8 @@ def _ambiguous(one: ConformingMesh, other: ConformingMesh) -> ConformingMesh:
     )
 
 
-def shown_cells(stored: OperatorMatrix) -> Iterator[Cells]:
-    """Cells that the rows may form, the likeliest first."""
+def shown_cells(stored: OperatorMatrix, *, mass: bool = False) -> Iterator[Cells]:
+    """Cells that the rows may form, the likeliest first; without or with a mass term."""
     numbering = local_numbering(stored.n, stored.edges)
     order = numbering.vertices
     near = OperatorMatrix(
@@ -116,7 +116,7 @@ def shown_cells(stored: OperatorMatrix) -> Iterator[Cells]:
     )
     for sets in node_sets(near):
         with suppress(TopologyError):
-            for blocks, told in ordered_cells(near, sets):
+            for blocks, told in ordered_cells(near, sets, mass=mass):
                 yield Cells({kind: order[cells] for kind, cells in blocks.items()}, told, order, sets.even)
 
 

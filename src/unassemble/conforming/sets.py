@@ -199,10 +199,12 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
     common = Common(matrix)
     for order, k in ((3, 10), (2, 9), (2, 8), (2, 6)):
         found = common.sets(k)
-        if order == 3 and not _cover(common, [found]):
-            found = common.bubbles()
         if _cover(common, [found]):
             yield NodeSets(order, (found,))
+        if order == 3:  # pairs of nodes of two cells may have ten neighbours in common, too
+            bubbles = common.bubbles()
+            if len(bubbles) != len(found) and _cover(common, [bubbles]):
+                yield NodeSets(order, (bubbles,))
     choices = list(_choices(common, common.sets(4)))
     for quads in choices:
         if _cover(common, [quads]):

@@ -22,11 +22,12 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 from ..elements.kinds import KINDS, Kind
 from ..elements.reference import mass_sums
 from ..errors import GeometryError
+from ..further_terms import less_mass
 from ..matrix import OperatorMatrix
 from ..nodes.grouping import same_pattern
 from ..nodes.unknowns import nodes_of_pattern
 from ..structures.layouts import SPACE
-from ..tolerances import HARDLY_ANY, LAST_DIGITS, LITTLE, NEARLY_ALL, ROUNDED, SUMMED
+from ..tolerances import ALIKE, HARDLY_ANY, LAST_DIGITS, LITTLE, NEARLY_ALL, ROUNDED, SUMMED
 from ..topology import components
 from ..words import count_of
 from .cliques import CELLS, cells_of, often
@@ -84,13 +85,19 @@ def mass_matrix(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) ->
         return Diagnosis("mass", f"a mass matrix of {name}", (sums, *masses.without), advice)
     crowded = masses.M.nnz > 7 * masses.M.shape[0] - 12  # twice 3 n - 6, and the diagonal
     bounds = masses.bounds if not exact and (crowded or not planar) else None
-    if bounds is None:
+    if bounds is None or _beside_stiffness(matrix):
         return None
     shown = (
         f"scaled to identity blocks its least eigenvalue is {bounds[0]:.2g}, where those of stiffnesses near zero",
         f"its couplings add up in one vector, to a largest eigenvalue of {bounds[1]:.2g}, as under a translation",
     )
     return Diagnosis("mass", f"a consistent mass matrix{masses.unknowns}", (*shown, *masses.without), UNREAD["mass"])
+
+
+def _beside_stiffness(matrix: OperatorMatrix) -> bool:
+    """Whether rows form straight triangles of second or third order, and more than their mass is there."""
+    less = less_mass(matrix)
+    return less is not None and bool(np.abs(less.matrix.entries).max() > ALIKE * np.abs(matrix.entries).max())
 
 
 def _is_lumped(matrix: OperatorMatrix) -> bool:
@@ -175,10 +182,10 @@ class _Masses:
         cells = cells_of(self.M.shape[0], edges)
         n_parts = len(components(self.M.shape[0], edges))
         if (cells.nodes, cells.shared) in CELLS and n_parts == 1:
-            return f" of {CELLS[cells.nodes, cells.shared][1]}"
+            return f" of {CELLS[cells.nodes, cells.shared][1]}, with little stiffness at most"
         several = n_parts > 1 or often(cells.twins) or nodes_of_pattern(self.M) is not None
         if not several:
-            return ""
+            return ", or another matrix of inner products, since no cells show in its graph"
         # Stiffnesses of a body that is held all around keep as far from zero while it has a few dozen nodes.
         return " of several unknowns per node" + (_OR_HELD if self.M.shape[0] < 150 else "")
 

@@ -26,17 +26,18 @@ class Sums:
 
     Attributes
     ----------
-    zero : (n,) bool
-        Rows that add up to nothing, alone ones left out.
+    zero, positive : (n,) bool
+        Rows that add up to nothing, and to more than nothing, alone ones left out.
     alone, identity : (n,) bool
         Rows with nothing beside the diagonal; those of them that have something on it.
     penalised : (n,) bool
         Rows whose diagonal is beyond everything else.
     sign : int
-        That of all sums, where none is zero and all have one; else 0.
+        That of all sums that are not zero, where these are not few and all have one; else 0.
     """
 
     zero: NDArray[np.bool_]
+    positive: NDArray[np.bool_]
     alone: NDArray[np.bool_]
     identity: NDArray[np.bool_]
     penalised: NDArray[np.bool_]
@@ -51,9 +52,10 @@ class Sums:
         alone = size == 0
         zero = (np.abs(sums) <= SUMMED * (size + np.abs(matrix.diagonal))) & ~alone
         penalised = (SMALL * np.abs(matrix.diagonal) > size) & ~alone
-        signs = np.unique(np.sign(sums[~alone & ~penalised]))
-        sign = int(signs[0]) if len(signs) == 1 and not (zero & ~alone).any() else 0
-        return cls(zero, alone, alone & (matrix.diagonal != 0), penalised, sign)
+        rest = ~(zero | alone | penalised)
+        signs = np.unique(np.sign(sums[rest]))
+        sign = int(signs[0]) if len(signs) == 1 and rest.sum() > MOST * (zero | rest).sum() else 0
+        return cls(zero, (sums > 0) & ~zero & ~alone, alone, alone & (matrix.diagonal != 0), penalised, sign)
 
     @property
     def rest(self) -> NDArray[np.bool_]:
@@ -152,9 +154,10 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
         if _is_grid(matrix.n, edges, cells):
             shown = "no three rows are coupled to each other, and most rows are coupled to six"
             return _of_kind("grid in space", "that of a grid in space, a seven-point stencil", shown, sums)
-    if (matrix.entries <= 0).all() and (sums.zero | sums.alone).all():
-        shown = "all rows add up to zero, no off-diagonal entry is positive, and no cells show in the graph"
-        return _of_kind("graph", "the Laplacian of a graph with weights", shown, sums)
+    if (matrix.entries <= 0).all() and (sums.zero | sums.alone | sums.positive).all():
+        more = "" if (sums.zero | sums.alone).all() else ", plus a diagonal"
+        shown = f"no off-diagonal entry is positive, rows add up to zero{' or more' if more else ''}, and no cells show"
+        return _of_kind("graph", f"the Laplacian of a graph with weights{more}", shown, sums)
     return _unknown(matrix, sums)
 
 
@@ -183,7 +186,7 @@ def further_terms(matrix: OperatorMatrix) -> str:
         return ""
     if sums.penalised.any() and (sums.zero | sums.alone | sums.penalised).all():
         return ", plus a diagonal"
-    if sums.zero.any():
+    if sums.zero.any() and not sums.sign:
         return ", plus a diagonal or without some unknowns"
     if np.ptp(matrix.diagonal) <= ROUNDED * np.abs(matrix.diagonal).max():
         return ", plus a diagonal, or with rows and columns scaled to a constant diagonal"

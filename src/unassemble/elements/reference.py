@@ -100,12 +100,13 @@ def planar_rules(kind: Kind) -> dict[str, Rule]:
     return {f"{order} x {order} Gauss": _gauss(2, order) for order in orders}
 
 
-def exact_rule(kind: Kind) -> Rule:
+def exact_rule(kind: Kind, more: int = 0) -> Rule:
     """A rule that integrates products of gradients exactly on affine cells, in the plane: Gauss's, on triangles folded.
 
-    The map (s, t) -> (s, (1 - s) t) takes the box to the triangle; its determinant costs one degree.
+    The map (s, t) -> (s, (1 - s) t) takes the box to the triangle; its determinant costs one degree. Products of
+    functions take one point `more` in each direction.
     """
-    at, weights = _gauss(2, kind.degree + 1)
+    at, weights = _gauss(2, kind.degree + 1 + more)
     if not kind.simplex:
         return at, weights
     s, t = at.T
