@@ -79,7 +79,7 @@ class InsideOptions:
     rounds: int = 8
     patience: int = 3
     peaks: float = 0.25
-    growing: tuple[tuple[float, int], ...] = ((1e-3, 10), (0.0, 25))
+    growing: tuple[tuple[float, int], ...] = ((1e-3, 5), (0.0, 20))
     grown: int = 3
     fits: float = 1e-7
     regrown: int = 4
