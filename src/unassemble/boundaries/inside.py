@@ -18,7 +18,7 @@ from ..topology import Piece
 from .embedding import tutte
 from .fit import Fit, FitOptions, WholeEntries
 from .judge import determined
-from .local import fit_near
+from .local import fit_anew, fit_near
 from .patch import distance, nearest
 from .rim import Rim
 
@@ -50,6 +50,8 @@ class InsideOptions:
         so that any damping would hold them.
     held : float
         Whole entries to a vertex, at least, where the rim is taken off as a whole: three far inside, two determine.
+    tries : int
+        Fits from random triangles where misfits are large, before vertices are taken off.
     rounds, patience : int
         Fits, with fewer vertices at the rim each, and those with more of them; and how many come before the rim is
         taken off as a whole in a small mesh, which loses more of it.
@@ -76,6 +78,7 @@ class InsideOptions:
     settling: int = 3
     newton: FitOptions = field(default_factory=lambda: FitOptions(steps=1, last_steps=8, damping=1e-15, exact=1e-12))
     held: float = 2.3
+    tries: int = 6
     rounds: int = 8
     patience: int = 3
     peaks: float = 0.25
@@ -230,6 +233,9 @@ def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, options: I
         _log.debug("%d whole entries: misfit %.1e", rim.whole.sum(), fit.misfit)
         if fit.misfit <= options.exact:
             break
+        fit = _tried(problem, rim, fit, options)
+        if fit.misfit <= options.exact:
+            break
         if turn >= patience and (bare := _bare(problem, rim, fit, options)):
             return bare
         misfit = np.abs(problem.misfits(fit.z, fit.scale))
@@ -239,6 +245,26 @@ def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, options: I
             break
         rim, fit = peeled, problem.faded(fit.z, fit.scale, peeled.whole, options.again)
     return fit, rim
+
+
+def _tried(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -> Fit:
+    """A fit, where misfits are large from random triangles again and again."""
+    rng = np.random.default_rng(1)
+    for _ in range(options.tries):
+        z = fit_anew(problem, fit.z, fit.scale, rim.whole, _places(problem, rim, fit, options.peaks), rng)
+        found = problem.fit(z, fit.scale, rim.whole, 0.0)
+        fit = found if found.misfit < fit.misfit else fit
+        if fit.misfit <= options.exact:
+            break
+    return fit
+
+
+def _places(problem: WholeEntries, rim: Rim, fit: Fit, part: float) -> NDArray[np.bool_]:
+    """(n,) vertices next to large misfits."""
+    misfit = np.where(rim.whole, np.abs(problem.misfits(fit.z, fit.scale)), 0.0)
+    places = np.zeros(problem.piece.n_vertices, dtype=bool)
+    places[problem.piece.edges[misfit > part * misfit.max()]] = True
+    return places
 
 
 def _grown(problem: WholeEntries, core: Fit, rim: Rim, options: InsideOptions) -> tuple[Fit, Rim]:
