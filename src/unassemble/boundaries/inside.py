@@ -50,8 +50,8 @@ class InsideOptions:
         so that any damping would hold them.
     held : float
         Whole entries to a vertex, at least, where the rim is taken off as a whole: three far inside, two determine.
-    tries : int
-        Fits from random triangles where misfits are large, before vertices are taken off.
+    tries, nearly : int, float
+        Fits from random triangles where misfits are large, before vertices are taken off, and up to which misfit.
     rounds, patience : int
         Fits, with fewer vertices at the rim each, and those with more of them; and how many come before the rim is
         taken off as a whole in a small mesh, which loses more of it.
@@ -79,6 +79,7 @@ class InsideOptions:
     newton: FitOptions = field(default_factory=lambda: FitOptions(steps=1, last_steps=8, damping=1e-15, exact=1e-12))
     held: float = 2.3
     tries: int = 6
+    nearly: float = 1e-3
     rounds: int = 8
     patience: int = 3
     peaks: float = 0.25
@@ -231,8 +232,6 @@ def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, options: I
     """Fits with fewer vertices at the rim each, until one has all whole entries; after a few without the rim."""
     for turn in range(options.rounds):
         _log.debug("%d whole entries: misfit %.1e", rim.whole.sum(), fit.misfit)
-        if fit.misfit <= options.exact:
-            break
         fit = _tried(problem, rim, fit, options)
         if fit.misfit <= options.exact:
             break
@@ -248,14 +247,15 @@ def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, options: I
 
 
 def _tried(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -> Fit:
-    """A fit, where misfits are large from random triangles again and again."""
+    """A fit, from random triangles again and again where misfits are large, if that is in a few places."""
     rng = np.random.default_rng(1)
     for _ in range(options.tries):
-        z = fit_anew(problem, fit.z, fit.scale, rim.whole, _places(problem, rim, fit, options.peaks), rng)
-        found = problem.fit(z, fit.scale, rim.whole, 0.0)
-        fit = found if found.misfit < fit.misfit else fit
-        if fit.misfit <= options.exact:
+        places = _places(problem, rim, fit, options.peaks)
+        if fit.misfit <= options.exact or fit.misfit > options.nearly or 4 * places.sum() > len(places):
             break
+        z = fit_anew(problem, fit.z, fit.scale, rim.whole, places, rng)
+        found = problem.fit(z, fit.scale, rim.whole, 0.0, options.newton)
+        fit = found if found.misfit < fit.misfit else fit
     return fit
 
 
