@@ -16,7 +16,7 @@ DOCS_INSTALLED := $(VENV)/.installed-docs
 .PHONY: help demo test test-all lint bench docs clean
 
 help:
-	@echo 'make demo   recover two matrices and draw the meshes (into demo-output/)'
+	@echo 'make demo   recover three matrices and draw the meshes (into demo-output/)'
 	@echo 'make test   run the tests, also with the fallback solver'
 	@echo 'make test-all  the same, and the long families'
 	@echo 'make lint   check style, types, and which rooms use which'

@@ -3,9 +3,9 @@
 To first order in sigma the best similarity onto the true mesh takes away the component along translations, rotation
 and scaling, so the bound is the trace of P C P, P the projector off these four displacements, C = sigma^2 (K'K)^-1 in
 any gauge, and K = (I - ww'/w'w) J the derivative of the weights with what a change of the unknown scale c could
-explain projected out. P C P = sigma^2 (K'K)^+ since K has no other null vectors. The derivative is coded here a
-second time, from dot and cross products; up to 3,000 edges the trace is exact, above it is the mean over 400 random
-vectors.
+explain projected out. P C P = sigma^2 (K'K)^+ since K has no other null vectors. The derivative of linear triangles is
+coded here a second time, from dot and cross products, that of others in noise_elements.py; up to 3,000 edges the trace
+is exact, above it is the mean over 400 random vectors.
 """
 
 from __future__ import annotations
@@ -79,8 +79,8 @@ def weights_and_derivative(z: np.ndarray, triangles: np.ndarray) -> tuple[np.nda
 class Bound:
     """The best linear estimate, and its mean square error."""
 
-    def __init__(self, z: np.ndarray, triangles: np.ndarray):
-        self.w, self.derivative = weights_and_derivative(z, triangles)
+    def __init__(self, z: np.ndarray, w: np.ndarray, derivative: sp.csr_array):
+        self.w, self.derivative = w, derivative
         n = len(z)
         centred = z - z.mean()
         first = int(np.abs(centred).argmax())

@@ -1,7 +1,7 @@
 """Mean square error of recovered meshes over the Cramer-Rao bound, from repeated draws of noise.
 
 python benchmarks/noise.py [--sizes 500,5000,50000] [--sigmas 1e-12,1e-11,...,1e-3] [--draws 400,100,10]
-                           [--output FILE.json] [--figure FILE.png] [--from FILE.json] [--channels]
+                           [--output FILE.json] [--figure FILE.png] [--from FILE.json] [--channels] [--element P2]
 
 Each draw adds independent normal errors of standard deviation sigma to the entries of one triangle of the Laplacian
 (and their mirror images to the other) of an irregular mesh with three islands; cotangent weights are about 0.6.
@@ -15,6 +15,9 @@ of each size, over all levels, is the mean over the most draws. Results of an ea
 have are not measured again: parts of the table may be run one by one.
 
 "lost" are meshes that end with flipped triangles; none of them may be certified.
+
+With --element P2 or Q1: the same for quadratic triangles on such a mesh, and for a lattice of irregular quadrilaterals
+with a hole; sizes then are numbers of rows, and errors those of corners.
 
 With --channels: how often meshes forty times as long as wide are certified. There smooth conformal maps come closest
 to the null space, and noise bends the start most.
@@ -30,8 +33,9 @@ from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
-from bound import Bound, mean_square, mesh_of_at_least, noisy
+from bound import Bound, mean_square, mesh_of_at_least, noisy, weights_and_derivative
 from irregular import laplacian, largest_piece
+from noise_elements import specimen
 from scipy.spatial import Delaunay
 
 from unassemble import Recovery, recover
@@ -46,6 +50,7 @@ def main() -> None:
     parser.add_argument("--sizes", default="500,5000,50000")
     parser.add_argument("--sigmas", default=",".join(f"1e-{k}" for k in range(12, 2, -1)))
     parser.add_argument("--draws", default="400,100,10", help="for each size")
+    parser.add_argument("--element", choices=("P1", "P2", "Q1"), default="P1")
     parser.add_argument("--output", type=Path)
     parser.add_argument("--figure", type=Path)
     parser.add_argument("--channels", action="store_true", help="only count how often long channels are recovered")
@@ -59,7 +64,9 @@ def main() -> None:
                 count_channels(size, sigma, int(arguments.draws.split(",")[0]))
         return
     for size, draws in zip(sizes, arguments.draws.split(","), strict=False):
-        for result in measure(size, list(map(float, arguments.sigmas.split(","))), int(draws), results):
+        for result in measure(
+            arguments.element, size, list(map(float, arguments.sigmas.split(","))), int(draws), results
+        ):
             results.append(result)
             if arguments.output:
                 arguments.output.write_text(json.dumps(results, indent=1) + "\n")
@@ -98,21 +105,26 @@ def count_channels(size: int, sigma: float, draws: int) -> None:
     )
 
 
-def measure(size: int, sigmas: list[float], draws: int, known: list[dict]) -> Iterator[dict]:
-    """One mesh, all noise levels that are not known yet."""
+def linear(size: int) -> tuple[sp.csr_array, np.ndarray, np.ndarray, Bound]:
+    """As :func:`noise_elements.specimen`, of linear triangles."""
     points, triangles = mesh_of_at_least(size)
     matrix, true = laplacian(points, triangles, 1.0)
     place = {tuple(p): k for k, p in enumerate(true)}
     triangles = np.array([place[tuple(p)] for p in points])[triangles]
     z = true @ [1, 1j]
     z = z / (2 * np.abs(z - z.mean()).max())
-    bound = Bound(z, triangles)
+    return matrix, np.arange(len(z)), z, Bound(z, *weights_and_derivative(z, triangles))
+
+
+def measure(element: str, size: int, sigmas: list[float], draws: int, known: list[dict]) -> Iterator[dict]:
+    """One mesh, all noise levels that are not known yet."""
+    matrix, corners, z, bound = linear(size) if element == "P1" else specimen(element, size)
     for sigma in sigmas:
         if any(r["vertices"] == len(z) and r["sigma"] == sigma for r in known):
             continue
         start = time.perf_counter()
         level = round(-1000 * np.log10(sigma))  # independent draws at every level
-        found = [draw_errors(matrix, z, bound, sigma, [level, seed]) for seed in range(draws)]
+        found = [draw_errors(matrix, corners, z, bound, sigma, [level, seed]) for seed in range(draws)]
         squares = np.array([one[:3] for one in found]) / (sigma**2 * bound.mean_square)
         result = {
             "vertices": len(z),
@@ -171,7 +183,9 @@ def plus_minus(values: np.ndarray, digits: int) -> str:
     return f"{values.mean():.{digits}f}{error}"
 
 
-def draw_errors(matrix: sp.csr_array, z: np.ndarray, bound: Bound, sigma: float, seed: list[int]) -> tuple:
+def draw_errors(
+    matrix: sp.csr_array, corners: np.ndarray, z: np.ndarray, bound: Bound, sigma: float, seed: list[int]
+) -> tuple:
     """Mean square error with the polish, without it, and to first order; certified; flipped at the start, at the end.
 
     And the beginning of the reason.
@@ -179,14 +193,18 @@ def draw_errors(matrix: sp.csr_array, z: np.ndarray, bound: Bound, sigma: float,
     given, noise = noisy(matrix, sigma, seed)
     polished, start = recover(given, noise=sigma), recover(given, noise=sigma, refine=False)
     linear = float(np.sum(bound.response(-noise[:, None]) ** 2)) / len(z)
-    squares = mean_square(polished.points, z), mean_square(start.points, z), linear
+    squares = mean_square(polished.points[corners], z), mean_square(start.points[corners], z), linear
     return *squares, polished.certified, any_flipped(start), any_flipped(polished), polished.reason[:200]
 
 
 def any_flipped(found: Recovery) -> bool:
-    """Whether a triangle is turned over."""
-    x, y = found.points[found.triangles].transpose(2, 1, 0)
-    return bool(((x[1] - x[0]) * (y[2] - y[0]) <= (x[2] - x[0]) * (y[1] - y[0])).any())
+    """Whether a cell is turned over in a corner."""
+    for cells in found.cells.values():
+        z = found.points[cells[:, : 3 if len(found.triangles) else 4]] @ [1, 1j]
+        side = np.roll(z, -1, axis=1) - z
+        if (np.imag(np.conj(np.roll(side, 1, axis=1)) * side) <= 0).any():
+            return True
+    return False
 
 
 def draw(results: list[dict], path: Path) -> None:

@@ -10,11 +10,13 @@ import pyamg
 import pytest
 import scipy.sparse as sp
 import skfem as fem
-from skfem.helpers import dot, grad
+from skfem.helpers import ddot, div, dot, grad
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 from skfem.models.poisson import laplace, mass
 
 from unassemble import MatrixError, NotPlanarError, RecoveryError, inspect_matrix, recover
+from unassemble.cells.search import best_first, updates
+from unassemble.matrix import check_matrix
 
 
 def shuffled(A, seed=3):
@@ -54,6 +56,13 @@ def outcome(A):
     except RecoveryError as error:
         return None, str(error)
     return found, found.advice
+
+
+def weighted(graph):
+    draw = np.random.default_rng(0)
+    for one in graph.edges.values():
+        one["weight"] = draw.uniform(0.2, 3)
+    return networkx.laplacian_matrix(graph).astype(float)
 
 
 UNREAD = {
@@ -98,6 +107,12 @@ UNREAD = {
         lambda: networkx.laplacian_matrix(networkx.random_geometric_graph(60, 0.3, seed=1)).astype(float),
         "graph without weights",
     ),
+    "weighted graph": ("graph", lambda: weighted(networkx.random_geometric_graph(60, 0.3, seed=1)), "with weights"),
+    "weighted graph with few triangles": (
+        "graph",
+        lambda: weighted(networkx.watts_strogatz_graph(100, 6, 0.1, seed=2)),
+        "with weights",
+    ),
     "line": ("segments", lambda: pyamg.gallery.poisson((40,), format="csr"), "on a line"),
 }
 
@@ -124,13 +139,84 @@ def test_what_is_not_read_yet_is_named(name):
     assert facts.recoverable.startswith("nothing: ") or facts.element or facts.surface
 
 
+PRODUCTS = {
+    "triangles": lambda: stiffness(DISC, fem.ElementTriP1()),
+    "tetrahedra": lambda: stiffness(TETS, fem.ElementTetP1()),
+    "five-point stencil": lambda: pyamg.gallery.poisson((12, 12), format="csr"),
+    "grid": lambda: networkx.laplacian_matrix(networkx.grid_2d_graph(12, 12)).astype(float),
+}
+
+
+@pytest.mark.parametrize("name", PRODUCTS)
+@pytest.mark.parametrize("power", [2, 3])
+def test_products_of_matrices_are_those_of_no_element(name, power):
+    """Second neighbours are coupled: each pair lies in cliques of four, but far more than cells of four would make."""
+    A = shuffled(PRODUCTS[name]())
+    A = A @ A if power == 2 else A @ A @ A
+    facts = inspect_matrix(A)
+    found, said = outcome(A)
+    assert (facts.kind, found) == ("unknown", None)
+    assert facts.advice.lower() in said.lower()
+
+
+def copied(A, copies):
+    """``kron(A, I)`` with all zeros of its blocks, as scipy makes it of two copies."""
+    A = sp.csr_array(A)
+    return sp.bsr_array((A.data[:, None, None] * np.eye(copies), A.indices, A.indptr)).tocsr()
+
+
+@pytest.mark.parametrize("element", [fem.ElementQuad1(), fem.ElementTriP1()], ids=["Q1", "P1"])
+@pytest.mark.parametrize("copies", [2, 3])
+def test_stored_zeros_that_join_copies_of_a_mesh_are_no_structure(element, copies):
+    """Other entries connect all of a mesh: of a Laplacian only constants are a null vector."""
+    mesh = QUADS if isinstance(element, fem.ElementQuad1) else DISC
+    K = stiffness(mesh, element)
+    A = shuffled(copied(K, copies))
+    assert A.nnz == copies**2 * K.nnz
+    facts, found = inspect_matrix(A), recover(A)
+    assert facts.n_pieces == copies
+    assert facts.recoverable.startswith(f"{copies * mesh.t.shape[1]:,} ")
+    assert found.certified
+    assert found.n_components == copies
+    assert any("stored zeros" in one for one in found.warnings)
+
+
+def test_zeros_of_a_connected_mesh_stay():
+    """Right angles leave zeros that belong to cells, and Dirichlet conditions zeros that tell what was there."""
+    K = stiffness(fem.MeshTri().refined(2), fem.ElementTriP1())
+    assert check_matrix(K).without_joining_zeros() is None
+    assert check_matrix(boundary_conditions()[2]["both"]).without_joining_zeros() is None
+
+
 def test_a_graph_in_the_plane_is_one_too():
     A = shuffled(networkx.laplacian_matrix(networkx.grid_2d_graph(6, 6)).astype(float))
-    facts, found = inspect_matrix(A), recover(A)
+    facts, (found, said) = inspect_matrix(A), outcome(A)
     assert facts.kind == "graph"
-    assert found.status == "uncertified"
-    assert facts.name in found.reason
-    assert found.advice == facts.advice
+    assert found is None or found.status == "uncertified"
+    assert facts.name in (said if found is None else found.reason)
+    assert facts.advice in (said.lower() if found is None else found.advice)
+
+
+@pytest.mark.parametrize("size", [12, 20])
+def test_no_work_is_spent_on_cells_that_no_number_tells(size, monkeypatch):
+    """All entries are equal: each cell looks like each other one, and like each hole."""
+    calls = {"judged": 0, "ranked": 0}
+    judge, maps = best_first.Judge.__call__, updates.ChangedMaps.__init__
+
+    def judged(*args):
+        calls["judged"] += 1
+        return judge(*args)
+
+    def ranked(*args):
+        calls["ranked"] += 1
+        maps(*args)
+
+    monkeypatch.setattr(best_first.Judge, "__call__", judged)
+    monkeypatch.setattr(updates.ChangedMaps, "__init__", ranked)
+    A = shuffled(networkx.laplacian_matrix(networkx.grid_2d_graph(size, size)).astype(float))
+    outcome(A)
+    assert calls["ranked"] == 0
+    assert 0 < calls["judged"] <= 10
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -283,6 +369,8 @@ def beams(n=12, length=0.7):
 
 
 MASSES = {
+    "cubic triangles": (lambda: masses(DISC, fem.ElementTriP3()), "cubic elements on triangles"),
+    "quadratic tetrahedra": (lambda: masses(TETS, fem.ElementTetP2()), "quadratic elements on tetrahedra"),
     "quadratic triangles": (lambda: masses(DISC, fem.ElementTriP2()), "quadratic elements on triangles"),
     "quadrilaterals": (lambda: masses(moved(fem.MeshQuad().refined(3)), fem.ElementQuad1()), "bilinear elements"),
     "biquadratic quadrilaterals": (lambda: masses(QUADS, fem.ElementQuad2()), "biquadratic elements"),
@@ -372,6 +460,40 @@ def test_masses_among_classics(name):
             recover(CLASSICS / name)
 
 
+def stokes():
+    """Flow on triangles, velocities and pressures at random places in one matrix."""
+    mesh = fem.MeshTri().refined(2)
+    velocity = fem.Basis(mesh, fem.ElementVector(fem.ElementTriP2()))
+    pressure = velocity.with_element(fem.ElementTriP1())
+    K = fem.BilinearForm(lambda u, v, w: ddot(grad(u), grad(v))).assemble(velocity)
+    B = -fem.BilinearForm(lambda u, q, w: div(u) * q).assemble(velocity, pressure)
+    return shuffled(sp.block_array([[K, B.T], [B, None]]))
+
+
+def condensed():
+    """A body that is held below, of which the upper side is left."""
+    basis = fem.Basis(moved(fem.MeshHex().refined(2)), fem.ElementVector(fem.ElementHex1()))
+    held = basis.get_dofs(lambda x: x[2] < 0.1).all()
+    A = linear_elasticity(*lame_parameters(1.0, 0.3)).assemble(basis)
+    kept = basis.get_dofs(lambda x: x[2] > 0.9).all()
+    rest = np.setdiff1d(np.arange(A.shape[0]), np.union1d(held, kept))
+    A = A.toarray()
+    return A[np.ix_(kept, kept)] - A[np.ix_(kept, rest)] @ np.linalg.solve(A[np.ix_(rest, rest)], A[np.ix_(rest, kept)])
+
+
+@pytest.mark.parametrize(
+    ("assembled", "said"),
+    [
+        (stokes, "zero .*: a saddle point"),
+        (lambda: shuffled((condensed() + condensed().T) / 2), "Every row is coupled to every other"),
+    ],
+    ids=["Taylor-Hood", "condensed"],
+)
+def test_what_other_matrices_seem_to_be(assembled, said):
+    with pytest.raises(RecoveryError, match=said):
+        recover(assembled())
+
+
 @pytest.mark.parametrize(("name", "said"), [("bcsstk02", "annihilate translations"), ("bcsstk22", "plane frame")])
 def test_nodes_among_classics_that_only_a_second_look_shows(name, said):
     if not (path := CLASSICS / f"{name}.mtx.gz").exists():
@@ -380,3 +502,21 @@ def test_nodes_among_classics_that_only_a_second_look_shows(name, said):
     found, why = outcome(path)
     assert said in str(facts)
     assert said in (why if found is None else found.operator)
+
+
+@pytest.mark.parametrize("name", ["bcsstk34", "ex3", "ex13", pytest.param("nasa1824", marks=pytest.mark.slow)])
+def test_inspect_and_recover_read_classics_alike(name):
+    """What no positions come of is of the same name for both, and 1,824 rows are no 1,509 nodes of two unknowns."""
+    if not (path := CLASSICS / f"{name}.mtx.gz").exists():
+        pytest.skip("no classics")
+    facts = inspect_matrix(path)
+    found, said = outcome(path)
+    assert found is None
+    if facts.kind == "unknown":
+        assert name == "nasa1824"
+        assert facts.advice.lower() in said.lower()
+        assert facts.recoverable.startswith("nothing")
+    else:
+        assert facts.name in said
+        assert "whose sums by direction vanish in" in facts.evidence[0]
+        assert "if enough rows are whole" in facts.recoverable

@@ -17,8 +17,8 @@ import pytest
 from handmade import lake, quadratic, solid, with_loose_row
 from unassemble.elements.kinds import KINDS
 from unassemble.errors import FormatError, OutputError
-from unassemble.export import check_output, save, to_meshio
-from unassemble.formats import FORMATS, MeshFormat
+from unassemble.export import STATUS, UNIQUENESS, check_output, save, to_meshio
+from unassemble.formats import FORMATS, MeshFormat, lacks_worth
 from unassemble.recovery import Recovery
 
 WORKING = [
@@ -369,3 +369,21 @@ def test_what_a_mesh_is_worth_stands_in_its_file(tmp_path, status):
     if known.uniqueness:
         assert bytes(mesh.field_data["uniqueness"]).decode() == known.uniqueness
     np.testing.assert_allclose(mesh.points[:, :2], known.points)
+
+
+@pytest.mark.parametrize("status", ["certified", "uncertified"])
+@pytest.mark.parametrize("suffix", [suffix for suffix in WORKING if suffix != ".vtu"])
+def test_every_format_tells_what_its_mesh_is_worth_or_is_said_not_to(suffix, status, tmp_path):
+    mesh_format = available(suffix)
+    known = lake(status=status, uniqueness="searched" if status == "certified" else None, backward_error=3e-16)
+    known.save(tmp_path / f"mesh{suffix}")
+    data = read(tmp_path / f"mesh{suffix}", mesh_format).point_data
+    if said := lacks_worth(f"mesh{suffix}"):
+        assert f"{suffix} has no place for status" in said
+        assert not {"status", "scale"} & set(data)
+        return
+    told = {name: set(np.ravel(data[name]).tolist()) for name in ("status", "uniqueness", "backward_error", "scale")}
+    assert told["status"] == {STATUS.index(status)}
+    assert told["uniqueness"] == {UNIQUENESS.index(known.uniqueness)}
+    np.testing.assert_allclose(list(told["backward_error"]), 3e-16, rtol=1e-10)
+    assert told["scale"] == {2.5}

@@ -29,6 +29,7 @@ def test_a_result_stands_on_one_screen(result):
     assert len(repr(result)) < 240
     assert "\n" not in repr(result)
     assert repr(result).startswith(f"<{type(result).__name__}: {result.status}, ")
+    assert f", {result.n_points:,} points, " in repr(result)  # of which some may have no position
     assert "array(" not in repr(result) + str(result)
     assert len(str(result).splitlines()) < 25
     assert str(result).startswith(f"{result.status}: {result.reason}")

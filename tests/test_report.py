@@ -9,7 +9,7 @@ import pytest
 from handmade import lake, quadratic, solid, two_pieces, with_loose_row
 from unassemble.errors import NotPlanarError, OutputError
 from unassemble.report import build_report, check_report, failure_report, write_report
-from unassemble.summary import summary
+from unassemble.summary import summary, three_lines
 
 STABLE = {
     "status",
@@ -137,3 +137,12 @@ def test_bodies_of_several_elements_or_none():
     body = solid("quad")
     assert replace(body, triangles=np.array([[4, 6, 7]])).element == "mixed"
     assert replace(body, quads=body.quads[:0]).element is None
+
+
+def test_points_without_cells_do_not_give_a_matrix_back():
+    """What is held against the matrix then are equations of the rows away from supports."""
+    known = replace(solid("tetra"), status="uncertified", reason="why", backward_error=2e-6)
+    assert "give the matrix back to 2.0e-06 of each row's largest entry" in three_lines(known)
+    bare = three_lines(replace(known, tetrahedra=np.empty((0, 4), np.int64)))
+    assert bare.startswith("uncertified: 8 points agree with all rows away from supports to 2.0e-06 (relative)")
+    assert "0 cells" not in bare

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import roots_legendre
 
 from .budget import AT_ONCE
-from .certify import Certificate, compared
+from .certify import Certificate, Terms, compared
 
 _CELLS = AT_ONCE // 100  # whose products have about a hundred numbers each
 
@@ -40,8 +40,11 @@ def certify_elements(
     blocks: Mapping[str, NDArray],
     factors: Mapping[str, NDArray],
     rules: Mapping[str, str],
+    terms: Terms | None = None,
 ) -> Certificate:
     """Re-assemble factor * Laplacian with isoparametric elements and compare off-diagonal entries.
+
+    With further terms the diagonal as well.
 
     Parameters
     ----------
@@ -57,6 +60,8 @@ def certify_elements(
     rules : mapping of str to str
         Quadrature: ``"n x n Gauss"`` for quadrilaterals; ``"degree 2"``, ``"degree 4"`` or ``"degree 5"`` for
         triangles.
+    terms : Terms, optional
+        Not lumped; a reaction on straight triangles only.
 
     Returns
     -------
@@ -71,7 +76,7 @@ def certify_elements(
         at, weights = _triangle_rule(rules[name]) if base == "triangle" else _gauss_rule(int(rules[name].split()[0]))
         vertex = np.array([(0, 0), (1, 0), (0, 1)] if base == "triangle" else [(-1, -1), (1, -1), (1, 1), (-1, 1)])
         (phi_s, phi_t), (corner_s, corner_t) = _slopes(name, at), _slopes(name, vertex)
-        a, b = np.triu_indices(cells.shape[1], 1)
+        a, b = np.triu_indices(cells.shape[1], 1 if terms is None else 0)
         for start in range(0, len(cells), _CELLS):
             some = cells[start : start + _CELLS]
             x, y = (points[some] - points[some[:, :1]]).transpose(2, 0, 1)  # digits of differences, not of coordinates
@@ -89,13 +94,17 @@ def certify_elements(
             right = (determinant > 0).all(axis=1) & (at_corner > 0).all(axis=1)
             flipped.append(first + start + np.flatnonzero(~right))
             keys.append((np.minimum(some[:, a], some[:, b]) * n + np.maximum(some[:, a], some[:, b])).ravel())
-            values.append((value * factors[name][start : start + _CELLS, None]).ravel())
+            value = value * factors[name][start : start + _CELLS, None]
+            if terms is not None and terms.reaction:
+                double_area = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
+                value += terms.reaction * np.outer(np.abs(double_area), _unit_mass(cells.shape[1])[a, b])
+            values.append(value.ravel())
         first += len(cells)
     key = np.concatenate(keys)
     summed = sp.coo_array((np.concatenate(values), (key // n, key % n)), shape=(n, n)).tocsr()
     summed.sort_indices()
     key = np.repeat(np.arange(n), np.diff(summed.indptr)) * n + summed.indices
-    return compared(n, edges, entries, key, summed.data, np.concatenate(flipped))
+    return compared(n, edges, entries, key, summed.data, np.concatenate(flipped), terms)
 
 
 def _gauss_rule(order: int) -> tuple[NDArray, NDArray]:
@@ -112,6 +121,25 @@ def _triangle_rule(name: str) -> tuple[NDArray, NDArray]:
         points += sorted(orbit)
         weights += [weight / 2] * len(orbit)
     return np.array(points), np.array(weights)
+
+
+def _unit_mass(k: int) -> NDArray:
+    """(k, k) mass matrix of the unit triangle, exact: Gauss's points on the square from 0 to 1, folded."""
+    at, weight = _gauss_rule(4)
+    s, t = (at.T + 1) / 2
+    u = (1 - s - (1 - s) * t, s, (1 - s) * t)
+    sides = ((0, 1), (1, 2), (2, 0))
+    if k == 3:
+        value = list(u)
+    elif k == 6:
+        value = [v * (2 * v - 1) for v in u] + [4 * u[i] * u[j] for i, j in sides]
+    else:
+        value = [v * (3 * v - 1) * (3 * v - 2) / 2 for v in u]
+        for i, j in sides:
+            value += [4.5 * u[i] * u[j] * (3 * u[i] - 1), 4.5 * u[i] * u[j] * (3 * u[j] - 1)]
+        value.append(27 * u[0] * u[1] * u[2])
+    phi = np.column_stack(value)
+    return phi.T @ ((weight / 4 * (1 - s))[:, None] * phi)
 
 
 def _slopes(name: str, at: NDArray) -> tuple[NDArray, NDArray]:

@@ -1,4 +1,4 @@
-"""The main job on two matrices that this library did not assemble."""
+"""The main job on two matrices that this library did not assemble, and on a small structure."""
 
 from __future__ import annotations
 
@@ -30,18 +30,21 @@ class Specimen:
     ----------
     name, origin : str
     matrix : (n, n) sparse
-    points : (n, 2) float64
-        True positions of the matrix rows.
+    points : (n, 2) or (n, 3) float64
+        True positions of the matrix rows, or of the nodes of a structure.
+    anchors : tuple of (row, x, y, z)
+        Positions that are not kept aside.
     """
 
     name: str
     origin: str
     matrix: sp.coo_array
     points: NDArray[np.float64]
+    anchors: tuple[tuple[float, ...], ...] = ()
 
 
 def run(folder: str | Path = "demo-output", *, echo: Callable[[str], None] = lambda line: None) -> list[Recovery]:
-    """Write, read and recover both matrices; meshes, reports and pictures go to `folder`.
+    """Write, read and recover the matrices; meshes, reports and pictures go to `folder`.
 
     Parameters
     ----------
@@ -57,17 +60,22 @@ def run(folder: str | Path = "demo-output", *, echo: Callable[[str], None] = lam
     """
     folder = made_folder(folder)
     recoveries = []
-    for specimen in (unit_square(), lake()):
+    for specimen in (unit_square(), lake(), mast()):
         file = folder / f"{specimen.name}.mtx"
         with whole_file(file, ".mtx") as draft, draft.open("wb") as stream:  # given a name, scipy misses a full disk
             scipy.io.mmwrite(stream, specimen.matrix, symmetry="symmetric", precision=17)
         echo(f"{specimen.name}: {specimen.origin}\n")
-        recovery = recover(file)
+        recovery = recover(file, anchors=specimen.anchors)
         recovery.save(folder / f"{specimen.name}.vtu")
         write_report(recovery, folder / f"{specimen.name}.json")
-        plot_comparison(specimen.points, recovery, folder / f"{specimen.name}.png")
+        picture = folder / f"{specimen.name}.png"
+        if recovery.vector_valued:
+            recovery.plot(picture)
+        else:
+            plot_comparison(specimen.points, recovery, picture)
         echo(summary(recovery))
-        echo(f"\nin {folder}: {specimen.name}.mtx, .vtu, .json and .png (true and recovered mesh)\n")
+        drawn = "recovered structure" if recovery.vector_valued else "true and recovered mesh"
+        echo(f"\nin {folder}: {specimen.name}.mtx, .vtu, .json and .png ({drawn})\n")
         recoveries.append(recovery)
     return recoveries
 
@@ -115,6 +123,43 @@ def lake(size: float = 0.055) -> Specimen:
         "a lake with islands, meshed by Netgen, assembled by scikit-fem, turned into -2.5 L + D, rows shuffled",
         matrix,
         points[np.argsort(place)],
+    )
+
+
+def mast(levels: int = 9) -> Specimen:
+    """A lattice mast, as those of classic test matrices: three rows for each node, in random order of the nodes.
+
+    A bar along e, of stiffness k, adds k e e^T to the blocks of its ends and takes it off those between them. The feet
+    are held, so that they and the bars that end there are not in the matrix.
+
+    Parameters
+    ----------
+    levels : int
+        Storeys; the mast is as wide below as two of them are high.
+    """
+    height, side = np.divmod(np.arange(4 * (levels + 1)), 4)
+    turn = np.pi / 2 * (side + 0.5) + 0.02 * height
+    width = np.sqrt(2) * (1 - 0.6 * height / levels)
+    points = np.column_stack([width * np.cos(turn), width * np.sin(turn), height])
+    low, node = np.arange(4 * levels), np.arange(4, 4 * (levels + 1))
+    beside = 4 * height + (side + 1) % 4
+    legs, braces, rings, floors = (low, low + 4), (low, beside[low] + 4), (node, beside[node]), (node[::4], node[2::4])
+    bars = np.hstack([legs, braces, rings, floors]).T
+    rng = np.random.default_rng(1976)
+    along = np.diff(points[bars], axis=1)[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    ends = np.concatenate([along, -along], axis=1) * np.sqrt(rng.uniform(1, 3, len(bars)) / length**3)[:, None]
+    strain = np.zeros((len(bars), len(points), 3))
+    np.put_along_axis(strain, bars[:, :, None], ends.reshape(-1, 2, 3), axis=1)
+    free = rng.permutation(np.arange(4, len(points)))
+    felt = strain[:, free].reshape(len(bars), -1)
+    points = points[free]
+    return Specimen(
+        "mast",
+        "a lattice mast, held at its feet, nodes shuffled, of which two are known, so that it stands upright",
+        sp.coo_array(felt.T @ felt),
+        points,
+        tuple((3 * k, *points[k]) for k in range(2)),
     )
 
 

@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
+STATUS = ("certified", "ambiguous", "uncertified")
+UNIQUENESS = ("proved", "searched", "ambiguous", None)
+"""Words that are numbers in point data, by their place."""
+
 
 def check_output(path: str | os.PathLike[str]) -> None:
     """Find out, before long work, whether a mesh can be saved as `path`.
@@ -49,7 +53,8 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
     vector-valued matrices ``node_of_row`` and ``direction_of_row``, and what the mesh is worth: ``status``,
     ``uniqueness`` and ``backward_error``, which ``.vtu`` holds as field data, with ``scale``.
     Other formats are those of meshio (:mod:`unassemble.formats`); of these ``.vtu`` holds polygons, the others get
-    them divided into triangles.
+    them divided into triangles. Those that hold point data have what the mesh is worth as such, see
+    :func:`to_meshio`; the rest have no place for it, which :func:`unassemble.formats.lacks_worth` says.
 
     Parameters
     ----------
@@ -118,6 +123,17 @@ def worth(recovery: Recovery) -> dict[str, NDArray]:
     }
 
 
+def _worth_of_points(recovery: Recovery) -> dict[str, NDArray]:
+    """The same in numbers, one for each point, and the scale of its piece."""
+    same = {
+        "status": STATUS.index(recovery.status),
+        "uniqueness": UNIQUENESS.index(recovery.uniqueness),
+        "backward_error": float(recovery.backward_error),
+    }
+    scale = np.append(recovery.scale, np.nan)[recovery.component]
+    return {name: np.full(recovery.n_points, value) for name, value in same.items()} | {"scale": scale}
+
+
 def without_points(recovery: Recovery) -> bool:
     """Whether there are edge lengths only, or areas, which no format but ``.npz`` holds."""
     if isinstance(recovery, Surface):
@@ -129,12 +145,14 @@ def to_meshio(recovery: Recovery) -> meshio.Mesh:
     """The mesh for meshio, in space (z = 0), since most formats know no other points.
 
     Point data, all scalar: ``row`` of the matrix, ``component``, ``boundary`` (1 on the outside of the mesh, else 0),
-    and where present ``node_status``, ``standard_deviation_x`` and ``standard_deviation_y``. Of vector-valued
+    and where present ``node_status``, ``standard_deviation_x`` and ``standard_deviation_y``. The same at every point,
+    since meshio's writers have no place for what belongs to a mesh as a whole: ``status`` and ``uniqueness``, by their
+    place in `STATUS` and `UNIQUENESS`, ``backward_error``, and ``scale``, that of the point's piece. Of vector-valued
     matrices there are ``row_x``, ``row_y``, ``row_z``, and of rotations ``row_rx``, ``row_ry``, ``row_rz``, instead of
     ``row``, with -1 for unknowns that the matrix lacks. Nodes without cells are cells of kind ``vertex``, so that they
     show. Undivided cells are blocks of kind ``polygon``, one for each number of vertices.
     """
-    return _mesh(recovery, 3, _point_data(recovery), polygons=True)
+    return _mesh(recovery, 3, _point_data(recovery) | _worth_of_points(recovery), polygons=True)
 
 
 def _mesh(recovery: Recovery, dimension: int, point_data: dict[str, NDArray], *, polygons: bool = False) -> meshio.Mesh:
@@ -234,6 +252,8 @@ def _mesh_for(recovery: Recovery, mesh_format: MeshFormat) -> meshio.Mesh:
     data: dict[str, NDArray] = {}
     if mesh_format.data == "all":
         data = _point_data(recovery)
+        if mesh_format.name != "vtu":  # which has field data
+            data |= _worth_of_points(recovery)
     elif mesh_format.data == "boundary":
         data = {f"{mesh_format.name}:ref": _boundary_flag(recovery)}
     mesh = _mesh(recovery, mesh_format.dimension, data, polygons=mesh_format.polygons)

@@ -168,3 +168,10 @@ def format_of(path: str | os.PathLike[str]) -> tuple[str, MeshFormat]:
     if mesh_format.needs and find_spec(mesh_format.needs) is None:
         raise OutputError(f"the format {suffix} needs the package {mesh_format.needs}: pip install {mesh_format.needs}")
     return suffix, mesh_format
+
+
+def lacks_worth(path: str | os.PathLike[str]) -> str:
+    """What a list of files that were written ends with where the mesh's can say nothing of its worth; else empty."""
+    suffix, mesh_format = format_of(path)
+    holds = not mesh_format.name or mesh_format.data == "all"
+    return "" if holds else f"; {suffix} has no place for status, uniqueness, backward error and scale"

@@ -38,6 +38,17 @@ class VectorReading:
     why: str
     rounding: Rounding | None = None
 
+    @property
+    def name(self) -> str:
+        """What the matrix is then, to follow "the matrix is"."""
+        from .structures import StructuralNumbering
+
+        found = self.numbering
+        if isinstance(found, StructuralNumbering):
+            return f"that of a {found.layout.name} with {found.block_size} unknowns per node"
+        order = {"pattern": "in an order found by the pattern"}.get(found.kind, found.kind)
+        return f"vector-valued, {found.block_size} components, {order}"
+
 
 def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) -> VectorReading:
     """Find the nodes of a matrix that is said to be vector-valued.
@@ -183,8 +194,8 @@ def _truss(whole: sp.csr_array, rounding: Rounding | None, reason: str) -> Vecto
 
 
 def _convinces(found: Numbering | None) -> TypeGuard[Numbering]:
-    """Whether rows annihilate constants, as those of scalar matrices never do, and those of a node look alike."""
-    return found is not None and found.share >= 0.05 and found.common >= 0.8
+    """Whether rows annihilate constants, as those of scalar matrices never do, and nodes look like such."""
+    return found is not None and found.sound
 
 
 def _evidence(found: Numbering | StructuralNumbering) -> str:

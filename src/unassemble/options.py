@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .errors import InputError
+from .errors import GeometryError, InputError
 from .reductions import ConstantTensor
 from .tolerances import SUMMED
 
@@ -125,6 +126,15 @@ class ScalarOptions:
             raise InputError(f"`scale` is a finite nonzero number, not {self.scale}")
         if self.noise is not None and not (_number("noise", self.noise) and self.noise > 0):
             raise InputError(f"`noise` is a positive standard deviation, not {self.noise}")
+
+    def check_scale(self, entries: NDArray[np.float64]) -> None:
+        """Refuse a factor next to which entries vanish or overflow: no triangle has such angles."""
+        largest = float(np.abs(entries).max(initial=0.0))
+        with np.errstate(over="ignore", under="ignore"):
+            ratio = 1.0 if self.scale is None else abs(np.float64(self.scale)) / largest
+        if not np.finfo(float).eps ** 2 < ratio < np.finfo(float).eps ** -2:
+            said = f"the scale {self.scale:g} is out of all proportion to the entries of the matrix, whose largest is "
+            raise GeometryError(f"{said}{largest:.3g}")
 
     @property
     def polished(self) -> bool:

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .clock import Clock
-from .diagnosis import explained, judged, refuse_masses
-from .errors import GeometryError, InputError, NotPlanarError, RecoveryError
+from .diagnosis import explained, indefinite, judged, refuse_masses
+from .errors import GeometryError, InputError, RecoveryError
 from .linalg import threads as thread_limit
+from .masses import weighed
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
-from .operators import VectorReading, about_translations, asked_for, second_reading, vector_valued
+from .operators import VectorReading, asked_for, second_reading, vector_valued
 from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, listed_anchors
-from .outputs import ConformingMesh, PlanarMesh, Recovery, Surface
+from .outputs import PlanarMesh, Recovery, Surface
 from .progress import StageDisplay
 from .quiet import quiet_libraries
 from .readings import ScalarReadings
@@ -45,6 +46,7 @@ def recover(
     numbering: Any = None,
     cells: bool = True,
     realise: bool = False,
+    mass: Any = None,
     variable: str | None = None,
     threads: int | None = None,
     progress: Callable[[str], None] | bool | None = None,
@@ -104,6 +106,9 @@ def recover(
         Vector-valued matrices: look for elements too, not for coordinates only.
     realise : bool
         Surfaces: look for coordinates in space that have the edge lengths.
+    mass : sparse matrix or array, ndarray, or path, optional
+        The mass matrix of the same mesh, which tells its size, or with `anchors` its density; see
+        :func:`unassemble.masses.weighed`.
     variable : str, optional
         Name of the variable in a ``.mat`` file.
     threads : int, optional
@@ -159,10 +164,14 @@ def recover(
         clock = Clock(progress if callable(progress) else display if progress else None)
         with clock("read"):
             matrix = read_matrix(A, variable=variable) if is_file(A) else A
-        with clock("check"):
-            checked = check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
-        with thread_limit(threads):
+
+        def answer(matrix: Any) -> Recovery:
+            with clock("check"):
+                checked = check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
             return _Task(checked, clock, about, frame, planar, given, realise).answer()
+
+        with thread_limit(threads):
+            return answer(matrix) if mass is None else weighed(answer, matrix, mass, anchored=bool(frame.anchors))
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +193,9 @@ class _Task:
             found = self._as_asked()
         except RecoveryError:
             refuse_masses(self.matrix, planar=False)
-            raise
+            if (apart := self.matrix.without_joining_zeros()) is None:
+                raise
+            return replace(self, matrix=apart).answer()
         if not (found.certified or isinstance(found, PlanarMesh)):
             refuse_masses(self.matrix, planar=False)
         return found
@@ -209,7 +220,14 @@ class _Task:
             if found is not None and found.certified:
                 return found
         at_sight = vector_valued(self.matrix)
-        return self._first_that_fits() if at_sight is None else self._as_vector(at_sight)
+        if at_sight is None:
+            return self._first_that_fits()
+        try:
+            return self._as_vector(at_sight)
+        except RecoveryError as error:
+            if said := indefinite(self.matrix):
+                raise GeometryError(said) from error
+            raise
 
     @cached_property
     def _readings(self) -> ScalarReadings:
@@ -217,7 +235,7 @@ class _Task:
 
     def _readings_of(self, part: OperatorMatrix, anchors: Sequence[Any]) -> ScalarReadings:
         frame = self.frame
-        self._check_scale(part)
+        self.planar.check_scale(part.entries)
         placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
         return ScalarReadings(part, placement, self.clock, self.planar)
 
@@ -229,22 +247,25 @@ class _Task:
         try:
             found = self._as_scalar(self.matrix, self.frame.anchors)
         except RecoveryError as error:
+            from .metric import unless_planar
+
             curved = self._as_certified_surface()
-            other = self._as_second_reading() if curved is None else _unless_planar(curved)
+            other = self._as_second_reading() if curved is None else unless_planar(curved)
             if other is not None:
                 return other
-            nodes = about_translations(self.matrix) if isinstance(error, NotPlanarError) else ""
-            raise explained(error, self.matrix, nodes) from error
+            raise explained(error, self.matrix) from error
         if found.certified:
             return found
         curved = self._as_certified_surface() if found.status == "uncertified" else None
         if curved is not None:
+            from .metric import unless_planar
+
             noise, little = found.estimated_noise, LARGEST_NOISE * np.abs(found.scale).min()
             if curved.fits_no_plane or (not found.missing_term and (noise is None or noise > little)):
-                return _unless_planar(curved)
+                return unless_planar(curved)
             note = "a surface in space has exactly these entries, as one has nearly any: see `operator='surface'`"
             found = replace(found, warnings=(*found.warnings, note))
-        if not (found.node_status.any() or isinstance(found, ConformingMesh)):
+        if not found.node_status.any():
             return judged(found, self.matrix)
         other = self._as_second_reading()
         better = other is not None and (other.certified or other.node_status.mean() < found.node_status.mean())
@@ -286,8 +307,7 @@ class _Task:
         """The matrix as that of a surface that is bent, if it is one without doubt."""
         from .metric import could_be_planar, realised
 
-        entries = self.matrix.entries
-        if np.ptp(entries) <= ROUNDED * np.abs(entries).max(initial=0.0):
+        if np.ptp(self.matrix.entries) <= ROUNDED * self.matrix.row_size.max():
             return None  # the Laplacian of a graph, most likely
         try:
             found = self._lengths()
@@ -307,26 +327,18 @@ class _Task:
             raise InputError(
                 f"`{unfit[0]}` is not for surfaces in space: leave it out, or choose `operator='laplacian'`"
             )
-        self._check_scale(self.matrix)
+        self.planar.check_scale(self.matrix.entries)
         return recover_surface(self.matrix, self.clock, self.planar, triangles)
 
     def _as_vector(self, reading: VectorReading) -> Recovery:
         from .vector import recover_vector
 
         self._refuse_scalar_options()
-        about, anchors = self.about, self.frame.anchors
-        return recover_vector(
-            self.matrix, reading, self.clock, anchors=anchors, cells=about.cells, scalar=self._as_scalar
-        )
-
-    def _check_scale(self, part: OperatorMatrix) -> None:
-        """Refuse a factor next to which entries vanish or overflow: no triangle has such angles."""
-        scale, largest = self.planar.scale, float(np.abs(part.entries).max(initial=0.0))
-        with np.errstate(over="ignore", under="ignore"):
-            ratio = 1.0 if scale is None else abs(np.float64(scale)) / largest
-        if not np.finfo(float).eps ** 2 < ratio < np.finfo(float).eps ** -2:
-            said = f"the scale {scale:g} is out of all proportion to the entries of the matrix, whose largest is "
-            raise GeometryError(f"{said}{largest:.3g}")
+        clock, anchors, cells = self.clock, self.frame.anchors, self.about.cells
+        try:
+            return recover_vector(self.matrix, reading, clock, anchors=anchors, cells=cells, scalar=self._as_scalar)
+        except GeometryError as error:
+            raise GeometryError(f"the matrix is {reading.name}, but {error}") from error
 
     def _refuse_scalar_options(self) -> None:
         if self.given:
@@ -334,15 +346,3 @@ class _Task:
                 f"`{self.given[0]}` is for scalar matrices, and this one is read as vector-valued: leave it out, or "
                 "choose `operator='laplacian'`"
             )
-
-
-def _unless_planar(surface: Surface) -> Surface:
-    """A surface that was not asked for, certified only where no mesh in the plane has its triangles.
-
-    It has as many lengths as entries, so that nearly any matrix on these triangles is that of one.
-    """
-    if surface.fits_no_plane:
-        return surface
-    reason = "the lengths give every entry back, but so may a coefficient that varies in the plane"
-    advice = "say so by `operator='surface'` if it is one in space, or else assemble it with a constant coefficient"
-    return replace(surface, status="uncertified", uniqueness=None, reason=reason, advice=advice)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -18,14 +19,15 @@ from .boundaries import (
 )
 from .clock import Clock
 from .conforming.recover import recover_conforming, shown_cells
+from .conforming.roles import Cells
 from .errors import GeometryError, RecoveryError
-from .further_terms import recover_with_terms
+from .further_terms import recover_elements_with_terms, recover_with_terms
 from .matrix import OperatorMatrix
 from .options import ScalarOptions
 from .recovery import PlanarMesh
 from .scalar import of_other_scale, recover_scalar
 from .scalar.placement import Placement
-from .tolerances import LITTLE
+from .tolerances import CERTIFIED, LITTLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +55,18 @@ class ScalarReadings:
     @cached_property
     def other_elements(self) -> PlanarMesh | None:
         """A mesh of other elements than linear triangles; None where no cells show, or none is near."""
-        cells = shown_cells(self.matrix)
-        try:
-            found = recover_conforming(self.matrix, cells, self.placement, self.clock, self.options)
-        except RecoveryError:
-            return None
-        return found if found.certified or found.backward_error < LITTLE else None
+
+        def of_cells(matrix: OperatorMatrix, cells: Iterable[Cells]) -> PlanarMesh:
+            return recover_conforming(matrix, cells, self.placement, self.clock, self.options)
+
+        found: PlanarMesh | None = None
+        with suppress(RecoveryError):
+            found = of_cells(self.matrix, shown_cells(self.matrix))
+        fits = found is not None and (found.status != "uncertified" or found.backward_error <= CERTIFIED)
+        if not (fits or self.placement.tensor):  # an entry that stands out by 1e-10 is no further term
+            terms = recover_elements_with_terms(self.matrix, of_cells, self.clock)
+            found = terms if terms is not None and terms.status != "uncertified" else found
+        return found if found is not None and (found.certified or found.backward_error < LITTLE) else None
 
     def likeliest(self) -> PlanarMesh:
         """The mesh of the first reading that fits, or else of the first that comes near.

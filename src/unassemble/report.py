@@ -22,7 +22,7 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
     """Everything but the mesh, made of what JSON knows; numbers that are not finite become None.
 
     Keys: ``status``, ``uniqueness``, ``reason``, ``advice`` (what to do next), ``operator``, ``element``,
-    ``reaction``, ``n_points``, ``n_cells``,
+    ``reaction``, ``density`` (beside a mass matrix), ``n_points``, ``n_cells``,
     ``n_components``, ``n_holes`` (null but for planar meshes), ``scale`` (one for each piece), ``backward_error``,
     ``timings`` (seconds by stage), ``warnings``; further ``n_polygons`` (cells that the matrix leaves undivided),
     ``n_hinges``, ``n_undetermined``, ``n_boundary_edges``, ``worst_entries`` (``row``, ``column``, ``misfit``, worst
@@ -38,6 +38,7 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
             "operator": recovery.operator,
             "element": recovery.element,
             "reaction": recovery.reaction,
+            "density": recovery.density,
             "n_points": recovery.n_points,
             "n_cells": recovery.n_cells,
             "n_polygons": recovery.n_polygons,

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .recovery import Body, ConformingMesh, Mechanical, PlanarMesh, Recovery, Surface
+from .recovery import Body, ConformingMesh, Mechanical, PlanarMesh, Recovery, Structure, Surface
 from .tolerances import CERTIFIED, SUSPICIOUS
 from .words import count_of, kind_text
 
@@ -40,11 +40,14 @@ def three_lines(recovery: Recovery, files: str = "") -> str:
         Names of those that were written, the mesh first.
     """
     missing = int(np.count_nonzero(recovery.node_status))
-    mesh = f"{' and '.join(counted_cells(recovery))} on {count_of(recovery.n_points, 'point')}"
+    cells = f"{' and '.join(counted_cells(recovery))} on " if recovery.n_cells or not recovery.vector_valued else ""
+    mesh = f"{cells}{count_of(recovery.n_points, 'point')}"
     mesh += f", {missing:,} of these without a position," if missing else ""
     fits = f"{mesh} give the matrix back to {recovery.backward_error:.1e} of each row's largest entry"
+    if not cells or (isinstance(recovery, Structure) and recovery.operator != "truss"):  # which has no other members
+        fits = f"{mesh} agree with all rows away from supports to {recovery.backward_error:.1e} (relative)"
     if isinstance(recovery, PlanarMesh) and 0 < recovery.n_fitting < recovery.n_entries:
-        fits += f", and {recovery.n_fitting:,} of {recovery.n_entries:,} entries to {CERTIFIED:g}"
+        fits += f", and {recovery.n_fitting:,} of {recovery.n_entries:,} entries to {CERTIFIED:g} of it"
     written = f" (written: {files})" if files else ""
     after = recovery.advice or "see `report()` for all that is known"
     return f"{recovery.status}: {fits}{written}\n  why   {recovery.reason}\n  next  {after}"
@@ -52,7 +55,7 @@ def three_lines(recovery: Recovery, files: str = "") -> str:
 
 def one_line(recovery: Recovery) -> str:
     """Kind, sizes, status and backward error, for a list or a prompt."""
-    sizes = f"{_points(recovery)} points, {', '.join(counted_cells(recovery))}"
+    sizes = f"{_points(recovery, ' points')}, {', '.join(counted_cells(recovery))}"
     return (
         f"<{type(recovery).__name__}: {recovery.status}, {recovery.operator}, {sizes}, "
         f"backward error {recovery.backward_error:.1e}>"
@@ -75,6 +78,7 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
         rows += _surface_rows(recovery)
     if isinstance(recovery, Mechanical):
         rows += _elastic_rows(recovery)
+    rows += [("density", f"{recovery.density:.10g}")] if recovery.density is not None else []
     rows.append(("backward error", f"{recovery.backward_error:.1e} (relative)"))
     if recovery.uniqueness is not None:
         rows.append(("other meshes", _OTHERS[recovery.uniqueness]))
@@ -146,7 +150,7 @@ def _noise_rows(mesh: PlanarMesh) -> list[tuple[str, str]]:
     if mesh.estimated_noise is not None and mesh.backward_error > SUSPICIOUS:
         rows.append(("noise", f"the misfit is that of a standard deviation of {mesh.estimated_noise:.1e} (absolute)"))
     if mesh.largest_deviation is not None:
-        rows.append(("std deviation", f"at most {mesh.largest_deviation:.1e} in a coordinate"))
+        rows.append(("std deviation", f"at most {mesh.largest_deviation:.1e} in a coordinate (absolute)"))
     return rows
 
 
@@ -174,9 +178,9 @@ def _elastic_rows(recovery: Mechanical) -> list[tuple[str, str]]:
     return rows
 
 
-def _points(recovery: Recovery) -> str:
+def _points(recovery: Recovery, noun: str = "") -> str:
     missing = int(np.count_nonzero(recovery.node_status))
-    return f"{recovery.n_points:,}" + (f", of which {missing:,} not determined" if missing else "")
+    return f"{recovery.n_points:,}{noun}" + (f", of which {missing:,} not determined" if missing else "")
 
 
 def _pieces(recovery: Recovery) -> str:

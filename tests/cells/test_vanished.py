@@ -161,7 +161,7 @@ def test_triangle_with_vertices_inside():
     assert triangle_set(found.triangles) == triangle_set(known.triangles)
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 8])
+@pytest.mark.parametrize("count", [1, 2, 3, 5])  # longer paths are taken for stiffness matrices on a line
 def test_path_is_a_strip_of_right_triangles(count):
     weights = np.random.default_rng(count).uniform(0.5, 2, count + 1)
     n = count + 2

@@ -40,6 +40,12 @@ def test_mesh_report_and_picture(work):
     assert (work.folder / "p.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.parametrize("out", ["mesh.obj", "mesh.msh", "mesh.stl", "mesh.vtu", "mesh.npz"])
+def test_files_that_cannot_hold_the_status_are_said_so(work, out):
+    said = work.recover(out=out).stdout
+    assert ("has no place for status" in said) == out.endswith((".obj", ".stl"))
+
+
 def test_from_standard_input(work):
     result = work.recover(matrix="-")  # nothing there
     assert result.exit_code == 2
@@ -169,6 +175,7 @@ def test_settings_reach_the_library(work, monkeypatch):
         "block_size": None,
         "numbering": None,
         "realise": False,
+        "mass": None,
         "variable": None,
         "threads": 2,
     }

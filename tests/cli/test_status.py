@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -85,6 +86,38 @@ def test_3_of_several_meshes_that_fit(work):
     assert (report["status"], report["uniqueness"]) == ("ambiguous", "ambiguous")
     assert report["alternatives"]
     assert report["backward_error"] < 1e-12
+
+
+def of_low_digits(matrix):
+    """As measured, with errors of one standard deviation."""
+    entries = sp.triu(matrix, 1).tocoo()
+    entries.data += 1e-4 * np.random.default_rng(0).standard_normal(entries.nnz)
+    off = entries + entries.T
+    return sp.coo_array(off + sp.diags_array(1e-4 * np.arange(off.shape[0]) - off.sum(axis=1)))
+
+
+UNCERTIFIED = {
+    "one entry": (spoilt, ()),
+    "noise": (of_low_digits, ()),
+    "too little noise": (of_low_digits, ("--noise", "1e-6")),
+    "scale": (sp.coo_array, ("--scale", "-2.9")),
+    "far away": (sp.coo_array, ("--anchor", "0,1e12,0", "--anchor", "1,1e12,1")),
+}
+
+
+@pytest.mark.parametrize("debug", [False, True])
+@pytest.mark.parametrize("name", UNCERTIFIED)
+def test_3_each_error_is_named_as_absolute_or_relative(work, name, debug):
+    spoil, options = UNCERTIFIED[name]
+    work.write("B.mtx", spoil(work.true.matrix))
+    result = work.recover(*options, *["--debug"] * debug, matrix="B.mtx")
+    assert result.exit_code == 3, result.stderr
+    assert debug or (";" not in result.stdout and len(result.stdout.splitlines()) == 3)
+    named = r" \((absolute|relative)\)| of (each|the) row's largest entry| of it\b| is allowed"
+    errors = list(re.finditer(r"[^ ]+e-\d\d+", result.stdout.replace("\n", " ")))
+    assert errors
+    for one in errors:
+        assert re.match(named, one.string[one.end() :]), one.string[one.start() - 60 : one.end() + 60]
 
 
 BROKEN = {

@@ -92,6 +92,13 @@ def test_no_such_output(work, one_sentence, out, why):
     assert why in one_sentence(result)
 
 
+def test_a_folder_in_place_of_a_matrix(work, one_sentence):
+    (work.folder / "in").mkdir()
+    result = work.run("in")
+    assert result.exit_code == 2
+    assert "is a directory: name the matrix file in it" in one_sentence(result)
+
+
 @pytest.mark.parametrize("words", [["A.mtx"], ["recover", "A.mtx"], ["recover", "./A.mtx"]])
 def test_the_mesh_goes_beside_the_matrix_where_nothing_is_said(work, one_sentence, words):
     result = work.run(*words)

@@ -22,7 +22,9 @@ import scipy.sparse as sp
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from unassemble.errors import InputError, MatrixFileError, UnassembleError
+from handmade import lake, solid
+from unassemble.errors import InputError, MatrixFileError, OutputError, UnassembleError
+from unassemble.formats import FORMATS
 from unassemble.matrix import check_matrix, load, read_matrix
 
 A = sp.csr_array(np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -0.5], [0.0, -0.5, 1.0]]))
@@ -210,6 +212,30 @@ def test_foreign_and_damaged_files(content: bytes, words: tuple[str, ...] | str,
     path.write_bytes(content)
     message = refused(MatrixFileError, words, read_matrix, path)
     assert str(path) in message
+
+
+# Lines of numbers have no first word.
+WORDLESS = (".avs", ".ugrid", ".svg")
+
+
+@pytest.mark.parametrize(
+    "suffix", [suffix for suffix, held in FORMATS.items() if held.name and not held.cannot and suffix not in WORDLESS]
+)
+def test_meshes_of_every_format_are_told_from_matrices(suffix, tmp_path, refused) -> None:
+    kinds = FORMATS[suffix].cells
+    mesh = lake() if "triangle" in kinds else solid("tetra" if "tetra" in kinds else "hexahedron")
+    with suppress(OutputError):  # a package may be missing
+        mesh.save(tmp_path / f"A{suffix}")
+        refused(MatrixFileError, "is a mesh (", read_matrix, tmp_path / f"A{suffix}")
+
+
+def test_first_words_end(tmp_path, refused) -> None:
+    (tmp_path / "A.obj").write_text("# comment\nv 1.0 2.0 0.0\n")
+    refused(MatrixFileError, "is a mesh (OBJ)", read_matrix, tmp_path / "A.obj")
+    (tmp_path / "A.txt").write_text("offset 1\n")
+    refused(MatrixFileError, "begins with 'offset 1'", read_matrix, tmp_path / "A.txt")
+    (tmp_path / "A.msh").write_text('(1 "written by meshio")\n')
+    refused(MatrixFileError, "is a mesh (ANSYS)", read_matrix, tmp_path / "A.msh")
 
 
 def test_variable_belongs_to_mat_files(refused) -> None:

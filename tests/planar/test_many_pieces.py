@@ -20,7 +20,7 @@ def chain(count, seed=0):
     return points, triangles
 
 
-@pytest.mark.parametrize("scale", [None, -2.5])
+@pytest.mark.parametrize("scale", [pytest.param(None, marks=pytest.mark.slow), -2.5])
 def test_a_chain_is_joined_from_triangle_to_triangle(scale):
     known = specimen(*chain(2000), c=-2.5)
     found = recover(known.matrix, scale=scale)

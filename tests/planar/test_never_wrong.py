@@ -119,7 +119,9 @@ def test_two_entries_far_apart_are_both_named():
     assert "2 entries stand out" in found.reason
 
 
-@pytest.mark.parametrize("options", [OPTIONS[0], OPTIONS[-1]], ids=str)  # others change nothing in the search
+@pytest.mark.parametrize(
+    "options", [OPTIONS[0], pytest.param(OPTIONS[-1], marks=pytest.mark.slow)], ids=str
+)  # others change nothing in the search
 def test_hole_filled_with_wrong_weights(options):
     """New entries close a hole with a fan; they are the weights of no mesh with this rim."""
     rim = recover(KNOWN.matrix)

@@ -74,7 +74,7 @@ def small():
     return known, response(known)
 
 
-@pytest.mark.parametrize("sigma", [1e-12, 1e-3])
+@pytest.mark.parametrize("sigma", [1e-12, pytest.param(1e-3, marks=pytest.mark.slow)])
 def test_mean_square_error_is_that_of_the_cramer_rao_bound(small, sigma):
     """100 draws; the null vector beside it. Both sums are over the same draws, and over their expectation."""
     known, linear = small
@@ -154,6 +154,7 @@ def test_start_far_off_is_polished_to_the_same_mesh_as_the_truth():
     assert recover(noisy(known.matrix, sigma), noise=sigma).certified
 
 
+@pytest.mark.slow
 def test_noise_that_lets_points_coincide_leaves_no_mesh():
     known, sigma = channel(200, 5), 2e-2
     matrix = noisy(known.matrix, sigma, seed=4)

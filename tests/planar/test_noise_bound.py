@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bound import Bound, mean_square, mesh_of_at_least, noisy
+from bound import Bound, mean_square, mesh_of_at_least, noisy, weights_and_derivative
 from irregular import laplacian
 
 from unassemble.matrix import check_matrix
@@ -29,7 +29,8 @@ class Setting:
         place = {tuple(p): k for k, p in enumerate(true)}
         z = true @ [1, 1j]
         self.z = z / (2 * np.abs(z - z.mean()).max())
-        self.bound = Bound(self.z, np.array([place[tuple(p)] for p in points])[triangles])
+        cells = np.array([place[tuple(p)] for p in points])[triangles]
+        self.bound = Bound(self.z, *weights_and_derivative(self.z, cells))
         checked = check_matrix(self.matrix)
         self.edges = checked.edges
         self.piece = surfaces(checked.n, checked.edges).pieces[0]
@@ -53,7 +54,7 @@ class Setting:
         return points
 
 
-@pytest.fixture(scope="module", params=[500, 5000, 50_000])
+@pytest.fixture(scope="module", params=[500, 5000, pytest.param(50_000, marks=pytest.mark.slow)])
 def setting(request):
     return request.param, Setting(request.param)
 

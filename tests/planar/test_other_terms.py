@@ -54,7 +54,7 @@ MATRICES = {
 }
 
 
-@pytest.mark.parametrize("refinements", [2, 3, 4])
+@pytest.mark.parametrize("refinements", [2, 3, pytest.param(4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", MATRICES)
 def test_another_term_is_no_noise(name, refinements):
     """Neither suggested as noise, nor certified with noise that would explain it by its size."""

@@ -38,6 +38,7 @@ def test_rounded_entries_are_tested_against_their_rounding(form):
     assert 0.2 * expected < error < 10 * expected
 
 
+@pytest.mark.slow
 def test_errors_relative_to_the_entries_are_weighed_so():
     """Weights of random points differ by orders of magnitude: with one sigma for all the mesh is worse."""
     errors, uniform = [], []

@@ -23,9 +23,7 @@ def test_forces_alone_check_nothing_in_a_plane_frame(counts):
     assert found.certified
     assert error(found.points, given.points) < 1e-12
     tied = held.with_springs(np.array([0, 4]), np.array([9, 16]))
-    found = recover(tied.matrix)
-    assert error(found.points, given.points) > 1e-3
-    assert found.status == "uncertified"
+    assert recover(tied.matrix).status == "uncertified"
 
 
 @pytest.mark.parametrize("make", [plane_frame, grillage, frame], ids=lambda make: make.__name__)

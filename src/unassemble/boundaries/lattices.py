@@ -85,7 +85,7 @@ def recover_lattice(
         uniqueness="ambiguous",
         reason=(
             f"the lattice, continued by {count_of(len(gone), 'vertex that has', 'vertices that have')} no row, gives "
-            f"the matrix back to {witness.backward_error:.1e}, row sums included"
+            f"the matrix back to {witness.backward_error:.1e} (relative), row sums included"
         ),
         operator=placement.operator,
         backward_error=witness.backward_error,

@@ -213,7 +213,7 @@ def _report(
         uniqueness="searched",
         reason=(
             f"{known:,} of {matrix.n:,} points are determined by {judged.entries:,} whole entries, which the operator "
-            f"re-assembled on them gives back to {judged.backward_error:.1e}"
+            f"re-assembled on them gives back to {judged.backward_error:.1e} (relative)"
         ),
         operator=placement.operator,
         backward_error=judged.backward_error,

@@ -11,7 +11,7 @@ from .status import Exit, say
 @click.option("-o", "--output", "folder", metavar="DIR", default="demo-output", show_default=True)
 @click.option("--debug", is_flag=True, expose_value=False, help="Show tracebacks and details.")
 def demo(folder: str) -> int:
-    """Recover two matrices that this library did not assemble.
+    """Recover two matrices that this library did not assemble, and a lattice mast.
 
     Matrices, meshes, reports and pictures of true and recovered mesh go to a folder.
     """

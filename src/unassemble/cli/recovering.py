@@ -48,6 +48,9 @@ from .values import Numbers, OptionalTolerance
 )
 @click.option("--handed", type=click.Choice(["left", "right"]), help="Side of that line on which the centroid lies.")
 @click.option("--realise", is_flag=True, help="Surfaces: coordinates in space.")
+@click.option(
+    "--mass", metavar="FILE", help="The mass matrix of the same mesh: it tells the size, or with anchors the density."
+)
 @click.option("--triangulate", is_flag=True, help="Divide cells that the matrix leaves undivided.")
 @click.option("--standard-deviations", is_flag=True, help="Error bars of the coordinates.")
 @click.option("--report", metavar="FILE", help="Write a report: .json.")
@@ -59,8 +62,8 @@ def recover(
 ) -> int:
     """Recover the mesh of MATRIX and write it to OUT.
 
-    MATRIX belongs to the Laplacian on a planar mesh of triangles or a surface, c L + D, or to isotropic elasticity in
-    the plane or in space.
+    MATRIX belongs to a scalar operator on a mesh of the plane or on a surface, to elasticity in the plane or in space,
+    or to a structure of bars, beams and shells.
 
     MATRIX is Matrix Market (also .gz), scipy's .npz, NumPy's .npy, MATLAB's .mat, or lines of row, column and entry; -
     reads Matrix Market from standard input. Rows count from 0. Without OUT the mesh goes to a .vtu beside MATRIX, if
@@ -71,6 +74,7 @@ def recover(
     options["numbering"] = spelled_numbering(options["numbering"])
     options["refine"] = not options.pop("no_refine")
     from ..export import check_output, without_points
+    from ..formats import lacks_worth
     from ..plot.canvas import check_plot
     from ..progress import StageDisplay
     from ..report import check_report, write_report
@@ -87,4 +91,4 @@ def recover(
         if plot is not None:
             display("plot")
             recovery.plot(plot)
-    return outcome(recovery, [out, report, plot], quiet=quiet)
+    return outcome(recovery, [out, report, plot], quiet=quiet, lacking=lacks_worth(out))

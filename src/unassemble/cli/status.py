@@ -75,8 +75,8 @@ class CommandLine(click.Group):
     def with_command(self, words: list[str]) -> list[str]:
         """The words with ``recover`` before them, where they begin with a file instead of a command."""
         first = words[0] if words else ""
-        is_file = first == "-" or (not first.startswith("-") and (Path(first).suffix or Path(first).is_file()))
-        return ["recover", *words] if is_file and first not in self.commands else words
+        named = first != "" and not first.startswith("-") and (Path(first).suffix or Path(first).exists())
+        return ["recover", *words] if (first == "-" or named) and first not in self.commands else words
 
     def in_use(self, words: Sequence[str]) -> list[click.Command]:
         """All commands, the one that is called first."""
@@ -113,15 +113,15 @@ def verdict(error: BaseException) -> tuple[int, str]:
             )
 
 
-def outcome(recovery: Recovery, written: Sequence[str | None], *, quiet: bool) -> int:
-    """Say what came of a recovery, and return the exit status."""
+def outcome(recovery: Recovery, written: Sequence[str | None], *, quiet: bool, lacking: str = "") -> int:
+    """Say what came of a recovery, and what the files that were written lack; return the exit status."""
     context = click.get_current_context()
     commands = [context.command]
     details = recovery.certified or getattr(context.find_root().command, "debug", False)
     if not quiet:
         from ..summary import summary, three_lines
 
-        files = ", ".join(click.format_filename(name) for name in written if name is not None)
+        files = ", ".join(click.format_filename(name) for name in written if name is not None) + lacking
         text = f"{summary(recovery)}\n  {'written':<15} {files}" if details else three_lines(recovery, files)
         say(as_typed(text, commands))
     elif not recovery.certified:

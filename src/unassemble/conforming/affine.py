@@ -2,12 +2,14 @@
 
 On an affine cell the matrix is int grad phi_i' G grad phi_j with one symmetric 2 x 2 matrix G: a combination of three
 known ones. So the orders that the graph leaves can be told apart by a linear fit of three numbers; of curved cells,
-and quadrilaterals that are no parallelograms, the right order is the one that fits best.
+and quadrilaterals that are no parallelograms, the right order is the one that fits best. A mass term adds a fourth
+known matrix, times the area.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -15,19 +17,23 @@ from numpy.typing import NDArray
 
 from ..budget import SAMPLE
 from ..elements.kinds import Kind
-from ..elements.reference import exact_rule, shape_gradients
+from ..elements.reference import exact_rule, shape_functions, shape_gradients
 from ..matrix import OperatorMatrix
 from ..tolerances import LITTLE
 from .sets import pairs_of
 
 
 @cache
-def _components(kind: Kind) -> NDArray[np.float64]:
-    """(k, k, 3) integrals for the three components of G."""
+def _components(kind: Kind, mass: bool) -> NDArray[np.float64]:
+    """(k, k, 3 or 4) integrals for the three components of G, and of products of shape functions for a unit area."""
     at, weights = exact_rule(kind)
     x, y = shape_gradients(kind, at).transpose(2, 0, 1)
-    products = ((x, x), (y, y), (x, y))
-    parts = [np.einsum("q,qi,qj->ij", weights, a, b) for a, b in products]
+    products = [(weights, a, b) for a, b in ((x, x), (y, y), (x, y))]
+    if mass:
+        at, weights = exact_rule(kind, more=1)
+        value = shape_functions(kind, at)
+        products.append((weights / weights.sum(), value, value))
+    parts = [np.einsum("q,qi,qj->ij", *some) for some in products]
     return np.stack([(part + part.T) / 2 for part in parts], axis=-1)
 
 
@@ -40,9 +46,12 @@ class ElementEntries:
     sets : (m, k) int64
     every : (p,) int64
         Keys of the pairs of all cells, of other sizes too, increasing, one for each cell.
+    mass : bool
+        Whether there is a mass term.
     """
 
-    def __init__(self, matrix: OperatorMatrix, sets: NDArray[np.int64], every: NDArray[np.int64]):
+    def __init__(self, matrix: OperatorMatrix, sets: NDArray[np.int64], every: NDArray[np.int64], *, mass: bool):
+        self._mass = mass
         m, k = sets.shape
         keys = pairs_of(matrix.n, sets)
         parts = np.searchsorted(every, keys, side="right") - np.searchsorted(every, keys)
@@ -63,12 +72,39 @@ class ElementEntries:
         a, b = np.triu_indices(kind.nodes, 1)
         i, j = order[:, a], order[:, b]
         value, weight = self._values[cells[:, None], i, j], self._weights[cells[:, None], i, j]
-        columns = _components(kind)[a, b]
+        columns = _components(kind, self._mass)[a, b]
         normal = np.einsum("mp,pr,ps->mrs", weight, columns, columns, optimize=True)
         right = np.einsum("mp,pr->mr", weight * value, columns)
         total = (weight * value**2).sum(axis=1)
         solution = np.linalg.solve(normal, right[..., None])[..., 0]
         return np.asarray(total - (right * solution).sum(axis=1)) / np.where(total > 0, total, 1.0)
+
+    def masses(self, kind: Kind) -> NDArray[np.float64]:
+        """(m,) areas of affine cells in their order, times s: from entries that belong to one cell only."""
+        a, b = np.triu_indices(kind.nodes, 1)
+        columns, own, found = _components(kind, True)[a, b], self._weights[:, a, b] == 1, np.zeros(len(self._values))
+        label = own @ (1 << np.arange(len(a)))
+        for one in np.unique(label):  # few: sides are shared or not
+            some = np.flatnonzero(label == one)
+            mine = own[some[0]]
+            found[some] = self._values[some][:, a[mine], b[mine]] @ np.linalg.pinv(columns[mine])[3]
+        return found
+
+
+def without_mass(matrix: OperatorMatrix, blocks: Mapping[Kind, NDArray[np.int64]]) -> tuple[OperatorMatrix, NDArray]:
+    """A matrix less the consistent mass matrix of affine cells in their order; and (m,) their areas, times s."""
+    every = np.sort(np.concatenate([pairs_of(matrix.n, cells).ravel() for cells in blocks.values()]))
+    off, own, areas = np.zeros(len(matrix.entries)), matrix.diagonal.copy(), []
+    stored = matrix.edges @ [matrix.n, 1]
+    for kind, cells in blocks.items():
+        mass = ElementEntries(matrix, cells, every, mass=True).masses(kind)
+        unit = _components(kind, True)[..., 3]
+        a, b = np.triu_indices(kind.nodes, 1)
+        place = np.minimum(np.searchsorted(stored, pairs_of(matrix.n, cells)), len(stored) - 1)
+        off += np.bincount(place.ravel(), np.outer(mass, unit[a, b]).ravel(), len(off))
+        own -= np.bincount(cells.ravel(), np.outer(mass, np.diagonal(unit)).ravel(), matrix.n)
+        areas.append(mass)
+    return replace(matrix, entries=matrix.entries - off, diagonal=own), np.concatenate(areas)
 
 
 def typical_misfit(matrix: OperatorMatrix, blocks: Mapping[Kind, NDArray[np.int64]]) -> float:
@@ -78,5 +114,7 @@ def typical_misfit(matrix: OperatorMatrix, blocks: Mapping[Kind, NDArray[np.int6
     for kind, cells in blocks.items():
         some = cells[:: len(cells) // SAMPLE + 1]
         order = np.broadcast_to(np.arange(kind.nodes), some.shape)
-        found.append(float(np.median(ElementEntries(matrix, some, every).misfit(kind, np.arange(len(some)), order))))
+        found.append(
+            float(np.median(ElementEntries(matrix, some, every, mass=False).misfit(kind, np.arange(len(some)), order)))
+        )
     return max(found)

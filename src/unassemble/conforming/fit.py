@@ -200,7 +200,8 @@ def _polished(start: Fitted, weights: NDArray, scale: float | None, noise: NDArr
     if entries.flipped(start.z):
         return replace(start, notes=("no polish: cells are flat or turned over",))
     try:
-        found = polish(entries, weights, start.z, scale=scale, spread=start.spread)
+        # Relative to the largest: squares of 1e-15, of what vanished beside noise of 1e-12, are too much to factorise.
+        found = polish(entries, weights, start.z, scale=scale, spread=start.spread / start.spread.max())
         spread = start.spread
         misfit = weights - found.scale * entries.weights(found.z)
         if noise is None and errors_of_one_size(misfit / found.scale, spread):

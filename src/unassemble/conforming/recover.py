@@ -25,7 +25,7 @@ from ..scalar.notes import piece_notes, topology_notes
 from ..scalar.placement import Placement
 from ..scalar.solving import Task
 from ..scalar.verdict import Held
-from ..tolerances import SMALL
+from ..tolerances import CERTIFIED, SMALL
 from ..topology import Topology, local_numbering
 from .deviations import deviations_of
 from .fit import Fitted, fitted
@@ -60,15 +60,16 @@ def recover_conforming(
     failure: Exception = TopologyError("no sets of rows that are coupled to each other are cells of any known element")
     best: ConformingMesh | None = None
     small = stored.n <= SEARCHED_ROWS
-    remaining = iter(shown)
+    remaining, even = iter(shown), False
     while True:
-        if best is not None and best.certified and not small:
+        if best is not None and best.certified and not (small or even):
             break
         with clock("cells"):
             cells = next(remaining, None)
         if cells is None:
             break
         try:
+            even = cells.even
             found = _recovered(stored, cells, clock, task)
         except (TopologyError, GeometryError, SolverError) as error:
             failure = error
@@ -106,8 +107,8 @@ def _ambiguous(one: ConformingMesh, other: ConformingMesh) -> ConformingMesh:
     )
 
 
-def shown_cells(stored: OperatorMatrix) -> Iterator[Cells]:
-    """Cells that the rows may form, the likeliest first."""
+def shown_cells(stored: OperatorMatrix, *, mass: bool = False) -> Iterator[Cells]:
+    """Cells that the rows may form, the likeliest first; without or with a mass term."""
     numbering = local_numbering(stored.n, stored.edges)
     order = numbering.vertices
     near = OperatorMatrix(
@@ -115,8 +116,8 @@ def shown_cells(stored: OperatorMatrix) -> Iterator[Cells]:
     )
     for sets in node_sets(near):
         with suppress(TopologyError):
-            for blocks, told in ordered_cells(near, sets):
-                yield Cells({kind: order[cells] for kind, cells in blocks.items()}, told, order)
+            for blocks, told in ordered_cells(near, sets, mass=mass):
+                yield Cells({kind: order[cells] for kind, cells in blocks.items()}, told, order, sets.even)
 
 
 def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -> ConformingMesh:
@@ -158,6 +159,8 @@ def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -
         worst_misfits=misfits,
         standard_deviations=bars,
         chi_square=written.test.figures if written.test else None,
+        n_entries=len(certificate.misfits),
+        n_fitting=int(np.count_nonzero(certificate.misfits <= CERTIFIED)),
         estimated_noise=float(np.linalg.norm(certificate.differences) / np.sqrt(freedom)) if freedom > 0 else None,
         quadrature=", ".join(dict.fromkeys(rule for fit in fits for rule in fit.rule.values())),
         straight=all(fit.straight for fit in fits),

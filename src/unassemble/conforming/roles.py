@@ -39,11 +39,14 @@ class Cells:
         Whether the graph alone tells them, and no entries.
     order : (n,) int64
         All rows, those near each other on the mesh near each other, too.
+    even : bool
+        Whether those that come next are as likely.
     """
 
     blocks: dict[Kind, NDArray[np.int64]]
     told: bool
     order: NDArray[np.int64]
+    even: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,17 +74,20 @@ def kind_of_size(k: int) -> Kind:
     return KINDS[_KINDS[k]]
 
 
-def ordered_cells(matrix: OperatorMatrix, found: NodeSets) -> Iterator[tuple[dict[Kind, NDArray[np.int64]], bool]]:
+def ordered_cells(
+    matrix: OperatorMatrix, found: NodeSets, *, mass: bool = False
+) -> Iterator[tuple[dict[Kind, NDArray[np.int64]], bool]]:
     """Cells of sets of rows, the likeliest first; then with some quadrilaterals in their second likeliest order.
 
-    With each, whether the graph alone tells them.
+    With each, whether the graph alone tells them. With a mass term nothing else stands on the diagonal.
 
     Raises
     ------
     TopologyError
         If the sets do not overlap as cells do.
     """
-    size = np.abs(np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n))
+    sums = np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n)
+    size = np.abs(matrix.diagonal if mass else sums)
     sides = _sides_between(matrix.n, found, size)
     every = np.sort(np.concatenate([pairs_of(matrix.n, sets).ravel() for sets in found.sets]))
     blocks: dict[Kind, NDArray[np.int64]] = {}
@@ -90,7 +96,7 @@ def ordered_cells(matrix: OperatorMatrix, found: NodeSets) -> Iterator[tuple[dic
     for sets in found.sets:
         kind = kind_of_size(sets.shape[1])
         per_cell = sides.per_cell[first : first + len(sets)]
-        blocks[kind], others[kind] = _ordered(matrix, kind, sets, sides, per_cell, size, every)
+        blocks[kind], others[kind] = _ordered(matrix, kind, sets, sides, per_cell, size, every, mass=mass)
         first += len(sets)
     told = found.told and not any(len(other.which) for other in others.values())
     yield blocks, told
@@ -144,6 +150,8 @@ def _ordered(
     per_cell: NDArray[np.int64],
     size: NDArray,
     every: NDArray[np.int64],
+    *,
+    mass: bool,
 ) -> tuple[NDArray[np.int64], _Second]:
     """Cells of one kind, and what else they could be."""
     corners, inner, open_rows, n_open = _parted(kind, sets, sides, size)
@@ -156,7 +164,7 @@ def _ordered(
     if not count.all():
         raise TopologyError(f"row {int(sets[np.argmin(count)][0])} is in a cell whose sides do not close")
     doubtful = np.flatnonzero(count > 1)
-    entries = ElementEntries(matrix, sets[doubtful], every)
+    entries = ElementEntries(matrix, sets[doubtful], every, mass=mass)
     best, second = np.full((2, len(doubtful)), np.inf)
     for some, trial in trials:
         several = count[some] > 1

@@ -16,6 +16,7 @@ from ..elements.cliques import Graph, simplices
 from ..matrix import OperatorMatrix
 from ..tolerances import ROUNDED
 from ..topology.keys import contains, distinct, pair_keys
+from .halves import halves
 
 _ABSENT = {4: 0, 6: 3, 8: 4, 9: 6, 10: 9}
 """Pairs that a cell of so many nodes may lack, because the entry vanishes and is not stored."""
@@ -35,11 +36,14 @@ class NodeSets:
         One for each number of nodes; rows increase within a cell.
     told : bool
         Whether no other sets would do as well.
+    even : bool
+        Whether those that come next are as likely.
     """
 
     order: int
     sets: tuple[NDArray[np.int64], ...]
     told: bool = False
+    even: bool = False
 
 
 class Common:
@@ -50,12 +54,19 @@ class Common:
 
     def __init__(self, matrix: OperatorMatrix):
         size = matrix.row_size[matrix.edges].min(axis=1)
-        i, j = matrix.edges.T
-        ends = np.concatenate([i, j]), np.concatenate([j, i])
         self.n = matrix.n
-        self.graph = Graph(sp.csr_array((np.ones(2 * len(i), np.int8), ends), shape=(matrix.n, matrix.n)))
-        self.keys = pair_keys(matrix.n, i, j)
+        self.keys = pair_keys(matrix.n, *matrix.edges.T)
+        self.graph = self._graph_of(self.keys)
         self.stored = self.keys[np.abs(matrix.entries) > ROUNDED * size]
+
+    @cached_property
+    def nonzero(self) -> Graph:
+        """Entries that are not zero."""
+        return self._graph_of(self.stored)
+
+    def _graph_of(self, keys: NDArray[np.int64]) -> Graph:
+        ends = np.concatenate([keys // self.n, keys % self.n]), np.concatenate([keys % self.n, keys // self.n])
+        return Graph(sp.csr_array((np.ones(2 * len(keys), np.int8), ends), shape=(self.n, self.n)))
 
     @cached_property
     def closed(self) -> sp.csr_array:
@@ -124,8 +135,7 @@ class Common:
             keys = self.stored[~contains(distinct(pairs_of(self.n, found)), self.stored)]
             if not len(keys):
                 break
-            ends = np.concatenate([keys // self.n, keys % self.n]), np.concatenate([keys % self.n, keys // self.n])
-            alone = Graph(sp.csr_array((np.ones(2 * len(keys), np.int8), ends), shape=(self.n, self.n)))
+            alone = self._graph_of(keys)
             middle = _paths(alone) if right_angles else simplices(alone, 2)
             several = sp.csr_array(sum(self.closed[column] for column in middle.T))
             several.data = (several.data >= 2).astype(np.int32)
@@ -166,6 +176,12 @@ def once(rows: NDArray[np.int64]) -> NDArray[np.int64]:
     return rows[np.sort(order[np.append(True, np.diff(label[order]) != 0)[: len(rows)]])]
 
 
+def _among(rows: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(m,) whether each set is one of the others, all of increasing rows."""
+    label = np.random.default_rng(0).integers(0, 2**63, rows.shape[1], dtype=np.uint64)
+    return contains(np.sort(others.astype(np.uint64) @ label), rows.astype(np.uint64) @ label)
+
+
 def pairs_of(n: int, cells: NDArray[np.int64]) -> NDArray[np.int64]:
     """(m, k (k - 1) / 2) keys of all pairs of each cell, in the order of :func:`numpy.triu_indices`."""
     a, b = np.triu_indices(cells.shape[1], 1)
@@ -182,10 +198,12 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
     common = Common(matrix)
     for order, k in ((3, 10), (2, 9), (2, 8), (2, 6)):
         found = common.sets(k)
-        if order == 3 and not _cover(common, [found]):
-            found = common.bubbles()
         if _cover(common, [found]):
             yield NodeSets(order, (found,))
+        if order == 3:  # pairs of nodes of two cells may have ten neighbours in common, too
+            bubbles = common.bubbles()
+            if len(bubbles) != len(found) and _cover(common, [bubbles]):
+                yield NodeSets(order, (bubbles,))
     choices = list(_choices(common, common.sets(4)))
     for quads in choices:
         if _cover(common, [quads]):
@@ -194,9 +212,12 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
         if len(triangles) and _cover(common, [triangles, quads]):
             yield NodeSets(1, (triangles, quads), len(choices) == 1)
     if not _cover(common, [found]):
-        found = common.quadratic_triangles(found)
-        if _cover(common, [found]):
-            yield NodeSets(2, (found,))
+        likeliest, other = halves(matrix, common.nonzero)
+        rest = common.quadratic_triangles(once(np.concatenate([found, likeliest])))
+        if _cover(common, [rest]):
+            yield NodeSets(2, (rest,), even=other is not None)
+            if other is not None:
+                yield NodeSets(2, (once(np.concatenate([rest[~_among(rest, likeliest)], other])),))
 
 
 def _choices(common: Common, quads: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
@@ -228,8 +249,8 @@ def _beside(common: Common, quads: NDArray[np.int64]) -> NDArray[np.int64]:
     halves = label[quads[:, list(combinations(range(4), 3))]].sum(axis=2)
     triangles = simplices(common.graph, 2)
     triangles = triangles[~np.isin(label[triangles].sum(axis=1), halves)]
-    if not len(triangles):
-        return triangles
+    if not 0 < len(triangles) < 3 * common.n:  # more than a planar graph has (Hakimi and Schmeichel, 1979): of solids
+        return triangles[:0]
     keys = pairs_of(common.n, quads)
     order = np.argsort(keys, axis=None)
     pairs = pairs_of(common.n, triangles)

@@ -50,13 +50,13 @@ def verdict(stored: OperatorMatrix, fits: Sequence[Fitted], held: Sequence[Held]
     if not written.passes:
         why = (
             f"the mesh fits, but not as it is written: so far from the origin its coordinates have too few digits, and "
-            f"the matrix is given back to {error:.1e} only"
+            f"the matrix is given back to {error:.1e} (relative) only"
         )
         return Verdict("uncertified", uniqueness, why)
     if written.test and written.by_noise:
         p = written.test.figures["p_value"]
         return Verdict("certified", uniqueness, f"the misfit is that of {written.test.noise} (p = {p:.2g})")
-    fits_well = f"the operator re-assembled on this mesh gives the matrix back to {error:.1e}"
+    fits_well = f"the operator re-assembled on this mesh gives the matrix back to {error:.1e} (relative)"
     return Verdict("certified", uniqueness, fits_well)
 
 
@@ -90,7 +90,7 @@ def _obstacle(fits: Sequence[Fitted], near: Held, task: Task) -> str:
         )
         return sentences((differs, *notes))
     for fit in fits if certificate.backward_error > SUSPICIOUS and task.options.refine else ():
-        squares = (fit.misfit / fit.spread) ** 2
+        squares = np.where(fit.weights != 0, (fit.misfit / fit.spread) ** 2, 0.0)  # what vanished is never to blame
         if squares.max() > _STANDS_OUT * squares.sum():
             i, j = fit.part.piece.vertices[fit.part.edges[int(squares.argmax())]]
             return f"the entry of rows {i} and {j} stands out, next to others that fit to rounding level"

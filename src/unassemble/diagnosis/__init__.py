@@ -1,17 +1,18 @@
 """What a scalar matrix is, read off its graph and its sums without solving anything: one answer for everybody."""
 
 from .answers import explained, judged
-from .kinds import PLANAR, UNKNOWN, Diagnosis
+from .kinds import PLANAR, Diagnosis
 from .mass import mass_matrix, refuse_masses
 from .scalar import diagnosed, further_terms
+from .structural import indefinite
 
 __all__ = [
     "PLANAR",
-    "UNKNOWN",
     "Diagnosis",
     "diagnosed",
     "explained",
     "further_terms",
+    "indefinite",
     "judged",
     "mass_matrix",
     "refuse_masses",

@@ -14,22 +14,14 @@ from .mass import mass_matrix
 from .scalar import diagnosed, where_nothing_fits
 
 
-def explained(error: RecoveryError, matrix: OperatorMatrix, otherwise: str = "") -> RecoveryError:
-    """An error of recovery, with what the matrix is in place of what its graph is not.
-
-    Parameters
-    ----------
-    error : RecoveryError
-    matrix : OperatorMatrix
-    otherwise : str
-        What else may be said, where it is of no kind that is known.
-    """
+def explained(error: RecoveryError, matrix: OperatorMatrix) -> RecoveryError:
+    """An error of recovery, with what the matrix is in place of what its graph is not."""
     planar = not isinstance(error, NotPlanarError)
     found = mass_matrix(matrix, planar=False) or diagnosed(matrix, planar=planar)
     if isinstance(error, NotPlanarError):
         begun = "the graph of the matrix is not planar"
         if found.kind == UNKNOWN:
-            said = sentences([begun + (f": {error.why}" if error.why else ""), otherwise or found.advice])
+            said = sentences([begun + (f": {error.why}" if error.why else ""), found.advice])
         elif found.unread:
             said = found.sentence(f"{begun}, for this is")
         else:

@@ -50,6 +50,9 @@ class Cells:
         Share of pairs that show a cell.
     in_fours, in_threes : float
         Share of pairs that lie in a clique of four, and of three.
+    around : float
+        To how many others, in the mean, the common neighbours of a pair are coupled among these: two, where the cells
+        around an edge are tetrahedra and close a ring, or less where they do not; some more by chance.
     twins : float
         Share of rows with the neighbours of another row: several unknowns of one node.
     """
@@ -59,7 +62,13 @@ class Cells:
     often: float
     in_fours: float
     in_threes: float
+    around: float
     twins: float
+
+    @property
+    def tetrahedral(self) -> bool:
+        """Whether pairs lie in cells of four, as many around each as in a mesh in space."""
+        return mostly(self.in_fours) and self.around <= 3  # products of matrices, and dense graphs, have 5 and more
 
 
 def cells_of(n: int, edges: NDArray[np.int64], most: int = 1500) -> Cells:
@@ -86,11 +95,13 @@ def cells_of(n: int, edges: NDArray[np.int64], most: int = 1500) -> Cells:
     found: Counter[int] = Counter()
     cells: set[frozenset[int]] = set()
     fours = threes = 0
+    around = 0.0
     for i, j in pairs.tolist():
         common = others[i] & others[j]
         threes += bool(common)
         inside = [len(common & others[k]) for k in common]
         fours += any(inside)
+        around += sum(inside) / max(len(inside), 1)
         if common and min(inside) == len(common) - 1:
             found[len(common) + 2] += 1
             cells.add(frozenset(common | {i, j}))
@@ -102,6 +113,7 @@ def cells_of(n: int, edges: NDArray[np.int64], most: int = 1500) -> Cells:
         count / len(pairs),
         fours / len(pairs),
         threes / len(pairs),
+        around / len(pairs),
         _twins(near),
     )
 

@@ -14,7 +14,7 @@ UNREAD: Mapping[str, str] = {
     "hexahedra": "scalar matrices of meshes in space are not read yet, but elasticity matrices of such meshes are",
     "grid in space": "scalar matrices of meshes in space are not read yet, but elasticity matrices of such meshes are",
     "mass": "pass the stiffness matrix of the same mesh: a mass matrix tells sizes of cells, and no shape",
-    "graph": "a graph without weights has no coordinates: a layout of the graph may draw it",
+    "graph": "a graph has no coordinates: a layout of the graph may draw it",
     "segments": "the length of each segment is the reciprocal of its entry, with nothing left to solve",
 }
 """What to do with kinds that :func:`unassemble.recover` refuses; who builds the recovery of one takes its line out."""

@@ -3,7 +3,7 @@
 Scaled to identity blocks at its nodes, a consistent mass matrix has eigenvalues between bounds that depend on the
 element alone, not on the mesh or on densities (Wathen 1987); those of a stiffness matrix come near to zero. And a rigid
 translation feels all masses at once, so that the couplings of most unknowns add up in one vector, where those of
-stiffnesses are against each other. Those of cubic elements do neither, and are not told.
+stiffnesses are against each other. Those of straight simplices, cubic ones too, show in the sums of their rows.
 
 A. J. Wathen, Realistic eigenvalue bounds for the Galerkin mass matrix, IMA J. Numer. Anal. 7 (1987), 449-457.
 """
@@ -11,6 +11,7 @@ A. J. Wathen, Realistic eigenvalue bounds for the Galerkin mass matrix, IMA J. N
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
@@ -18,18 +19,28 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
+from ..elements.kinds import KINDS, Kind
+from ..elements.reference import mass_sums
 from ..errors import GeometryError
+from ..further_terms import less_mass
 from ..matrix import OperatorMatrix
 from ..nodes.grouping import same_pattern
 from ..nodes.unknowns import nodes_of_pattern
 from ..structures.layouts import SPACE
-from ..tolerances import HARDLY_ANY, LAST_DIGITS, LITTLE, NEARLY_ALL, ROUNDED, SUMMED
+from ..tolerances import ALIKE, HARDLY_ANY, LAST_DIGITS, LITTLE, NEARLY_ALL, ROUNDED, SUMMED
 from ..topology import components
 from ..words import count_of
 from .cliques import CELLS, cells_of, often
 from .kinds import LENGTHS, UNREAD, Diagnosis
 
-_SIMPLICES = {1: "segments", 2: "triangles", 3: "tetrahedra"}
+_SIMPLICES = {
+    "linear elements on segments": Kind("line", "line", 1, 2),
+    "linear elements on triangles": KINDS["triangle"],
+    "quadratic elements on triangles": KINDS["triangle6"],
+    "cubic elements on triangles": KINDS["triangle10"],
+    "linear elements on tetrahedra": KINDS["tetra"],
+    "quadratic elements on tetrahedra": KINDS["tetra10"],
+}
 
 _OR_HELD = ", or the stiffness matrix of a body of a few nodes that is held all around, which recovery tells"
 
@@ -66,24 +77,27 @@ def mass_matrix(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) ->
     masses = _Masses.of(matrix)
     if masses is None:
         return None
-    if dimension := masses.simplices:
-        ratio = {1: "twice", 2: "once", 3: "two thirds of"}[dimension]
-        advice = {1: LENGTHS, 2: "" if planar else UNREAD["mass"], 3: UNREAD["mass"]}[dimension]
-        shares = f"each diagonal entry is {ratio} the sum of the others in its row, and all are of one sign"
-        name = f"a mass matrix of linear elements on {_SIMPLICES[dimension]}"
-        return Diagnosis("mass", name, (shares, *masses.without), advice)
-    if masses.quadratic:
-        sums = "rows add up to zero, or to 15/8 of their diagonal entry, as those of corners and of middles of sides"
-        return Diagnosis("mass", "a mass matrix of quadratic elements on triangles", (sums,), UNREAD["mass"])
+    if masses.simplices:
+        name, kind, ratios = masses.simplices
+        advice = LENGTHS if kind.dim == 1 else "" if planar and kind == KINDS["triangle"] else UNREAD["mass"]
+        parts = " or ".join(str(Fraction(ratio).limit_denominator(1000)) for ratio in ratios)
+        sums = f"every row adds up to {parts} times its diagonal entry"
+        return Diagnosis("mass", f"a mass matrix of {name}", (sums, *masses.without), advice)
     crowded = masses.M.nnz > 7 * masses.M.shape[0] - 12  # twice 3 n - 6, and the diagonal
     bounds = masses.bounds if not exact and (crowded or not planar) else None
-    if bounds is None:
+    if bounds is None or _beside_stiffness(matrix):
         return None
     shown = (
         f"scaled to identity blocks its least eigenvalue is {bounds[0]:.2g}, where those of stiffnesses near zero",
         f"its couplings add up in one vector, to a largest eigenvalue of {bounds[1]:.2g}, as under a translation",
     )
     return Diagnosis("mass", f"a consistent mass matrix{masses.unknowns}", (*shown, *masses.without), UNREAD["mass"])
+
+
+def _beside_stiffness(matrix: OperatorMatrix) -> bool:
+    """Whether rows form straight triangles of second or third order, and more than their mass is there."""
+    less = less_mass(matrix)
+    return less is not None and bool(np.abs(less.matrix.entries).max() > ALIKE * np.abs(matrix.entries).max())
 
 
 def _is_lumped(matrix: OperatorMatrix) -> bool:
@@ -125,27 +139,20 @@ class _Masses:
         return (f"{count_of(self.n_massless, 'row is', 'rows are')} zero",) if self.n_massless else ()
 
     @cached_property
-    def simplices(self) -> int:
-        """Dimension of the simplices whose mass matrix with linear elements this is; 0 for none.
+    def simplices(self) -> tuple[str, Kind, list[float]] | None:
+        """The straight elements whose mass matrix this is, and what rows add up to, over their diagonal entries.
 
-        A simplex of volume V in d dimensions adds 2 V / ((d + 1) (d + 2)) to each diagonal entry and half as much to
-        each of d off-diagonal ones in the same row.
+        The area of a cell is a factor of its whole mass matrix: what a row of some kind of node, a corner say, adds up
+        to over its diagonal entry is the same on all cells, and so on all meshes.
         """
-        if not (self.M.data > 0).all():
-            return 0
         diagonal = self.M.diagonal()
-        others = self.M.sum(axis=1) - diagonal
-        return next((d for d in _SIMPLICES if np.allclose(d * diagonal, 2 * others, rtol=SUMMED, atol=0)), 0)
-
-    @cached_property
-    def quadratic(self) -> bool:
-        """Whether this is the mass matrix of quadratic triangles: corners have no integral, middles (16 + 16 - 4) / 32.
-
-        Of an element of area 180 the rows are 6, -1, -1, 0, 0, -4 and 32, 16, 16, 0, 0, -4.
-        """
-        sums, diagonal = self.M.sum(axis=1), self.M.diagonal()
-        corners, middles = (np.abs(sums - part * diagonal) <= SUMMED * diagonal for part in (0, 15 / 8))
-        return bool((corners | middles).all() and corners.any() and middles.any())
+        share = self.M.sum(axis=1) / diagonal
+        for name, kind in _SIMPLICES.items():
+            ratios = np.unique(mass_sums(kind).round(10)).tolist()
+            apart = np.abs(share[:, None] - ratios) <= SUMMED * abs(self.M).sum(axis=1)[:, None] / diagonal[:, None]
+            if apart.any(axis=1).all() and apart.any(axis=0).all():
+                return name, kind, ratios
+        return None
 
     @cached_property
     def bounds(self) -> tuple[float, float] | None:
@@ -175,7 +182,7 @@ class _Masses:
         cells = cells_of(self.M.shape[0], edges)
         n_parts = len(components(self.M.shape[0], edges))
         if (cells.nodes, cells.shared) in CELLS and n_parts == 1:
-            return f" of {CELLS[cells.nodes, cells.shared][1]}"
+            return f" of {CELLS[cells.nodes, cells.shared][1]}, with little stiffness at most"
         several = n_parts > 1 or often(cells.twins) or nodes_of_pattern(self.M) is not None
         if not several:
             return ""

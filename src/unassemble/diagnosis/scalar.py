@@ -14,6 +14,7 @@ from ..words import count_of
 from .cliques import CELLS, Cells, cells_of, mostly, often
 from .kinds import CONSTANT, KEEP_ALL, PLANAR, TERMS, UNKNOWN, UNREAD, WITHOUT_MASS, Diagnosis
 from .mass import mass_matrix
+from .structural import saddle_point, seeming
 
 LINEAR = "a stiffness matrix of linear elements on triangles"
 _SMALL = 10  # rows: fewer may be a mesh of few triangles, whatever their entries are
@@ -32,7 +33,7 @@ class Sums:
     penalised : (n,) bool
         Rows whose diagonal is beyond everything else.
     sign : int
-        That of all sums, where none is zero and all have one; else 0.
+        That of all sums that are not zero, where these are not few and all have one; else 0.
     """
 
     zero: NDArray[np.bool_]
@@ -50,8 +51,9 @@ class Sums:
         alone = size == 0
         zero = (np.abs(sums) <= SUMMED * (size + np.abs(matrix.diagonal))) & ~alone
         penalised = (SMALL * np.abs(matrix.diagonal) > size) & ~alone
-        signs = np.unique(np.sign(sums[~alone & ~penalised]))
-        sign = int(signs[0]) if len(signs) == 1 and not (zero & ~alone).any() else 0
+        rest = ~(zero | alone | penalised)
+        signs = np.unique(np.sign(sums[rest]))
+        sign = int(signs[0]) if len(signs) == 1 and rest.sum() > MOST * (zero | rest).sum() else 0
         return cls(zero, alone, alone & (matrix.diagonal != 0), penalised, sign)
 
     @property
@@ -113,13 +115,15 @@ def diagnosed(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis:
     degree = np.bincount(matrix.edges.ravel(), minlength=matrix.n)
     if degree.max() <= 2 and (degree == 1).any() and matrix.n >= _SMALL:
         return _of_kind("segments", "a stiffness matrix on a line", "no row is coupled to more than two", sums)
-    if _is_graph(matrix, sums):
+    if matrix.unweighted and matrix.n >= _SMALL and matrix.entries[0] < 0:
         equal = "all off-diagonal entries are equal, and on a mesh those of the boundary have one cell and others two"
         return _of_kind("graph", "the Laplacian of a graph without weights", equal, sums)
     if planar:
         return Diagnosis(PLANAR, LINEAR + further_terms(matrix), sums.evidence)
-    if not (sums.zero.any() or sums.sign):  # as of no stiffness matrix, whatever its graph looks like
-        return _unknown(sums)
+    # Rows of stiffnesses have a diagonal, and some sums are zero or of one sign; blocks form cliques as cells do.
+    saddle = saddle_point(matrix)
+    if saddle or not (sums.zero.any() or sums.sign):
+        return _unknown(matrix, sums, saddle)
     return _by_cells(matrix, sums)
 
 
@@ -136,7 +140,7 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
         if kind and not doubtful.get(kind):
             shown = f"rows form cliques of {cells.nodes}, neighbours of which share {cells.shared} rows"
             return _of_kind(kind, f"{operator} of {name}", shown, sums)
-        if not (often(cells.often) or several) and mostly(cells.in_fours):
+        if not (often(cells.often) or several) and cells.tetrahedral:
             shown = f"{cells.in_fours:.0%} of the coupled pairs of rows lie in a clique of four"
             return _of_kind("tetrahedra", f"{operator} of linear elements on tetrahedra", shown, sums)
         if _has_middles(matrix):
@@ -149,15 +153,18 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
         if _is_grid(matrix.n, edges, cells):
             shown = "no three rows are coupled to each other, and most rows are coupled to six"
             return _of_kind("grid in space", "that of a grid in space, a seven-point stencil", shown, sums)
-    return _unknown(sums)
+    if (matrix.entries <= 0).all() and (sums.zero | sums.alone).all():
+        shown = "all rows add up to zero, no off-diagonal entry is positive, and no cells show in the graph"
+        return _of_kind("graph", "the Laplacian of a graph with weights", shown, sums)
+    return _unknown(matrix, sums)
 
 
-def _unknown(sums: Sums) -> Diagnosis:
+def _unknown(matrix: OperatorMatrix, sums: Sums, seems: str = "") -> Diagnosis:
     return Diagnosis(
         UNKNOWN,
         "no scalar matrix of a kind that is known",
         ("neither its graph nor its sums show one", *sums.evidence),
-        TERMS,
+        seems or seeming(matrix) or TERMS,
     )
 
 
@@ -177,7 +184,7 @@ def further_terms(matrix: OperatorMatrix) -> str:
         return ""
     if sums.penalised.any() and (sums.zero | sums.alone | sums.penalised).all():
         return ", plus a diagonal"
-    if sums.zero.any():
+    if sums.zero.any() and not sums.sign:
         return ", plus a diagonal or without some unknowns"
     if np.ptp(matrix.diagonal) <= ROUNDED * np.abs(matrix.diagonal).max():
         return ", plus a diagonal, or with rows and columns scaled to a constant diagonal"
@@ -190,7 +197,8 @@ def further_terms(matrix: OperatorMatrix) -> str:
 def _has_middles(matrix: OperatorMatrix, most: int = 400) -> bool:
     """Whether rows m have neighbours i, j with A_im = A_jm = -4 A_ij, as middles of the sides of quadratic triangles.
 
-    Both entries are multiples of the same cotangents, so that neither is left out without the other; of zeros that are
+    Middles are coupled to the eight other nodes of two cells at most. Both entries are multiples of the same
+    cotangents, so that neither is left out without the other; of zeros that are
     not stored there is no trace. Looked for in `most` rows.
     """
     A, least = matrix.csr(), ROUNDED * matrix.row_size
@@ -203,20 +211,13 @@ def _has_middles(matrix: OperatorMatrix, most: int = 400) -> bool:
 
     def between(m: int) -> bool:
         ends = sorted((value, i) for i, value in entries(m).items() if i != m)
-        return any(
+        return len(ends) <= 8 and any(
             abs(u - v) <= SUMMED * abs(u) and abs(entries(i).get(j, 0.0) + u / 4) <= SUMMED * abs(u)
             for k, (u, i) in enumerate(ends)
             for v, j in ends[k + 1 : k + 4]
         )
 
     return sum(map(between, sample)) >= (1 - MOST) * len(sample)
-
-
-def _is_graph(matrix: OperatorMatrix, sums: Sums) -> bool:
-    """Whether all entries are equal and all rows add up to zero."""
-    entries = matrix.entries
-    equal = np.ptp(entries) <= ROUNDED * np.abs(entries).max()
-    return bool(matrix.n >= _SMALL and equal and entries[0] < 0 and (sums.zero | sums.alone).all())
 
 
 def _is_grid(n: int, edges: NDArray[np.int64], cells: Cells) -> bool:

@@ -73,7 +73,7 @@ def of_few_digits(
         return "uncertified", hidden(objection, rounding)
     if np.isnan(error):
         return "uncertified", NOTHING_LEFT
-    holds = f"the entries are rounded to {rounding.name}, and the identities hold to {error:.1e}"
+    holds = f"the entries are rounded to {rounding.name}, and the identities hold to {error:.1e} (relative)"
     if not error <= max(rounding.spread, CERTIFIED):
         return "uncertified", Reason(
             f"{holds}, which is more than that leaves: positions may be off by {doubt:.0e} of the size"
@@ -121,11 +121,11 @@ def verdict(
     if np.isnan(error):
         return "uncertified", NOTHING_LEFT
     if error > CERTIFIED:
-        return "uncertified", Reason(f"the largest residual of a valid identity is {error:.1e}")
+        return "uncertified", Reason(f"the largest residual of a valid identity is {error:.1e} (relative)")
     if error > _MAGNIFIED * nearly:
         return "uncertified", Reason(
-            f"the valid identities hold to {error:.1e}, but a field that is no translation or scale satisfies them up "
-            f"to {nearly:.1e}: nodes that it moves may be wrong by more than 1e-8"
+            f"the valid identities hold to {error:.1e} (relative), but a field that is no translation or scale "
+            f"satisfies them up to {nearly:.1e}: nodes that it moves may be wrong by more than 1e-8"
         )
     return "certified", Reason("the valid identities hold to rounding, and only translations and scale satisfy them")
 

@@ -8,6 +8,7 @@ from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import factorial
 
 from .kinds import Kind
 
@@ -50,6 +51,19 @@ def shape_functions(kind: Kind, at: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray((at[:, None, :] ** _exponents(kind)).prod(axis=2) @ _coefficients(kind))
 
 
+def mass_sums(kind: Kind) -> NDArray[np.float64]:
+    """(k,) sums of the rows of a simplex's mass matrix, over the diagonal: the same on all meshes of straight cells.
+
+    The integral of a monomial over the unit simplex is the product of the factorials of its exponents over that of
+    their sum and d.
+    """
+    power = _exponents(kind)
+    both, C = power[:, None, :] + power, _coefficients(kind)
+    integrals = factorial(both).prod(axis=2) / factorial(both.sum(axis=2) + kind.dim)
+    M = C.T @ integrals @ C
+    return np.asarray(M.sum(axis=1) / M.diagonal())
+
+
 def shape_gradients(kind: Kind, at: NDArray[np.float64]) -> NDArray[np.float64]:
     """(q, k, d) gradients of the shape functions at points (q, d) of the reference element."""
     power = _exponents(kind)
@@ -86,12 +100,13 @@ def planar_rules(kind: Kind) -> dict[str, Rule]:
     return {f"{order} x {order} Gauss": _gauss(2, order) for order in orders}
 
 
-def exact_rule(kind: Kind) -> Rule:
+def exact_rule(kind: Kind, more: int = 0) -> Rule:
     """A rule that integrates products of gradients exactly on affine cells, in the plane: Gauss's, on triangles folded.
 
-    The map (s, t) -> (s, (1 - s) t) takes the box to the triangle; its determinant costs one degree.
+    The map (s, t) -> (s, (1 - s) t) takes the box to the triangle; its determinant costs one degree. Products of
+    functions take one point `more` in each direction.
     """
-    at, weights = _gauss(2, kind.degree + 1)
+    at, weights = _gauss(2, kind.degree + 1 + more)
     if not kind.simplex:
         return at, weights
     s, t = at.T

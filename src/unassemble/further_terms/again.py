@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..certify import Terms, certify
+from ..certify import Certificate, Terms, certify
+from ..certify_elements import certify_elements
 from ..matrix import OperatorMatrix
-from ..recovery import PlanarMesh
+from ..recovery import ConformingMesh, PlanarMesh
 from ..tolerances import CERTIFIED
 
 Plain = Callable[..., PlanarMesh]
@@ -25,11 +26,9 @@ class Held:
 
     def with_terms(self, found: PlanarMesh, terms: Terms, operator: str, *notes: str) -> PlanarMesh:
         """The mesh of the Laplacian as that of the whole matrix, if it gives that back."""
-        matrix, triangles = self.matrix, found.divided()[0]
-        factor = found.scale[found.component[triangles].max(axis=1)]  # a hinge carries the lowest label
-        held = certify(matrix.edges, matrix.entries, found.points, triangles, factor, self.tensor, terms)
+        held = self._held(found, terms)
         good = held.backward_error <= CERTIFIED and not len(held.flipped)
-        fits = f"{operator} re-assembled on this mesh gives the matrix back to {held.backward_error:.1e}"
+        fits = f"{operator} re-assembled on this mesh gives the matrix back to {held.backward_error:.1e} (relative)"
         worst, misfits = held.worst(0 if good and found.certified else 10)
         return replace(
             found,
@@ -43,6 +42,21 @@ class Held:
             worst_entries=worst,
             worst_misfits=misfits,
         )
+
+    def _held(self, found: PlanarMesh, terms: Terms) -> Certificate:
+        def factor(cells: NDArray) -> NDArray:
+            return found.scale[found.component[cells].max(axis=1)]  # a hinge carries the lowest label
+
+        given = self.matrix.edges, self.matrix.entries, found.points
+        if not isinstance(found, ConformingMesh):
+            triangles = found.divided()[0]
+            return certify(*given, triangles, factor(triangles), self.tensor, terms)
+        rules = {
+            name: next(rule for rule in found.quadrature.split(", ") if ("Gauss" in rule) == name.startswith("quad"))
+            for name in found.cells
+        }
+        factors = {name: factor(cells) for name, cells in found.cells.items()}
+        return certify_elements(*given, found.cells, factors, rules, terms)
 
 
 def areas_of(mesh: PlanarMesh) -> NDArray[np.float64]:

@@ -61,7 +61,9 @@ def mass_alone(held: Held, topology: Topology, skeleton: Skeleton, sums: RowSums
         node_status=np.ones(matrix.n, dtype=np.int8),
         status="certified",
         uniqueness="proved",
-        reason=sentences((f"the mass matrix of triangles with these areas is the given one to {error:.1e}", _NO_SHAPE)),
+        reason=sentences(
+            (f"the mass matrix of triangles with these areas is the given one to {error:.1e} (relative)", _NO_SHAPE)
+        ),
         operator="mass",
         backward_error=error,
         n_holes=topology.n_holes + int(hole.sum()),
@@ -86,7 +88,7 @@ def with_consistent_mass(
     found = replace(found, uniqueness="searched" if found.uniqueness == "proved" else found.uniqueness)
     terms = Terms(held.matrix.diagonal, reaction)
     operator = "c L + s M, M the consistent mass matrix,"
-    return held.with_terms(found, terms, operator, _size(reaction), *((_OTHER,) if found.certified else ()))
+    return held.with_terms(found, terms, operator, size_note(reaction), *((_OTHER,) if found.certified else ()))
 
 
 def _fit(skeleton: Skeleton, entries: NDArray, sums: RowSums) -> MetricFit | None:
@@ -167,11 +169,12 @@ def with_lumped_mass(held: Held, found: PlanarMesh, sums: RowSums) -> PlanarMesh
     if not (np.abs(sums.values - reaction * share) <= allowed).all():
         return found
     terms = Terms(held.matrix.diagonal, reaction, lumped=True)
-    again = held.with_terms(found, terms, "c L + s M, M the lumped mass matrix,", _size(reaction))
+    again = held.with_terms(found, terms, "c L + s M, M the lumped mass matrix,", size_note(reaction))
     return again if again.certified else found
 
 
-def _size(reaction: float) -> str:
+def size_note(reaction: float) -> str:
+    """How lengths depend on s."""
     return (
         "the mesh has a size: if the factor of the mass matrix is s, lengths are those given here times "
         f"sqrt({reaction:.12g} / s)"

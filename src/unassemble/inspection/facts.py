@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -12,7 +14,9 @@ from scipy.sparse import csgraph
 from ..conforming.affine import typical_misfit
 from ..conforming.parts import parts_of
 from ..conforming.recover import shown_cells
+from ..conforming.roles import Cells
 from ..errors import GeometryError, RecoveryError, TopologyError
+from ..further_terms import less_mass
 from ..matrix import OperatorMatrix
 from ..operators import VectorReading
 from ..planar.conformal import estimate_scale
@@ -51,8 +55,9 @@ def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]
     from ..structures.bars import bars_of
 
     found = vector.numbering
+    shown = {"name": vector.name, "evidence": (vector.why,)}
     if isinstance(found, StructuralNumbering):
-        return {
+        return shown | {
             "block_size": found.block_size,
             "n_nodes": found.n_nodes,
             "numbering": found.kind,
@@ -60,7 +65,7 @@ def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]
         }
     nodal = nodal_matrix(matrix.csr(), found)
     words = {"pattern": "in an order found by the pattern"}
-    return {
+    return shown | {
         "block_size": found.block_size,
         "n_nodes": found.n_nodes,
         "numbering": words.get(found.kind, found.kind),
@@ -71,13 +76,23 @@ def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]
 
 def element_facts(matrix: OperatorMatrix) -> dict[str, Any]:
     """Of a scalar matrix whose rows form cells of other elements than linear triangles; empty where they form none."""
-    try:
-        cells = next(shown_cells(matrix), None)
-        parts = [] if cells is None else parts_of(cells)
-    except TopologyError:
-        return {}
-    if cells is None or typical_misfit(matrix, cells.blocks) > _LIKE:
-        return {}
+    for whole, cells in _readings(matrix):
+        with suppress(TopologyError):
+            if typical_misfit(whole, cells.blocks) <= _LIKE:
+                return _of_cells(cells)
+    return {}
+
+
+def _readings(matrix: OperatorMatrix) -> Iterator[tuple[OperatorMatrix, Cells]]:
+    """Without a mass term, and with one."""
+    if (cells := next(shown_cells(matrix), None)) is not None:
+        yield matrix, cells
+    if (less := less_mass(matrix)) is not None:
+        yield less.matrix, less.cells
+
+
+def _of_cells(cells: Cells) -> dict[str, Any]:
+    parts = parts_of(cells)
     names = [_NAMES[kind.name] for kind in cells.blocks]
     return {
         "element": names[0] if len(names) == 1 else "mixed",

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import guessed
-from ..diagnosis import PLANAR, UNKNOWN, Diagnosis, diagnosed, further_terms, mass_matrix
+from ..diagnosis import PLANAR, Diagnosis, diagnosed, further_terms, indefinite, mass_matrix
 from ..errors import NotPlanarError, RecoveryError
 from ..matrix import OperatorMatrix, load
-from ..operators import VectorReading, about_translations, second_reading, vector_valued
+from ..operators import VectorReading, second_reading, vector_valued
 from ..quiet import quiet_libraries
 from ..tolerances import MOST
 from ..topology import Topology, components, located, require_planar, surfaces
@@ -21,6 +21,7 @@ from .facts import element_facts, matrix_facts, mesh_facts, nodes_facts, surface
 from .text import element_text, lines_of, mesh_text
 
 _IF = "if the entries agree, which recovery tells"
+_IF_WHOLE = f"if enough rows are whole, away from supports, and {_IF[3:]}"
 _NO_CELLS = "the graph of the matrix is planar, but no cell shows in it, nor do the entries suggest any"
 
 
@@ -162,11 +163,11 @@ class Inspection:
         """What :func:`unassemble.recover` may make of the matrix; only that tells whether its entries are a mesh's."""
         if self.structure:
             size = "up to position and size" if self.structure == "truss" else "in true size, up to position"
-            return f"coordinates of {count_of(self.n_nodes, 'node')} {size}, members and cells, {_IF}"
+            return f"coordinates of {count_of(self.n_nodes, 'node')} {size}, members and cells, {_IF_WHOLE}"
         if self.n_nodes and self.coupled:
             return (
                 f"coordinates of {count_of(self.n_nodes, 'node')} in {self.block_size}D, up to position and size, "
-                f"and elements that the matrix re-assembles from, {_IF}"
+                f"and elements that the matrix re-assembles from, {_IF_WHOLE}"
             )
         if self.n_nodes:
             return "what each direction's scalar matrix holds"
@@ -229,7 +230,10 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
     """
     with quiet_libraries():
         matrix = A if isinstance(A, OperatorMatrix) else load(A, variable=variable, drop_zeros=drop_zeros)
-        return _inspected(matrix)
+        found = _inspected(matrix)
+        if found.recoverable.startswith("nothing") and (apart := matrix.without_joining_zeros()):  # as recovery does
+            found = _inspected(apart)
+        return found
 
 
 def _inspected(matrix: OperatorMatrix) -> Inspection:
@@ -258,11 +262,9 @@ def _inspected(matrix: OperatorMatrix) -> Inspection:
             vector = second_reading(matrix)  # as recovery does
             if vector is not None:
                 return _vector_valued(matrix, facts, vector)
-            facts |= _diagnosis(matrix, planar=planar)
-            if not planar and facts["kind"] == UNKNOWN:  # as recovery says it
-                facts["advice"] = about_translations(matrix) or facts["advice"]
+            read_as = _diagnosis(matrix, planar=planar)
             witness = getattr(error, "witness", ())
-            return Inspection(**facts, planar=planar, obstacle=str(error or _NO_CELLS), witness=witness)
+            return Inspection(**facts, **read_as, planar=planar, obstacle=str(error or _NO_CELLS), witness=witness)
     found = mesh_facts(read, topology)
     if found["mixed_signs"] or found["n_undetermined"] > MOST * matrix.n:  # as in recovery where no mesh fits
         if (mass := mass_matrix(matrix, planar=False)) is not None:
@@ -277,7 +279,9 @@ def _masses(facts: dict[str, Any], mass: Diagnosis) -> Inspection:
 
 
 def _vector_valued(matrix: OperatorMatrix, facts: dict[str, Any], vector: VectorReading) -> Inspection:
-    return Inspection(**facts, planar=False, obstacle=vector.why, **nodes_facts(matrix, vector))
+    read_as = nodes_facts(matrix, vector)
+    read_as["evidence"] += (said,) if (said := indefinite(matrix)) else ()  # where recovery fails it says so
+    return Inspection(**facts, **read_as, planar=False, obstacle=vector.why)
 
 
 def _diagnosis(matrix: OperatorMatrix, *, planar: bool) -> dict[str, Any]:

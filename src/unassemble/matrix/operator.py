@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse import csgraph
 
-from ..tolerances import SUMMED
+from ..tolerances import ROUNDED, SUMMED
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +64,13 @@ class OperatorMatrix:
         return np.asarray(np.abs(sums) <= SUMMED * size)
 
     @property
+    def unweighted(self) -> bool:
+        """Whether all entries are equal and all rows add up to zero: the numbers tell no cell from a hole."""
+        size = np.abs(self.entries).max(initial=0.0)
+        alike = len(self.entries) > 0 and np.ptp(self.entries) <= ROUNDED * size
+        return bool(alike and self.adds_up.all())
+
+    @property
     def incomplete_rows(self) -> NDArray[np.bool_]:
         """(n,) rows that do not add up to zero, if any others do; none otherwise.
 
@@ -76,6 +84,23 @@ class OperatorMatrix:
         """The same with some entries, (e,) bool, not stored."""
         errors = None if self.errors is None else self.errors[~gone]
         return replace(self, edges=self.edges[~gone], entries=self.entries[~gone], errors=errors)
+
+    def without_joining_zeros(self) -> OperatorMatrix | None:
+        """The same without stored zeros between parts that no other entry joins; None where there are none.
+
+        They are no structure: a Laplacian annihilates nothing but constants on a connected mesh, so that its entries
+        other than zero connect all of it. Of ``kron(L, I)``, say, they join copies of one mesh.
+        """
+        zero = self.entries == 0
+        graph = sp.coo_array((np.ones(int((~zero).sum())), self.edges[~zero].T), shape=(self.n, self.n))
+        part = csgraph.connected_components(graph, directed=False)[1]
+        alone = (np.bincount(part) == 1)[part]  # rows of the identity, whose zeros tell what was there
+        i, j = self.edges.T
+        joining = zero & (part[i] != part[j]) & ~alone[i] & ~alone[j]
+        if not joining.any():
+            return None
+        note = f"stored zeros that join parts with no other entry between them are left out: {joining.sum():,}"
+        return replace(self.without(joining), warnings=(*self.warnings, note))
 
     def csr(self) -> sp.csr_array:
         """Both triangles and the diagonal, all of it stored."""

@@ -16,6 +16,7 @@ from typing import IO, Any, BinaryIO
 import scipy.sparse as sp
 
 from ..errors import InputError, MatrixFileError, UnassembleError
+from ..formats import FORMATS
 from .canonical import canonical, inconsistency
 from .market import read_market
 from .mat import read_mat, read_mat4, read_mat73
@@ -78,8 +79,9 @@ def _read(stream: Any, name: str, variable: str | None) -> Any:
     kind = kind_of(_head(stream))
     if kind == "gzip":
         return _read_gzip(stream, name, variable)
-    if kind is None:
-        raise MatrixFileError(f"{name} {foreign(_head(stream))}")
+    suffix = next((one for one, held in FORMATS.items() if held.name and name.lower().endswith(one)), "")
+    if kind is None or (kind == "hdf5" and suffix):
+        raise MatrixFileError(f"{name} {foreign(_head(stream), suffix)}")
     if kind in _MATLAB:
         return _MATLAB[kind](stream, name, variable)
     if variable is not None:

@@ -41,7 +41,13 @@ _MESHES = (
     (b"begin bulk", "Nastran"),
     (b"cend", "Nastran"),
     (b"/prep7", "ANSYS"),
+    (b"(0 ", "ANSYS"),
+    (b"(1 ", "ANSYS"),
     (b"title", "Tecplot"),
+    (b"begin modelpartdata", "Kratos"),
+    (b"!permas", "PERMAS"),
+    (b"* flac3d", "FLAC3D"),
+    (b"tin", "WKT"),
 )
 # Two row and column numbers and an entry, after comments at most.
 _TRIPLET = re.compile(
@@ -74,8 +80,11 @@ def kind_of(head: bytes) -> str | None:
     return "triplets" if _TRIPLET.match(head.removeprefix(_UTF8_MARK)) else None
 
 
-def foreign(head: bytes) -> str:
-    """What a file is that no reader takes, and what to do, to follow the name of the file."""
+def foreign(head: bytes, suffix: str = "") -> str:
+    """What a file is that no reader takes, and what to do, to follow the name of the file.
+
+    Binary files are told by their names where `suffix` is that of a mesh format; else it is empty.
+    """
     if not head:
         return "is empty"
     for offset, magic, sentence in _FOREIGN:
@@ -83,10 +92,11 @@ def foreign(head: bytes) -> str:
             return sentence
     if _is_pickle(head):
         return "is a Python pickle, which can run any code and is never loaded: save with scipy.sparse.save_npz"
-    mesh = _mesh(head)
+    binary = b"\0" in head or _is_hdf5(head)
+    mesh = _mesh(head) or (suffix if binary else "")
     if mesh:
         return f"is a mesh ({mesh}), and a matrix is asked for: name the file of the matrix that was assembled on it"
-    if b"\0" in head:
+    if binary:
         return "is a binary file of unknown format, not Matrix Market, .npz, .npy or .mat"
     text = head.removeprefix(_UTF8_MARK).lstrip()
     if not text:
@@ -106,7 +116,7 @@ def _mesh(head: bytes) -> str:
         while comment and text.startswith(comment) and b"\n" in text:
             text = text.split(b"\n", 1)[1].lstrip()
         words = [(word, kind) for word, kind in _MESHES if text.startswith(word)]
-        found = next((kind for word, kind in words if not text[len(word) : len(word) + 1].isalnum()), "")
+        found = next((kind for word, kind in words if not text[len(word) - 1 : len(word) + 1].isalnum()), "")
         if found:
             return found
     return ""

@@ -71,3 +71,15 @@ def flattened(surface: Surface, planar: PlanarMesh) -> Surface:
         warnings=planar.warnings,
         realisation={"misfit": 0.0, "largest": 0.0, "misfits": []},
     )
+
+
+def unless_planar(surface: Surface) -> Surface:
+    """A surface that was not asked for, certified only where no mesh in the plane has its triangles.
+
+    It has as many lengths as entries, so that nearly any matrix on these triangles is that of one.
+    """
+    if surface.fits_no_plane:
+        return surface
+    reason = "the lengths give every entry back, but so may a coefficient that varies in the plane"
+    advice = "say so by `operator='surface'` if it is one in space, or else assemble it with a constant coefficient"
+    return replace(surface, status="uncertified", uniqueness=None, reason=reason, advice=advice)

@@ -163,7 +163,7 @@ def _verdict(
         i, j = held.entries.pairs[np.argmax(held.entries.misfits)]
         known = "" if options.scale is None else f" with c = {options.scale:g}"
         error = held.entries.backward_error
-        reason = f"lengths{known} give the entries back up to {error:.1e} only, worst in rows {i} and {j}"
+        reason = f"lengths{known} give the entries back up to {error:.1e} (relative) only, worst in rows {i} and {j}"
         return _Verdict("uncertified", None, reason)
     bare = np.bincount(found.mesh.piece_of_edge, ~solid) == 0
     if bare.any():

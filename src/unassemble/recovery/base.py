@@ -57,6 +57,9 @@ class Recovery:
         they have displacements only and elements are of any kind; ``"surface laplacian"``.
     reaction : float
         The factor s of the mass matrix in the operator, 0 if none.
+    density : float or None
+        Beside a mass matrix: mass over area or volume, on the mesh as it is given here; 1 where the mesh is in the size
+        that makes it so.
     backward_error : float
         Largest difference between an off-diagonal entry and the re-assembled one, relative to the largest
         off-diagonal entry of its row. For elasticity whose cells are not recognised the largest residual of a valid
@@ -91,6 +94,7 @@ class Recovery:
     advice: str = ""
     operator: str
     reaction: float = 0.0
+    density: float | None = None
     backward_error: float
     timings: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()

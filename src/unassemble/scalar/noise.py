@@ -63,7 +63,9 @@ class Noise:
         return cls(sigma, error / sigma, digits.name, float(repeats), float(different))
 
     def __str__(self) -> str:
-        return f"rounding to {self.digits}" if self.digits else f"noise of standard deviation {self.sigma:.3g}"
+        return (
+            f"rounding to {self.digits}" if self.digits else f"noise of standard deviation {self.sigma:.3g} (absolute)"
+        )
 
     def on(self, topology: Topology) -> NDArray[np.float64]:
         """(e',) standard deviations over `sigma` of all entries, those included that have vanished and are exact."""

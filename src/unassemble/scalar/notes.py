@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..matrix import OperatorMatrix
-from ..tolerances import ROUNDED
 from ..topology import Topology
 from ..words import count_of, words_of
 
@@ -90,8 +89,7 @@ def origin_notes(matrix: OperatorMatrix, suspects: NDArray) -> list[str]:
     a wrong entry spoils two sums.
     """
     rest = np.flatnonzero(matrix.incomplete_rows)
-    size = np.abs(matrix.entries)
-    if not len(rest) and np.ptp(matrix.entries) <= ROUNDED * size.max():
+    if matrix.unweighted:
         return [
             "all entries are equal, as in the Laplacian of a graph without weights; on a mesh, entries on the boundary "
             "have one triangle each and others two"

@@ -141,11 +141,8 @@ def _like_noise(certificate: Certificate, evidence: Evidence, scale: NDArray) ->
         return ""
     if size.max() > 8 * np.sqrt(np.mean(size**2)):
         return ""
-    size_of = f"noise of standard deviation {evidence.noise:.2g} in the entries"
-    absolute = "(in their own units, not relative)"
-    if len(size) < _MANY:
-        return f"{size_of} would leave as much {absolute}"
-    return f"the misfit looks like {size_of} {absolute}"
+    size_of = f"noise of standard deviation {evidence.noise:.2g} (absolute) in the entries"
+    return f"{size_of} would leave as much" if len(size) < _MANY else f"the misfit looks like {size_of}"
 
 
 def _turned_over(topology: Topology, certificate: Certificate) -> str:
@@ -214,8 +211,8 @@ def ambiguous(others: list[Alternative], certificate: Certificate) -> Reason:
     first = others[0]
     instead = f" in place of {_cells(first.cells)}" if first.cells else " besides"
     return Reason.of(
-        f"the mesh gives the matrix back to {certificate.backward_error:.1e}, but so does another, with the cells "
-        f"{_cells(first.other_cells)}{instead}",
+        f"the mesh gives the matrix back to {certificate.backward_error:.1e} (relative), but so does another, with "
+        f"the cells {_cells(first.other_cells)}{instead}",
         f"likewise in {count_of(len(others) - 1, 'more part')} of the matrix" if len(others) > 1 else "",
         advice="choose by what else is known of the mesh: the report lists all cells in doubt",
     )
@@ -230,7 +227,7 @@ def nothing_to_spare(certificate: Certificate, rows: NDArray[np.int64], *, known
     )
     return Reason.of(
         f"{which} no entry to spare: nearly any entries belong to such a mesh, and that it gives the matrix back to "
-        f"{certificate.backward_error:.1e} proves nothing",
+        f"{certificate.backward_error:.1e} (relative) proves nothing",
         advice="" if known_scale else "give `scale` if it is known",
     )
 
@@ -239,8 +236,9 @@ def far_away(origins: NDArray, written: Certificate, near: Certificate) -> Reaso
     """The reason of a mesh that fits until its coordinates are written, too far from the origin."""
     origin = complex(origins[np.abs(origins).argmax()])
     return Reason.of(
-        f"the mesh gives the matrix back to {near.backward_error:.1e}, but its coordinates lie so far from the origin "
-        f"that they have too few digits left: as written they give it back to {written.backward_error:.1e}",
+        f"the mesh gives the matrix back to {near.backward_error:.1e} (relative), but its coordinates lie so far from "
+        f"the origin that they have too few digits left: as written they give it back to "
+        f"{written.backward_error:.1e} (relative)",
         advice=f"subtract a point near ({origin.real:.6g}, {origin.imag:.6g}) from all of `anchors`",
     )
 

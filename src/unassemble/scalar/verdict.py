@@ -147,11 +147,11 @@ def _by_itself(f: Findings) -> tuple[bool, Reason]:
     error, test, topology = f.certificate.backward_error, f.near.test, f.solved.topology
     good, apart = f.near.passes, discord(topology, f.solved.factors, error, f.solved.noise)
     if good and apart:
-        return False, Reason.of(f"the matrix is given back to {error:.1e}, but {apart[0]}", *apart[1:])
+        return False, Reason.of(f"the matrix is given back to {error:.1e} (relative), but {apart[0]}", *apart[1:])
     if test and f.near.by_noise:
         return _by_noise(f, test)
     doubt = max(mesh.doubt for mesh in f.solved.meshes)
-    fits = f"the operator re-assembled on this mesh gives the matrix back to {error:.1e}"
+    fits = f"the operator re-assembled on this mesh gives the matrix back to {error:.1e} (relative)"
     if not good or f.evidence.certain:
         bare = good and len(topology.bare_edges) > 0
         why = misfit(f, f.trouble)
@@ -183,7 +183,7 @@ def _by_noise(f: Findings, test: NoiseTest) -> tuple[bool, Reason]:
 def _bare(f: Findings) -> Reason:
     i, j = f.solved.topology.edges[f.solved.topology.bare_edges[0]]
     return Reason.of(
-        f"the mesh gives the matrix back to {f.certificate.backward_error:.1e}, but the stored zero of rows {i} and "
-        f"{j} belongs to no cell",
+        f"the mesh gives the matrix back to {f.certificate.backward_error:.1e} (relative), but the stored zero of "
+        f"rows {i} and {j} belongs to no cell",
         advice="forget stored zeros by `drop_zeros`, if they are no part of the structure",
     )

@@ -19,6 +19,7 @@ from ..recovery import Structure
 from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SUMMED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
 from .certificate import forces, members_misfits
+from .contradictions import said_of
 from .members import members_and_cells, mispaired
 from .nodes import Nodes, nodes_of
 from .placed import Placed, covered
@@ -69,7 +70,7 @@ def serve_structure(
         counted[nodes.row_of[nodes.present]] = valid[nodes.present]
         force, used = forces(whole, layout, node, direction, found.points, counted)
         ends, misfit = members_misfits(members, layout, found.points)
-        used |= np.isin(node, ends)
+        used = (used | np.isin(node, ends)) & ~np.isin(node, found.spoiled)
         error = float(np.concatenate([force, misfit]).max()) if used.any() else float("inf")
         doubt = _doubt(error, found, numbering, rounding)
         status, reason = _verdict(
@@ -97,7 +98,8 @@ def serve_structure(
         )
     elif status == "certified":
         reason = Reason(f"{reason.text}: {covered(used, abs(whole[used]).sum(axis=0) > 0)}")
-    notes = list(found.notes)
+    notes = [said_of(nodes, found.spoiled)] if len(found.spoiled) else []
+    notes += found.notes
     placed = np.pad(found.points, ((0, 0), (0, layout.space - layout.dim)))
     points, factor, more = anchored(placed, found.component, len(found.evidence), known, sized=bool(layout.rotations))
     fields: dict[str, Any] = {}

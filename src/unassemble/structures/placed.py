@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -75,6 +75,8 @@ class Placed:
     unnoticed : (m,) bool
         Those of them that a disturbance would change without being noticed.
     notes : tuple of str
+    spoiled : (k,) int64
+        Nodes whose rows contradict the others, and were left out.
     """
 
     points: NDArray[np.float64]
@@ -83,6 +85,7 @@ class Placed:
     used: NDArray[np.bool_]
     unnoticed: NDArray[np.bool_]
     notes: tuple[str, ...]
+    spoiled: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 
     def fields(self, numbering: Numbering | StructuralNumbering) -> dict[str, Any]:
         """What every structure's recovery says of nodes, rows and pieces."""

@@ -13,6 +13,7 @@ from ..errors import GeometryError
 from ..nodes.shape import in_gauge, set_aside, shape
 from ..recovery import Evidence
 from ..tolerances import CANCELLED, CERTIFIED, SINGULAR
+from .contradictions import contradicted
 from .equations import Equations, equations, joined, told_by
 from .layouts import Layout
 from .nodes import Nodes
@@ -25,6 +26,7 @@ from .straight import Straight
 def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIED) -> tuple[Placed, NDArray[np.bool_]]:
     """Positions from all rows; where these contradict or do not check each other, from those that no spring spoils.
 
+    Where these contradict each other as well, from all but the rows of few nodes, if the others agree without them.
     What `members` tell by themselves comes on top. Equations contradict each other if residuals exceed what is
     `allowed`.
 
@@ -43,13 +45,26 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     failure: GeometryError | None = None
     layout, valid = nodes.layout, nodes.whole()
     edges = np.column_stack(sp.triu(nodes.moving, 1).nonzero())
-    for springs in (False, True) if layout.rotations else (False,):
+    ways = [(False, False), (False, True), (True, False)] if layout.rotations else [(False, False)]
+    if layout.rotations and layout.dim == 3:  # where nothing drills, forces alone are too few to leave any out
+        ways.append((True, True))
+    for but_for_some, springs in ways:
+        if but_for_some and (allowed > CERTIFIED or any(found.residual <= allowed for found, _ in attempts)):
+            break  # of entries with few digits other ones would be left out each time that these are drawn anew
         given, counted = joined(equations(nodes, valid, springs=springs), told_by(members, nodes)), valid.copy()
         if springs:
             counted[:, len(layout.displacements) :] = False
+        spoiled = np.empty(0, np.int64)
+        if but_for_some:
+            some = contradicted(given, nodes)
+            if some is None:
+                continue
+            given, spoiled = given[~some[0]], some[1]
+            counted[spoiled] = False
         try:
             solve = partial(_positions if layout.rotations else _shape, given, layout)
             found = placed(given.operator, layout.dim, edges, solve, allowed)
+            found = replace(found, spoiled=spoiled)
         except GeometryError as error:
             failure = failure or error
             continue

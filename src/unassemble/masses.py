@@ -1,0 +1,192 @@
+"""A mass matrix beside the stiffness matrix: the size of the mesh, or its density.
+
+The stiffness matrix of the plane does not change with the size of the mesh, and that of a body in space only together
+with its modulus. The mass matrix int rho phi_i phi_j does: on a mesh t times as large it is t^d times as large. So it
+tells rho where the size is known (by anchors), and the size where rho is: 1, as of programs that know no density. It is
+assembled here on the mesh as written, by closed forms and quadrature of its own, and held against the matrix as given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.special import roots_legendre
+
+from .errors import GeometryError, InputError, RecoveryError
+from .matrix import is_file, read_matrix
+from .matrix.digits import Digits
+from .recovery import Body, PlanarMesh, Recovery
+from .tolerances import AGREED, ALIKE, CERTIFIED, HARDLY_ANY, SUMMED
+from .words import sentences
+
+_SIMPLICES = ("triangle", "tetra")
+_SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+_CORNERS = {"quad": _SQUARE, "hexahedron": tuple((*corner, u) for u in (-1, 1) for corner in _SQUARE)}
+
+
+def weighed(recover: Callable[[Any], Recovery], stiffness: Any, mass: Any, *, anchored: bool) -> Recovery:
+    """The mesh of a stiffness matrix with its density, or in the size in which the density is 1.
+
+    Parameters
+    ----------
+    recover : callable
+        From a stiffness matrix to its mesh.
+    stiffness : (N, N) sparse matrix or array, or ndarray
+    mass : the same, or path
+        Consistent; or lumped, each diagonal entry the sum of a row of the consistent one.
+    anchored : bool
+        Whether the size of the mesh is known.
+
+    Raises
+    ------
+    InputError
+        If the matrices differ in size.
+    GeometryError
+        If this is not the mass matrix of the mesh with one density, or masses of such meshes are not read.
+    RecoveryError
+        As `recover` does.
+    """
+    A, M = sp.csr_array(stiffness), sp.csr_array(read_matrix(mass) if is_file(mass) else mass)
+    if A.shape != M.shape:
+        sizes = " and ".join(f"{one.shape[0]} by {one.shape[1]}" for one in (A, M))
+        raise InputError(f"the matrix and its mass matrix differ in size: they are {sizes}")
+    if not (np.isrealobj(M.data) and np.isfinite(M.data).all() and (M.diagonal() > 0).all()):
+        raise GeometryError("`mass` is no mass matrix: not all of its diagonal entries are positive numbers")
+    found: Recovery | None
+    try:
+        found = recover(_with_zeros(A, M))
+    except RecoveryError:
+        found = None
+    if found is None or not found.certified:
+        found = recover(stiffness)
+    if not found.certified:
+        note = "the mass matrix was not looked at, for the mesh is not certified"
+        return replace(found, warnings=(*found.warnings, note))
+    lumped = M.count_nonzero() == M.shape[0]
+    unit = _assembled(found, lumped).diagonal()
+    whole = _whole(A, found) & (unit > 0)  # nodes beside supports may be in no cell
+    piece = found.component if found.node_of_row is None else found.component[found.node_of_row]
+    own = [whole & (piece == k) for k in range(found.n_components)]
+    factors = np.array([np.median(M.diagonal()[rows] / unit[rows]) for rows in own])
+    if not anchored:
+        found = _enlarged(found, factors ** (1 / found.dim))
+    density = float(factors[0]) if anchored else 1.0
+    misfit = _misfit(density * _assembled(found, lumped), M, whole)
+    if not misfit <= (CERTIFIED if found.backward_error <= CERTIFIED else ALIKE):
+        raise GeometryError(
+            f"`mass` is not the mass matrix of this mesh with one density: entries differ by up to {misfit:.1e} of the "
+            "diagonals of their rows. The mesh of the stiffness matrix alone is certified"
+        )
+    said = f"the mass matrix assembled on it again is the one given to {misfit:.1e}"
+    said += "" if whole.all() else f", in the {whole.mean():.0%} of its rows all cells of which are determined"
+    return replace(found, density=density, reason=sentences([found.reason.split(". ")[0], said]))
+
+
+def _with_zeros(A: sp.csr_array, M: sp.csr_array) -> sp.csr_array:
+    """A with an explicit zero in each place of M where it has no entry: sides of triangles that face right angles."""
+    one, other = A.tocoo(), M.tocoo()
+    place = np.concatenate([one.row, other.row]), np.concatenate([one.col, other.col])
+    return sp.csr_array(sp.coo_array((np.concatenate([one.data, 0 * other.data]), place), shape=A.shape))
+
+
+def _whole(A: sp.csr_array, found: Recovery) -> NDArray[np.bool_]:
+    """(N,) rows of nodes all of whose cells the mesh has, with positions that are determined.
+
+    They annihilate constants; where hardly any row does so, as with an unknown diagonal, that is not asked for.
+    """
+    if found.node_of_row is None or found.direction_of_row is None:
+        node, direction = np.arange(A.shape[0]), np.zeros(A.shape[0], dtype=np.int64)
+    else:
+        node, direction = found.node_of_row, found.direction_of_row
+    labels = (direction[:, None] == np.arange(direction.max() + 1)).astype(float)
+    still = np.asarray((np.abs(A @ labels) <= SUMMED * (abs(A) @ labels)).all(axis=1))
+    loose = (found.node_status[node] != 0) | (direction < 0)
+    determined = ~loose & (abs(A) @ loose.astype(float) == 0)
+    return determined & still if still.mean() > HARDLY_ANY else determined
+
+
+def _assembled(found: Recovery, lumped: bool) -> sp.csr_array:
+    """(N, N) mass matrix of the mesh with density 1."""
+    cells = found.cells
+    if found.n_polygons:
+        raise GeometryError(
+            "the stiffness matrix leaves cells undivided, and `mass` does not tell into which triangles: it is lumped, "
+            "or that of another mesh"
+        )
+    other = [kind for kind in cells if kind not in (*_SIMPLICES, *_CORNERS)]
+    if other or not (cells and isinstance(found, PlanarMesh | Body)):
+        raise GeometryError(
+            f"mass matrices are read beside those of linear elements on cells that are known, not of {found.operator}"
+            + (f" on cells of the kind {other[0]}" if other else "")
+        )
+    n, rows, columns, values = found.n_points, [], [], []
+    for kind, nodes in cells.items():
+        k = nodes.shape[1]
+        rows.append(np.repeat(nodes, k, axis=1).ravel())
+        columns.append(np.tile(nodes, k).ravel())
+        values.append(_of_cells(kind, found.points[nodes]).ravel())
+    place = np.concatenate(rows), np.concatenate(columns)
+    scalar = sp.csr_array(sp.coo_array((np.concatenate(values), place), shape=(n, n)))
+    if lumped:
+        scalar = sp.csr_array(sp.diags_array(scalar.sum(axis=1)))
+    if found.node_of_row is None or found.direction_of_row is None:
+        return scalar
+    total, N = sp.csr_array((len(found.node_of_row),) * 2), len(found.node_of_row)
+    for k in range(found.dim):
+        own = np.flatnonzero(found.direction_of_row == k)
+        choose = sp.csr_array((np.ones(len(own)), (own, found.node_of_row[own])), shape=(N, n))
+        total = total + choose @ scalar @ choose.T
+    return sp.csr_array(total)
+
+
+def _of_cells(kind: str, corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, k, k) mass matrices of cells with corners (m, k, d)."""
+    m, k, d = corners.shape
+    if kind in _SIMPLICES:
+        volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / (2 if d == 2 else 6)
+        return volume[:, None, None] * (1 + np.eye(k)) / ((d + 1) * (d + 2))
+    signs = np.array(_CORNERS[kind], dtype=float)
+    x, weight = roots_legendre(3)  # exact: products of shape functions and determinants have degree 4 in each direction
+    total = np.zeros((m, k, k))
+    for q in np.ndindex(*(3,) * d):
+        factors = (1 + signs * x[list(q)]) / 2
+        shape = factors.prod(axis=1)
+        slopes = np.stack([signs[:, a] / 2 * np.delete(factors, a, axis=1).prod(axis=1) for a in range(d)])
+        measure = np.abs(np.linalg.det(slopes @ corners)) * weight[list(q)].prod()
+        total += measure[:, None, None] * np.outer(shape, shape)
+    return total
+
+
+def _misfit(again: sp.csr_array, M: sp.csr_array, whole: NDArray[np.bool_]) -> float:
+    """Largest difference in whole rows, less what rounding to few digits explains, relative to the diagonals."""
+    digits = Digits.of(M.data)
+    rounding = sp.csr_array((np.zeros(M.nnz) if digits is None else digits.unit, M.indices, M.indptr), shape=M.shape)
+    over = (abs(again - M) - rounding).tocoo()
+    root = np.sqrt(M.diagonal())
+    some = whole[over.row]
+    return float((over.data[some] / (root[over.row] * root[over.col])[some]).max(initial=0.0))
+
+
+def _enlarged(found: Recovery, times: NDArray[np.float64]) -> Recovery:
+    """The mesh with each piece so many times as large, and its moduli with it."""
+    if len(found.hinges) and np.ptp(times) > AGREED * times.max():
+        raise GeometryError(
+            "pieces that meet in single vertices are of different sizes, by `mass`: that is not read yet"
+        )
+    of_node = np.where(found.component < 0, np.nan, times[found.component])[:, None]
+    more: dict[str, Any] = {}
+    if isinstance(found, PlanarMesh):
+        if found.standard_deviations is not None:
+            more["standard_deviations"] = found.standard_deviations * of_node
+        if len(found.eliminated_points):
+            more["eliminated_points"] = found.eliminated_points * times[0]
+    if isinstance(found, Body):
+        first = np.concatenate([cells[:, 0] for cells in found.cells.values()])
+        more["scale"] = found.scale / times ** (found.dim - 2)
+        more["lame"] = found.lame / of_node[first] ** (found.dim - 2)
+    return replace(found, points=found.points * of_node, **more)
