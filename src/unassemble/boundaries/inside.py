@@ -232,11 +232,11 @@ def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, options: I
     """Fits with fewer vertices at the rim each, until one has all whole entries; after a few without the rim."""
     for turn in range(options.rounds):
         _log.debug("%d whole entries: misfit %.1e", rim.whole.sum(), fit.misfit)
+        if fit.misfit > options.exact and turn >= patience and (bare := _bare(problem, rim, fit, options)):
+            return bare
         fit = _tried(problem, rim, fit, options)
         if fit.misfit <= options.exact:
             break
-        if turn >= patience and (bare := _bare(problem, rim, fit, options)):
-            return bare
         misfit = np.abs(problem.misfits(fit.z, fit.scale))
         peeled = rim.peeled(misfit, options.peaks * float(misfit[rim.whole].max(initial=0.0)))
         peeled = None if peeled is None else peeled.pruned()
