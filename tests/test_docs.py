@@ -7,6 +7,7 @@ import runpy
 from pathlib import Path
 
 import matplotlib as mpl
+import pytest
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -27,6 +28,12 @@ def test_the_notebook_runs(tmp_path, monkeypatch):
             exec("".join(cell["source"]), names)
     assert names["found"].certified
     assert {path.name for path in tmp_path.iterdir()} == {"report.json", "mesh.vtu"}
+
+
+@pytest.mark.parametrize("example", sorted((DOCS.parent / "examples").glob("*.py")), ids=lambda path: path.stem)
+def test_examples_run(example):
+    counts = runpy.run_path(str(example))["main"](vertices=(13, 4, 4))
+    assert counts["recovered modes"] < counts["block size"]
 
 
 def test_the_index_has_user_pages_before_proofs():

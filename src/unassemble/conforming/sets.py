@@ -193,8 +193,9 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
 
     Linear ones are quadrilaterals only: triangles beside them follow once diagonals are known.
     """
-    if not 0 < len(matrix.edges) <= _DENSEST * matrix.n:
-        return
+    degree = np.bincount(matrix.edges.ravel(), minlength=1).astype(float)
+    if not 0 < len(matrix.edges) <= _DENSEST * matrix.n or (degree**2).sum() > SAMPLE * matrix.n:
+        return  # too dense, or with a row that is coupled to nearly all others
     common = Common(matrix)
     for order, k in ((3, 10), (2, 9), (2, 8), (2, 6)):
         found = common.sets(k)

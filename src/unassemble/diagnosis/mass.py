@@ -185,7 +185,7 @@ class _Masses:
             return f" of {CELLS[cells.nodes, cells.shared][1]}, with little stiffness at most"
         several = n_parts > 1 or often(cells.twins) or nodes_of_pattern(self.M) is not None
         if not several:
-            return ""
+            return ", or another matrix of inner products, since no cells show in its graph"
         # Stiffnesses of a body that is held all around keep as far from zero while it has a few dozen nodes.
         return " of several unknowns per node" + (_OR_HELD if self.M.shape[0] < 150 else "")
 

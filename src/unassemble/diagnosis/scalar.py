@@ -26,8 +26,8 @@ class Sums:
 
     Attributes
     ----------
-    zero : (n,) bool
-        Rows that add up to nothing, alone ones left out.
+    zero, positive : (n,) bool
+        Rows that add up to nothing, and to more than nothing, alone ones left out.
     alone, identity : (n,) bool
         Rows with nothing beside the diagonal; those of them that have something on it.
     penalised : (n,) bool
@@ -37,6 +37,7 @@ class Sums:
     """
 
     zero: NDArray[np.bool_]
+    positive: NDArray[np.bool_]
     alone: NDArray[np.bool_]
     identity: NDArray[np.bool_]
     penalised: NDArray[np.bool_]
@@ -54,7 +55,7 @@ class Sums:
         rest = ~(zero | alone | penalised)
         signs = np.unique(np.sign(sums[rest]))
         sign = int(signs[0]) if len(signs) == 1 and rest.sum() > MOST * (zero | rest).sum() else 0
-        return cls(zero, alone, alone & (matrix.diagonal != 0), penalised, sign)
+        return cls(zero, (sums > 0) & ~zero & ~alone, alone, alone & (matrix.diagonal != 0), penalised, sign)
 
     @property
     def rest(self) -> NDArray[np.bool_]:
@@ -153,9 +154,10 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
         if _is_grid(matrix.n, edges, cells):
             shown = "no three rows are coupled to each other, and most rows are coupled to six"
             return _of_kind("grid in space", "that of a grid in space, a seven-point stencil", shown, sums)
-    if (matrix.entries <= 0).all() and (sums.zero | sums.alone).all():
-        shown = "all rows add up to zero, no off-diagonal entry is positive, and no cells show in the graph"
-        return _of_kind("graph", "the Laplacian of a graph with weights", shown, sums)
+    if (matrix.entries <= 0).all() and (sums.zero | sums.alone | sums.positive).all():
+        more = "" if (sums.zero | sums.alone).all() else ", plus a diagonal"
+        shown = f"no off-diagonal entry is positive, rows add up to zero{' or more' if more else ''}, and no cells show"
+        return _of_kind("graph", f"the Laplacian of a graph with weights{more}", shown, sums)
     return _unknown(matrix, sums)
 
 

@@ -11,11 +11,11 @@ from ..words import GIVE_NUMBERING, count_of, words_of
 
 
 def saddle_point(matrix: OperatorMatrix) -> str:
-    """That coupled rows have diagonals of exactly zero; empty where none do."""
+    """That coupled rows have diagonals of exactly zero, and others not; empty where none do."""
     coupled = np.zeros(matrix.n, dtype=bool)
     coupled[matrix.edges[matrix.entries != 0]] = True
     empty = coupled & (matrix.diagonal == 0)
-    if not empty.any():
+    if not (empty.any() and matrix.diagonal.any()):  # or the diagonal was left out
         return ""
     rows = count_of(int(empty.sum()), "diagonal entry of coupled rows is", "diagonal entries of coupled rows are")
     return (
@@ -32,7 +32,7 @@ def indefinite(matrix: OperatorMatrix) -> str:
     i, j = matrix.edges.T
     own, size = matrix.diagonal, np.sqrt(np.abs(matrix.diagonal))
     over = np.flatnonzero((np.abs(matrix.entries) > (1 + SMALL) * size[i] * size[j]) | (own[i] * own[j] < 0))
-    if not len(over):
+    if not (len(over) and own.any()):
         return ""
     some = min(len(np.unique(i[over])), len(np.unique(j[over])))
     k = over[0]

@@ -10,7 +10,7 @@ from scipy.sparse import csgraph
 from .adjacency import adjacency, neighbours
 from .keys import contains, distinct
 
-_MOST_WORK = 20_000_000  # vertices in the balls about cycles
+_MOST_WORK = 4_000_000  # cycles looked at again, or neighbours of vertices on the rims of balls about cycles
 
 
 def not_faces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> NDArray[np.bool_]:
@@ -46,8 +46,12 @@ def _peel_inner_vertices(n: int, edges: NDArray, triangles: NDArray, opposite: N
     alive = np.ones(len(triangles), dtype=bool)
     degree = np.bincount(edges.ravel(), minlength=n)
     order, key = _by_edges(len(edges), opposite)
+    work = 0
     while True:
         rows = np.flatnonzero(alive)
+        work += len(rows)
+        if work > _MOST_WORK:  # many rounds that peel off a vertex or two
+            return false
         count = np.bincount(opposite[rows].ravel(), minlength=len(edges))
         cycles_at = np.bincount(triangles[rows].ravel(), minlength=n)
         inner = (degree == 3) & (cycles_at == 3)
@@ -108,7 +112,10 @@ def _parts_nearby(graph: sp.csr_array, cycles: NDArray, radius: int) -> NDArray[
     removed = distinct(np.arange(len(cycles))[:, None] * n + cycles)
     ball = rim = removed
     tails, heads = [], []
+    degree = np.diff(graph.indptr).astype(np.int64)
     for _ in range(radius):
+        if degree[rim % n].sum() > _MOST_WORK:
+            return None
         place, neighbour = neighbours(graph, rim % n)
         tail = rim[place]
         head = tail - tail % n + neighbour
@@ -117,8 +124,6 @@ def _parts_nearby(graph: sp.csr_array, cycles: NDArray, radius: int) -> NDArray[
         reached = distinct(head)
         rim = reached[~contains(ball, reached)]
         ball = np.sort(np.concatenate([ball, rim]))
-        if len(ball) > _MOST_WORK:
-            return None
     # Components of all balls without the cycles; one that reaches the rim may go on.
     tail, head = np.concatenate(tails), np.concatenate(heads)
     kept = ~contains(removed, tail) & ~contains(removed, head)
