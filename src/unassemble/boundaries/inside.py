@@ -232,15 +232,15 @@ def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, options: I
     """Fits with fewer vertices at the rim each, until one has all whole entries; after a few without the rim."""
     for turn in range(options.rounds):
         _log.debug("%d whole entries: misfit %.1e", rim.whole.sum(), fit.misfit)
-        if fit.misfit > options.exact and turn >= patience and (bare := _bare(problem, rim, fit, options)):
+        if turn < patience:
+            fit = _tried(problem, rim, fit, options)
+        elif fit.misfit > options.exact and (bare := _bare(problem, rim, fit, options)):
             return bare
-        fit = _tried(problem, rim, fit, options)
         if fit.misfit <= options.exact:
             break
         misfit = np.abs(problem.misfits(fit.z, fit.scale))
         peeled = rim.peeled(misfit, options.peaks * float(misfit[rim.whole].max(initial=0.0)))
-        peeled = None if peeled is None else peeled.pruned()
-        if peeled is None or not peeled.whole.any():
+        if peeled is None or not (peeled := peeled.pruned()).whole.any():
             break
         rim, fit = peeled, problem.faded(fit.z, fit.scale, peeled.whole, options.again)
     return fit, rim
@@ -248,10 +248,12 @@ def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, options: I
 
 def _tried(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -> Fit:
     """A fit, from random triangles again and again where misfits are large, if that is in a few places."""
-    rng = np.random.default_rng(1)
-    for _ in range(options.tries):
+    rng, first = np.random.default_rng(1), fit.misfit
+    for turn in range(options.tries):
         places = _places(problem, rim, fit, options.peaks)
         if fit.misfit <= options.exact or fit.misfit > options.nearly or 4 * places.sum() > len(places):
+            break
+        if 2 * turn >= options.tries and 2 * fit.misfit > first:
             break
         z = fit_anew(problem, fit.z, fit.scale, rim.whole, places, rng)
         found = problem.fit(z, fit.scale, rim.whole, 0.0, options.newton)
@@ -262,9 +264,7 @@ def _tried(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) ->
 def _places(problem: WholeEntries, rim: Rim, fit: Fit, part: float) -> NDArray[np.bool_]:
     """(n,) vertices next to large misfits."""
     misfit = np.where(rim.whole, np.abs(problem.misfits(fit.z, fit.scale)), 0.0)
-    places = np.zeros(problem.piece.n_vertices, dtype=bool)
-    places[problem.piece.edges[misfit > part * misfit.max()]] = True
-    return places
+    return np.isin(np.arange(len(fit.z)), problem.piece.edges[misfit > part * misfit.max()])
 
 
 def _grown(problem: WholeEntries, core: Fit, rim: Rim, options: InsideOptions) -> tuple[Fit, Rim]:
