@@ -61,7 +61,7 @@ def certify_elements(
         Quadrature: ``"n x n Gauss"`` for quadrilaterals; ``"degree 2"``, ``"degree 4"`` or ``"degree 5"`` for
         triangles.
     terms : Terms, optional
-        Not lumped; a reaction on straight triangles only.
+        Not lumped.
 
     Returns
     -------
@@ -96,8 +96,7 @@ def certify_elements(
             keys.append((np.minimum(some[:, a], some[:, b]) * n + np.maximum(some[:, a], some[:, b])).ravel())
             value = value * factors[name][start : start + _CELLS, None]
             if terms is not None and terms.reaction:
-                double_area = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
-                value += terms.reaction * np.outer(np.abs(double_area), _unit_mass(cells.shape[1])[a, b])
+                value += terms.reaction * _masses(name, x, y)
             values.append(value.ravel())
         first += len(cells)
     key = np.concatenate(keys)
@@ -123,23 +122,48 @@ def _triangle_rule(name: str) -> tuple[NDArray, NDArray]:
     return np.array(points), np.array(weights)
 
 
-def _unit_mass(k: int) -> NDArray:
-    """(k, k) mass matrix of the unit triangle, exact: Gauss's points on the square from 0 to 1, folded."""
-    at, weight = _gauss_rule(4)
-    s, t = (at.T + 1) / 2
-    u = (1 - s - (1 - s) * t, s, (1 - s) * t)
-    sides = ((0, 1), (1, 2), (2, 0))
-    if k == 3:
-        value = list(u)
-    elif k == 6:
-        value = [v * (2 * v - 1) for v in u] + [4 * u[i] * u[j] for i, j in sides]
+def _masses(name: str, x: NDArray, y: NDArray) -> NDArray:
+    """(m, pairs) integrals of products of shape functions, a node's with itself among them, exact in the plane.
+
+    By Gauss's points on a square, on triangles folded: (s, t) -> (s, (1 - s) t) on the unit square.
+    """
+    at, weight = _gauss_rule(5)
+    if name.startswith("triangle"):
+        s, t = (at.T + 1) / 2
+        at, weight = np.column_stack([s, (1 - s) * t]), weight / 4 * (1 - s)
+    along_s, along_t = _slopes(name, at)
+    value = _values(name, *at.T)
+    a, b = np.triu_indices(value.shape[1])
+    determinant = (x @ along_s.T) * (y @ along_t.T) - (x @ along_t.T) * (y @ along_s.T)
+    return (np.abs(determinant) * weight) @ (value[:, a] * value[:, b])
+
+
+def _values(name: str, s: NDArray, t: NDArray) -> NDArray:
+    """(q, k) shape functions at points of the reference cell."""
+    if name.startswith("triangle"):
+        u, sides = (1 - s - t, s, t), ((0, 1), (1, 2), (2, 0))
+        if name == "triangle":
+            value = list(u)
+        elif name == "triangle6":
+            value = [v * (2 * v - 1) for v in u] + [4 * u[i] * u[j] for i, j in sides]
+        else:
+            value = [v * (3 * v - 1) * (3 * v - 2) / 2 for v in u]
+            for i, j in sides:
+                value += [4.5 * u[i] * u[j] * (3 * u[i] - 1), 4.5 * u[i] * u[j] * (3 * u[j] - 1)]
+            value.append(27 * u[0] * u[1] * u[2])
+    elif name == "quad8":
+        value = [(1 + a * s) * (1 + b * t) * (a * s + b * t - 1) / 4 for a, b in [(-1, -1), (1, -1), (1, 1), (-1, 1)]]
+        value += [
+            (1 - s * s) * (1 + b * t) / 2 if a == 0 else (1 + a * s) * (1 - t * t) / 2
+            for a, b in [(0, -1), (1, 0), (0, 1), (-1, 0)]
+        ]
+    elif name == "quad":
+        value = [(1 + a * s) * (1 + b * t) / 4 for a, b in [(-1, -1), (1, -1), (1, 1), (-1, 1)]]
     else:
-        value = [v * (3 * v - 1) * (3 * v - 2) / 2 for v in u]
-        for i, j in sides:
-            value += [4.5 * u[i] * u[j] * (3 * u[i] - 1), 4.5 * u[i] * u[j] * (3 * u[j] - 1)]
-        value.append(27 * u[0] * u[1] * u[2])
-    phi = np.column_stack(value)
-    return phi.T @ ((weight / 4 * (1 - s))[:, None] * phi)
+        along = [[v * (v - 1) / 2, 1 - v * v, v * (v + 1) / 2] for v in (s, t)]
+        places = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1), (1, 1)]
+        value = [along[0][i] * along[1][j] for i, j in places]
+    return np.column_stack(value)
 
 
 def _slopes(name: str, at: NDArray) -> tuple[NDArray, NDArray]:

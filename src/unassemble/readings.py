@@ -64,7 +64,9 @@ class ScalarReadings:
             found = of_cells(self.matrix, shown_cells(self.matrix))
         fits = found is not None and (found.status != "uncertified" or found.backward_error <= CERTIFIED)
         if not (fits or self.placement.tensor):  # an entry that stands out by 1e-10 is no further term
-            terms = recover_elements_with_terms(self.matrix, of_cells, self.clock)
+            terms = recover_elements_with_terms(
+                self.matrix, of_cells, self.clock, anchored=bool(self.placement.anchors)
+            )
             found = terms if terms is not None and terms.status != "uncertified" else found
         return found if found is not None and (found.certified or found.backward_error < LITTLE) else None
 

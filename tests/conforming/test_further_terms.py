@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from skfem import Basis, BilinearForm, MeshTri
+from skfem import Basis, BilinearForm, MeshQuad, MeshTri
 from skfem.helpers import grad
 
-from conforming.assembled import ELEMENTS, assembled, cell_sets, laplace, largest_error, quadrilaterals
+from conforming.assembled import ELEMENTS, assembled, cell_sets, laplace, largest_error, quadrilaterals, with_hole
 from meshes import random_mesh
 from unassemble import RecoveryError, inspect_matrix, recover
 
@@ -40,8 +40,20 @@ def test_a_mass_term_gives_the_mesh_a_size(element, ratio, c):
         assert "mass matrix, as of a reaction" in inspect_matrix(known.matrix).operator
 
 
+def test_pieces_have_one_unit_of_length():
+    first, s = with_mass("P2", triangles(60, 0), 1.0)
+    mesh = triangles(60, 1)
+    second = assembled("P2", MeshTri(3 * mesh.p, mesh.t), reaction=s)
+    found = recover(sp.block_diag([first.matrix, second.matrix], format="csr"))
+    assert found.status == "certified", found.reason
+    n = len(first.points)
+    sizes = [np.linalg.norm(some - some.mean(axis=0)) for some in (found.points[:n], found.points[n:])]
+    true = [np.linalg.norm(some - some.mean(axis=0)) for some in (first.points, second.points)]
+    assert sizes[1] / sizes[0] == pytest.approx(true[1] / true[0], rel=1e-9)
+
+
 @pytest.mark.parametrize("relative", [1e-1, 1e-4, 1e-7])
-@pytest.mark.parametrize("element", ["P2", "P3"])
+@pytest.mark.parametrize("element", ["P2"])
 def test_one_entry_changed_beside_a_mass_term(element, relative):
     matrix = with_mass(element, triangles(50), 1.0)[0].matrix.tolil()
     i, j = next((i, j) for i, j in zip(*matrix.nonzero(), strict=True) if i < j and abs(matrix[i, j]) > 0.1)
@@ -59,10 +71,26 @@ def status(matrix):
         return "failed"
 
 
-@pytest.mark.parametrize("ratio", [1e-3, 1.0, 100.0])
-@pytest.mark.parametrize("element", ["Q1", "Q2"])
-def test_a_mass_term_on_quadrilaterals_is_named_and_never_certified(element, ratio):
-    matrix = with_mass(element, quadrilaterals(8, 7), ratio)[0].matrix
+@pytest.mark.parametrize(("element", "ratio"), [("Q1", 1.0), ("Q1", -0.01), ("Q2", 1.0), ("S2", 0.1), ("mixed", 0.1)])
+def test_a_mass_term_on_quadrilaterals(element, ratio):
+    mesh = with_hole(quadrilaterals(9, 8))
+    if element == "mixed":
+        quads, halves = mesh.t[:, ::2], mesh.t[:, 1::2]
+        other = MeshTri(mesh.p, np.hstack([halves[[0, 1, 2]], halves[[0, 2, 3]]]), validate=False)
+        known = assembled("mixed", other, MeshQuad(mesh.p, quads, validate=False), c=-2.0, reaction=-2.0 * ratio)
+    else:
+        known, _ = with_mass(element, mesh, ratio, -2.0)
+    found = recover(known.matrix)
+    assert found.status == "certified", found.reason
+    assert cell_sets(found) == known.cells
+    assert largest_error(found.points, known.points) < 1e-9
+    assert found.scale == pytest.approx(-2.0, rel=1e-7)
+    assert np.sign(found.reaction) == -np.sign(ratio)
+    assert found.uniqueness == "searched"
+
+
+def test_much_mass_on_quadrilaterals_is_named_and_never_certified():
+    matrix = with_mass("Q1", quadrilaterals(8, 7), 100.0)[0].matrix
     said = ""
     try:
         found = recover(matrix)
@@ -73,10 +101,12 @@ def test_a_mass_term_on_quadrilaterals_is_named_and_never_certified(element, rat
     assert "mass matrix" in said or "No row adds up to zero" in said
 
 
-@pytest.mark.parametrize("jacobi", [False, True])
-@pytest.mark.parametrize("element", ["P2", "P3", "Q1", "Q2", "S2"])
+@pytest.mark.parametrize(
+    ("element", "jacobi"),
+    [("P2", False), ("P2", True), ("P3", False), ("Q1", False), ("Q1", True), ("Q2", False), ("S2", False)],
+)
 def test_scaled_unknowns(element, jacobi):
-    known = assembled(element, triangles(60) if element[0] == "P" else quadrilaterals(9, 8), c=-3.0)
+    known = assembled(element, triangles(60) if element[0] == "P" else quadrilaterals(5, 4), c=-3.0)
     S = np.random.default_rng(1).uniform(0.5, 2, len(known.points))
     if jacobi:
         S = 1 / np.sqrt(-known.matrix.diagonal())

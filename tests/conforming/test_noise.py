@@ -43,6 +43,18 @@ def test_errors_are_as_large_as_the_bars_say(element):
     assert np.mean(statistics) == pytest.approx(1, abs=0.15)
 
 
+@pytest.mark.parametrize("element", ["P2", "Q1"])
+def test_errors_of_rounded_entries_are_as_large_as_the_bars_say(element):
+    known, ratios = known_of(element), []
+    for c in np.random.default_rng(0).uniform(1, 10, 12):
+        matrix = c * known.matrix
+        matrix.data = np.array([float(f"{value:.5e}") for value in matrix.data])
+        found = recover(matrix, standard_deviations=True)
+        assert found.status == "certified", found.reason
+        ratios.append(np.sum(np.abs(errors(found.points, known.points)) ** 2) / np.sum(found.standard_deviations**2))
+    assert np.sqrt(np.mean(ratios)) == pytest.approx(1, abs=0.25)
+
+
 def errors(found, true):
     """What the best similarity, mirrored or not, leaves, in the frame of what was found."""
     z = found @ [1, 1j]

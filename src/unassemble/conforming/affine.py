@@ -9,7 +9,6 @@ known matrix, times the area.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -89,22 +88,6 @@ class ElementEntries:
             mine = own[some[0]]
             found[some] = self._values[some][:, a[mine], b[mine]] @ np.linalg.pinv(columns[mine])[3]
         return found
-
-
-def without_mass(matrix: OperatorMatrix, blocks: Mapping[Kind, NDArray[np.int64]]) -> tuple[OperatorMatrix, NDArray]:
-    """A matrix less the consistent mass matrix of affine cells in their order; and (m,) their areas, times s."""
-    every = np.sort(np.concatenate([pairs_of(matrix.n, cells).ravel() for cells in blocks.values()]))
-    off, own, areas = np.zeros(len(matrix.entries)), matrix.diagonal.copy(), []
-    stored = matrix.edges @ [matrix.n, 1]
-    for kind, cells in blocks.items():
-        mass = ElementEntries(matrix, cells, every, mass=True).masses(kind)
-        unit = _components(kind, True)[..., 3]
-        a, b = np.triu_indices(kind.nodes, 1)
-        place = np.minimum(np.searchsorted(stored, pairs_of(matrix.n, cells)), len(stored) - 1)
-        off += np.bincount(place.ravel(), np.outer(mass, unit[a, b]).ravel(), len(off))
-        own -= np.bincount(cells.ravel(), np.outer(mass, np.diagonal(unit)).ravel(), matrix.n)
-        areas.append(mass)
-    return replace(matrix, entries=matrix.entries - off, diagonal=own), np.concatenate(areas)
 
 
 def typical_misfit(matrix: OperatorMatrix, blocks: Mapping[Kind, NDArray[np.int64]]) -> float:
