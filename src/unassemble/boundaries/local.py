@@ -88,8 +88,9 @@ def fit_anew(
     """
     options, piece = options or AnewOptions(), problem.piece
     free = distance(piece, places, options.reach) <= options.reach
-    there = fit_near(problem, z, scale, whole, free, options.random, rng)
-    there = fit_near(problem, there, scale, whole, free, options.schedule)
+    with np.errstate(all="ignore"):  # random triangles may lead far away
+        there = fit_near(problem, z, scale, whole, free, options.random, rng)
+        there = fit_near(problem, there, scale, whole, free, options.schedule)
     ends = piece.edges[free[piece.edges].all(axis=1)].T
     graph = sp.coo_array((np.ones(ends.shape[1], np.int8), ends), shape=(len(z), len(z)))
     label = np.where(free, csgraph.connected_components(graph, directed=False)[1], -1)
