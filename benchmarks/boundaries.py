@@ -1,12 +1,15 @@
 """Boundary conditions on third-party meshes: how much comes back, and whether all of it is right.
 
     python benchmarks/boundaries.py [FOLDER] [--conditions eliminated robin] [--meshes NAME] [--most 3000]
+    python benchmarks/boundaries.py --random 20000 90000 [--runs 3]
 
 Every mesh of the folder (npz with points and triangles; ``../shared/corpus/planar`` unless told) gets each boundary
 condition as scikit-fem puts it in, in random order of the rows. Printed are the share of the points that are
 determined, the largest error among them after the best similarity, relative to the diameter of their piece, and
 processor time in direct solves with the same matrix. The last lines count meshes with 70, and with 90 per cent
-determined. Exit status 1 where a determined point is off by more than 1e-8.
+determined. With ``--random``, meshes of random points around two holes are taken instead, all boundary vertices
+eliminated, and the median of several runs is printed, each held against direct solves of its own. Exit status 1 where
+a determined point is off by more than 1e-8.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "boundaries")]
 
 from conditions import convected, eliminated, identity_rows, largest_error_of, mesh_of, robin  # noqa: E402
 
+from meshes import random_mesh  # noqa: E402
 from unassemble import RecoveryError, recover  # noqa: E402
 from unassemble.linalg import UpperTriangle, factorisation  # noqa: E402
 
@@ -49,7 +53,11 @@ def main() -> int:
     parser.add_argument("--conditions", nargs="+", choices=CONDITIONS, default=list(CONDITIONS))
     parser.add_argument("--meshes", nargs="+", help="these only")
     parser.add_argument("--most", type=int, default=10**9, help="vertices of the meshes that are used")
+    parser.add_argument("--random", nargs="+", type=int, help="vertices of random meshes, instead of a folder")
+    parser.add_argument("--runs", type=int, default=3, help="with each of these")
     arguments = parser.parse_args()
+    if arguments.random:
+        return int(max(timed(n, arguments.runs) for n in arguments.random) > WRONG)
     wrong = False
     for condition in arguments.conditions:
         shares = []
@@ -86,6 +94,22 @@ def measured(matrix: sp.csr_array, points: np.ndarray) -> tuple[float, float, st
     error = largest_error_of(found, points, known) if known.sum() > 2 else 0.0
     solves = f"{seconds / unit(matrix):5.0f} solves" if len(points) > 1000 else ""
     return float(known.mean()), error, f"{len(points):6d} rows   {known.mean():5.0%} error {error:.0e} {solves}"
+
+
+def timed(n: int, runs: int) -> float:
+    """Print direct solves that a random mesh takes, all boundary vertices eliminated; the largest error."""
+    matrix, points = eliminated(mesh_of(*random_mesh(n, seed=1)))
+    solves, error = [], 0.0
+    for _ in range(runs):
+        start = time.process_time()
+        found = recover(matrix)
+        seconds = time.process_time() - start
+        solves.append(seconds / np.median([unit(matrix) for _ in range(3)]))
+        error = max(error, largest_error_of(found, points, found.node_status == 0))
+    share = float((found.node_status == 0).mean())
+    times = f"{np.median(solves):.0f} ({min(solves):.0f} to {max(solves):.0f}) solves"
+    print(f"random {len(points):6d} rows   {found.status} {share:.0%} error {error:.0e} {times}", flush=True)
+    return error
 
 
 def unit(matrix: sp.csr_array) -> float:

@@ -90,7 +90,9 @@ def test_identity_rows_of_a_disc(levels):
 
 
 @needs_shared
-@pytest.mark.parametrize("name", ["pyamg_airfoil", "skfem_annulus", "gc_lego", "skfem_square"])
+@pytest.mark.parametrize(
+    "name", ["pyamg_airfoil", "skfem_annulus", pytest.param("gc_lego", marks=pytest.mark.slow), "skfem_square"]
+)
 def test_identity_rows_third_party(name):
     matrix, points = identity_rows(corpus(name))
     found = recover(matrix)

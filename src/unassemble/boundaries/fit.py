@@ -273,17 +273,16 @@ class _System:
         gradient = mu * np.where(free[prior.corners], prior.gradient(z), 0)
         parts = [(entries, problem.place[piece.stencil]), (gradient, problem.place[prior.corners])]
         jacobian = jacobian_rows(problem.columns, parts)
-        product = jacobian.T.tobsr() @ jacobian
-        self._upper = UpperTriangle.of(product)
-        self._jacobian = jacobian
+        self._transposed = jacobian.T.tobsr()
+        self._upper = UpperTriangle.of(self._transposed @ jacobian)
         self._fitted = trust * problem.weights / scale  # what a / c changes by with -log c
-        self.slope = jacobian.T @ np.concatenate([self._fitted, np.zeros(len(shape))])
+        self.slope = self._transposed @ np.concatenate([self._fitted, np.zeros(len(shape))])
         self.size = float(self._fitted @ self._fitted)
         self.towards(misfit, shape)
 
     def towards(self, misfit: NDArray, shape: NDArray) -> _System:
         """With other right-hand sides."""
-        self.right = self._jacobian.T @ np.concatenate([misfit, -shape])
+        self.right = self._transposed @ np.concatenate([misfit, -shape])
         self.along = float(self._fitted @ misfit)
         return self
 

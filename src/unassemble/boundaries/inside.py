@@ -18,7 +18,7 @@ from ..topology import Piece
 from .embedding import tutte
 from .fit import Fit, FitOptions, WholeEntries
 from .judge import determined
-from .local import fit_near
+from .local import fit_anew, fit_near
 from .patch import distance, nearest
 from .rim import Rim
 
@@ -50,6 +50,8 @@ class InsideOptions:
         so that any damping would hold them.
     held : float
         Whole entries to a vertex, at least, where the rim is taken off as a whole: three far inside, two determine.
+    tries, nearly : int, float
+        Fits from random triangles where misfits are large, before vertices are taken off, and up to which misfit.
     rounds, patience : int
         Fits, with fewer vertices at the rim each, and those with more of them; and how many come before the rim is
         taken off as a whole in a small mesh, which loses more of it.
@@ -76,10 +78,12 @@ class InsideOptions:
     settling: int = 3
     newton: FitOptions = field(default_factory=lambda: FitOptions(steps=1, last_steps=8, damping=1e-15, exact=1e-12))
     held: float = 2.3
+    tries: int = 6
+    nearly: float = 1e-3
     rounds: int = 8
     patience: int = 3
     peaks: float = 0.25
-    growing: tuple[tuple[float, int], ...] = ((1e-3, 10), (0.0, 25))
+    growing: tuple[tuple[float, int], ...] = ((1e-3, 5), (0.0, 20))
     grown: int = 3
     fits: float = 1e-7
     regrown: int = 4
@@ -228,17 +232,39 @@ def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, options: I
     """Fits with fewer vertices at the rim each, until one has all whole entries; after a few without the rim."""
     for turn in range(options.rounds):
         _log.debug("%d whole entries: misfit %.1e", rim.whole.sum(), fit.misfit)
+        if turn < patience:
+            fit = _tried(problem, rim, fit, options)
+        elif fit.misfit > options.exact and (bare := _bare(problem, rim, fit, options)):
+            return bare
         if fit.misfit <= options.exact:
             break
-        if turn >= patience and (bare := _bare(problem, rim, fit, options)):
-            return bare
         misfit = np.abs(problem.misfits(fit.z, fit.scale))
         peeled = rim.peeled(misfit, options.peaks * float(misfit[rim.whole].max(initial=0.0)))
-        peeled = None if peeled is None else peeled.pruned()
-        if peeled is None or not peeled.whole.any():
+        if peeled is None or not (peeled := peeled.pruned()).whole.any():
             break
         rim, fit = peeled, problem.faded(fit.z, fit.scale, peeled.whole, options.again)
     return fit, rim
+
+
+def _tried(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -> Fit:
+    """A fit, from random triangles again and again where misfits are large, if that is in a few places."""
+    rng, first = np.random.default_rng(1), fit.misfit
+    for turn in range(options.tries):
+        places = _places(problem, rim, fit, options.peaks)
+        if fit.misfit <= options.exact or fit.misfit > options.nearly or 4 * places.sum() > len(places):
+            break
+        if 2 * turn >= options.tries and 2 * fit.misfit > first:
+            break
+        z = fit_anew(problem, fit.z, fit.scale, rim.whole, places, rng)
+        found = problem.fit(z, fit.scale, rim.whole, 0.0, options.newton)
+        fit = found if found.misfit < fit.misfit else fit
+    return fit
+
+
+def _places(problem: WholeEntries, rim: Rim, fit: Fit, part: float) -> NDArray[np.bool_]:
+    """(n,) vertices next to large misfits."""
+    misfit = np.where(rim.whole, np.abs(problem.misfits(fit.z, fit.scale)), 0.0)
+    return np.isin(np.arange(len(fit.z)), problem.piece.edges[misfit > part * misfit.max()])
 
 
 def _grown(problem: WholeEntries, core: Fit, rim: Rim, options: InsideOptions) -> tuple[Fit, Rim]:

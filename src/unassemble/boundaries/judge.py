@@ -135,19 +135,20 @@ class _Linearised:
         The inverse is that of J'J, made definite by a small shift; with c free its column is projected out, which is a
         matter of rank one.
         """
-        product = UpperTriangle.of(self.jacobian.T.tobsr() @ self.jacobian)
+        transposed = self.jacobian.T.tobsr()
+        product = UpperTriangle.of(transposed @ self.jacobian)
         data, start = product.data.copy(), product.indptr[:-1]
         typical = float(np.median(np.diagonal(data[start][self.held], axis1=1, axis2=2)))
         data[start] += np.where(self.held, JudgeOptions.shift, 1.0)[:, None, None] * typical * np.eye(2)
         matrix = product.with_data(data)
         solver = analyse(matrix)
         solver.factorise(matrix)
-        pull = self.jacobian.T @ self.slope
+        pull = transposed @ self.slope
         response = solver.solve(pull)
         left = float(self.slope @ self.slope - pull @ response)
 
         def preimage(y: NDArray) -> NDArray:
-            x = solver.solve(np.ascontiguousarray(self.jacobian.T @ self._without_slope(y)))
+            x = solver.solve(np.ascontiguousarray(transposed @ self._without_slope(y)))
             return x + np.outer(response, pull @ x) / left if left > 0 else x
 
         rng = np.random.default_rng(1)

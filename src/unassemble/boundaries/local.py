@@ -6,13 +6,34 @@ others: each vertex has a damping, and a step counts where it lowers the squares
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse import csgraph
 
 from ..topology import Piece
 from .fit import WholeEntries, first_flips
-from .patch import Patch, spread
+from .patch import Patch, distance, spread
 from .shape import ShapePrior
+
+
+@dataclass(frozen=True)
+class AnewOptions:
+    """Settings of fits from random triangles.
+
+    Attributes
+    ----------
+    reach : int
+        Distance in edges up to which vertices move.
+    random, schedule : tuple of (float, int)
+        Weights of the prior and steps with it: with random triangles, then as ever.
+    """
+
+    reach: int = 3
+    random: tuple[tuple[float, int], ...] = ((0.1, 10), (0.01, 5))
+    schedule: tuple[tuple[float, int], ...] = ((1e-3, 10), (0.0, 20))
 
 
 def fit_near(
@@ -22,6 +43,7 @@ def fit_near(
     whole: NDArray[np.bool_],
     free: NDArray[np.bool_],
     schedule: tuple[tuple[float, int], ...],
+    rng: np.random.Generator | None = None,
 ) -> NDArray[np.complex128]:
     """Positions of which some are improved; the others, and c, stay.
 
@@ -36,23 +58,58 @@ def fit_near(
         Vertices that move.
     schedule : tuple of (float, int)
         Weights of the prior, one after the other, and numbers of steps with each.
+    rng : Generator, optional
+        For triangles that the prior has at random.
     """
     patch = Patch.about(problem.piece, free)
     part = WholeEntries(patch.piece, problem.weights[patch.edges], problem.guessed[patch.edges], scale, patch.free)
     moved = z.copy()
     try:
         for mu, steps in schedule:
-            moved[patch.vertices] = _fitted(part, moved[patch.vertices], whole[patch.edges], mu, steps)
+            moved[patch.vertices] = _fitted(part, moved[patch.vertices], whole[patch.edges], mu, steps, rng)
     finally:
         part.release()
     return moved
 
 
-def _fitted(
-    part: WholeEntries, z: NDArray, whole: NDArray[np.bool_], mu: float, steps: int, first: float = 1e-3
+def fit_anew(
+    problem: WholeEntries,
+    z: NDArray[np.complex128],
+    scale: float,
+    whole: NDArray[np.bool_],
+    places: NDArray[np.bool_],
+    rng: np.random.Generator,
+    options: AnewOptions | None = None,
 ) -> NDArray[np.complex128]:
+    """Positions about places that do not fit, (n,) bool, from random triangles at the rim; what is no better stays.
+
+    Few entries may have several solutions next to each other and a minimum that is none, each with triangles of its
+    own: which of them a fit comes to is decided by the prior.
+    """
+    options, piece = options or AnewOptions(), problem.piece
+    free = distance(piece, places, options.reach) <= options.reach
+    with np.errstate(all="ignore"):  # random triangles may lead far away
+        there = fit_near(problem, z, scale, whole, free, options.random, rng)
+        there = fit_near(problem, there, scale, whole, free, options.schedule)
+    ends = piece.edges[free[piece.edges].all(axis=1)].T
+    graph = sp.coo_array((np.ones(ends.shape[1], np.int8), ends), shape=(len(z), len(z)))
+    label = np.where(free, csgraph.connected_components(graph, directed=False)[1], -1)
+    touched = label[piece.stencil].max(axis=0)
+    asked = whole & (touched >= 0)
+    with np.errstate(all="ignore"):
+        before, after = (
+            np.bincount(touched[asked], problem.misfits(some, scale)[asked] ** 2, len(z)) for some in (z, there)
+        )
+    return np.where(free & (after < before)[label], there, z)
+
+
+def _fitted(
+    part: WholeEntries, z: NDArray, whole: NDArray[np.bool_], mu: float, steps: int,
+    rng: np.random.Generator | None, first: float = 1e-3,
+) -> NDArray[np.complex128]:  # fmt: skip
     piece, scale = part.piece, float(part.known_scale or 1.0)
     prior = ShapePrior.of(piece, ~whole).about(part.free)
+    prior = prior if rng is None else prior.unlike(rng)
     whole = whole & part.asked
     fitted = piece.triangles[(whole[piece.opposite] | (mu > 0)).any(axis=1)]
     damping = np.full(len(z), first)
@@ -60,7 +117,7 @@ def _fitted(
     for _ in range(steps):
         if not (np.abs(misfit) > 1e-14).any():
             break
-        found = part.step(z, scale, whole, prior, mu, misfit, shape, np.append(damping[part.free], 1.0))
+        found = part.step(z, scale, whole, prior, mu, misfit, shape, np.append(damping[part.free], 1.0)[: part.columns])
         if found is None:
             damping *= 100
             continue

@@ -18,9 +18,12 @@ class ShapePrior:
     ----------
     corners : (3, m) int64
         a, b, c.
+    wanted : (m,) float64 or float
+        What it should be.
     """
 
     corners: NDArray[np.int64]
+    wanted: NDArray[np.float64] | float = 0.0
 
     @classmethod
     def of(cls, piece: Piece, unknown: NDArray[np.bool_]) -> ShapePrior:
@@ -32,6 +35,10 @@ class ShapePrior:
         """Of triangles with one of these vertices, (n,) bool."""
         return ShapePrior(self.corners[:, vertices[self.corners].any(axis=0)])
 
+    def unlike(self, rng: np.random.Generator) -> ShapePrior:
+        """For triangles that are random, sides differing by factors of about 1.6."""
+        return ShapePrior(self.corners, rng.standard_normal(self.corners.shape[1]))
+
     def _sides(self, z: NDArray) -> NDArray[np.complex128]:
         a, b, c = z[self.corners]
         return np.stack([b - a, c - b, a - c])
@@ -39,7 +46,7 @@ class ShapePrior:
     def residual(self, z: NDArray) -> NDArray[np.float64]:
         """(m,)."""
         ab, bc, ca = np.log(np.abs(self._sides(z)))
-        return np.asarray(2 * ab - bc - ca)
+        return np.asarray(2 * ab - bc - ca - self.wanted)
 
     def gradient(self, z: NDArray) -> NDArray[np.complex128]:
         """(3, m) g with d residual = Re sum_k g_k dz_k over the corners."""
