@@ -112,6 +112,21 @@ def test_an_unbraced_truss_is_no_answer():
         recover(matrix, numbering="interleaved", block_size=2)
 
 
+def test_a_plate_with_five_unknowns_per_node():
+    """Bending and stretching are not coupled; nodes are those of both, and what is certified is bending."""
+    given = shell(lambda u, v: np.column_stack([u, 1.1 * v, 0 * u]), (13, 11)).only(range(5), 3)
+    given = given.clamped(lowest(given.points, 0)).permuted(1)
+    found = recover(given.matrix)
+    assert found.certified
+    assert found.operator == "plate"
+    assert found.n_points == len(given.points)
+    assert found.node_of_row.tolist() == np.repeat(np.arange(len(given.points)), 5).tolist()
+    known = np.isfinite(found.points).all(axis=1)
+    assert known.mean() > 0.8
+    assert error(found.points[known], given.points[known][:, :2]) < 1e-10
+    assert int(found.reason.split(": ")[-1].split("%")[0]) <= 60
+
+
 def test_given_numbering_with_pinned_supports():
     """Displacements of the lowest nodes are gone, their rotations are not."""
     given = frame()

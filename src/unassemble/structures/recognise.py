@@ -84,7 +84,21 @@ def find_structure(
         best = max((one for one in (best, other) if one is not None), key=_rows_told, default=None)
         if best is other and best is not None and best.layout.rotations:
             best = _continued(matrix, best)
-    return best if best is not None and best.layout.rotations else None
+    return _beside(matrix, best) if best is not None and best.layout.rotations else None
+
+
+def _beside(matrix: sp.csr_array, one: StructuralNumbering) -> StructuralNumbering:
+    """The same where each node has further rows, before its own or after: those of the same node, if they couple alike.
+
+    So stand the displacements in the plane of a plate beside those across it, to which they are not coupled.
+    """
+    told = one.direction_of_row[np.flatnonzero(np.diff(one.node_of_row, prepend=-1))] >= 0
+    if one.kind != "interleaved" or len(told) % 2 or (told[::2] != told[0]).any() or (told[1::2] == told[0]).any():
+        return one
+    onto = sp.csr_array((np.ones(len(one.node_of_row)), (np.arange(len(one.node_of_row)), one.node_of_row)))
+    near = sp.csr_array(onto.T @ pattern_of(matrix) @ onto) != 0
+    same = near[::2][:, ::2] != near[1::2][:, 1::2]
+    return one if same.nnz > HARDLY_ANY * near.nnz else replace(one, node_of_row=one.node_of_row // 2)
 
 
 def _best(
