@@ -121,7 +121,7 @@ def pieces_of_linear(found, triangles: NDArray) -> Iterator[sp.csr_array]:
     for k in range(label.max() + 1):
         rows, corners = np.unique(triangles[label == k], return_inverse=True)
         mesh = skfem.MeshTri(found.points[rows].T.copy(), corners.reshape(-1, 3).T.copy())
-        yield assembled_on(mesh, skfem.ElementTriP1(), rows, found)
+        yield assembled_on(mesh, skfem.ElementTriP1(), rows, found, laplace)
 
 
 def pieces_of_elements(found, cells: dict[str, NDArray], form=laplace) -> Iterator[sp.csr_array]:
