@@ -121,7 +121,7 @@ def pieces_of_linear(found, triangles: NDArray) -> Iterator[sp.csr_array]:
     for k in range(label.max() + 1):
         rows, corners = np.unique(triangles[label == k], return_inverse=True)
         mesh = skfem.MeshTri(found.points[rows].T.copy(), corners.reshape(-1, 3).T.copy())
-        yield assembled_on(mesh, skfem.ElementTriP1(), rows, found)
+        yield assembled_on(mesh, skfem.ElementTriP1(), rows, found, laplace)
 
 
 def pieces_of_elements(found, cells: dict[str, NDArray], form=laplace) -> Iterator[sp.csr_array]:
@@ -138,8 +138,8 @@ def pieces_of_elements(found, cells: dict[str, NDArray], form=laplace) -> Iterat
         yield total
 
 
-def assembled_on(mesh, element, rows: NDArray, found, form=laplace) -> sp.csr_array:
-    """The Laplacian, or another form, nodes being the rows that lie where they do."""
+def assembled_on(mesh, element, rows: NDArray, found, form) -> sp.csr_array:
+    """The matrix of a form, nodes being the rows that lie where they do."""
     basis = skfem.Basis(mesh, element)
     place = rows[cKDTree(found.points[rows]).query(basis.doflocs.T)[1]]
     part = sp.coo_array(form.assemble(basis))
@@ -155,12 +155,13 @@ def areas_give_back(found, matrix: sp.csr_array) -> bool:
 
 
 def masses(found) -> sp.csr_array:
-    """The mass matrix, from scikit-fem."""
-    if isinstance(found, ConformingMesh):
+    """The mass matrix, from scikit-fem; other elements are straight."""
+    if found.element != "P1":
         return sum(pieces_of_elements(found, found.cells, mass))
     rows, corners = np.unique(found.divided()[0], return_inverse=True)
     mesh = skfem.MeshTri(found.points[rows].T.copy(), corners.reshape(-1, 3).T.copy())
-    return assembled_on(mesh, skfem.ElementTriP1(), rows, found, mass)
+    part = sp.coo_array(mass.assemble(skfem.Basis(mesh, skfem.ElementTriP1())))
+    return sp.coo_array((part.data, (rows[part.row], rows[part.col])), shape=2 * (found.n_points,)).tocsr()
 
 
 def judged(given: Given) -> str:

@@ -21,7 +21,7 @@ from .clock import Clock
 from .conforming.recover import recover_conforming, shown_cells
 from .conforming.roles import Cells
 from .errors import GeometryError, RecoveryError
-from .further_terms import recover_elements_with_terms, recover_with_terms
+from .further_terms import less_mass, recover_elements_with_terms, recover_with_terms
 from .matrix import OperatorMatrix
 from .options import ScalarOptions
 from .recovery import PlanarMesh
@@ -59,16 +59,27 @@ class ScalarReadings:
         def of_cells(matrix: OperatorMatrix, cells: Iterable[Cells]) -> PlanarMesh:
             return recover_conforming(matrix, cells, self.placement, self.clock, self.options)
 
-        found: PlanarMesh | None = None
-        with suppress(RecoveryError):
-            found = of_cells(self.matrix, shown_cells(self.matrix))
-        fits = found is not None and (found.status != "uncertified" or found.backward_error <= CERTIFIED)
-        if not (fits or self.placement.tensor):  # an entry that stands out by 1e-10 is no further term
-            terms = recover_elements_with_terms(
-                self.matrix, of_cells, self.clock, anchored=bool(self.placement.anchors)
-            )
-            found = terms if terms is not None and terms.status != "uncertified" else found
-        return found if found is not None and (found.certified or found.backward_error < LITTLE) else None
+        def plainly() -> PlanarMesh | None:
+            with suppress(RecoveryError):
+                return of_cells(self.matrix, shown_cells(self.matrix))
+            return None
+
+        def with_terms() -> PlanarMesh | None:
+            anchored = bool(self.placement.anchors)
+            found = recover_elements_with_terms(self.matrix, of_cells, self.clock, anchored=anchored)
+            return None if found is None or found.status == "uncertified" else found
+
+        order = [plainly] if self.placement.tensor else [plainly, with_terms]
+        if len(order) > 1 and less_mass(self.matrix) is not None:  # told by entries that are zero without a mass term
+            order.reverse()
+        nearest: PlanarMesh | None = None
+        for reading in order:
+            found = reading()
+            # One that is off by 1e-10, because of an entry that stands out, lacks no term.
+            if found is not None and (found.status != "uncertified" or found.backward_error <= CERTIFIED):
+                return found
+            nearest = nearest or found
+        return nearest if nearest is not None and nearest.backward_error < LITTLE else None
 
     def likeliest(self) -> PlanarMesh:
         """The mesh of the first reading that fits, or else of the first that comes near.
