@@ -113,7 +113,7 @@ def surface_readings(cycles: Cycles) -> Iterator[NDArray[np.bool_]]:
             constraints=limits,
             options={"node_limit": nodes},
         )
-        nodes -= max(found.mip_node_count or 0, 1)
+        nodes -= max(found.mip_node_count or 0, 2 * len(rows))  # the first of each takes as long as many more
         size = None if found.x is None else round(-found.fun)
         if size is None and largest is None:
             worst = at[int(np.argmax(np.asarray(incidence.sum(axis=1)).ravel() + taken))]
