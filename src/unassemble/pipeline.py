@@ -103,7 +103,7 @@ def recover(
     numbering : {"interleaved", "by component"} or (node_of_row, direction_of_row), optional
         Vector-valued matrices: how the unknowns stand; found where it is not given.
     cells : bool
-        Vector-valued matrices: look for elements too, not for coordinates only.
+        Vector-valued matrices: look for elements too, not only where nothing else confirms coordinates.
     realise : bool
         Surfaces: look for coordinates in space that have the edge lengths.
     mass : sparse matrix or array, ndarray, or path, optional
