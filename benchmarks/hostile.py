@@ -124,7 +124,7 @@ def pieces_of_linear(found, triangles: NDArray) -> Iterator[sp.csr_array]:
         yield assembled_on(mesh, skfem.ElementTriP1(), rows, found)
 
 
-def pieces_of_elements(found, cells: dict[str, NDArray]) -> Iterator[sp.csr_array]:
+def pieces_of_elements(found, cells: dict[str, NDArray], form=laplace) -> Iterator[sp.csr_array]:
     """The matrix of each piece of a mesh of other, straight elements; a hinge has the lowest label of its pieces."""
     for k in range(found.n_components):
         total = sp.csr_array((found.n_points, found.n_points))
@@ -134,15 +134,15 @@ def pieces_of_elements(found, cells: dict[str, NDArray]) -> Iterator[sp.csr_arra
                 kind, element, corners = ELEMENTS[name]
                 vertices, local = np.unique(own[:, :corners], return_inverse=True)
                 mesh = kind(found.points[vertices].T.copy(), local.reshape(-1, corners).T.copy())
-                total = total + assembled_on(mesh, element(), np.unique(own), found)
+                total = total + assembled_on(mesh, element(), np.unique(own), found, form)
         yield total
 
 
-def assembled_on(mesh, element, rows: NDArray, found) -> sp.csr_array:
-    """The Laplacian, nodes being the rows that lie where they do."""
+def assembled_on(mesh, element, rows: NDArray, found, form=laplace) -> sp.csr_array:
+    """The Laplacian, or another form, nodes being the rows that lie where they do."""
     basis = skfem.Basis(mesh, element)
     place = rows[cKDTree(found.points[rows]).query(basis.doflocs.T)[1]]
-    part = sp.coo_array(laplace.assemble(basis))
+    part = sp.coo_array(form.assemble(basis))
     return sp.coo_array((part.data, (place[part.row], place[part.col])), shape=2 * (found.n_points,)).tocsr()
 
 
@@ -155,11 +155,12 @@ def areas_give_back(found, matrix: sp.csr_array) -> bool:
 
 
 def masses(found) -> sp.csr_array:
-    """The mass matrix of linear triangles, from scikit-fem."""
+    """The mass matrix, from scikit-fem."""
+    if isinstance(found, ConformingMesh):
+        return sum(pieces_of_elements(found, found.cells, mass))
     rows, corners = np.unique(found.divided()[0], return_inverse=True)
     mesh = skfem.MeshTri(found.points[rows].T.copy(), corners.reshape(-1, 3).T.copy())
-    part = sp.coo_array(mass.assemble(skfem.Basis(mesh, skfem.ElementTriP1())))
-    return sp.coo_array((part.data, (rows[part.row], rows[part.col])), shape=2 * (found.n_points,)).tocsr()
+    return assembled_on(mesh, skfem.ElementTriP1(), rows, found, mass)
 
 
 def judged(given: Given) -> str:
