@@ -3,7 +3,9 @@
 import time
 import warnings
 from contextlib import suppress
+from functools import partial
 
+import hostile
 import networkx as nx
 import numpy as np
 import pytest
@@ -36,6 +38,11 @@ def test_what_went_wrong_before(found):
     """Entries exchanged where nothing checks them; cells held together by an assumption; cells of 1e-200 the others."""
     _, _, outcome, _, said = tried(*found)
     assert outcome not in ("WRONG", "CRASH", "SLOW"), said
+
+
+def test_nor_where_no_elements_are_asked_for(monkeypatch):
+    monkeypatch.setattr(hostile, "recover", partial(recover, cells=False))
+    assert tried(601, 1363)[2] == "uncertified"
 
 
 def test_rows_that_vanish_beside_others_are_refused():

@@ -164,3 +164,35 @@ def test_at_the_command_line(tmp_path, monkeypatch):
     np.testing.assert_allclose(distances(np.load("m.npz")["points"]), distances(true), rtol=1e-10)
     assert runner.invoke(main, ["recover", "K.mtx", "-o", "n.npz", "--mass", "small.mtx"]).exit_code == 2
     assert not (tmp_path / "n.npz").exists()
+
+
+def test_a_mass_term_in_the_matrix_itself():
+    K, M, true = scalar(moved(LAKE), density=1.0)
+    found = recover(K - 0.7 * M, mass=M)
+    assert found.certified
+    assert found.reaction == pytest.approx(-0.7, rel=1e-9)
+    assert any("sqrt(-0.7 / s)" in note for note in found.warnings)
+    np.testing.assert_allclose(distances(found.points), distances(true), rtol=1e-9)
+
+
+def test_one_anchor_tells_no_size():
+    K, M, true = scalar(moved(LAKE), density=1.0)
+    found = recover(K, mass=M, anchors=[(7, 3.0, -2.0)])
+    assert found.density == 1.0
+    np.testing.assert_allclose(found.points[7], (3, -2), atol=1e-12)
+    np.testing.assert_allclose(distances(found.points), distances(true), rtol=1e-9)
+
+
+def test_areas_are_held_against_no_mass():
+    M = scalar(moved(LAKE))[1]
+    with pytest.raises(RecoveryError, match="held against"):
+        recover(M, mass=M)
+
+
+@pytest.mark.parametrize("given", [np.zeros(3), np.full((2, 2), None), object()])
+def test_no_matrix_at_all(given):
+    K = scalar(moved(LAKE))[0]
+    with pytest.raises(RecoveryError, match="`mass`: "):
+        recover(K, mass=given)
+    with pytest.raises(RecoveryError, match="matri"):
+        recover(given, mass=K)

@@ -8,7 +8,7 @@ assembled here on the mesh as written, by closed forms and quadrature of its own
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,8 +17,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.special import roots_legendre
 
-from .errors import GeometryError, InputError, RecoveryError
-from .matrix import is_file, read_matrix
+from .errors import GeometryError, InputError, MatrixError, RecoveryError
+from .matrix import as_csr, is_file, read_matrix
 from .matrix.digits import Digits
 from .recovery import Body, PlanarMesh, Recovery
 from .tolerances import AGREED, ALIKE, CERTIFIED, HARDLY_ANY, SUMMED
@@ -29,7 +29,9 @@ _SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 _CORNERS = {"quad": _SQUARE, "hexahedron": tuple((*corner, u) for u in (-1, 1) for corner in _SQUARE)}
 
 
-def weighed(recover: Callable[[Any], Recovery], stiffness: Any, mass: Any, *, anchored: bool) -> Recovery:
+def weighed(
+    recover: Callable[[Any], Recovery], stiffness: Any, mass: Any, anchors: Sequence[tuple[Any, ...]]
+) -> Recovery:
     """The mesh of a stiffness matrix with its density, or in the size in which the density is 1.
 
     Parameters
@@ -39,23 +41,29 @@ def weighed(recover: Callable[[Any], Recovery], stiffness: Any, mass: Any, *, an
     stiffness : (N, N) sparse matrix or array, or ndarray
     mass : the same, or path
         Consistent; or lumped, each diagonal entry the sum of a row of the consistent one.
-    anchored : bool
-        Whether the size of the mesh is known.
+    anchors : sequence of (row, x, y) or (row, x, y, z)
+        Two and more tell the size; one stays where it is.
 
     Raises
     ------
     InputError
         If the matrices differ in size.
+    MatrixError
+        If one is no square matrix of finite numbers.
     GeometryError
         If this is not the mass matrix of the mesh with one density, or masses of such meshes are not read.
     RecoveryError
         As `recover` does.
     """
-    A, M = sp.csr_array(stiffness), sp.csr_array(read_matrix(mass) if is_file(mass) else mass)
+    A, given = as_csr(stiffness), read_matrix(mass) if is_file(mass) else mass
+    try:
+        M = as_csr(given)
+    except MatrixError as error:
+        raise MatrixError(f"`mass`: {error}") from error
     if A.shape != M.shape:
         sizes = " and ".join(f"{one.shape[0]} by {one.shape[1]}" for one in (A, M))
         raise InputError(f"the matrix and its mass matrix differ in size: they are {sizes}")
-    if not (np.isrealobj(M.data) and np.isfinite(M.data).all() and (M.diagonal() > 0).all()):
+    if not (np.isrealobj(M.data) and (M.diagonal() > 0).all()):
         raise GeometryError("`mass` is no mass matrix: not all of its diagonal entries are positive numbers")
     found: Recovery | None
     try:
@@ -72,10 +80,17 @@ def weighed(recover: Callable[[Any], Recovery], stiffness: Any, mass: Any, *, an
     whole = _whole(A, found) & (unit > 0)  # nodes beside supports may be in no cell
     piece = found.component if found.node_of_row is None else found.component[found.node_of_row]
     own = [whole & (piece == k) for k in range(found.n_components)]
+    if not all(rows.any() for rows in own):
+        raise GeometryError(
+            "in some piece the cells about no node are all determined, so that nothing can be held against `mass`. The "
+            "mesh of the stiffness matrix alone is certified"
+        )
     factors = np.array([np.median(M.diagonal()[rows] / unit[rows]) for rows in own])
-    if not anchored:
-        found = _enlarged(found, factors ** (1 / found.dim))
-    density = float(factors[0]) if anchored else 1.0
+    sized = len(anchors) > 1
+    if not sized:
+        centre = np.array(anchors[0][1:] if anchors else [0.0] * found.dim)[: found.dim]
+        found = _enlarged(found, factors ** (1 / found.dim), centre)
+    density = float(factors[0]) if sized else 1.0
     misfit = _misfit(density * _assembled(found, lumped), M, whole)
     if not misfit <= (CERTIFIED if found.backward_error <= CERTIFIED else ALIKE):
         raise GeometryError(
@@ -172,21 +187,27 @@ def _misfit(again: sp.csr_array, M: sp.csr_array, whole: NDArray[np.bool_]) -> f
     return float((over.data[some] / (root[over.row] * root[over.col])[some]).max(initial=0.0))
 
 
-def _enlarged(found: Recovery, times: NDArray[np.float64]) -> Recovery:
-    """The mesh with each piece so many times as large, and its moduli with it."""
+def _enlarged(found: Recovery, times: NDArray[np.float64], centre: NDArray[np.float64]) -> Recovery:
+    """The mesh with each piece so many times as large, from a point (d,) on, and its moduli with it."""
     if len(found.hinges) and np.ptp(times) > AGREED * times.max():
         raise GeometryError(
             "pieces that meet in single vertices are of different sizes, by `mass`: that is not read yet"
         )
+    if found.reaction:  # which all pieces share
+        times = np.full_like(times, times[0])
     of_node = np.where(found.component < 0, np.nan, times[found.component])[:, None]
     more: dict[str, Any] = {}
     if isinstance(found, PlanarMesh):
         if found.standard_deviations is not None:
             more["standard_deviations"] = found.standard_deviations * of_node
         if len(found.eliminated_points):
-            more["eliminated_points"] = found.eliminated_points * times[0]
+            more["eliminated_points"] = centre + (found.eliminated_points - centre) * times[0]
+        if found.reaction:
+            more["reaction"] = found.reaction / times[0] ** found.dim
+            old, new = (f"{one:.12g}" for one in (found.reaction, more["reaction"]))
+            more["warnings"] = tuple(note.replace(old, new) for note in found.warnings)
     if isinstance(found, Body):
         first = np.concatenate([cells[:, 0] for cells in found.cells.values()])
         more["scale"] = found.scale / times ** (found.dim - 2)
         more["lame"] = found.lame / of_node[first] ** (found.dim - 2)
-    return replace(found, points=found.points * of_node, **more)
+    return replace(found, points=centre + (found.points - centre) * of_node, **more)

@@ -46,8 +46,12 @@ class VectorReading:
         found = self.numbering
         if isinstance(found, StructuralNumbering):
             return f"that of a {found.layout.name} with {found.block_size} unknowns per node"
-        order = {"pattern": "in an order found by the pattern"}.get(found.kind, found.kind)
-        return f"vector-valued, {found.block_size} components, {order}"
+        return f"vector-valued, {found.block_size} components, {self.order}"
+
+    @property
+    def order(self) -> str:
+        """How the unknowns stand, in words."""
+        return {"pattern": "in an order found by the pattern"}.get(self.numbering.kind, self.numbering.kind)
 
 
 def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) -> VectorReading:

@@ -103,7 +103,7 @@ def recover(
     numbering : {"interleaved", "by component"} or (node_of_row, direction_of_row), optional
         Vector-valued matrices: how the unknowns stand; found where it is not given.
     cells : bool
-        Vector-valued matrices: look for elements too, not for coordinates only.
+        Vector-valued matrices: look for elements too, not only where nothing else confirms coordinates.
     realise : bool
         Surfaces: look for coordinates in space that have the edge lengths.
     mass : sparse matrix or array, ndarray, or path, optional
@@ -171,7 +171,7 @@ def recover(
             return _Task(checked, clock, about, frame, planar, given, realise).answer()
 
         with thread_limit(threads):
-            return answer(matrix) if mass is None else weighed(answer, matrix, mass, anchored=bool(frame.anchors))
+            return answer(matrix) if mass is None else weighed(answer, matrix, mass, frame.anchors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,11 +244,11 @@ class _Task:
 
         A straight beam's rows, for one, fall apart into planar graphs.
         """
+        from .metric import unless_planar
+
         try:
             found = self._as_scalar(self.matrix, self.frame.anchors)
         except RecoveryError as error:
-            from .metric import unless_planar
-
             curved = self._as_certified_surface()
             other = self._as_second_reading() if curved is None else unless_planar(curved)
             if other is not None:
@@ -258,8 +258,6 @@ class _Task:
             return found
         curved = self._as_certified_surface() if found.status == "uncertified" else None
         if curved is not None:
-            from .metric import unless_planar
-
             noise, little = found.estimated_noise, LARGEST_NOISE * np.abs(found.scale).min()
             if curved.fits_no_plane or (not found.missing_term and (noise is None or noise > little)):
                 return unless_planar(curved)

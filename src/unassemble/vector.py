@@ -42,7 +42,7 @@ def recover_vector(
     clock : Clock
     anchors : sequence of (row, x, y) or (row, x, y, z), optional
     cells : bool
-        Look for elements too.
+        Look for elements too, not only where nothing else confirms positions.
     scalar : callable
         Recovers a scalar matrix with anchors, for directions that are not coupled.
 

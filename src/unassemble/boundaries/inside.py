@@ -142,9 +142,10 @@ def fit_inside(
     """
     options = options or InsideOptions()
     rim = Rim.of(piece, given)
-    if not rim.whole.any():
+    unit = float(np.median(np.abs(weights[rim.whole]))) if rim.whole.any() else 0.0
+    if not unit:
         return None
-    unit = float(np.median(np.abs(weights[rim.whole]))) * (1 if weights[rim.whole].sum() > 0 else -1)
+    unit *= 1 if weights[rim.whole].sum() > 0 else -1
     weights = weights / unit
     shared = np.zeros_like(given) if shared is None else shared & ~given
     halved = np.where(shared, weights / 2, weights)

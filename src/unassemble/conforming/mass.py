@@ -75,8 +75,3 @@ def less(matrix: OperatorMatrix, blocks: Blocks, weights: Weights) -> OperatorMa
         off -= np.bincount(place[there], products[there], len(off))
         own -= np.bincount(cells.ravel(), (weights[kind] @ value**2).ravel(), matrix.n)
     return replace(matrix, entries=off, diagonal=own)
-
-
-def total(weights: Weights) -> float:
-    """Of all cells."""
-    return float(sum(some.sum() for some in weights.values()))

@@ -204,7 +204,7 @@ def _trials(
             between = sides.between[place[some]] if none.size and len(sides.keys) else none
             local = _local(sets[some], between)
             for fill in _fillings(kind, known[some[0]]):
-                yield some, _filled(kind, around[some], local, open_rows[some], inner[some], fill)
+                yield some, _filled(around[some], local, open_rows[some], inner[some], fill)
 
 
 def _parted(
@@ -273,7 +273,6 @@ def _fillings(kind: Kind, known: NDArray[np.bool_]) -> list[tuple[int, ...]]:
 
 
 def _filled(
-    kind: Kind,
     corners: NDArray[np.int64],
     local: NDArray[np.int64],
     open_rows: NDArray[np.int64],

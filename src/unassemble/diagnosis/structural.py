@@ -37,9 +37,9 @@ def indefinite(matrix: OperatorMatrix) -> str:
     some = min(len(np.unique(i[over])), len(np.unique(j[over])))
     k = over[0]
     return saddle_point(matrix) or (
-        f"the matrix has eigenvalues of both signs: {count_of(some, 'row is', 'rows are')} coupled to others by more "
-        f"than both diagonals allow, as rows {i[k]} and {j[k]}. Stiffness matrices have none, so that entries are "
-        "damaged, or those of initial stresses or of a saddle point were added"
+        f"the matrix has eigenvalues of both signs, as no stiffness matrix has: {count_of(some, 'row is', 'rows are')} "
+        f"coupled to others by more than both diagonals allow, as rows {i[k]} and {j[k]}, so that entries are damaged, "
+        "or those of initial stresses or of a saddle point were added"
     )
 
 

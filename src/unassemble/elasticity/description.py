@@ -44,7 +44,7 @@ def described(
     solution : Solution
     clock : Clock
     cells : bool
-        Look for elements too.
+        Look for elements too, not only where nothing else confirms positions.
     rounding : Rounding, optional
         Of the entries, where they have few digits.
     placed_again : callable
@@ -64,8 +64,10 @@ def described(
         )
     backward = found.backward_error if found.certified else error
     status, reason = verdict(nodal, solution, error, found, numbering)
-    alone = status == "certified" and cells and not found.certified
+    alone = status == "certified" and not found.certified
     lone = determined(solution.points) & ~checked(nodal, solution) if alone else np.zeros(nodal.n, dtype=bool)
+    if lone.any() and not cells:  # only elements can confirm them
+        return described(nodal, numbering, solution, clock, cells=True, rounding=rounding, placed_again=placed_again)
     if alone and not (determined(solution.points) & ~lone).any():
         status, reason, lone = "uncertified", NOTHING_CHECKED, np.zeros_like(lone)
     if rounding and near and not any(solution.freedoms):

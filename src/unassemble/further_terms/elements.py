@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..certify import Terms
 from ..clock import Clock
-from ..conforming.mass import Blocks, Weights, guessed_from_sums, less, told_by_entries, total, weights_at
+from ..conforming.mass import Blocks, Weights, guessed_from_sums, less, told_by_entries, weights_at
 from ..conforming.recover import shown_cells
 from ..conforming.roles import Cells
 from ..errors import RecoveryError
@@ -122,7 +122,7 @@ def _settled(
         except RecoveryError:
             break
         areas = weights_at(found.points, blocks)
-        reaction = area / total(areas)
+        reaction = area / float(sum(some.sum() for some in areas.values()))
         since += 1
         if found.backward_error < least:
             best, least, since = (found, reaction), found.backward_error, 0

@@ -64,11 +64,10 @@ def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]
             "structure": found.layout.name,
         }
     nodal = nodal_matrix(matrix.csr(), found)
-    words = {"pattern": "in an order found by the pattern"}
     return shown | {
         "block_size": found.block_size,
         "n_nodes": found.n_nodes,
-        "numbering": words.get(found.kind, found.kind),
+        "numbering": vector.order,
         "coupled": not uncoupled(nodal),
         "structure": "" if uncoupled(nodal) or bars_of(nodal) is None else "truss",
     }

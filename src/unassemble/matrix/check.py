@@ -56,11 +56,7 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
     (2, [[0, 1]], [-1.0])
     """
     _check_options(drop_zeros, noise)
-    A = _as_sparse(A)
-    _check_shape(A.shape)
-    csr = canonical(_with_numbers(A))
-    _check_entries(csr)
-    csr, notes = _real(csr)
+    csr, notes = _real(as_csr(A))
     pairs = triangles(csr)
     if not len(pairs.edges):
         raise MatrixError(_diagonal(csr.diagonal()))
@@ -95,6 +91,21 @@ def _diagonal(diagonal: NDArray[np.float64]) -> str:
             "edge. Pass the stiffness matrix of the same mesh"
         )
     return "the matrix is diagonal: it has no off-diagonal entry, and so no mesh edge"
+
+
+def as_csr(A: Any) -> sp.csr_array:
+    """A square matrix of finite numbers in compressed rows; see :func:`canonical`.
+
+    Raises
+    ------
+    MatrixError
+        If it is none.
+    """
+    A = _as_sparse(A)
+    _check_shape(A.shape)
+    csr = canonical(_with_numbers(A))
+    _check_entries(csr)
+    return csr
 
 
 def _as_sparse(A: Any) -> Any:

@@ -74,7 +74,7 @@ def recover_surface(
     if options.noise is not None and options.standard_deviations:
         with clock("deviations"):
             deviations = _deviations(best, options.noise)
-    return _report(used, best, verdict, notes, clock, deviations)
+    return _report(best, verdict, notes, clock, deviations)
 
 
 def _require_few_handles(matrix: OperatorMatrix) -> None:
@@ -214,7 +214,6 @@ _SUMS = {
 
 
 def _report(
-    matrix: OperatorMatrix,
     found: _Found,
     verdict: _Verdict,
     notes: list[str],

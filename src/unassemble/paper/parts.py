@@ -40,7 +40,7 @@ def part(whole: Piece, mask: NDArray) -> Part:
     triangles, opposite = local.reshape(-1, 3), opposite.reshape(-1, 3)
     gluing = glue(len(rows), opposite)
     rim = boundary_corners(gluing)
-    loop, order = loops(following(triangles, opposite, gluing, rim))
+    loop, order = loops(following(triangles, gluing, rim))
     flat = triangles.ravel()
     boundary = np.column_stack([flat[following_corner(1, rim)], flat[following_corner(2, rim)]])[order]
     offsets = np.append(np.flatnonzero(np.diff(loop[order], prepend=-1)), len(loop))

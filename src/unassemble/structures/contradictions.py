@@ -40,6 +40,8 @@ def contradicted(given: Equations, nodes: Nodes) -> tuple[NDArray[np.bool_], NDA
     """
     A, b = given.operator, nodes.layout.block_size
     lengths = float(np.abs(given.right).max(initial=0.0))
+    if not lengths:
+        return None
     x, weight, least = np.zeros(A.shape[1]), np.ones(A.shape[0]), lengths
     for _ in range(REFINEMENTS):
         weighted = sp.csr_array(sp.diags_array(weight / weight.max()) @ A)

@@ -16,7 +16,7 @@ def boundary_corners(gluing: Gluing) -> NDArray:
     return gluing.first[gluing.count == 1]
 
 
-def following(triangles: NDArray, opposite: NDArray, gluing: Gluing, corners: NDArray) -> NDArray:
+def following(triangles: NDArray, gluing: Gluing, corners: NDArray) -> NDArray:
     """For each boundary edge a -> b the place in `corners` of the boundary edge b -> c of the same fan.
 
     Rotates about b from triangle to triangle, all edges at once, so that a vertex at which the

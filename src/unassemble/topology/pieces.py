@@ -47,7 +47,7 @@ def planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray)
     opposite = np.where(flip[:, None], opposite[:, [0, 2, 1]], opposite)
     gluing = reglue(gluing, flip)
     corners = boundary_corners(gluing)
-    loop, order = loops(following(triangles, opposite, gluing, corners))
+    loop, order = loops(following(triangles, gluing, corners))
     at = _vertices_of_pieces(n, triangles, piece)
     glued = _Surfaces(triangles, opposite, gluing, piece)
     if not _spheres_with_holes(n, glued, at, corners, loop):
