@@ -54,13 +54,19 @@ OUTCOMES = ("right", "ambiguous", "uncertified", "refused", "SLOW", "WRONG", "CR
 
 
 def positions_agree(found, pieces: list[Piece]) -> bool:
-    """Whether the determined points of every piece are right, up to similarity, in every component found."""
+    """Whether the determined points of every piece are right, up to similarity, in every component found.
+
+    Where a component has nothing of a piece but what other pieces share, it is theirs.
+    """
     node = np.arange(found.n_points) if found.node_of_row is None else found.node_of_row
+    times = np.bincount(np.concatenate([rows for rows, _ in pieces]), minlength=len(node))
     for rows, points in pieces:
         known = rows[found.node_status[node[rows]] == 0]
         place = dict(zip(rows.tolist(), points, strict=True))
         for label in np.unique(found.component[node[known]]):
             own = known[found.component[node[known]] == label]
+            if (times[own] > 1).all():
+                continue
             x, y = found.points[node[own]], np.array([place[row] for row in own.tolist()])
             if x.shape[1] != y.shape[1] or misplaced(x - x.mean(axis=0), y - y.mean(axis=0)) > DISTANCE:
                 return False
