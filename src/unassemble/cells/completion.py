@@ -76,7 +76,8 @@ def completed(
     def misfit_of_triangles() -> NDArray[np.float64]:
         return misfits_of(matrix, [(piece, attempt(piece)) for piece in topology.pieces])
 
-    budget = Budget(0 if matrix.unweighted and scale is None else DEFAULT.worth(matrix.n))  # nothing to go by but the graph
+    by_graph_alone = matrix.unweighted and scale is None
+    budget = Budget(0 if by_graph_alone else DEFAULT.worth(matrix.n))
     for part, own in components_with_pieces:
         if not doubtful[part.vertices[0]]:
             continue
