@@ -59,6 +59,7 @@ def test_the_size_of_a_mesh_in_the_plane(mesh, lumped):
     found = recover(K, mass=M)
     assert found.certified, found.reason
     assert found.density == 1.0
+    assert any("lengths are those given here over sqrt(rho)" in note for note in found.warnings)
     assert "mass matrix" in found.reason
     np.testing.assert_allclose(distances(found.points), distances(true), rtol=1e-10)
     assert found.n_polygons == 0  # which diagonal each square has is in the mass matrix only

@@ -99,7 +99,11 @@ def weighed(
         )
     said = f"the mass matrix assembled on it again is the one given to {misfit:.1e}"
     said += "" if whole.all() else f", in the {whole.mean():.0%} of its rows all cells of which are determined"
-    return replace(found, density=density, reason=sentences([found.reason.split(". ")[0], said]))
+    notes = found.warnings
+    if not sized:
+        root = "sqrt(rho)" if found.dim == 2 else "the cube root of rho"
+        notes += (f"the mesh has the size of density 1: if that is rho, lengths are those given here over {root}",)
+    return replace(found, density=density, warnings=notes, reason=sentences([found.reason.split(". ")[0], said]))
 
 
 def _with_zeros(A: sp.csr_array, M: sp.csr_array) -> sp.csr_array:
