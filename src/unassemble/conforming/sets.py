@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..budget import AT_ONCE, LARGE, SAMPLE
 from ..elements.cliques import Graph, simplices
+from ..elements.surface import among
 from ..matrix import OperatorMatrix
 from ..tolerances import ROUNDED
 from ..topology.keys import contains, distinct, pair_keys
@@ -176,12 +177,6 @@ def once(rows: NDArray[np.int64]) -> NDArray[np.int64]:
     return rows[np.sort(order[np.append(True, np.diff(label[order]) != 0)[: len(rows)]])]
 
 
-def _among(rows: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(m,) whether each set is one of the others, all of increasing rows."""
-    label = np.random.default_rng(0).integers(0, 2**63, rows.shape[1], dtype=np.uint64)
-    return contains(np.sort(others.astype(np.uint64) @ label), rows.astype(np.uint64) @ label)
-
-
 def pairs_of(n: int, cells: NDArray[np.int64]) -> NDArray[np.int64]:
     """(m, k (k - 1) / 2) keys of all pairs of each cell, in the order of :func:`numpy.triu_indices`."""
     a, b = np.triu_indices(cells.shape[1], 1)
@@ -218,7 +213,7 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
         if _cover(common, [rest]):
             yield NodeSets(2, (rest,), even=other is not None)
             if other is not None:
-                yield NodeSets(2, (once(np.concatenate([rest[~_among(rest, likeliest)], other])),))
+                yield NodeSets(2, (once(np.concatenate([rest[~among(rest, likeliest)], other])),))
 
 
 def _choices(common: Common, quads: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:

@@ -64,8 +64,8 @@ def outer_facets(blocks: Blocks) -> list[NDArray[np.int64]]:
         facets[size] = some[~_repeated(_labels(some))]
     if {3, 4} <= facets.keys():
         halves = facets[4][:, [[0, 1, 2], [1, 2, 3], [2, 3, 0], [3, 0, 1]]]
-        covered = _among(halves.reshape(-1, 3), facets[3]).reshape(-1, 4).any(axis=1)
-        inner = _among(facets[3], halves[covered].reshape(-1, 3))
+        covered = among(halves.reshape(-1, 3), facets[3]).reshape(-1, 4).any(axis=1)
+        inner = among(facets[3], halves[covered].reshape(-1, 3))
         facets = {3: facets[3][~inner], 4: facets[4][~covered]}
     return list(facets.values())
 
@@ -87,7 +87,7 @@ def outer_nodes(blocks: Blocks) -> NDArray[np.int64]:
         for k, some in enumerate(kind.between):
             if kind.dim == 3 and len(some) == 4:  # in the middle of a facet of a hexahedron
                 (outside,) = outer_facets({kind.base: cells[:, : kind.corners]})
-                nodes.append(cells[_among(cells[:, list(some)], outside), kind.corners + k])
+                nodes.append(cells[among(cells[:, list(some)], outside), kind.corners + k])
     return np.unique(np.concatenate(nodes))
 
 
@@ -97,7 +97,7 @@ def _labels(sets: NDArray[np.int64]) -> NDArray[np.uint64]:
     return np.asarray(np.random.default_rng(0).integers(0, 2**63, n, dtype=np.uint64)[sets].sum(axis=1))
 
 
-def _among(sets: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.bool_]:
+def among(sets: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(m,) whether each set is one of the others."""
     label = _labels(np.vstack([sets, others]))
     return contains(np.sort(label[len(sets) :]), label[: len(sets)])
