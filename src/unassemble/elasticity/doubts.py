@@ -58,19 +58,16 @@ def _held_together(found: Cells, piece: NDArray[np.int64], firm: NDArray[np.bool
     Cells re-assemble wherever they lie, and those of the plane in any size. Two nodes that they share fix both; and
     nodes that are `firm`, (n,), are as good as the nodes of one cell.
     """
-    held = np.zeros(len(piece), dtype=bool)
-    groups = [cells for block in found.blocks.values() for cells in block]
-    groups += [np.flatnonzero(firm & (piece == k)) for k in range(piece.max() + 1)]
-    count = np.array([len(group) for group in groups])
-    start = np.concatenate([[0], np.cumsum(count)])
-    member = sp.csr_array(
-        (np.ones(start[-1], np.int32), np.concatenate(groups), start), shape=(len(groups), len(piece))
-    )
+    held, pieces = np.zeros(len(piece), dtype=bool), np.arange(piece.max() + 1)
+    groups = [*found.blocks.values(), *(np.flatnonzero(firm & (piece == k))[None] for k in pieces)]
+    count = np.repeat([group.shape[1] for group in groups], [len(group) for group in groups])
+    first = np.concatenate([*(piece[cells[:, 0]] for cells in found.blocks.values()), pieces])
+    nodes, start = np.concatenate([group.ravel() for group in groups]), np.concatenate([[0], np.cumsum(count)])
+    member = sp.csr_array((np.ones(len(nodes), np.int32), nodes, start), shape=(len(count), len(piece)))
     shared = member @ member.T
     label = sp.csgraph.connected_components(sp.csr_array(shared >= 2), directed=False)[1]
-    first = piece[np.array([group[0] if len(group) else 0 for group in groups])]
     size = np.bincount(label, count)[label]
-    for k in range(piece.max() + 1):
+    for k in pieces:
         here = np.flatnonzero((first == k) & (count > 0))
         if len(here):
             best = label[here[np.argmax(size[here])]]
