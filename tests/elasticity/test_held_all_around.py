@@ -183,4 +183,4 @@ def test_several_supports_on_all_sides(kind, perturb):
     verdict = judged(found, truth)
     assert found.certified
     assert verdict.error < 1e-8
-    assert verdict.missing < 0.1  # next to the clamp, for quadratic elements
+    assert verdict.missing < 0.35  # next to the clamp, for quadratic elements, and beside penalties

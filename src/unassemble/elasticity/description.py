@@ -51,17 +51,13 @@ def described(
         Points (n, d) from another matrix that may have been rounded to the given one.
     """
     with clock("certify"):
-        error = largest_residual(nodal, solution.valid, solution.points, solution.ratio)
+        error = largest_residual(nodal, solution.valid, solution.points)
         near = not error >= max(ALIKE, rounding.spread if rounding else 0.0)  # NaN where only elements can tell
         ratio = _lame_ratio(nodal, solution) if near else None
     found = no_cells()
     if (cells or solution.straight or solution.hanging is not None) and near:
         with clock("cells"):
             found = recognise_cells(nodal, solution.points, ratio)
-    if solution.cautious is not None and not found.certified:
-        return described(
-            nodal, numbering, solution.cautious, clock, cells=cells, rounding=rounding, placed_again=placed_again
-        )
     backward = found.backward_error if found.certified else error
     status, reason = verdict(nodal, solution, error, found, numbering)
     alone = status == "certified" and not found.certified

@@ -115,7 +115,7 @@ def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: floa
     which fewer rows can tell.
     """
     graph, known = coupled(nodal, points), determined(points)
-    likely = Entries.of(nodal, known, surrounded(nodal, valid_pairs(nodal, inferred=True)))
+    likely = Entries.of(nodal, known, surrounded(nodal, valid_pairs(nodal)))
     found = no_cells()
     # The power of two next to the largest entry: squares of what is measured in it neither overflow nor vanish.
     unit = float(2.0 ** np.frexp(nodal.size.max(initial=0.0))[1])

@@ -57,7 +57,6 @@ def straightened(
     found : Solution or None
         None where the identities determine nothing.
     valid : (n, d, d) bool
-        By the strict rule.
     patch : int, optional
         Most nodes per chart.
     """
