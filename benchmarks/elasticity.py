@@ -70,7 +70,7 @@ def measure_recovery(path: Path, cells: bool) -> dict:
     error = np.linalg.norm(scale * a - b, axis=1).max() / np.linalg.norm(np.ptp(b, axis=0))
     return {
         "nodes": len(points), "seconds": seconds, "memory": peak() - before, "error": float(error),
-        "status": found.status, "cells": found.cells.n_cells, "timings": dict(found.timings),
+        "status": found.status, "cells": found.n_cells, "timings": dict(found.timings),
     }  # fmt: skip
 
 

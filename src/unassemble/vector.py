@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from .clock import Clock
-from .elasticity.serving import Request, serve_body
+from .elasticity.description import Request
+from .elasticity.recover import serve_body
 from .errors import RecoveryError
 from .matrix import OperatorMatrix
 from .nodes import Numbering

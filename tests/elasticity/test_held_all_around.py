@@ -61,7 +61,7 @@ def test_elements_tell_the_axes(kind, perturb):
     assert np.isfinite(found.points).all(axis=1).sum() > 0.3 * len(truth)
     assert error(found.points, truth) < 1e-10
     assert found.poisson_ratio == pytest.approx(0.3, abs=1e-9)
-    assert found.cells.lame[:, 0] / found.cells.lame[:, 1] == pytest.approx(np.full(found.cells.n_cells, 1.5), abs=1e-6)
+    assert found.lame[:, 0] / found.lame[:, 1] == pytest.approx(np.full(found.n_cells, 1.5), abs=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["tet-p1", "hex-q1"])

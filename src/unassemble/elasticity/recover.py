@@ -1,4 +1,4 @@
-"""Coordinates from an elasticity matrix, and nothing else: the whole room on one page."""
+"""Coordinates from an elasticity matrix: the whole room on one page."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from numpy.typing import NDArray
 from ..clock import Clock
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
-from ..matrix import check_matrix
+from ..matrix import OperatorMatrix, check_matrix
+from ..nodes.anchoring import checked_anchors
 from ..nodes.nodal import NodalMatrix, nodal_matrix, uncoupled
 from ..nodes.numbering import Numbering
-from ..nodes.rounded import Rounding, with_exact_sums
+from ..nodes.rounded import with_exact_sums
 from ..nodes.unknowns import find_numbering
-from .description import described
+from ..recovery import Body
+from .description import Request, described
 from .doubts import with_doubts
 from .positions import solve
-from .results import ElasticityRecovery
 from .springs import without_springs
 from .verdict import about_made_up_nodes, about_open_rows, no_positions
 
@@ -29,8 +30,8 @@ def recover_elasticity(
     numbering: Numbering | None = None,
     cells: bool = True,
     patch: int | None = None,
-) -> ElasticityRecovery:
-    """Recover node positions from the stiffness matrix of isotropic linear elasticity.
+) -> Body:
+    """Recover node positions from the stiffness matrix of isotropic linear elasticity, and nothing else.
 
     Parameters
     ----------
@@ -54,7 +55,8 @@ def recover_elasticity(
     """
     clock = Clock()
     with clock("check"):
-        whole, rounding = with_exact_sums(check_matrix(matrix).csr())
+        checked = check_matrix(matrix)
+        whole, rounding = with_exact_sums(checked.csr())
     with clock("numbering"):
         numbering = numbering or find_numbering(whole, block_size)
         nodal = nodal_matrix(whole, numbering)
@@ -62,22 +64,27 @@ def recover_elasticity(
         raise GeometryError(
             "the directions are not coupled: these are scalar matrices side by side. Recover one of them by itself"
         )
-    return place_nodes(nodal, numbering, clock, cells=cells, patch=patch, rounding=rounding)
+    return serve_body(checked, nodal, numbering, clock, Request(cells=cells, rounding=rounding), patch)
 
 
-def place_nodes(
+def serve_body(
+    matrix: OperatorMatrix,
     nodal: NodalMatrix,
     numbering: Numbering,
     clock: Clock,
-    *,
-    cells: bool = True,
+    request: Request,
     patch: int | None = None,
-    rounding: Rounding | None = None,
-) -> ElasticityRecovery:
-    """The recovery once the nodes are known: null space, certificate, cells; see :func:`recover_elasticity`.
+) -> Body:
+    """Recover a solid body whose numbering is known; `patch` as in :func:`recover_elasticity`.
 
-    `rounding` is that of the entries, where they have few digits.
+    Raises
+    ------
+    InputError
+        For anchors that do not fit.
+    RecoveryError
+        If no piece is determined.
     """
+    known = checked_anchors(request.anchors, numbering.node_of_row, numbering.block_size)  # before the long work
     with clock("null space"), blas_threads(1):
         nodal = with_doubts(without_springs(nodal), numbering)
         try:
@@ -86,7 +93,7 @@ def place_nodes(
             if not numbering.inferred:
                 raise
             raise GeometryError(no_positions(about_open_rows(numbering) or error)) from error
-        why = about_made_up_nodes(nodal, numbering, solution, rounding) if numbering.inferred else ""
+        why = about_made_up_nodes(nodal, numbering, solution, request.rounding) if numbering.inferred else ""
         if why:
             raise GeometryError(no_positions(why))
 
@@ -95,4 +102,4 @@ def place_nodes(
         with blas_threads(1):
             return solve(other, patch).points
 
-    return described(nodal, numbering, solution, clock, cells=cells, rounding=rounding, placed_again=placed_again)
+    return described(matrix, nodal, numbering, solution, clock, request, known, placed_again)

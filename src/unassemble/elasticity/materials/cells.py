@@ -46,22 +46,6 @@ class Cells:
     shown: NDArray[np.bool_] | None = None
 
     @property
-    def kind(self) -> str:
-        """The kind of all cells; several are joined by a plus sign."""
-        return "+".join(self.blocks)
-
-    @property
-    def cells(self) -> NDArray[np.int64]:
-        """(m, k) the cells, where they are of one kind."""
-        (cells,) = self.blocks.values()
-        return cells
-
-    @property
-    def first_nodes(self) -> NDArray[np.int64]:
-        """(n_cells,) a node of each cell, in the order of `lame`."""
-        return np.concatenate([cells[:, 0] for cells in self.blocks.values()])
-
-    @property
     def recognised(self) -> bool:
         """Whether there are cells."""
         return bool(self.blocks)
