@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .errors import FormatError, InputError, OutputError
 from .files import check_target, whole_file
-from .recovery import Body, Recovery
+from .recovery import Recovery
 from .words import count_of
 
 if TYPE_CHECKING:
@@ -22,22 +22,19 @@ if TYPE_CHECKING:
 def modes_of(recovery: Recovery) -> NDArray[np.float64]:
     """Near-null space of a vector-valued matrix, (N, 3) or (N, 6), rows as in the matrix: PyAMG's ``B``.
 
-    Translations, then rotations; nodes without coordinates get what they have without moving. The directions of a
-    vector Laplacian are not coupled: it has translations only, (N, 2) or (N, 3).
+    Translations, then rotations; nodes without coordinates get what they have without moving.
 
     Raises
     ------
     InputError
         If the matrix is scalar.
     """
-    from .structures.layouts import PINNED, layout_named
+    from .structures.layouts import layout_named
 
     node, direction = recovery.node_of_row, recovery.direction_of_row
     if node is None or direction is None:
         raise InputError("a scalar matrix has no rigid-body modes: its near-null space is that of the constants")
     layout = layout_named(recovery.operator)
-    if layout is None and not (isinstance(recovery, Body) or recovery.operator in ("truss", PINNED.name)):
-        return (direction[:, None] == np.arange(direction.max() + 1)).astype(np.float64)
     return rigid_body_modes(recovery.points, node, direction, layout)
 
 

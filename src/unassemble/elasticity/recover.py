@@ -60,10 +60,6 @@ def recover_elasticity(
     with clock("numbering"):
         numbering = numbering or find_numbering(whole, block_size)
         nodal = nodal_matrix(whole, numbering)
-    if uncoupled(nodal):
-        raise GeometryError(
-            "the directions are not coupled: these are scalar matrices side by side. Recover one of them by itself"
-        )
     return serve_body(checked, nodal, numbering, clock, Request(cells=cells, rounding=rounding), patch)
 
 
@@ -84,6 +80,11 @@ def serve_body(
     RecoveryError
         If no piece is determined.
     """
+    if uncoupled(nodal):
+        raise GeometryError(
+            "the directions are not coupled, as those of a vector Laplacian: these are scalar matrices side by side, "
+            "which `operator='laplacian'` recovers"
+        )
     known = checked_anchors(request.anchors, numbering.node_of_row, numbering.block_size)  # before the long work
     with clock("null space"), blas_threads(1):
         nodal = with_doubts(without_springs(nodal), numbering)

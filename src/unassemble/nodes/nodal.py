@@ -184,7 +184,7 @@ def annihilating(nodal: NodalMatrix) -> NDArray[np.bool_]:
 
 
 def uncoupled(nodal: NodalMatrix) -> bool:
-    """Whether no component is coupled to another: a vector Laplacian, several scalar matrices side by side."""
+    """Whether no component is coupled to another: as of a vector Laplacian."""
     off = np.abs(nodal.data[:, ~np.eye(nodal.dim, dtype=bool)])
     return bool(off.max(initial=0) <= 1e-12 * np.median(nodal.size[nodal.size > 0])) if nodal.size.any() else True
 
