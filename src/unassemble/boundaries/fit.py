@@ -53,6 +53,8 @@ class FitOptions:
         Of a step, each with ten times the damping.
     guess, most_guess : float
         Weight of a guessed entry: in units of the prior's, and at most, beside 1 of whole entries.
+    shortest : float
+        Part of a step below which the iteration ends after it: a few places hold all others up.
     """
 
     steps: int = 12
@@ -64,6 +66,7 @@ class FitOptions:
     trials: int = 12
     guess: float = 10.0
     most_guess: float = 0.3
+    shortest: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +189,7 @@ class WholeEntries:
                 last, cost = cost, float(misfit @ misfit + shape @ shape)
             damping = max(damping / 10, 1e-15) if share == 1 else 1.5 * damping
             small = small + 1 if cost > (1 - options.gain) * before else 0
-            if small >= (1 if mu else 4):
+            if small >= (1 if mu else 4) or share < options.shortest:
                 break
         rest, size = float(np.linalg.norm(misfit[whole])) / np.sqrt(count), float(np.linalg.norm(prior.residual(z)))
         _log.debug("mu %.0e: misfit %.1e, prior %.1e, %d factorisations", mu, rest, size, factorisations)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeometryError, SolverError
-from ..planar.conformal import conformal_map, estimate_scale
+from ..planar.conformal import ConformalOptions, conformal_map, estimate_scale
 from ..planar.cotangent import weight_roundings
 from ..topology import Piece
 from .embedding import tutte
@@ -76,7 +76,9 @@ class InsideOptions:
     steepest: float = 3.0
     band: int = 5
     settling: int = 3
-    newton: FitOptions = field(default_factory=lambda: FitOptions(steps=1, last_steps=8, damping=1e-15, exact=1e-12))
+    newton: FitOptions = field(
+        default_factory=lambda: FitOptions(steps=1, last_steps=8, damping=1e-15, exact=1e-12, near=0.05, shortest=1.0)
+    )
     held: float = 2.3
     tries: int = 6
     nearly: float = 1e-3
@@ -217,11 +219,18 @@ def _bare(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -> 
 
     What is wrong at the rim then bends nothing inside.
     """
-    bare = rim.bared()
-    if bare.whole.sum() <= options.held * bare.inside.sum():
-        return None
-    found = problem.fit(fit.z, fit.scale, bare.whole, 0.0, options.newton)
-    if found.misfit > options.exact:
+    bare, found = rim.bared(), fit
+    for _ in range(options.rounds):
+        if bare.whole.sum() <= options.held * bare.inside.sum():
+            return None
+        found = problem.fit(found.z, found.scale, bare.whole, 0.0, options.newton)
+        if found.misfit <= options.exact:
+            break
+        less = _less(problem, bare, found, options)
+        if less is None:
+            return None
+        bare = less
+    else:
         return None
     inside = bare.inside
     _, label = nearest(problem.piece, np.where(inside, np.arange(len(inside)), -1), len(inside))
@@ -239,12 +248,19 @@ def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, options: I
             return bare
         if fit.misfit <= options.exact:
             break
-        misfit = np.abs(problem.misfits(fit.z, fit.scale))
-        peeled = rim.peeled(misfit, options.peaks * float(misfit[rim.whole].max(initial=0.0)))
+        peeled = _less(problem, rim, fit, options)
         if peeled is None or not (peeled := peeled.pruned()).whole.any():
             break
         rim, fit = peeled, problem.faded(fit.z, fit.scale, peeled.whole, options.again)
     return fit, rim
+
+
+def _less(
+    problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions, keep: NDArray[np.bool_] | None = None
+) -> Rim | None:
+    """Without vertices of the rim next to peaks of misfit."""
+    misfit = np.abs(problem.misfits(fit.z, fit.scale))
+    return rim.peeled(misfit, options.peaks * float(misfit[rim.whole].max(initial=0.0)), keep)
 
 
 def _tried(problem: WholeEntries, rim: Rim, fit: Fit, options: InsideOptions) -> Fit:
@@ -295,8 +311,7 @@ def _grown(problem: WholeEntries, core: Fit, rim: Rim, options: InsideOptions) -
         fit = problem.fit(z, core.scale, grown.whole, 0.0, options.newton)
         if fit.misfit <= options.exact:
             return fit, grown
-        misfit = np.abs(problem.misfits(fit.z, fit.scale))
-        less = grown.peeled(misfit, options.peaks * float(misfit[grown.whole].max()), keep=rim.left)
+        less = _less(problem, grown, fit, options, keep=rim.left)
         if less is None:
             break
         grown = less
@@ -333,7 +348,9 @@ def _conformal(problem: WholeEntries, weights: NDArray) -> NDArray[np.complex128
     """The conformal map of entries that are whole or guessed, its triangles of mean area 1/2; 0 where there is none."""
     piece = problem.piece
     try:
-        z = conformal_map(piece, weights, scale=problem.known_scale, sharp=False).z
+        z = conformal_map(
+            piece, weights, scale=problem.known_scale, sharp=False, options=ConformalOptions(max_factorisations=2)
+        ).z
     except (GeometryError, SolverError):
         return np.zeros(piece.n_vertices, dtype=np.complex128)
     area = float(_areas(piece, z).mean())
