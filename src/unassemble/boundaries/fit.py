@@ -165,11 +165,11 @@ class WholeEntries:
         for _ in range(options.steps if mu else options.last_steps):
             if not mu and misfit @ misfit <= count * options.exact**2:
                 break
-            system = _System(self, z, scale, whole, prior, mu, misfit, shape)
+            system = System(self, z, scale, whole, prior, mu, misfit, shape)
             better = None
             for _ in range(options.trials):
                 factorisations += 1
-                step = self._step(system, damping)
+                step = self.step(system, damping)
                 if step is not None:
                     better = self._along(z, scale, *step, whole, prior, mu, cost)
                 if better is not None:
@@ -216,14 +216,7 @@ class WholeEntries:
         """Misfits of entries (e,) and of the prior, weighted."""
         return self.trust(whole, mu) * self.misfits(z, scale), mu * prior.residual(z)
 
-    def step(
-        self, z: NDArray, scale: float, whole: NDArray, prior: ShapePrior, mu: float, misfit: NDArray, shape: NDArray,
-        damping: NDArray,
-    ) -> tuple[NDArray, float] | None:  # fmt: skip
-        """Displacement and change of log c; None where the normal matrix cannot be factorised."""
-        return self._step(_System(self, z, scale, whole, prior, mu, misfit, shape), damping)
-
-    def _step(self, system: _System, damping: float | NDArray) -> tuple[NDArray, float] | None:
+    def step(self, system: System, damping: float | NDArray) -> tuple[NDArray, float] | None:
         """Displacement and change of log c; None where the normal matrix cannot be factorised."""
         matrix = system.damped(damping)
         try:
@@ -233,7 +226,7 @@ class WholeEntries:
             return None
         return self._solved(system)
 
-    def _solved(self, system: _System) -> tuple[NDArray, float] | None:
+    def _solved(self, system: System) -> tuple[NDArray, float] | None:
         """The same with the factor that is there."""
         assert self._factor is not None
         gradient, response = self._factor.solve(np.column_stack([system.right, system.slope])).T
@@ -263,7 +256,7 @@ class WholeEntries:
         return None
 
 
-class _System:
+class System:
     """The linearised problem: normal matrix, right-hand side, and the column of log c beside them."""
 
     def __init__(
@@ -283,7 +276,7 @@ class _System:
         self.size = float(self._fitted @ self._fitted)
         self.towards(misfit, shape)
 
-    def towards(self, misfit: NDArray, shape: NDArray) -> _System:
+    def towards(self, misfit: NDArray, shape: NDArray) -> System:
         """With other right-hand sides."""
         self.right = self._transposed @ np.concatenate([misfit, -shape])
         self.along = float(self._fitted @ misfit)
