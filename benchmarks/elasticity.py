@@ -58,7 +58,7 @@ def peak() -> float:
 
 
 def measure_recovery(path: Path, cells: bool) -> dict:
-    from unassemble.elasticity import recover_elasticity
+    from assembled import recover_elasticity
 
     matrix, points = load(path)
     before, start = peak(), perf_counter()
@@ -81,7 +81,8 @@ def measure_pyamg(path: Path, near_null: str) -> dict:
     rhs = np.random.default_rng(0).standard_normal(matrix.shape[0])
     given: dict = {}
     if near_null in ("true", "recovered"):
-        from unassemble.elasticity import recover_elasticity
+        from assembled import recover_elasticity
+
         from unassemble.modes import rigid_body_modes
 
         row = np.arange(matrix.shape[0])

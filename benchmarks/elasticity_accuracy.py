@@ -15,9 +15,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "elasticity"))
 
-from assembled import ELEMENTS, box, error, stiffness
+from assembled import ELEMENTS, box, error, recover_elasticity, stiffness
 
-from unassemble.elasticity import recover_elasticity
 from unassemble.errors import RecoveryError
 
 

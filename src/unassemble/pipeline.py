@@ -56,7 +56,7 @@ def recover(
     Scalar: A = c L + D, where L is the stiffness matrix of the Laplacian with linear elements on triangles in the
     plane and natural boundary conditions, c any nonzero number and D any diagonal matrix, both unknown.
     Vector-valued: isotropic linear elasticity in the plane or in space, with supports; see
-    :func:`unassemble.elasticity.recover_elasticity`. And frames, shells and plates, whose nodes have rotations beside
+    :mod:`unassemble.elasticity`. And frames, shells and plates, whose nodes have rotations beside
     displacements; see :mod:`unassemble.structures`. And the Laplacian of triangulated surfaces in space, c L + D, of
     which the edge lengths are found; see :mod:`unassemble.metric`.
 

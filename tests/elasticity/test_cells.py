@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 import skfem
-from assembled import ELEMENTS, box, eliminated, heterogeneous, on_plane, permuted_nodes, stiffness
+from assembled import ELEMENTS, box, eliminated, heterogeneous, on_plane, permuted_nodes, recover_elasticity, stiffness
 from scipy.spatial import Delaunay, cKDTree
 
 from unassemble import recover
-from unassemble.elasticity import recover_elasticity
 from unassemble.elements.kinds import KINDS
 from unassemble.elements.ordering import ordered_boxes
 

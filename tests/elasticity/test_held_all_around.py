@@ -3,11 +3,20 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from assembled import ELEMENTS, Assembled, box, eliminated, error, on_plane, permuted_nodes, stiffness
+from assembled import (
+    ELEMENTS,
+    Assembled,
+    box,
+    eliminated,
+    error,
+    on_plane,
+    permuted_nodes,
+    recover_elasticity,
+    stiffness,
+)
 from supported import given, judged
 
 from unassemble import recover
-from unassemble.elasticity import recover_elasticity
 from unassemble.errors import GeometryError
 from unassemble.nodes.unknowns import given_numbering
 

@@ -5,10 +5,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 import skfem
-from assembled import eliminated, error, on_plane, permuted_nodes, stiffness
+from assembled import eliminated, error, on_plane, permuted_nodes, recover_elasticity, stiffness
 from scipy.spatial import Delaunay
-
-from unassemble.elasticity import recover_elasticity
 
 
 def cut_into_boxes(points: np.ndarray, simplices: np.ndarray) -> skfem.Mesh:

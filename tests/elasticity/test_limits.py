@@ -15,6 +15,7 @@ from assembled import (
     on_plane,
     orthotropic,
     permuted_nodes,
+    recover_elasticity,
     stiffness,
     vector_laplace,
     with_identity,
@@ -23,7 +24,6 @@ from assembled import (
 from supported import given as held
 from supported import judged
 
-from unassemble.elasticity import recover_elasticity
 from unassemble.errors import FormatError, GeometryError, RecoveryError
 from unassemble.modes import rigid_body_modes, save_amgcl_coordinates, save_petsc_vec
 

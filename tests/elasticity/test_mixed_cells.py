@@ -3,12 +3,11 @@
 import meshio
 import numpy as np
 import pytest
-from assembled import Assembled, eliminated, error, on_plane
+from assembled import Assembled, eliminated, error, on_plane, recover_elasticity
 from mixed import mixed
 from supported import given, judged
 
 from unassemble import recover
-from unassemble.elasticity import recover_elasticity
 from unassemble.elements.surface import outer_facets, outer_nodes
 
 COUNTS = (9, 8)

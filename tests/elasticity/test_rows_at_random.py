@@ -4,10 +4,9 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-from assembled import box, heterogeneous, permuted_nodes, stiffness
+from assembled import box, heterogeneous, permuted_nodes, recover_elasticity, stiffness
 from supported import SUPPORTS, assert_certified, given, judged
 
-from unassemble.elasticity import recover_elasticity
 from unassemble.errors import RecoveryError
 
 COUNTS = {"tri-p1": (8, 9), "quad-q1": (8, 9), "tet-p1": (4, 5, 5), "hex-q1": (5, 6, 5), "tri-p2": (6, 7),

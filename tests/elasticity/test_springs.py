@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from assembled import Assembled, box, error, on_plane, permuted_nodes, stiffness
+from assembled import Assembled, box, error, on_plane, permuted_nodes, recover_elasticity, stiffness
 from supported import Given, judged
-
-from unassemble.elasticity import recover_elasticity
 
 KINDS = {"tri-p1": (6, 7), "quad-q1": (6, 5), "tri-p2": (5, 4), "tet-p1": (4, 5, 4), "hex-q1": (4, 4, 3)}
 

@@ -11,13 +11,13 @@ from assembled import (
     heterogeneous,
     on_plane,
     permuted_nodes,
+    recover_elasticity,
     stiffness,
     with_identity,
     with_penalty,
 )  # fmt: skip
 from supported import with_zeros
 
-from unassemble.elasticity import recover_elasticity
 from unassemble.errors import RecoveryError
 from unassemble.nodes.unknowns import find_numbering, given_numbering
 

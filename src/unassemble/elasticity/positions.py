@@ -19,8 +19,8 @@ from .straight.straight import straightened
 _LARGE = 2000
 
 
-def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
-    """Place all nodes; `patch` is the most nodes per chart.
+def solve(nodal: NodalMatrix) -> Solution:
+    """Place all nodes.
 
     Raises
     ------
@@ -31,17 +31,17 @@ def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
     found: Solution | None = None
     failure: GeometryError | None = None
     if nodal.dim == 3 and nodal.n > _LARGE and not nodal.penalised.any():
-        at_once = _with_planes(nodal, None, valid, patch)
+        at_once = _with_planes(nodal, None, valid)
         found = at_once if at_once is not None and at_once.unique else None
     if found is None:
         try:
-            found = placed(nodal, valid, patch)
+            found = placed(nodal, valid)
         except GeometryError as error:
             failure = error
         if not (found is not None and found.whole):
-            found = _with_planes(nodal, found, valid, patch)
+            found = _with_planes(nodal, found, valid)
     if not (found is not None and found.unique):
-        found = straightened(nodal, found, valid, patch)
+        found = straightened(nodal, found, valid)
         if found is not None and found.straight and found.planes:  # elements told axes only
             found = replace(found, hanging=determined(found.points))
     if found is None:
@@ -49,9 +49,7 @@ def solve(nodal: NodalMatrix, patch: int | None) -> Solution:
     return found
 
 
-def _with_planes(
-    nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.bool_], patch: int | None
-) -> Solution | None:
+def _with_planes(nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.bool_]) -> Solution | None:
     """Once more with what rows next to rollers say, if there are any, and that fits and determines more.
 
     What is determined by that only hangs on an assumption: elements have to show it.
@@ -60,7 +58,7 @@ def _with_planes(
     if completed is None:
         return found
     try:
-        other = replace(placed(*completed, patch), planes=True, valid=valid)
+        other = replace(placed(*completed), planes=True, valid=valid)
     except GeometryError:
         return found
     if not other.exact or (found is not None and other.rank <= found.rank):

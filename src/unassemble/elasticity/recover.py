@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 from ..clock import Clock
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
-from ..matrix import OperatorMatrix, check_matrix
+from ..matrix import OperatorMatrix
 from ..nodes.anchoring import checked_anchors
 from ..nodes.nodal import NodalMatrix, nodal_matrix, uncoupled
 from ..nodes.numbering import Numbering
-from ..nodes.rounded import with_exact_sums
-from ..nodes.unknowns import find_numbering
 from ..recovery import Body
 from .description import Request, described
 from .doubts import with_doubts
@@ -23,55 +21,14 @@ from .springs import without_springs
 from .verdict import about_made_up_nodes, about_open_rows, no_positions
 
 
-def recover_elasticity(
-    matrix: sp.csr_array,
-    *,
-    block_size: int | None = None,
-    numbering: Numbering | None = None,
-    cells: bool = True,
-    patch: int | None = None,
-) -> Body:
-    """Recover node positions from the stiffness matrix of isotropic linear elasticity, and nothing else.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric; unknowns may be eliminated, replaced by identity rows, or penalised.
-    block_size : int, optional
-        2 or 3; found where it is not given.
-    numbering : Numbering, optional
-        Where it is known; see :func:`.unknowns.given_numbering`.
-    cells : bool
-        Look for elements too.
-    patch : int, optional
-        Most nodes per chart; see :mod:`.atlas`.
-
-    Raises
-    ------
-    MatrixError
-        If the matrix is not square, symmetric and finite.
-    RecoveryError
-        If it is no elasticity matrix, or determines nothing.
-    """
-    clock = Clock()
-    with clock("check"):
-        checked = check_matrix(matrix)
-        whole, rounding = with_exact_sums(checked.csr())
-    with clock("numbering"):
-        numbering = numbering or find_numbering(whole, block_size)
-        nodal = nodal_matrix(whole, numbering)
-    return serve_body(checked, nodal, numbering, clock, Request(cells=cells, rounding=rounding), patch)
-
-
 def serve_body(
     matrix: OperatorMatrix,
     nodal: NodalMatrix,
     numbering: Numbering,
     clock: Clock,
     request: Request,
-    patch: int | None = None,
 ) -> Body:
-    """Recover a solid body whose numbering is known; `patch` as in :func:`recover_elasticity`.
+    """Recover a solid body whose numbering is known.
 
     Raises
     ------
@@ -89,7 +46,7 @@ def serve_body(
     with clock("null space"), blas_threads(1):
         nodal = with_doubts(without_springs(nodal), numbering)
         try:
-            solution = solve(nodal, patch)
+            solution = solve(nodal)
         except RecoveryError as error:
             if not numbering.inferred:
                 raise
@@ -101,6 +58,6 @@ def serve_body(
     def placed_again(matrix: sp.csr_array) -> NDArray[np.float64]:
         other = with_doubts(without_springs(nodal_matrix(matrix, numbering)), numbering)
         with blas_threads(1):
-            return solve(other, patch).points
+            return solve(other).points
 
     return described(matrix, nodal, numbering, solution, clock, request, known, placed_again)

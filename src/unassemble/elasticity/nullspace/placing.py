@@ -20,8 +20,8 @@ from .solution import Solution
 _WHOLE = {2: 250_000, 3: 30_000}
 
 
-def placed(nodal: NodalMatrix, valid: NDArray[np.bool_], patch: int | None) -> Solution:
-    """Positions piece by piece, from valid identities, (n, d, d) or (n, d, d, d), with `patch` nodes per chart at most.
+def placed(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> Solution:
+    """Positions piece by piece, from valid identities, (n, d, d) or (n, d, d, d).
 
     Raises
     ------
@@ -35,7 +35,7 @@ def placed(nodal: NodalMatrix, valid: NDArray[np.bool_], patch: int | None) -> S
     failure: GeometryError | None = None
     for piece in range(n_pieces):
         body = np.flatnonzero(component == piece)
-        found = null_fields(nodal, valid, body, patch=patch)
+        found = null_fields(nodal, valid, body)
         if found.charts > 1 and not _settled(found):
             if len(body) <= _WHOLE[nodal.dim]:
                 found = null_fields(nodal, valid, body, patch=len(body))

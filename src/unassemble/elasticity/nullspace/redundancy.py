@@ -31,7 +31,7 @@ def checked(nodal: NodalMatrix, solution: Solution) -> NDArray[np.bool_]:
         valid = solution.valid.copy()
         valid[lone] = False
         try:
-            solution = placed(nodal, valid, None)
+            solution = placed(nodal, valid)
         except GeometryError:
             return np.zeros_like(known)
         if not solution.unique:
