@@ -26,10 +26,11 @@ from time import perf_counter
 import numpy as np
 import scipy.sparse as sp
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "elasticity"))
+
 
 def assemble(kind: str, size: int, material: str, support: str, path: Path) -> None:
     """Write matrix and true points of a cube that is held."""
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "elasticity"))
     from assembled import box, eliminated, on_plane, stiffness
     from supported import with_zeros
 
