@@ -19,15 +19,15 @@ def from_columns(diagonal: NDArray, pairs: Triangles) -> tuple[Triangles, NDArra
     -------
     pairs : Triangles
     replaced : (n,) bool or None
-        Such rows; None where there are none with a column.
+        Such rows, those among them too that have such neighbours only; None where no column is left.
     warnings : tuple of str
     """
     row, column = np.zeros(len(diagonal)), np.zeros(len(diagonal))
     for end, own, other in ((0, pairs.upper, pairs.lower), (1, pairs.lower, pairs.upper)):
         np.maximum.at(row, pairs.edges[:, end], np.abs(own))
         np.maximum.at(column, pairs.edges[:, end], np.abs(other))
-    replaced = (row == 0) & (column > 0) & (diagonal != 0)
-    if not replaced.any():
+    replaced = (row == 0) & (diagonal != 0) & (np.bincount(pairs.edges.ravel(), minlength=len(row)) > 0)
+    if not (column[replaced] > 0).any():
         return pairs, None, ()
     first, second = replaced[pairs.edges].T
     rest = ~(first | second)
