@@ -65,7 +65,7 @@ class InsideOptions:
     peaks: float = 0.5
     growing: tuple[tuple[float, int], ...] = ((1e-3, 5), (0.0, 20))
     grown: int = 3
-    fits: float = 1e-10
+    fits: float = 1e-12
     growths: int = 24
     regrown: int = 4
     exact: float = 1e-12
