@@ -16,7 +16,7 @@ from ..nodes.rounded import Rounding
 from ..tolerances import ALIKE
 from .doubts import guessed_directions, unborne, unconfirmed
 from .materials.cells import no_cells, recognise_cells
-from .nullspace.certificate import largest_residual
+from .nullspace.certificate import residuals
 from .nullspace.material import lame_ratio, poisson_ratio
 from .nullspace.redundancy import checked
 from .nullspace.solution import Solution
@@ -33,7 +33,7 @@ def described(
     *,
     cells: bool,
     rounding: Rounding | None,
-    placed_again: Callable[[sp.csr_array], NDArray[np.float64]],
+    placed_again: Callable[[sp.csr_array], tuple[NDArray[np.float64], NDArray[np.float64]]],
 ) -> ElasticityRecovery:
     """The recovery, with its certificate, material and cells, and the sentences that go with them.
 
@@ -48,10 +48,11 @@ def described(
     rounding : Rounding, optional
         Of the entries, where they have few digits.
     placed_again : callable
-        Points (n, d) from another matrix that may have been rounded to the given one.
+        Points (n, d), and misfits (k,), from another matrix that may have been rounded to the given one.
     """
     with clock("certify"):
-        error = largest_residual(nodal, solution.valid, solution.points, solution.ratio)
+        misfits = residuals(nodal, solution.valid, solution.points, solution.ratio)
+        error = float(np.abs(misfits).max()) if len(misfits) else float("nan")
         near = not error >= max(ALIKE, rounding.spread if rounding else 0.0)  # NaN where only elements can tell
         ratio = _lame_ratio(nodal, solution) if near else None
     found = no_cells()
@@ -70,10 +71,11 @@ def described(
         return described(nodal, numbering, solution, clock, cells=True, rounding=rounding, placed_again=placed_again)
     if alone and not (determined(solution.points) & ~lone).any():
         status, reason, lone = "uncertified", NOTHING_CHECKED, np.zeros_like(lone)
+    known = None
     if rounding and near and not any(solution.freedoms):
         with clock("certify"):
-            doubt = known_to(solution.points, solution.component, rounding, placed_again, sized=False)
-        status, reason = of_few_digits(nodal, solution, error, numbering, rounding, doubt)
+            known = known_to(solution.points, solution.component, misfits, rounding, placed_again, sized=False)
+        status, reason = of_few_digits(nodal, solution, error, numbering, rounding, known)
     elif rounding:
         reason = hidden(reason, rounding)
     withheld = np.zeros(nodal.n, dtype=bool)
@@ -100,6 +102,7 @@ def described(
         poisson_ratio=None if ratio is None else poisson_ratio(ratio),
         cells=found,
         backward_error=backward,
+        position_error=known.error if known and known.explained else None,
         status=status,
         reason=reason.text,
         advice=reason.advice,

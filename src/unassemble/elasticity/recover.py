@@ -16,6 +16,7 @@ from ..nodes.rounded import Rounding, with_exact_sums
 from ..nodes.unknowns import find_numbering
 from .description import described
 from .doubts import with_doubts
+from .nullspace.certificate import residuals
 from .positions import solve
 from .results import ElasticityRecovery
 from .springs import without_springs
@@ -90,9 +91,10 @@ def place_nodes(
         if why:
             raise GeometryError(no_positions(why))
 
-    def placed_again(matrix: sp.csr_array) -> NDArray[np.float64]:
+    def placed_again(matrix: sp.csr_array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         other = with_doubts(without_springs(nodal_matrix(matrix, numbering)), numbering)
         with blas_threads(1):
-            return solve(other, patch).points
+            again = solve(other, patch)
+        return again.points, residuals(other, again.valid, again.points, again.ratio)
 
     return described(nodal, numbering, solution, clock, cells=cells, rounding=rounding, placed_again=placed_again)

@@ -35,6 +35,8 @@ class ElasticityRecovery:
         Elements, where they are recognised.
     backward_error : float
         Largest residual of a valid identity; or of the re-assembled matrix where `cells` hold.
+    position_error : float or None
+        See :class:`~unassemble.recovery.mechanical.Mechanical`.
     status : {"certified", "uncertified"}
     reason, advice : str
         Why; what to do next where they are not certified.
@@ -54,6 +56,7 @@ class ElasticityRecovery:
     poisson_ratio: float | None
     cells: Cells
     backward_error: float
+    position_error: float | None
     status: str
     reason: str
     numbering: str

@@ -81,6 +81,7 @@ def serve_body(
         advice=reason.advice,
         operator="elasticity",
         backward_error=found.backward_error,
+        position_error=found.position_error,
         timings=clock.timings,
         warnings=(*matrix.warnings, *found.warnings, *notes),
         node_of_row=found.node_of_row,
