@@ -46,8 +46,8 @@ class InsideOptions:
         Weights of the prior and steps for vertices at the rim, while those inside stay.
     grown, fits : float
         Distance in edges up to which vertices move again, and misfit up to which they need not, in units of rounding.
-    regrown : int
-        Fits of all that has grown together.
+    growths, regrown : int
+        Fits of what grows, with fewer vertices each, and of all together.
     exact : float
         Root mean square misfit of whole entries that is none, in units of typical ones.
     """
@@ -62,10 +62,11 @@ class InsideOptions:
     nearly: float = 1e-3
     rounds: int = 8
     patience: int = 3
-    peaks: float = 0.25
+    peaks: float = 0.5
     growing: tuple[tuple[float, int], ...] = ((1e-3, 5), (0.0, 20))
     grown: int = 3
-    fits: float = 1e-7
+    fits: float = 1e-10
+    growths: int = 24
     regrown: int = 4
     exact: float = 1e-12
 
@@ -236,7 +237,7 @@ def _grown(problem: WholeEntries, core: Fit, rim: Rim, options: InsideOptions) -
     folded[piece.triangles[areas(piece, z) <= 0]] = True
     grown = Rim(piece, rim.given, rim.left | ~folded[piece.triangles].any(axis=1))
     free = movable
-    for _ in range(options.rounds):
+    for _ in range(options.growths):
         if not free.any():
             break
         z = fit_near(problem, z, core.scale, grown.whole, free, options.growing)
