@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from assembled import box, error, heterogeneous, on_plane, permuted_nodes, stiffness
+from assembled import box, error, heterogeneous, on_plane, permuted_nodes, recover_elasticity, stiffness
 from supported import assert_certified, given, judged
 
-from unassemble.elasticity import positions, recover_elasticity
+from unassemble.elasticity import positions
 from unassemble.errors import RecoveryError
 from unassemble.nodes.unknowns import find_numbering
 
