@@ -24,7 +24,7 @@ from ..tolerances import ALIKE, LAST_DIGITS
 from ..words import Reason
 from .doubts import guessed_directions, unborne, unconfirmed
 from .materials.cells import Cells, no_cells, recognise_cells
-from .nullspace.certificate import largest_residual
+from .nullspace.certificate import residuals
 from .nullspace.material import lame_ratio, poisson_ratio
 from .nullspace.redundancy import checked
 from .nullspace.solution import Solution
@@ -61,15 +61,17 @@ def described(
     clock: Clock,
     request: Request,
     known: Anchors,
-    placed_again: Callable[[sp.csr_array], NDArray[np.float64]],
+    placed_again: Callable[[sp.csr_array], tuple[NDArray[np.float64], NDArray[np.float64]]],
 ) -> Body:
     """The body, with its certificate, material and cells, and the sentences that go with them.
 
-    `placed_again` finds points (n, d) from another matrix that may have been rounded to the given one.
+    `placed_again` finds points (n, d), and misfits (k,), from another matrix that may have been rounded to the given
+    one.
     """
     cells, rounding = request.cells, request.rounding
     with clock("certify"):
-        error = largest_residual(nodal, solution.valid, solution.points)
+        misfits = residuals(nodal, solution.valid, solution.points)
+        error = float(np.abs(misfits).max()) if len(misfits) else float("nan")
         near = not error >= max(ALIKE, rounding.spread if rounding else 0.0)  # NaN where only elements can tell
         ratio = _lame_ratio(nodal, solution) if near else None
     found = no_cells()
@@ -84,10 +86,11 @@ def described(
         return described(matrix, nodal, numbering, solution, clock, more, known, placed_again)
     if alone and not (determined(solution.points) & ~lone).any():
         status, reason, lone = "uncertified", NOTHING_CHECKED, np.zeros_like(lone)
+    bar = None
     if rounding and near and not any(solution.freedoms):
         with clock("certify"):
-            doubt = known_to(solution.points, solution.component, rounding, placed_again, sized=False)
-        status, reason = of_few_digits(nodal, solution, error, numbering, rounding, doubt)
+            bar = known_to(solution.points, solution.component, misfits, rounding, placed_again, sized=False)
+        status, reason = of_few_digits(nodal, solution, error, numbering, rounding, bar)
     elif rounding:
         reason = hidden(reason, rounding)
     withheld = np.zeros(nodal.n, dtype=bool)
@@ -124,6 +127,7 @@ def described(
         advice=reason.advice,
         operator="elasticity",
         backward_error=found.backward_error if found.certified else error,
+        position_error=bar.error if bar and bar.explained else None,
         timings=clock.timings,
         warnings=(
             *matrix.warnings,

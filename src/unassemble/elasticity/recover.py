@@ -16,6 +16,7 @@ from ..nodes.numbering import Numbering
 from ..recovery import Body
 from .description import Request, described
 from .doubts import with_doubts
+from .nullspace.certificate import residuals
 from .positions import solve
 from .springs import without_springs
 from .verdict import about_made_up_nodes, about_open_rows, no_positions
@@ -55,9 +56,10 @@ def serve_body(
         if why:
             raise GeometryError(no_positions(why))
 
-    def placed_again(matrix: sp.csr_array) -> NDArray[np.float64]:
+    def placed_again(matrix: sp.csr_array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         other = with_doubts(without_springs(nodal_matrix(matrix, numbering)), numbering)
         with blas_threads(1):
-            return solve(other).points
+            again = solve(other)
+        return again.points, residuals(other, again.valid, again.points)
 
     return described(matrix, nodal, numbering, solution, clock, request, known, placed_again)

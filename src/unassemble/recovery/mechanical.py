@@ -41,11 +41,14 @@ class Mechanical(Recovery):
     ----------
     evidence : tuple of Evidence
         The null space of each piece's identities.
+    position_error : float or None
+        Of entries with few digits: how far off a node may be, ten standard deviations, over its piece's diameter.
     quads : (m, 4) int64
         Cells of four corners, counter-clockwise in the plane.
     """
 
     evidence: tuple[Evidence, ...] = ()
+    position_error: float | None = None
     quads: NDArray[np.int64] = field(default_factory=none_of(4))
 
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from ...nodes.nodal import NodalMatrix, determined
 
 
-def largest_residual(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64]) -> float:
-    """Largest misfit of a valid identity among determined nodes.
+def residuals(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Misfits of valid identities among determined nodes.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def largest_residual(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArr
 
     Returns
     -------
-    float
+    (k,) float64
         Relative to the size of a row, times the mean distance between coupled nodes.
     """
     d = nodal.dim
@@ -39,17 +39,14 @@ def largest_residual(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArr
     ) @ (~known).astype(float)
     usable = valid & (blind == 0)[:, None, None]
     if not usable.any():
-        return float("nan")
+        return np.empty(0)
     size = np.where(nodal.size > 0, nodal.size, 1.0) * _mean_distance(nodal, points)
     value = np.empty((d, d, d, nodal.n))
     for c, b in product(range(d), repeat=2):
         entries = np.ascontiguousarray(nodal.data[:, c, b])
         block = sp.csr_array((entries, nodal.indices, nodal.indptr), shape=(nodal.n, nodal.n))
         value[c, b] = (block @ x).T / size
-    worst = 0.0
-    for misfit, needed in _differences(value, usable, d):
-        worst = max(worst, float(np.abs(misfit[needed]).max(initial=0)))
-    return worst
+    return np.concatenate([misfit[needed] for misfit, needed in _differences(value, usable, d)])
 
 
 def _mean_distance(nodal: NodalMatrix, points: NDArray) -> float:
