@@ -139,8 +139,8 @@ def verdict(
 
 
 def _softest(solution: Solution) -> float:
-    """Least singular value of a field that is no translation or scale, of pieces that are not settled."""
-    return min((one.gap for one in solution.evidence if one.gap > 0 and not one.settled), default=1.0)
+    """Least singular value of a field that is no translation or scale."""
+    return min((one.gap for one in solution.evidence if one.gap > 0), default=1.0)
 
 
 def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, *, exact: bool = True) -> Reason:
@@ -166,12 +166,6 @@ def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, 
             f"a field that is no translation or scale satisfies the identities up to {_softest(solution):.1e}, and "
             "nodes that it moves may be wrong by more than 1e-8",
             "slender bodies have such fields, and nodes that few rows hold",
-        )
-    if not solution.strict:
-        return Reason.of(
-            "supports leave too few rows that are surely whole",
-            "those that add up to zero were taken for whole",
-            advice=WITHOUT_SUPPORTS,
         )
     if _torn(nodal, solution):
         return Reason.of(

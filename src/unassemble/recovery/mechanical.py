@@ -25,15 +25,12 @@ class Evidence:
         Singular value of the best field that is none of these; an upper bound on large bodies.
     rows : int
         Nodes with valid identities.
-    settled : bool
-        Whether the residual is that small beside the gap that no other field has a part in the coordinates.
     """
 
     null_dimension: int
     residual: float
     gap: float
     rows: int
-    settled: bool = False
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
