@@ -40,8 +40,9 @@ class InsideOptions:
     rounds, patience : int
         Fits, with fewer vertices at the rim each, and those with more of them; and how many come before the rim is
         taken off as a whole in a small mesh, which loses more of it.
-    peaks : float
-        Part of the largest misfit above which there are places to peel.
+    peaks, peaks_again : float
+        Part of the largest misfit above which there are places to peel, from the first start and from the next one:
+        what one comes to a bad end with the other often does not.
     growing : tuple of (float, int)
         Weights of the prior and steps for vertices at the rim, while those inside stay.
     grown, fits : float
@@ -62,7 +63,8 @@ class InsideOptions:
     nearly: float = 1e-3
     rounds: int = 8
     patience: int = 3
-    peaks: float = 0.35
+    peaks: float = 0.25
+    peaks_again: float = 0.35
     growing: tuple[tuple[float, int], ...] = ((1e-3, 5), (0.0, 20))
     grown: int = 3
     fits: float = 1e-12
@@ -152,8 +154,9 @@ def fit_inside(
 def _core(problem: WholeEntries, rim: Rim, options: InsideOptions) -> tuple[Fit, Rim] | None:
     """A fit of all entries that some rim has whole, or else the last one; None where there is no drawing."""
     found = None
-    for fit, near in first_fits(problem, rim, options.newton):
-        found = _shrunk(problem, rim, fit, 0 if near else options.patience, options)
+    for again, (fit, near) in enumerate(first_fits(problem, rim, options.newton)):
+        less = replace(options, peaks=options.peaks_again) if again else options
+        found = _shrunk(problem, rim, fit, 0 if near else options.patience, less)
         if found[0].misfit <= options.exact:
             break
     return found
