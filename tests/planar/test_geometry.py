@@ -162,7 +162,7 @@ def test_error_bars_are_those_of_repeated_draws():
     if mean_orientation(piece, z) < 0:
         z = np.conj(z)
     sigma, rng = 1e-6, np.random.default_rng(3)
-    predicted = sigma**2 * coordinate_covariances(piece, z, beside=0.0)
+    predicted = sigma**2 * coordinate_covariances(piece, z, free_scale=True)
     draws = []
     for _ in range(150):
         found = polish(piece, weights + sigma * rng.standard_normal(len(weights)), z).z
@@ -177,8 +177,8 @@ def test_error_bars_are_those_of_repeated_draws():
 
 def test_sampled_error_bars_agree_with_exact_ones():
     piece, _, z = single_piece(150, seed=6)
-    exact = coordinate_covariances(piece, z, beside=None)
-    sampled = coordinate_covariances(piece, z, beside=None, options=SamplingOptions(exact_up_to=0))
+    exact = coordinate_covariances(piece, z, free_scale=False)
+    sampled = coordinate_covariances(piece, z, free_scale=False, options=SamplingOptions(exact_up_to=0))
     ratio = np.sqrt(np.trace(sampled, axis1=1, axis2=2) / np.trace(exact, axis1=1, axis2=2))
     assert np.median(ratio) == pytest.approx(1, abs=0.05)
     assert ratio.std() < 0.08

@@ -42,7 +42,7 @@ def deviations_of(n: int, fits: Sequence[Fitted], placed: Sequence[NDArray], tas
             fit.entries.weights(parameters) / spread,
             z,
             distant_pair(parameters),
-            beside=0.0 if task.scale is None else None,
+            free_scale=task.scale is None,
             stretch=stretch,
             nodes=fit.entries.nodes,
         )

@@ -49,7 +49,6 @@ def cautious_polish(
     *,
     scale: float | None = None,
     spread: NDArray | None = None,
-    pins: NDArray | None = None,
     options: CautiousOptions | None = None,
 ) -> PolishedMesh:
     """Maximum-likelihood mesh from a distant start, with a factorisation for each step.
@@ -61,7 +60,6 @@ def cautious_polish(
     z : (n,) complex128
     scale : float, optional
     spread : (e,) float64, optional
-    pins : (k,) int, optional
         As for the polish.
     options : CautiousOptions, optional
     """
@@ -69,7 +67,7 @@ def cautious_polish(
     spread = np.ones(len(weights)) if spread is None else spread
     extent = np.abs(z - z.mean()).max()
     z = (z - z.mean()) / extent
-    pins = distant_pair(z) if pins is None else pins
+    pins = distant_pair(z)
     problem = Problem(Cotangents(piece), weights, spread, scale)
     fit, steps, length, converged = problem.at(z), 0, np.inf, False
     history: list[tuple[float, float]] = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,10 +15,8 @@ from ..topology import Piece
 from .cautious import CautiousOptions, cautious_polish, count_flipped
 from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
-from .hinged import Hinged
 from .polish import PolishedMesh, errors_of_one_size, polish
 from .robust import ASIDE
-from .side_by_side import SideBySide
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +68,7 @@ def brought_near(piece: Piece, weights: NDArray, mesh: PieceMesh, *, scale: floa
     if _fits_roughly(piece, weights, mesh.z, mesh.scale):
         return mesh
     try:
-        found = _polished(piece, weights, mesh.z, scale, None, None)
+        found = _polished(piece, weights, mesh.z, scale, None)
     except SolverError:
         return mesh
     near = found.converged and _fits_roughly(piece, weights, found.z, found.scale)
@@ -94,14 +92,12 @@ def refined(
     scale: float | None,
     rounding: bool,
     noise: NDArray[np.float64] | None = None,
-    pins: NDArray[np.int64] | None = None,
 ) -> PieceMesh:
     """Gauss-Newton polish; where it cannot be done the mesh stays as it is, with a note.
 
     `noise`, (e,), are standard deviations of the entries' errors, up to a common factor, all equal by default. With
     `rounding`, errors are taken to be those of assembly in floating-point arithmetic, unless the misfit is beyond that
     and more likely to be such noise. Without it the noise is known, and tested: entries set aside count as any other.
-    `pins` are as for the polish.
     """
     noise = None if noise is None or (noise == 1).all() else noise
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -114,14 +110,14 @@ def refined(
         weights[mesh.aside] = mesh.scale * edge_weights(piece, mesh.z)[mesh.aside]
         spread = _set_aside(mesh.aside, len(weights), spread)
     try:
-        found = _polished(piece, weights, mesh.z, scale, spread, pins)
+        found = _polished(piece, weights, mesh.z, scale, spread)
         if (
             rounding
             and spread is not None
             and errors_of_one_size(weights / found.scale - edge_weights(piece, found.z), spread)
         ):
             spread = noise
-            found = _polished(piece, weights, found.z, scale, spread, pins)
+            found = _polished(piece, weights, found.z, scale, spread)
     except SolverError as error:
         shortest = _shortest(piece, mesh.z)
         too_far = f"the start is too far off, with edges of {shortest:.0e} of its size"
@@ -132,53 +128,6 @@ def refined(
         return PieceMesh(found.z, found.scale, mesh.notes, spread, aside=mesh.aside)
     note = f"the polish did not converge: its last step moved points by {found.last_step:.0e} of the size"
     return PieceMesh(found.z, found.scale, (*mesh.notes, note), spread, found.last_step, mesh.aside)
-
-
-def refined_together(
-    pieces: Sequence[Piece],
-    weights: NDArray,
-    meshes: Sequence[PieceMesh],
-    joined: Hinged | None,
-    scale: float | None,
-    *,
-    rounding: bool,
-    noise: NDArray[np.float64],
-) -> list[PieceMesh] | None:
-    """Polish several pieces with a single c; None if that does not converge.
-
-    Parameters
-    ----------
-    pieces : sequence of Piece
-    weights : (e,) float64
-        -A_ij of each edge of the whole graph.
-    meshes : sequence of PieceMesh
-        Starts.
-    joined : Hinged or None
-        The pieces, where rings of them hold each other; without it each has a similarity of its own.
-    scale : float, optional
-        c, where it is known.
-    rounding : bool
-        As for :func:`refined`.
-    noise : (e,) float64
-        Of the entries of the whole graph, as for :func:`refined`.
-    """
-    beside = SideBySide.of(pieces, [mesh.z for mesh in meshes])
-    union = joined or beside
-    aside = [first + mesh.aside for first, mesh in zip(beside.edges, meshes, strict=False) if mesh.aside is not None]
-    notes = tuple(dict.fromkeys(note for mesh in meshes for note in mesh.notes))
-    start = PieceMesh(union.z, meshes[0].scale, notes, aside=np.concatenate(aside) if aside else None)
-    rows = union.piece.edge_rows
-    found = refined(
-        union.piece, weights[rows], start, scale=scale, rounding=rounding, noise=noise[rows], pins=union.pins
-    )
-    if found.notes != notes:
-        return None
-    spreads = [None] * len(pieces) if found.spread is None else beside.split(found.spread, beside.edges)
-    positions = [found.z[own] for own in joined.local] if joined else beside.split(found.z, beside.vertices)
-    return [
-        PieceMesh(z, found.scale, found.notes, spread, found.doubt, mesh.aside)
-        for z, spread, mesh in zip(positions, spreads, meshes, strict=True)
-    ]
 
 
 def _set_aside(edges: NDArray[np.int64], count: int, spread: NDArray | None) -> NDArray[np.float64]:
@@ -194,18 +143,17 @@ def _polished(
     start: NDArray,
     scale: float | None,
     spread: NDArray | None,
-    pins: NDArray[np.int64] | None,
 ) -> PolishedMesh:
     """By the chord iteration; where it fails, by small steps from the better of start and result.
 
     Rounding in the normal equations of long thin pieces is one reason to fail.
     """
     try:
-        found = polish(piece, weights, start, scale=scale, spread=spread, pins=pins)
+        found = polish(piece, weights, start, scale=scale, spread=spread)
     except SolverError:  # steps that led to flat triangles; small ones do not
         if piece.n_vertices > CautiousOptions().most_vertices:
             raise
-        return cautious_polish(piece, weights, start, scale=scale, spread=spread, pins=pins)
+        return cautious_polish(piece, weights, start, scale=scale, spread=spread)
     finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
     flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
     if found.converged and not flipped:
@@ -213,7 +161,7 @@ def _polished(
     if piece.n_vertices > CautiousOptions().most_vertices:
         return found
     nearest = found.z if flipped <= count_flipped(piece, start) else start
-    again = cautious_polish(piece, weights, nearest, scale=scale, spread=spread, pins=pins)
+    again = cautious_polish(piece, weights, nearest, scale=scale, spread=spread)
     return again if again.residual < found.residual or not finite else found
 
 

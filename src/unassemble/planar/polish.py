@@ -115,7 +115,6 @@ def polish(
     *,
     scale: float | None = None,
     spread: NDArray | None = None,
-    pins: NDArray | None = None,
     options: PolishOptions | None = None,
 ) -> PolishedMesh:
     """Improve positions to the level that the entries allow.
@@ -133,14 +132,12 @@ def polish(
     spread : (e,) float64, optional
         Standard deviations of the errors of a up to a common factor, for instance
         :func:`~unassemble.planar.cotangent.weight_roundings`; of one size by default.
-    pins : (k,) int, optional
-        Vertices that are held, two of each part where the piece falls apart; by default two that are far apart.
     options : PolishOptions, optional
     """
     options = options or PolishOptions()
     extent = np.abs(z - z.mean()).max()
     z = (z - z.mean()) / extent
-    pins = distant_pair(z) if pins is None else pins
+    pins = distant_pair(z)
     spread = np.ones(len(weights)) if spread is None else spread
     model = Cotangents(drawn) if isinstance(drawn, Piece) else drawn
     problem = Problem(model, weights, spread, scale)

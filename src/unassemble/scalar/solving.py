@@ -20,7 +20,7 @@ from ..planar.piece import PieceMesh, brought_near, collapsed, positions, refine
 from ..tolerances import NOISY
 from ..topology import Piece, Polygons, Topology
 from ..words import sentences
-from .factors import Factors, fitted_together
+from .factors import leaders
 from .noise import Noise, with_vanished
 from .placement import Placement
 from .wrong_entries import wrong_entries
@@ -72,8 +72,6 @@ class Solved:
     topology : Topology
         Of that matrix, without the pieces that have no positions; these are listed in its ``failures``.
     meshes : list of PieceMesh
-    factors : Factors
-        What each piece by itself says of c.
     noise : Noise or None
         Without that of rounding, if the misfit is far beyond it.
     """
@@ -81,7 +79,6 @@ class Solved:
     matrix: OperatorMatrix
     topology: Topology
     meshes: list[PieceMesh]
-    factors: Factors
     noise: Noise | None
 
     @property
@@ -90,9 +87,11 @@ class Solved:
         return np.array([mesh.scale for mesh in self.meshes])
 
     def freedom(self, *, free_scale: bool) -> int:
-        """Entries less unknowns: 2 v - 4 coordinates of each piece, as far as rings do not tie them, and each c."""
-        coordinates = sum(2 * piece.n_vertices - 4 for piece in self.topology.pieces) - int(self.factors.closings.sum())
-        return len(self.topology.edges) - coordinates - (self.factors.count if free_scale else 0)
+        """Entries less unknowns: 2 v - 4 coordinates of each piece, and each c that was fitted."""
+        coordinates = sum(2 * piece.n_vertices - 4 for piece in self.topology.pieces)
+        lead = leaders(self.topology)
+        fitted = int(np.sum((lead == np.arange(len(lead))) | (self.scales != self.scales[lead])))
+        return len(self.topology.edges) - coordinates - (fitted if free_scale else 0)
 
 
 def solve(
@@ -147,8 +146,7 @@ def solve(
             noise = None
             meshes = _polished(topology, matrix, starts, scale, noise) if refine else starts
         topology, meshes = _successes(topology, [_sound(*both) for both in zip(topology.pieces, meshes, strict=True)])
-        meshes, factors = fitted_together(topology, -matrix.entries, meshes, noise, scale, refine=refine)
-    return Solved(matrix, topology, meshes, factors, noise)
+    return Solved(matrix, topology, meshes, noise)
 
 
 def _is_rounding(topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], noise: Noise) -> bool:
@@ -163,19 +161,23 @@ def _is_rounding(topology: Topology, matrix: OperatorMatrix, meshes: list[PieceM
 def _polished(
     topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], scale: float | None, noise: Noise | None
 ) -> list[PieceMesh]:
-    """Each piece by itself."""
+    """Each piece by itself; under known noise those that share vertices with the c of the one that tells it best."""
     errors = with_vanished(topology) if noise is None else noise.on(topology)
-    return [
-        refined(
-            piece,
-            -matrix.entries[piece.edge_rows],
-            mesh,
+
+    def polished(p: int, scale: float | None) -> PieceMesh:
+        rows = topology.pieces[p].edge_rows
+        return refined(
+            topology.pieces[p],
+            -matrix.entries[rows],
+            meshes[p],
             scale=scale,
             rounding=noise is None,
-            noise=errors[piece.edge_rows],
+            noise=errors[rows],
         )
-        for piece, mesh in zip(topology.pieces, meshes, strict=True)
-    ]
+
+    lead = leaders(topology) if noise else np.arange(len(meshes))
+    first = {p: polished(p, scale) for p in np.unique(lead).tolist()}
+    return [first.get(p) or polished(p, scale or first[int(lead[p])].scale) for p in range(len(meshes))]
 
 
 def _sound(piece: Piece, mesh: PieceMesh) -> Outcome:

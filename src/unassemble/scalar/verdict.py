@@ -145,7 +145,7 @@ def verdict(f: Findings, other_meshes: Callable[[], tuple[list[Alternative], str
 def _by_itself(f: Findings) -> tuple[bool, Reason]:
     """Whether the mesh fits as well as it is sure of its positions, and the reason."""
     error, test, topology = f.certificate.backward_error, f.near.test, f.solved.topology
-    good, apart = f.near.passes, discord(topology, f.solved.factors, error, f.solved.noise)
+    good, apart = f.near.passes, discord(topology, f.solved.meshes, error, f.solved.noise)
     if good and apart:
         return False, Reason.of(f"the matrix is given back to {error:.1e} (relative), but {apart[0]}", *apart[1:])
     if test and f.near.by_noise:

@@ -19,7 +19,7 @@ from ...topology.pieces import planar_pieces
 from ..candidates.candidates import Candidates
 from .maps import map_of
 from .triangulation import triangulation
-from .within_errors import GAP, beyond, factor_tolerances, polished
+from .within_errors import GAP, beyond, polished
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ class Labelling:
         solved = [(piece, mesh) for piece, mesh in zip(self.pieces, meshes, strict=True) if mesh]
         misfit = misfits(n, edges, self.weights, solved)
         errors = self._errors
-        better = None if errors is None else polished(solved, self.weights, errors, misfit)
+        better = None if errors is None else polished(solved, self.weights, errors, misfit, candidates.scale)
         if better is None or errors is None:
             errors = None
         else:
@@ -162,8 +162,7 @@ def _add_discord(
     """
     if not solved or (len(solved) == 1 and scale is None):
         return
-    tolerance = 0.0 if errors is None else factor_tolerances(solved, errors, scale)
-    add_differing_factors(solved, misfit, scale, tolerance)
+    add_differing_factors(solved, misfit, scale)
     if (misfit > ALIKE).any():  # whether rings close is the last question, and the dearest
         return
     topology = Topology(n, edges, tuple(piece for piece, _ in solved), "")
@@ -174,16 +173,10 @@ def _add_discord(
     misfit[at_hinges] = np.maximum(misfit[at_hinges], min(left, 1.0))
 
 
-def add_differing_factors(
-    solved: list[tuple[Piece, PieceMesh]], misfit: NDArray, scale: float | None, tolerance: NDArray | float = 0.0
-) -> None:
-    """Raise the misfit of pieces with another factor than is known, or than the largest has, by that difference.
-
-    Differences up to `tolerance`, (pieces,), are none.
-    """
+def add_differing_factors(solved: list[tuple[Piece, PieceMesh]], misfit: NDArray, scale: float | None) -> None:
+    """Raise the misfit of pieces with another factor than is known, or than the largest has, by that difference."""
     scale = scale or max(solved, key=lambda item: item[0].n_vertices)[1].scale
     apart = np.minimum(np.abs(np.array([mesh.scale for _, mesh in solved]) / scale - 1), 1.0)
-    apart[apart <= tolerance] = 0.0
     rows = np.concatenate([piece.edge_rows for piece, _ in solved])
     misfit[rows] = np.maximum(misfit[rows], np.repeat(apart, [len(piece.edge_rows) for piece, _ in solved]))
 
