@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from ..tolerances import LAST_DIGITS, ROUNDED
 from ..topology import Piece
 from .cotangent import edge_weights
-from .iterative import IterativeNormalEquations
 from .normal import Jacobian, NormalEquations, WeightJacobian, distant_pair
 
 _log = logging.getLogger(__name__)
@@ -40,8 +39,6 @@ class PolishOptions:
     settled : float
         The iteration also ends when a step changes the fitted weights by less than this times the noise that the misfit
         shows: the mesh then moves by as small a part of its error bars.
-    direct_limit : int
-        Up to this many vertices J'J is factorised; above, conjugate gradients take a tenth of the memory.
     """
 
     max_steps: int = 40
@@ -50,7 +47,6 @@ class PolishOptions:
     rounding: float = 1e-10
     contraction: float = 0.2
     settled: float = 1e-3
-    direct_limit: int = 1_500_000
 
 
 SHORT = PolishOptions(max_steps=8, max_factorisations=3)
@@ -143,22 +139,17 @@ def polish(
     problem = Problem(model, weights, spread, scale)
     fit = problem.at(z)
     equations: NormalEquations | None = None
-    system: GaussNewton | IterativeGaussNewton | None = None
+    system: GaussNewton | None = None
     factorisations, steps, length, converged = 0, 0, np.inf, False
     while steps < options.max_steps and not converged:
         jacobian = model.jacobian(fit.z, spread)
         fresh = system is None
         if system is None:
-            fitted = fit.weights if scale is None else None
-            if not (isinstance(drawn, Piece) and len(z) > options.direct_limit):
-                if equations is None:
-                    equations = NormalEquations(jacobian, pins)
-                else:
-                    equations.renew(jacobian)
-                system = GaussNewton(jacobian, equations, fitted)
+            if equations is None:
+                equations = NormalEquations(jacobian, pins)
             else:
-                near = WeightJacobian(drawn, fit.z, spread)
-                system = IterativeGaussNewton(IterativeNormalEquations(drawn, near, fit.z, fitted))
+                equations.renew(jacobian)
+            system = GaussNewton(jacobian, equations, fit.weights if scale is None else None)
             factorisations += 1
         move = system(jacobian, fit.misfit)
         previous, length = length, float(np.abs(move).max())
@@ -166,8 +157,6 @@ def polish(
         if slow and length > options.rounding and not fresh:
             if factorisations == options.max_factorisations:
                 break
-            if isinstance(system, IterativeGaussNewton):
-                system.release()
             system, length = None, np.inf
             continue
         better = downhill(problem, fit, move)
@@ -283,21 +272,6 @@ class GaussNewton:
             return move
         log_scale = float(self._weights @ (misfit - jacobian.forward(move))) / self._complement
         return move - log_scale * self._response
-
-    def release(self) -> None:
-        """Give the memory of the factor back."""
-        self._equations.release()
-
-
-class IterativeGaussNewton:
-    """The same steps: conjugate gradients take the scale along."""
-
-    def __init__(self, equations: IterativeNormalEquations):
-        self._equations = equations
-
-    def __call__(self, jacobian: Jacobian, misfit: NDArray) -> NDArray:
-        """Displacement d (n,) complex; the best scale has left nothing of w in the misfit."""
-        return self._equations.solve(jacobian.transpose(misfit))
 
     def release(self) -> None:
         """Give the memory of the factor back."""

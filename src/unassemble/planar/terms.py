@@ -17,7 +17,6 @@ from ..errors import SolverError
 from ..topology import Piece
 from .cotangent import cotangent, edge_weights
 from .normal import NormalEquations, WeightJacobian, distant_pair
-from .polish import PolishOptions
 from .suspects import Complement
 
 MASS, COEFFICIENT, ONE_SIGN = "mass", "coefficient", "one sign"
@@ -46,7 +45,7 @@ class Term:
 def lacking_term(
     piece: Piece, weights: NDArray, z: NDArray, scale: float, spread: NDArray | None, *, free_scale: bool
 ) -> Term | None:
-    """The term that explains most of a misfit; None where there are too few entries to spare, or too many vertices.
+    """The term that explains most of a misfit; None where there are too few entries to spare.
 
     Parameters
     ----------
@@ -63,7 +62,7 @@ def lacking_term(
         Whether c was fitted.
     """
     freedom = len(weights) - 2 * piece.n_vertices + 4 - free_scale
-    if freedom < 3 or piece.n_vertices > PolishOptions().direct_limit:
+    if freedom < 3:
         return None
     names, terms = _terms(piece, z)
     count = min(len(names), freedom // 3)  # of few entries the first ones only
