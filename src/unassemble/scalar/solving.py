@@ -23,7 +23,6 @@ from ..words import sentences
 from .factors import leaders
 from .noise import Noise, with_vanished
 from .placement import Placement
-from .wrong_entries import wrong_entries
 
 Clock = Callable[[str], AbstractContextManager[None]]
 
@@ -122,22 +121,15 @@ def solve(
 
     with clock(method):
         doubtful = in_doubt(matrix, topology, start, scale, noise.sigma if noise and not noise.digits else None)
-        spoilt: dict[Piece, PieceMesh] = {}
-        if doubtful.any():
-            spoilt, doubtful = wrong_entries(matrix, topology, start, doubtful, scale)
-
-    def attempt(piece: Piece) -> Outcome:
-        return spoilt.get(piece) or start(piece)
 
     if doubtful.any() and task.search:
         with clock("faces"), blas_threads(1):  # hundreds of small readings
-            matrix, topology, outcomes = completed(matrix, topology, attempt, doubtful, scale)
+            matrix, topology, outcomes = completed(matrix, topology, start, doubtful, scale)
             # The search leaves c free in its solves, stops early and knows one method, which is polished.
             if scale is not None or not refine:
-                found = zip(topology.pieces, outcomes, strict=True)
-                outcomes = [mesh if _is_spoilt(mesh) else attempt(piece) for piece, mesh in found]
+                outcomes = [start(piece) for piece in topology.pieces]
     else:
-        outcomes = [attempt(piece) for piece in topology.pieces]
+        outcomes = [start(piece) for piece in topology.pieces]
     topology, meshes = _successes(topology, outcomes)
     with clock("polish") if refine else nullcontext():
         starts = meshes
@@ -184,11 +176,6 @@ def _sound(piece: Piece, mesh: PieceMesh) -> Outcome:
     """A mesh whose points have places of their own; else why it is none."""
     why = collapsed(piece, mesh.z)
     return GeometryError(sentences([f"no mesh fits, and {why} in the nearest one", *mesh.notes])) if why else mesh
-
-
-def _is_spoilt(mesh: Outcome) -> bool:
-    """Whether it leaves out entries that are wrong."""
-    return isinstance(mesh, PieceMesh) and mesh.aside is not None
 
 
 def _successes(topology: Topology, outcomes: list[Outcome]) -> tuple[Topology, list[PieceMesh]]:
