@@ -110,10 +110,13 @@ def test_impossible_scale(scale):
         recover(specimen(*random_mesh(60)).matrix, scale=scale)
 
 
-def test_scale_of_the_other_sign():
-    found = recover(specimen(*random_mesh(60)).matrix, scale=-1.0)
+def test_wrong_scales():
+    matrix = specimen(*random_mesh(60)).matrix
+    with pytest.raises(GeometryError, match="or the given scale"):
+        recover(matrix, scale=-1.0)
+    found = recover(matrix, scale=0.97)
     assert found.status == "uncertified"
-    assert "the scale -1 does not fit, and 1 does" in found.reason
+    assert "leave out `scale`" in found.advice
 
 
 def test_options_that_cannot_be_used_are_reported_or_refused():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext, suppress
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from ..cells import SEARCHED_ROWS, Alternative, alternatives, components_of
 from ..certify import certify
 from ..clock import Clock
-from ..errors import RecoveryError
 from ..linalg import AnalysisAhead, Factorisation, UpperTriangle, blas_threads, factorisation
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.hinges import free_images, join
 from ..planar.pencil import pencil_pattern
 from ..recovery import PlanarMesh
-from ..tolerances import ALIKE, CERTIFIED, SIGMAS, SMALL
+from ..tolerances import CERTIFIED, SIGMAS, SMALL
 from ..topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
 from .deviations import coordinate_deviations
 from .evidence import weigh
@@ -27,7 +26,6 @@ from .joined import JoinedMesh
 from .noise import Noise, NoiseTest
 from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
 from .placement import Placement
-from .reasons import other_scale
 from .solving import Solved, Task, solve
 from .verdict import Findings, Held, Verdict, verdict
 
@@ -62,41 +60,7 @@ def recover_scalar(
         Of the edges, where they are known from elsewhere: they give pieces their relative sizes.
     """
     noise = Noise.known(stored, options.noise)
-    task = Task(options=options, placement=placement, noise=noise, squared_lengths=squared_lengths)
-    if options.scale is None:
-        return _by_digits(stored, clock, task)
-    found = None
-    with suppress(RecoveryError):
-        found = _by_digits(stored, clock, replace(task, search=noise is not None))
-        if found.status != "uncertified":
-            return found
-    # Where no cells fit, a search for them does not come to an end soon: first see whether another scale does.
-    free = _of_any_scale(stored, clock, replace(task, options=replace(options, scale=None)))
-    other = None if free is None else of_other_scale(free, options.scale)
-    if other is not None:
-        return other if found is None else replace(found, reason=other.reason, advice=other.advice)
-    return _by_digits(stored, clock, task) if found is None or noise is None else found
-
-
-def _of_any_scale(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh | None:
-    """The certified mesh of a matrix whose scale is free, if there is one; cells that the graph shows come first."""
-    for search in (False, True):
-        with suppress(RecoveryError):
-            found = _by_digits(stored, clock, replace(task, search=search))
-            if found.certified:
-                return found
-    return None
-
-
-def of_other_scale(found: PlanarMesh, given: float) -> PlanarMesh | None:
-    """A certified mesh with the scale that fits, uncertified since another was given; None if that is the same."""
-    fitting = float(found.scale[0])
-    if not found.certified or np.abs(found.scale - fitting).max() > ALIKE * abs(fitting):
-        return None
-    if abs(given - fitting) <= ALIKE * abs(fitting):
-        return None
-    why = other_scale(given, fitting, found.backward_error)
-    return replace(found, status="uncertified", uniqueness=None, reason=why.text, advice=why.advice)
+    return _by_digits(stored, clock, Task(options, placement, noise, squared_lengths))
 
 
 def _by_digits(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:

@@ -27,7 +27,7 @@ from .placement import Placement
 Clock = Callable[[str], AbstractContextManager[None]]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Task:
     """What is asked of a scalar matrix, and known of it.
 
@@ -39,15 +39,12 @@ class Task:
         Errors of the entries, where they are not those of assembly.
     squared_lengths : (e,) float64 or None
         Of the edges of the matrix, where they are known from elsewhere.
-    search : bool
-        Whether to look for other cells where those that the graph shows do not fit.
     """
 
     options: ScalarOptions
     placement: Placement
     noise: Noise | None
     squared_lengths: NDArray[np.float64] | None = None
-    search: bool = True
 
     @property
     def stretch(self) -> float:
@@ -122,7 +119,7 @@ def solve(
     with clock(method):
         doubtful = in_doubt(matrix, topology, start, scale, noise.sigma if noise and not noise.digits else None)
 
-    if doubtful.any() and task.search:
+    if doubtful.any():
         with clock("faces"), blas_threads(1):  # hundreds of small readings
             matrix, topology, outcomes = completed(matrix, topology, start, doubtful, scale)
             # The search leaves c free in its solves, stops early and knows one method, which is polished.
