@@ -48,28 +48,6 @@ def join(
     return _joined(topology, joined, held)[0]
 
 
-def free_images(topology: Topology, joined: list[NDArray]) -> NDArray[np.int64]:
-    """Pieces in rings of which the mirror image meets the others as well: the matrix does not tell these apart.
-
-    Parameters
-    ----------
-    topology : Topology
-    joined : list of (n_p,) complex128
-        Positions by :func:`join`.
-    """
-    if rings(topology) <= 0 or len(joined) > _DENSE:
-        return np.empty(0, dtype=np.int64)
-    held = _held(groups(topology), np.zeros(len(joined), dtype=np.int64))
-    shared = [np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces]
-    free = []
-    for piece in np.flatnonzero(~held & (np.array(shared) > 1)):
-        turned = list(joined)
-        turned[piece] = np.conj(turned[piece])
-        if _joined(topology, turned, held)[1] <= ALIKE:
-            free.append(piece)
-    return np.array(free, dtype=np.int64)
-
-
 def gap(topology: Topology, positions: list[NDArray], closed: float = ALIKE) -> float:
     """How far apart the pieces stay at shared vertices when they are joined, relative to the largest piece.
 
@@ -84,29 +62,11 @@ def gap(topology: Topology, positions: list[NDArray], closed: float = ALIKE) -> 
 def _matching_images(
     topology: Topology, positions: list[NDArray], held: NDArray[np.bool_], closed: float
 ) -> list[NDArray]:
-    """Mirror images of pieces in rings that let these close.
-
-    Those of one embedding; else one piece after the other is turned over as long as that lowers the gap.
-    """
-    if rings(topology) <= 0:
+    """Mirror images of pieces in rings that let these close: those given, or those of one embedding."""
+    if rings(topology) <= 0 or _joined(topology, positions, held)[1] <= closed:
         return positions
-    best = _joined(topology, positions, held)[1]
-    if best > closed:
-        drawn = _as_drawn(topology, positions, held)
-        left = _joined(topology, drawn, held)[1]
-        positions, best = (drawn, left) if left <= closed else (positions, best)
-    if len(positions) > _DENSE:
-        return positions
-    while best > closed:
-        trials = []
-        for piece in np.flatnonzero(~held).tolist():
-            turned = [np.conj(z) if p == piece else z for p, z in enumerate(positions)]
-            trials.append((_joined(topology, turned, held)[1], turned))
-        lowest, turned = min(trials, key=lambda trial: trial[0], default=(np.inf, positions))
-        if not lowest < 0.999 * best:
-            break
-        best, positions = lowest, turned
-    return positions
+    drawn = _as_drawn(topology, positions, held)
+    return drawn if _joined(topology, drawn, held)[1] <= closed else positions
 
 
 def _as_drawn(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> list[NDArray]:

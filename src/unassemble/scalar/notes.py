@@ -18,7 +18,7 @@ def topology_notes(topology: Topology) -> list[str]:
     if len(topology.pieces) > 1:
         notes.append(
             f"{len(topology.pieces)} pieces: the matrix does not say how they lie relative to each other, "
-            "so each has a frame of its own"
+            "so each has a frame and a mirror image of its own"
         )
     if k := len(topology.hinges):
         notes.append(
@@ -41,22 +41,6 @@ def piece_notes(remarks: Sequence[Sequence[str]]) -> list[str]:
     if len(remarks) == 1:
         return list(pieces)
     return [f"{_pieces(labels)}: {remark}" for remark, labels in pieces.items()]
-
-
-def image_notes(topology: Topology, free: NDArray) -> list[str]:
-    """Pieces, by number, of which the mirror image fits as well."""
-    if len(free) == 1:
-        (label,) = free.tolist()
-        return [
-            f"piece {label}, of row {topology.pieces[label].vertices.min()}: its mirror image meets the other pieces "
-            "in the same vertices, and the matrix does not tell which of the two it is"
-        ]
-    if not len(free):
-        return []
-    return [
-        f"{_pieces(free.tolist())}: their mirror images meet the other pieces in the same vertices, and the matrix "
-        "does not tell which of the two each is"
-    ]
 
 
 def _pieces(labels: list[int]) -> str:

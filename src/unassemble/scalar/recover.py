@@ -15,7 +15,7 @@ from ..clock import Clock
 from ..linalg import AnalysisAhead, Factorisation, UpperTriangle, blas_threads, factorisation
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..planar.hinges import free_images, join
+from ..planar.hinges import join
 from ..planar.pencil import pencil_pattern
 from ..recovery import PlanarMesh
 from ..tolerances import CERTIFIED, SIGMAS, SMALL
@@ -24,7 +24,7 @@ from .deviations import coordinate_deviations
 from .evidence import weigh
 from .joined import JoinedMesh
 from .noise import Noise, NoiseTest
-from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
+from .notes import origin_notes, piece_notes, topology_notes, vanished_notes
 from .placement import Placement
 from .solving import Solved, Task, solve
 from .verdict import Findings, Held, Verdict, verdict
@@ -132,8 +132,7 @@ def _place(solved: Solved, task: Task) -> _Placed:
         remarks.append((*mesh.notes, *more))
     known = np.array([placement.known_positions(piece) for piece in topology.pieces])
     placed = join(topology, placed, known)
-    images = image_notes(topology, free_images(topology, placed))
-    notes = [*piece_notes(remarks), *placement.unused(topology), *topology_notes(topology), *images]
+    notes = [*piece_notes(remarks), *placement.unused(topology), *topology_notes(topology)]
     notes += [*vanished_notes(topology), *topology.failures]
     joined = JoinedMesh.of(topology, placed, solved.scales / task.stretch)
     shift = origins[joined.component]
