@@ -64,15 +64,12 @@ class MetricFit:
     residual : float
         Root mean square of the equations' residuals: cosines, and relative areas.
     steps : int
-    held : bool
-        Whether at its end flat triangles were in the way: no minimum then.
     """
 
     metric: Metric
     scale: float
     residual: float
     steps: int
-    held: bool
 
 
 def _cosine(x: NDArray) -> NDArray[np.float64]:
@@ -135,7 +132,6 @@ def fit_metric(
     sums: NDArray,
     trust: NDArray,
     options: MetricOptions | None = None,
-    start: MetricFit | None = None,
 ) -> MetricFit | None:
     """The metric and the factor c with which a mesh has these entries; None where the iteration breaks down.
 
@@ -150,13 +146,11 @@ def fit_metric(
     trust : (n,) float64
         Weights of the row sums, relative to those of entries: less than 1 where they have lost digits.
     options : MetricOptions, optional
-    start : MetricFit, optional
-        Where to begin; with circles about the vertices unless told.
     """
     options = options or MetricOptions()
     equations = Equations(skeleton, entries, sums, trust)
     with np.errstate(all="ignore"):  # of a misfit that is not finite nothing comes
-        metric, c = (start.metric, start.scale) if start else equations.start()
+        metric, c = equations.start()
         try:
             return _descended(equations, metric, c, options) if c else None
         except SolverError:
@@ -191,7 +185,7 @@ def _descended(equations: Equations, metric: Metric, c: float, options: MetricOp
         settled = not stopped and left > 0.5 * before and left < 1e-9 * root
         if left < options.tolerance * root or settled:
             break
-    return MetricFit(metric, c, float(np.linalg.norm(residual)) / root, step, stopped > 0)
+    return MetricFit(metric, c, float(np.linalg.norm(residual)) / root, step)
 
 
 def _solved(derivative: sp.csr_array, by_c: NDArray, residual: NDArray, damping: float) -> tuple[NDArray, float]:

@@ -9,7 +9,7 @@ For squared sides u_0, u_1, u_2 of a triangle of area a, and g_k half the cotang
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -45,14 +45,6 @@ class Skeleton:
         """Pieces of a graph, in its numbering."""
         union = Together(pieces)
         return cls(n, edges, union.vertices[union.triangles], union.edge_rows[union.opposite])
-
-    def without(self, triangle: int) -> Skeleton:
-        """All triangles but one."""
-        return replace(
-            self,
-            triangles=np.delete(self.triangles, triangle, axis=0),
-            opposite=np.delete(self.opposite, triangle, axis=0),
-        )
 
     @cached_property
     def sides(self) -> NDArray[np.int64]:
