@@ -22,38 +22,18 @@ _ALIKE = 1.01  # ratio of misfits of rules between which only rounding or noise 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A part with positions.
-
-    Attributes
-    ----------
-    part : Part
-    weights : (e,) float64
-        -A_ij of the part's edges.
-    entries : Entries
-        What its entries are for given parameters.
-    z : (entries.n,) complex128
-        Positions of corners where the part is straight, else of all nodes.
-    scale : float
-        c.
-    rule : dict of str to str
-        Quadrature of each kind of cell.
-    straight : bool
-    spread : (e,) float64
-        Standard deviations of the entries' errors, up to a common factor, for which z is the least-squares solution.
-    misfit : (e,) float64
-        What is left of the weights.
-    notes : tuple of str
-    """
+    """A part with positions."""
 
     part: Part
-    weights: NDArray[np.float64]
-    entries: Entries
-    z: NDArray[np.complex128]
-    scale: float
-    rule: dict[str, str]
+    weights: NDArray[np.float64]  # (e,) -A_ij of the part's edges
+    entries: Entries  # what its entries are for given parameters
+    z: NDArray[np.complex128]  # (entries.n,) positions of corners where the part is straight, else of all nodes
+    scale: float  # c
+    rule: dict[str, str]  # quadrature of each kind of cell
     straight: bool
+    # (e,) standard deviations of the entries' errors, up to a common factor, for which z is the least-squares solution
     spread: NDArray[np.float64]
-    misfit: NDArray[np.float64]
+    misfit: NDArray[np.float64]  # (e,) what is left of the weights
     notes: tuple[str, ...] = ()
 
     @property

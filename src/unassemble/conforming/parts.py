@@ -23,29 +23,16 @@ Blocks = dict[Kind, NDArray[np.int64]]
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One edge-connected, oriented part of a mesh; its corners are numbered first.
+    """One edge-connected, oriented part of a mesh; its corners are numbered first."""
 
-    Attributes
-    ----------
-    piece : Piece
-        The part as triangles between corners, quadrilaterals divided; its `vertices` are the rows of all nodes,
-        and its `edges` the sides of cells.
-    n_corners : int
-    n_holes : int
-    blocks : dict of Kind to (m, k) int64
-        Cells, local nodes, all of one orientation.
-    edges : (e, 2) int64
-        Pairs i < j of local nodes that a cell has, in lexicographic order.
-    places : dict of Kind to (m, k (k - 1) / 2) int64
-        Rows of `edges` of all pairs of each cell.
-    """
-
+    # the part as triangles between corners, quadrilaterals divided; its `vertices` are the rows of all nodes, and its
+    # `edges` the sides of cells
     piece: Piece
     n_corners: int
     n_holes: int
-    blocks: Blocks
-    edges: NDArray[np.int64]
-    places: Blocks
+    blocks: Blocks  # cells, local nodes, all of one orientation
+    edges: NDArray[np.int64]  # (e, 2) pairs i < j of local nodes that a cell has, in lexicographic order
+    places: Blocks  # rows of `edges` of all pairs of each cell
 
     @property
     def n(self) -> int:

@@ -27,24 +27,12 @@ _DENSEST = 10  # entries above the diagonal, of a row in the mean: cubic triangl
 
 @dataclass(frozen=True, eq=False)
 class NodeSets:
-    """Cells as sets of rows.
+    """Cells as sets of rows."""
 
-    Attributes
-    ----------
-    order : int
-        Polynomial degree along a side, which has order + 1 nodes.
-    sets : tuple of (m, k) int64
-        One for each number of nodes; rows increase within a cell.
-    told : bool
-        Whether no other sets would do as well.
-    even : bool
-        Whether those that come next are as likely.
-    """
-
-    order: int
-    sets: tuple[NDArray[np.int64], ...]
-    told: bool = False
-    even: bool = False
+    order: int  # polynomial degree along a side, which has order + 1 nodes
+    sets: tuple[NDArray[np.int64], ...]  # tuple of (m, k) one for each number of nodes; rows increase within a cell
+    told: bool = False  # whether no other sets would do as well
+    even: bool = False  # whether those that come next are as likely
 
 
 class Common:

@@ -108,17 +108,10 @@ def _is_lumped(matrix: OperatorMatrix) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Masses:
-    """A matrix with diagonal entries of one sign, made positive, without the rows of zeros.
+    """A matrix with diagonal entries of one sign, made positive, without the rows of zeros."""
 
-    Attributes
-    ----------
-    M : (k, k) sparse
-    n_massless : int
-        Rows of zeros: unknowns without a mass, or points inside of a mesh whose boundary has one.
-    """
-
-    M: sp.csr_array
-    n_massless: int
+    M: sp.csr_array  # (k, k)
+    n_massless: int  # rows of zeros: unknowns without a mass, or points inside of a mesh whose boundary has one
 
     @classmethod
     def of(cls, matrix: OperatorMatrix) -> _Masses | None:

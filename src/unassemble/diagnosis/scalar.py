@@ -22,26 +22,16 @@ _SMALL = 10  # rows: fewer may be a mesh of few triangles, whatever their entrie
 
 @dataclass(frozen=True, eq=False)
 class Sums:
-    """What rows add up to.
+    """What rows add up to."""
 
-    Attributes
-    ----------
-    zero, positive : (n,) bool
-        Rows that add up to nothing, and to more than nothing, alone ones left out.
-    alone, identity : (n,) bool
-        Rows with nothing beside the diagonal; those of them that have something on it.
-    penalised : (n,) bool
-        Rows whose diagonal is beyond everything else.
-    sign : int
-        That of all sums that are not zero, where these are not few and all have one; else 0.
-    """
-
+    # (n,) each: rows that add up to nothing, and to more than nothing, alone ones left out
     zero: NDArray[np.bool_]
     positive: NDArray[np.bool_]
+    # (n,) each: rows with nothing beside the diagonal; those of them that have something on it
     alone: NDArray[np.bool_]
     identity: NDArray[np.bool_]
-    penalised: NDArray[np.bool_]
-    sign: int
+    penalised: NDArray[np.bool_]  # (n,) rows whose diagonal is beyond everything else
+    sign: int  # that of all sums that are not zero, where these are not few and all have one; else 0
 
     @classmethod
     def of(cls, matrix: OperatorMatrix) -> Sums:

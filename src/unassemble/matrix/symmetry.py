@@ -17,22 +17,13 @@ from .operator import row_sizes
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
-    """Both triangles of a matrix on one pattern.
+    """Both triangles of a matrix on one pattern."""
 
-    Attributes
-    ----------
-    edges : (e, 2) int64
-        Pairs i < j with A_ij or A_ji stored, in lexicographic order.
-    upper, lower : (e,) float64
-        A_ij and A_ji; zero where only the other one is stored.
-    one_sided : int
-        Number of pairs of which only one entry is stored.
-    """
-
-    edges: NDArray[np.int64]
+    edges: NDArray[np.int64]  # (e, 2) pairs i < j with A_ij or A_ji stored, in lexicographic order
+    # (e,) each: A_ij and A_ji; zero where only the other one is stored
     upper: NDArray[np.float64]
     lower: NDArray[np.float64]
-    one_sided: int
+    one_sided: int  # number of pairs of which only one entry is stored
 
 
 def triangles(A: sp.csr_array) -> Triangles:

@@ -22,24 +22,12 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class CautiousOptions:
-    """Settings of the iteration.
+    """Settings of the iteration."""
 
-    Attributes
-    ----------
-    max_steps : int
-        Each with a factorisation.
-    most_vertices : int
-        Of a piece for which so many factorisations are worth their time; callers ask.
-    least_area : float
-        What a step must leave of the area of every triangle, relative.
-    settled : float
-        As in :class:`~unassemble.planar.polish.PolishOptions`.
-    """
-
-    max_steps: int = 40
-    most_vertices: int = 200_000
-    least_area: float = 0.1
-    settled: float = 1e-3
+    max_steps: int = 40  # each with a factorisation
+    most_vertices: int = 200_000  # of a piece for which so many factorisations are worth their time; callers ask
+    least_area: float = 0.1  # what a step must leave of the area of every triangle, relative
+    settled: float = 1e-3  # as in :class:`~unassemble.planar.polish.PolishOptions`
 
 
 def cautious_polish(

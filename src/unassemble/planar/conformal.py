@@ -36,51 +36,28 @@ _MANY = 100  # triangles that agree, if they are no small share: mirrored neighb
 
 @dataclass(frozen=True)
 class ConformalOptions:
-    """Settings of the search; the defaults serve every matrix that we know.
+    """Settings of the search; the defaults serve every matrix that we know."""
 
-    Attributes
-    ----------
-    krylov_steps : int
-        Most solves with one factorisation.
-    max_factorisations : int
-        Factorisations before giving up.
-    first_shift : float
-        Relative to the estimate of c; any value well inside (0, 1) will do.
-    scatters, nearest : float
-        Where triangles agree it is nearer: at least so many times their scatter, and so much, below the estimate.
-    margin : float
-        Distance of the last shift below c, relative. Nearer, M would be singular to working accuracy.
-    """
-
-    krylov_steps: int = 8
-    max_factorisations: int = 8
-    first_shift: float = 0.7
+    krylov_steps: int = 8  # most solves with one factorisation
+    max_factorisations: int = 8  # factorisations before giving up
+    first_shift: float = 0.7  # relative to the estimate of c; any value well inside (0, 1) will do
+    # where triangles agree it is nearer: at least so many times their scatter, and so much, below the estimate
     scatters: float = 3.0
     nearest: float = 0.03
+    # distance of the last shift below c, relative. Nearer, M would be singular to working accuracy.
     margin: float = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
 class ConformalMap:
-    """Result of :func:`conformal_map`.
+    """Result of :func:`conformal_map`."""
 
-    Attributes
-    ----------
-    z : (n,) complex128
-        Positions x + iy, in no particular gauge.
-    scale : float
-        c, with its sign.
-    factorisations, solves : int
-        What it cost.
-    converged : bool
-        Whether position changes fell to the level that the conditioning allows.
-    """
-
-    z: NDArray[np.complex128]
-    scale: float
+    z: NDArray[np.complex128]  # (n,) positions x + iy, in no particular gauge
+    scale: float  # c, with its sign
+    # what it cost
     factorisations: int
     solves: int
-    converged: bool
+    converged: bool  # whether position changes fell to the level that the conditioning allows
 
 
 def estimate_scale(piece: Piece, weights: NDArray) -> float:
@@ -99,21 +76,11 @@ def estimate_scale(piece: Piece, weights: NDArray) -> float:
 
 @dataclass(frozen=True)
 class _Estimate:
-    """What triangles say of c.
+    """What triangles say of c."""
 
-    Attributes
-    ----------
-    scale : float
-        Their median.
-    scatter : float
-        The range, relative, of the middle four fifths of them.
-    likely : float or None
-        What is probably right to all digits: what many of them say, as on grids, or 1.
-    """
-
-    scale: float
-    scatter: float
-    likely: float | None
+    scale: float  # their median
+    scatter: float  # the range, relative, of the middle four fifths of them
+    likely: float | None  # what is probably right to all digits: what many of them say, as on grids, or 1
 
 
 def _estimate(piece: Piece, weights: NDArray) -> _Estimate:

@@ -20,25 +20,15 @@ from .polish import PolishedMesh, errors_of_one_size, polish
 
 @dataclass(frozen=True, eq=False)
 class PieceMesh:
-    """Positions of a piece in the frame in which they were found.
+    """Positions of a piece in the frame in which they were found."""
 
-    Attributes
-    ----------
-    z : (n,) complex128
-    scale : float
-    notes : tuple of str
-        Stages that did not converge.
-    spread : (e,) float64 or None
-        Standard deviations of the entries' errors, up to a common factor, for which z is the least-squares solution;
-        all equal by default.
-    doubt : float
-        About the error of z relative to its extent, where a polish came to no end for reasons of conditioning.
-    """
-
-    z: NDArray[np.complex128]
+    z: NDArray[np.complex128]  # (n,)
     scale: float
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # stages that did not converge
+    # (e,) standard deviations of the entries' errors, up to a common factor, for which z is the least-squares solution;
+    # all equal by default
     spread: NDArray[np.float64] | None = None
+    # about the error of z relative to its extent, where a polish came to no end for reasons of conditioning
     doubt: float = 0.0
 
 

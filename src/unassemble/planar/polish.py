@@ -25,27 +25,15 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class PolishOptions:
-    """Settings of the iteration; lengths are relative to the mesh's extent.
-
-    Attributes
-    ----------
-    max_steps, max_factorisations : int
-    tolerance : float
-        The iteration ends when the next step is expected to be below this.
-    rounding : float
-        Below this a step that does not contract is taken for rounding.
-    contraction : float
-        A step longer than this times the one before asks for a new factorisation.
-    settled : float
-        The iteration also ends when a step changes the fitted weights by less than this times the noise that the misfit
-        shows: the mesh then moves by as small a part of its error bars.
-    """
+    """Settings of the iteration; lengths are relative to the mesh's extent."""
 
     max_steps: int = 40
     max_factorisations: int = 8
-    tolerance: float = 5e-16
-    rounding: float = 1e-10
-    contraction: float = 0.2
+    tolerance: float = 5e-16  # the iteration ends when the next step is expected to be below this
+    rounding: float = 1e-10  # below this a step that does not contract is taken for rounding
+    contraction: float = 0.2  # a step longer than this times the one before asks for a new factorisation
+    # the iteration also ends when a step changes the fitted weights by less than this times the noise that the misfit
+    # shows: the mesh then moves by as small a part of its error bars
     settled: float = 1e-3
 
 
@@ -55,27 +43,15 @@ SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 
 @dataclass(frozen=True, eq=False)
 class PolishedMesh:
-    """Result of :func:`polish`.
+    """Result of :func:`polish`."""
 
-    Attributes
-    ----------
-    z : (n,) complex128
-    scale : float
-    residual : float
-        Root of the sum of squares of (c w - a) / s.
-    steps, factorisations : int
-    converged : bool
-        Whether steps fell to rounding level.
-    last_step : float
-        Length of the last step that was computed, relative to the mesh's extent: about the error that remains.
-    """
-
-    z: NDArray[np.complex128]
+    z: NDArray[np.complex128]  # (n,)
     scale: float
-    residual: float
+    residual: float  # root of the sum of squares of (c w - a) / s
     steps: int
     factorisations: int
-    converged: bool
+    converged: bool  # whether steps fell to rounding level
+    # length of the last step that was computed, relative to the mesh's extent: about the error that remains
     last_step: float
 
 

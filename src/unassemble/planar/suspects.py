@@ -27,45 +27,24 @@ from .polish import SHORT, polish
 
 @dataclass(frozen=True)
 class SuspectOptions:
-    """Settings of the selection.
+    """Settings of the selection."""
 
-    Attributes
-    ----------
-    candidates : int
-        Entries of the largest misfit, among which those that stand out are looked for.
-    most : int
-        Entries that are left out.
-    enough : float
-        Share of the sum of squares at which nothing is left to explain: derivatives are no longer accurate.
-    least_ratio : float
-        An entry is suspect if leaving it out saves this many times the mean square of what is left.
-    """
-
-    candidates: int = 48
-    most: int = 8
+    candidates: int = 48  # entries of the largest misfit, among which those that stand out are looked for
+    most: int = 8  # entries that are left out
+    # share of the sum of squares at which nothing is left to explain: derivatives are no longer accurate
     enough: float = 1e-6
+    # an entry is suspect if leaving it out saves this many times the mean square of what is left
     least_ratio: float = 30.0
 
 
 @dataclass(frozen=True, eq=False)
 class Suspects:
-    """Entries that stand out.
+    """Entries that stand out."""
 
-    Attributes
-    ----------
-    edges : (k,) int64
-        Edges of the piece, the one that saves most first.
-    left : float
-        Share of the sum of squares that remains without them.
-    size : float
-        Root of the sum of squares that leaving them out saves, in units of the weights (divided by `spread`).
-    log_p : float
-        Natural logarithm of the probability, at most, that normal errors let so few entries stand out so far.
-    """
-
-    edges: NDArray[np.int64]
-    left: float
-    size: float
+    edges: NDArray[np.int64]  # (k,) edges of the piece, the one that saves most first
+    left: float  # share of the sum of squares that remains without them
+    size: float  # root of the sum of squares that leaving them out saves, in units of the weights (divided by `spread`)
+    # natural logarithm of the probability, at most, that normal errors let so few entries stand out so far
     log_p: float
 
 

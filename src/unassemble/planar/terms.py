@@ -24,22 +24,13 @@ MASS, COEFFICIENT, ONE_SIGN = "mass", "coefficient", "one sign"
 
 @dataclass(frozen=True)
 class Term:
-    """A term that explains a misfit.
+    """A term that explains a misfit."""
 
-    Attributes
-    ----------
-    name : {"mass", "coefficient", "one sign"}
-        Entries of a mass matrix; of a coefficient that varies in space; all off by one number. Densities and
-        coefficients are quadratic polynomials.
-    share : float
-        Part of the sum of squares that it explains.
-    probability : float
-        That independent normal errors have as much in common with all the terms looked for.
-    """
-
+    # {"mass", "coefficient", "one sign"} entries of a mass matrix; of a coefficient that varies in space; all off by
+    # one number. Densities and coefficients are quadratic polynomials.
     name: str
-    share: float
-    probability: float
+    share: float  # part of the sum of squares that it explains
+    probability: float  # that independent normal errors have as much in common with all the terms looked for
 
 
 def lacking_term(

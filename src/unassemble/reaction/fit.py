@@ -30,45 +30,23 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class MetricOptions:
-    """Settings of the iteration.
+    """Settings of the iteration."""
 
-    Attributes
-    ----------
-    steps, patience : int
-        The iteration ends after so many steps, or when as many as the second have not lowered the residual by a fifth.
-    damping : float
-        The first; relative to the diagonal of the normal equations.
-    nearly : float
-        Share of the way to a flat triangle that a step may go.
-    tolerance : float
-        Root mean square of the equations' residuals at which nothing but rounding is left.
-    """
-
+    # the iteration ends after so many steps, or when as many as the second have not lowered the residual by a fifth
     steps: int = 400
     patience: int = 25
-    damping: float = 1e-2
-    nearly: float = 0.9
-    tolerance: float = 1e-15
+    damping: float = 1e-2  # the first; relative to the diagonal of the normal equations
+    nearly: float = 0.9  # share of the way to a flat triangle that a step may go
+    tolerance: float = 1e-15  # root mean square of the equations' residuals at which nothing but rounding is left
 
 
 @dataclass(frozen=True, eq=False)
 class MetricFit:
-    """Result of :func:`fit_metric`.
+    """Result of :func:`fit_metric`."""
 
-    Attributes
-    ----------
-    metric : Metric
-        In units of length in which s = 1.
-    scale : float
-        c.
-    residual : float
-        Root mean square of the equations' residuals: cosines, and relative areas.
-    steps : int
-    """
-
-    metric: Metric
-    scale: float
-    residual: float
+    metric: Metric  # in units of length in which s = 1
+    scale: float  # c
+    residual: float  # root mean square of the equations' residuals: cosines, and relative areas
     steps: int
 
 

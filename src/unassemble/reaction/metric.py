@@ -22,23 +22,12 @@ from ..topology.together import Together
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """Triangles glued along edges; no orientation or planarity is needed.
+    """Triangles glued along edges; no orientation or planarity is needed."""
 
-    Attributes
-    ----------
-    n : int
-        Number of vertices.
-    edges : (e, 2) int64
-    triangles : (m, 3) int64
-        Vertices.
-    opposite : (m, 3) int64
-        The edge that faces each corner.
-    """
-
-    n: int
-    edges: NDArray[np.int64]
-    triangles: NDArray[np.int64]
-    opposite: NDArray[np.int64]
+    n: int  # number of vertices
+    edges: NDArray[np.int64]  # (e, 2)
+    triangles: NDArray[np.int64]  # (m, 3) vertices
+    opposite: NDArray[np.int64]  # (m, 3) the edge that faces each corner
 
     @classmethod
     def of(cls, n: int, edges: NDArray, pieces: Sequence[Piece]) -> Skeleton:

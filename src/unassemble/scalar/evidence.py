@@ -23,24 +23,15 @@ from .solving import Solved
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What can be said about a misfit beyond its size.
+    """What can be said about a misfit beyond its size."""
 
-    Attributes
-    ----------
-    noise : float or None
-        Standard deviation of independent errors of one size in the entries that would leave this misfit; None where
-        there are no more entries than unknowns, and where the misfit is no noise.
-    suspects : (k, 2) int64
-        Entries without which a mesh fits all others, as well as right entries are fitted.
-    certain : bool
-        Whether that few entries explain nearly all of the misfit cannot be chance.
-    term : Term or None
-        A term that the model lacks, where it cannot be chance that it explains so much of the misfit.
-    """
-
+    # standard deviation of independent errors of one size in the entries that would leave this misfit; None where there
+    # are no more entries than unknowns, and where the misfit is no noise
     noise: float | None
+    # (k, 2) entries without which a mesh fits all others, as well as right entries are fitted
     suspects: NDArray[np.int64]
-    certain: bool
+    certain: bool  # whether that few entries explain nearly all of the misfit cannot be chance
+    # a term that the model lacks, where it cannot be chance that it explains so much of the misfit
     term: Term | None = None
 
 

@@ -46,25 +46,18 @@ def _converted(
 class Placement:
     """What is known of the true frame.
 
-    Attributes
-    ----------
-    anchors : tuple of (row, x, y)
-    tensor : ConstantTensor or None
-    direction : (row, row, degrees) or None
-        Angle, from the x axis, of the line from the first row's point to the second's.
-    handed : {"left", "right"} or None
-        On which side of that line (with two anchors: of the line from the first to the second) the centroid of
-        the piece lies.
-
     Raises
     ------
     InputError
         For values that contradict each other or themselves.
     """
 
-    anchors: tuple[Anchor, ...] = ()
+    anchors: tuple[Anchor, ...] = ()  # tuple of (row, x, y)
     tensor: ConstantTensor | None = None
+    # (row, row, degrees) angle, from the x axis, of the line from the first row's point to the second's
     direction: Direction | None = None
+    # {"left", "right"} or None on which side of that line (with two anchors: of the line from the first to the second)
+    # the centroid of the piece lies
     handed: str | None = None
 
     @property

@@ -29,21 +29,12 @@ Clock = Callable[[str], AbstractContextManager[None]]
 
 @dataclass(frozen=True)
 class Task:
-    """What is asked of a scalar matrix, and known of it.
-
-    Attributes
-    ----------
-    options : ScalarOptions
-    placement : Placement
-    noise : Noise or None
-        Errors of the entries, where they are not those of assembly.
-    squared_lengths : (e,) float64 or None
-        Of the edges of the matrix, where they are known from elsewhere.
-    """
+    """What is asked of a scalar matrix, and known of it."""
 
     options: ScalarOptions
     placement: Placement
-    noise: Noise | None
+    noise: Noise | None  # errors of the entries, where they are not those of assembly
+    # (e,) of the edges of the matrix, where they are known from elsewhere
     squared_lengths: NDArray[np.float64] | None = None
 
     @property
@@ -59,23 +50,13 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Positions and scale of each piece, in no particular frame.
+    """Positions and scale of each piece, in no particular frame."""
 
-    Attributes
-    ----------
-    matrix : OperatorMatrix
-        With entries that had vanished as zeros.
-    topology : Topology
-        Of that matrix, without the pieces that have no positions; these are listed in its ``failures``.
-    meshes : list of PieceMesh
-    noise : Noise or None
-        Without that of rounding, if the misfit is far beyond it.
-    """
-
-    matrix: OperatorMatrix
+    matrix: OperatorMatrix  # with entries that had vanished as zeros
+    # of that matrix, without the pieces that have no positions; these are listed in its ``failures``
     topology: Topology
     meshes: list[PieceMesh]
-    noise: Noise | None
+    noise: Noise | None  # without that of rounding, if the misfit is far beyond it
 
     @property
     def scales(self) -> NDArray[np.float64]:

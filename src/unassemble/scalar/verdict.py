@@ -57,30 +57,17 @@ class Held:
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """All that a verdict is made of.
+    """All that a verdict is made of."""
 
-    Attributes
-    ----------
-    stored : OperatorMatrix
-        The matrix as given.
-    solved : Solved
-    mesh : JoinedMesh
-        Relative to the origins of its pieces.
-    origins : (pieces,) complex128
-    near, written : Held
-        The mesh about these origins, and as it is written.
-    evidence : Evidence
-    known_scale, polished : bool
-        Whether c is known, and whether a polish was asked for.
-    """
-
-    stored: OperatorMatrix
+    stored: OperatorMatrix  # the matrix as given
     solved: Solved
-    mesh: JoinedMesh
-    origins: NDArray[np.complex128]
+    mesh: JoinedMesh  # relative to the origins of its pieces
+    origins: NDArray[np.complex128]  # (pieces,)
+    # the mesh about these origins, and as it is written
     near: Held
     written: Held
     evidence: Evidence
+    # whether c is known, and whether a polish was asked for
     known_scale: bool
     polished: bool
 
@@ -102,24 +89,14 @@ class Findings:
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What a mesh is worth.
+    """What a mesh is worth."""
 
-    Attributes
-    ----------
-    status : {"certified", "uncertified", "ambiguous"}
-    uniqueness : {"proved", "searched", "ambiguous"} or None
-        Whether other meshes fit; None where this one does not.
-    reason : Reason
-    others : sequence of Alternative
-        Other meshes that fit.
-    distant : bool
-        Whether coordinates so far from the origin that they have too few digits are the only obstacle.
-    """
-
-    status: str
+    status: str  # {"certified", "uncertified", "ambiguous"}
+    # {"proved", "searched", "ambiguous"} or None whether other meshes fit; None where this one does not
     uniqueness: str | None
     reason: Reason
-    others: Sequence[Alternative] = ()
+    others: Sequence[Alternative] = ()  # other meshes that fit
+    # whether coordinates so far from the origin that they have too few digits are the only obstacle
     distant: bool = False
 
 

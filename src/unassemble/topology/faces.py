@@ -22,19 +22,11 @@ class FaceComplex:
     """A graph and, for each side of each edge, the side that follows it along a face.
 
     Half-edge 2 k runs along edge k from its lower to its higher vertex, 2 k + 1 back: ``h ^ 1`` is the other side.
-
-    Attributes
-    ----------
-    n_vertices : int
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
-    successor : (2 e,) int64
-        The next half-edge of the face on the left.
     """
 
     n_vertices: int
-    edges: NDArray[np.int64]
-    successor: NDArray[np.int64]
+    edges: NDArray[np.int64]  # (e, 2) pairs i < j in lexicographic order
+    successor: NDArray[np.int64]  # (2 e,) the next half-edge of the face on the left
 
     @property
     def tail(self) -> NDArray[np.int64]:

@@ -15,21 +15,11 @@ from .search import breadth_first
 
 @dataclass(frozen=True, eq=False)
 class Numbering:
-    """A graph whose vertices have numbers of its own.
+    """A graph whose vertices have numbers of its own."""
 
-    Attributes
-    ----------
-    vertices : (k,) int64
-        Vertex of the original graph behind each number.
-    edge_rows : (e,) int64
-        Row of the original edge list behind each edge.
-    edges : (e, 2) int64
-        New numbers i < j in lexicographic order.
-    """
-
-    vertices: NDArray[np.int64]
-    edge_rows: NDArray[np.int64]
-    edges: NDArray[np.int64]
+    vertices: NDArray[np.int64]  # (k,) vertex of the original graph behind each number
+    edge_rows: NDArray[np.int64]  # (e,) row of the original edge list behind each edge
+    edges: NDArray[np.int64]  # (e, 2) new numbers i < j in lexicographic order
 
 
 def local_numbering(n: int, edges: NDArray) -> Numbering:

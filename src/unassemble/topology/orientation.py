@@ -14,17 +14,10 @@ from .search import breadth_first
 
 @dataclass(frozen=True, eq=False)
 class Gluing:
-    """Which corners face each edge.
+    """Which corners face each edge."""
 
-    Attributes
-    ----------
-    count : (e,) int64
-        Number of triangles at each edge.
-    first, second : (e,) int64
-        Corners (3 * triangle + position) that face the edge, -1 where there is none.
-    """
-
-    count: NDArray[np.int64]
+    count: NDArray[np.int64]  # (e,) number of triangles at each edge
+    # (e,) each: corners (3 * triangle + position) that face the edge, -1 where there is none
     first: NDArray[np.int64]
     second: NDArray[np.int64]
 

@@ -11,17 +11,10 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Polygons:
-    """Cycles of vertices.
+    """Cycles of vertices."""
 
-    Attributes
-    ----------
-    offsets : (count + 1,) int64
-    vertices : (offsets[-1],) int64
-        Polygon k is ``vertices[offsets[k]:offsets[k + 1]]``, in running order.
-    """
-
-    offsets: NDArray[np.int64]
-    vertices: NDArray[np.int64]
+    offsets: NDArray[np.int64]  # (count + 1,)
+    vertices: NDArray[np.int64]  # (offsets[-1],) polygon k is ``vertices[offsets[k]:offsets[k + 1]]``, in running order
 
     @classmethod
     def none(cls) -> Polygons:

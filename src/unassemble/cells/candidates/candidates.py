@@ -16,48 +16,23 @@ from .corners import corners_of
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Cells that a graph may have; a labelling is any set of them that shares no half-edge.
-
-    Attributes
-    ----------
-    n_vertices : int
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
-    weights : (e,) float64
-        -A_ij of each edge.
-    scale : float or None
-        c, where it is known.
-    cells : Polygons
-    corner : (cells,) bool
-        Triangles a-b-c of two edges a-b, b-c; the third has vanished from the boundary, which it does if the angle at b
-        is a right one.
-    embedding : FaceComplex
-    relative : (e,) float64
-        The weights over c, or over the likeliest c, from the angles.
-    sides : (s, 2) int64
-        Pairs (cell, half-edge) of what each cell takes up.
-    belief : (cells,) float64
-        From the angles: 1 for a certain cell, 0 for a certain hole, about.
-    first : (cells,) bool
-        The faces that make the likeliest labelling without vanished boundary edges.
-    outer : (cells,) bool
-        The face of each block that bounds it from outside.
-    errors : (e,) float64 or None
-        Standard deviations of the errors of the weights, where they are known.
-    """
+    """Cells that a graph may have; a labelling is any set of them that shares no half-edge."""
 
     n_vertices: int
-    edges: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    scale: float | None
+    edges: NDArray[np.int64]  # (e, 2) pairs i < j in lexicographic order
+    weights: NDArray[np.float64]  # (e,) -A_ij of each edge
+    scale: float | None  # c, where it is known
     cells: Polygons
+    # (cells,) triangles a-b-c of two edges a-b, b-c; the third has vanished from the boundary, which it does if the
+    # angle at b is a right one
     corner: NDArray[np.bool_]
     embedding: FaceComplex
-    relative: NDArray[np.float64]
-    sides: NDArray[np.int64]
-    belief: NDArray[np.float64]
-    first: NDArray[np.bool_]
-    outer: NDArray[np.bool_]
+    relative: NDArray[np.float64]  # (e,) the weights over c, or over the likeliest c, from the angles
+    sides: NDArray[np.int64]  # (s, 2) pairs (cell, half-edge) of what each cell takes up
+    belief: NDArray[np.float64]  # (cells,) from the angles: 1 for a certain cell, 0 for a certain hole, about
+    first: NDArray[np.bool_]  # (cells,) the faces that make the likeliest labelling without vanished boundary edges
+    outer: NDArray[np.bool_]  # (cells,) the face of each block that bounds it from outside
+    # (e,) standard deviations of the errors of the weights, where they are known
     errors: NDArray[np.float64] | None = field(default=None, kw_only=True)
 
     @classmethod

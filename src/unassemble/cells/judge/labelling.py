@@ -24,32 +24,16 @@ from .within_errors import GAP, beyond, polished
 
 @dataclass(frozen=True, eq=False)
 class Labelling:
-    """Cells, the triangulated pieces that they make, and how the weights of these fit.
-
-    Attributes
-    ----------
-    candidates : Candidates
-    labels : (cells,) bool
-        What is taken for a cell.
-    edges : (e', 2) int64
-        Those of the graph, with the vanished ones of the cells' triangles.
-    weights : (e',) float64
-        Zero for these.
-    pieces : tuple of Piece
-        Empty where the cells do not make planar surfaces.
-    meshes : tuple of PieceMesh or None
-        None where a piece has no positions.
-    misfit : (e',) float64
-        |c w - a| relative to the smaller of both rows' largest entries, at most 1; 1 on edges of no piece. Where errors
-        of the weights are known, and it is not far beyond them, less what they explain.
-    """
+    """Cells, the triangulated pieces that they make, and how the weights of these fit."""
 
     candidates: Candidates
-    labels: NDArray[np.bool_]
-    edges: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    pieces: tuple[Piece, ...]
-    meshes: tuple[PieceMesh | None, ...]
+    labels: NDArray[np.bool_]  # (cells,) what is taken for a cell
+    edges: NDArray[np.int64]  # (e', 2) those of the graph, with the vanished ones of the cells' triangles
+    weights: NDArray[np.float64]  # (e',) zero for these
+    pieces: tuple[Piece, ...]  # empty where the cells do not make planar surfaces
+    meshes: tuple[PieceMesh | None, ...]  # None where a piece has no positions
+    # (e',) |c w - a| relative to the smaller of both rows' largest entries, at most 1; 1 on edges of no piece. Where
+    # errors of the weights are known, and it is not far beyond them, less what they explain.
     misfit: NDArray[np.float64]
 
     @classmethod

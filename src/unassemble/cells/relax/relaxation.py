@@ -25,32 +25,17 @@ from .sheet import Placed, Sheet, unpinned
 
 @dataclass(frozen=True)
 class PathOptions:
-    """The path of the barrier.
+    """The path of the barrier."""
 
-    Attributes
-    ----------
-    first, last, factor : float
-        Barriers t, and the ratio of one to the one before.
-    slack : float
-        q at the first barrier.
-    near : float
-        Strength of the first labels.
-    nearest : float
-        Of the way to 0 or 1 that one step leaves.
-    outlier : float
-        Misfit beyond which an edge counts by its misfit, not by the square.
-    held : float
-        Keeps the problem definite where labels of zero leave vertices free.
-    """
-
+    # barriers t, and the ratio of one to the one before
     first: float = 0.3
     last: float = 1e-3
     factor: float = 0.75
-    slack: float = 0.03
-    near: float = 0.95
-    nearest: float = 0.1
-    outlier: float = 0.3
-    held: float = 1e-9
+    slack: float = 0.03  # q at the first barrier
+    near: float = 0.95  # strength of the first labels
+    nearest: float = 0.1  # of the way to 0 or 1 that one step leaves
+    outlier: float = 0.3  # misfit beyond which an edge counts by its misfit, not by the square
+    held: float = 1e-9  # keeps the problem definite where labels of zero leave vertices free
 
 
 def relaxed(sheet: Sheet, free: NDArray[np.bool_], options: PathOptions | None = None) -> NDArray[np.bool_] | None:

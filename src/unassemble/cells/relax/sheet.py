@@ -46,17 +46,10 @@ class _Graph:
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """Positions of a sheet.
+    """Positions of a sheet."""
 
-    Attributes
-    ----------
-    z : (n,) complex128
-    c : float
-        Scale in units of the sheet's.
-    """
-
-    z: NDArray[np.complex128]
-    c: float
+    z: NDArray[np.complex128]  # (n,)
+    c: float  # scale in units of the sheet's
 
 
 class Sheet:
