@@ -62,11 +62,29 @@ def gap(topology: Topology, positions: list[NDArray], closed: float = ALIKE) -> 
 def _matching_images(
     topology: Topology, positions: list[NDArray], held: NDArray[np.bool_], closed: float
 ) -> list[NDArray]:
-    """Mirror images of pieces in rings that let these close: those given, or those of one embedding."""
-    if rings(topology) <= 0 or _joined(topology, positions, held)[1] <= closed:
+    """Mirror images of pieces in rings that let these close.
+
+    Those of one embedding; else one piece after the other is turned over as long as that lowers the gap.
+    """
+    if rings(topology) <= 0:
         return positions
-    drawn = _as_drawn(topology, positions, held)
-    return drawn if _joined(topology, drawn, held)[1] <= closed else positions
+    best = _joined(topology, positions, held)[1]
+    if best > closed:
+        drawn = _as_drawn(topology, positions, held)
+        left = _joined(topology, drawn, held)[1]
+        positions, best = (drawn, left) if left <= closed else (positions, best)
+    if len(positions) > _DENSE:
+        return positions
+    while best > closed:
+        trials = []
+        for piece in np.flatnonzero(~held).tolist():
+            turned = [np.conj(z) if p == piece else z for p, z in enumerate(positions)]
+            trials.append((_joined(topology, turned, held)[1], turned))
+        lowest, turned = min(trials, key=lambda trial: trial[0], default=(np.inf, positions))
+        if not lowest < 0.999 * best:
+            break
+        best, positions = lowest, turned
+    return positions
 
 
 def _as_drawn(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> list[NDArray]:
