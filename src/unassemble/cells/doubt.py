@@ -119,13 +119,7 @@ def components_of(matrix: OperatorMatrix) -> NDArray[np.int32]:
 def with_pieces(n: int, edges: NDArray[np.int64], pieces: Sequence[Piece]) -> list[tuple[Numbering, list[Piece]]]:
     """Each component, the largest first, and its pieces in their order; in linear time.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
-    pieces : sequence of Piece
-        None of which belongs to two components.
+    `edges` (e, 2): pairs i < j in lexicographic order; `pieces`: none of which belongs to two components.
     """
     parts = components(n, edges)
     label = np.full(n, -1)

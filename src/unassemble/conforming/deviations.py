@@ -16,13 +16,7 @@ from .fit import Fitted
 def deviations_of(n: int, fits: Sequence[Fitted], placed: Sequence[NDArray], task: Task) -> NDArray[np.float64]:
     """(n, 2) standard deviations in the final frame, NaN for rows of no cell.
 
-    Parameters
-    ----------
-    n : int
-    fits : sequence of Fitted
-    placed : sequence of (k,) complex128
-        Nodes of each part in that frame.
-    task : Task
+    `placed` sequence of (k,): nodes of each part in that frame.
     """
     result = np.full((n, 2), np.nan)
     tensor = task.placement.tensor

@@ -36,11 +36,7 @@ class Outline:
 def among_corners(part: Part, weights: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Pairs of corners, lexicographic, and the weights of L restricted to straight cells.
 
-    Parameters
-    ----------
-    part : Part
-    weights : (e,) float64
-        -A_ij of the part's edges.
+    `weights` (e,): -A_ij of the part's edges.
     """
     if part.degree == 1:
         return part.edges, weights
@@ -60,18 +56,9 @@ def among_corners(part: Part, weights: NDArray) -> tuple[NDArray[np.int64], NDAr
 def corner_positions(part: Part, weights: NDArray, scale: float | None) -> tuple[NDArray[np.complex128], float]:
     """Positions of corners up to a similarity, and c.
 
-    Parameters
-    ----------
-    part : Part
-    weights : (e,) float64
-        -A_ij of the part's edges.
-    scale : float, optional
-        c, where it is known.
+    `weights` (e,): -A_ij of the part's edges; `scale`: c, where it is known.
 
-    Raises
-    ------
-    GeometryError
-        If no map of positive area is found, or the entries make no positive energy.
+    Raises GeometryError if no map of positive area is found, or the entries make no positive energy.
     """
     edges, weights = among_corners(part, weights)
     unit = float(np.sign(weights.sum()) * np.median(np.abs(weights[weights != 0]))) if weights.any() else 0.0

@@ -60,13 +60,7 @@ class Cells:
 def cells_of(n: int, edges: NDArray[np.int64], most: int = 1500) -> Cells:
     """Look at some pairs of a graph, all near to each other.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-        Pairs i < j, at least one.
-    most : int
-        Pairs to look at, in a part of four times as many rows.
+    `edges` (e, 2): pairs i < j, at least one; `most`: pairs to look at, in a part of four times as many rows.
     """
     graph = sp.csr_array((np.ones(len(edges), np.int32), edges.T), shape=(n, n))
     graph = graph + graph.T

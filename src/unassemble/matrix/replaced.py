@@ -15,12 +15,7 @@ from .symmetry import Triangles
 def from_columns(diagonal: NDArray, pairs: Triangles) -> tuple[Triangles, NDArray[np.bool_] | None, tuple[str, ...]]:
     """Entries of rows without any off the diagonal, which is not zero, taken from their columns where these were kept.
 
-    Returns
-    -------
-    pairs : Triangles
-    replaced : (n,) bool or None
-        Such rows; None where there are none with a column.
-    warnings : tuple of str
+    Returns `replaced` (n,): such rows; None where there are none with a column.
     """
     row, column = np.zeros(len(diagonal)), np.zeros(len(diagonal))
     for end, own, other in ((0, pairs.upper, pairs.lower), (1, pairs.lower, pairs.upper)):

@@ -13,12 +13,7 @@ from .solving import Solved, Task
 def coordinate_deviations(solved: Solved, task: Task, placed: list[NDArray]) -> NDArray:
     """(n, 2) standard deviations in the final frame.
 
-    Parameters
-    ----------
-    solved : Solved
-    task : Task
-    placed : list of (k,) complex128
-        Positions of each piece in that frame.
+    `placed` list of (k,): positions of each piece in that frame.
     """
     pieces, meshes, tensor = solved.topology.pieces, solved.meshes, task.placement.tensor
     free = task.scale is None

@@ -30,15 +30,8 @@ def discord(
 ) -> tuple[str, ...]:
     """What is wrong where pieces share vertices but not c, errors of entries allowed for; up to two sentences.
 
-    Parameters
-    ----------
-    topology : Topology
-    meshes : sequence of PieceMesh
-        Where the noise is known the others have been fitted with the c of their leaders, if at all.
-    backward_error : float
-        Of the entries.
-    noise : Noise, optional
-        Their errors.
+    `meshes`: where the noise is known the others have been fitted with the c of their leaders, if at all;
+    `backward_error`: of the entries; `noise`: their errors.
     """
     if not len(topology.hinges):
         return ()

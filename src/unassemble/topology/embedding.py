@@ -18,10 +18,7 @@ from .short_cycles import chordless_four_cycles
 def short_faces(n: int, edges: NDArray) -> list[NDArray[np.int64]]:
     """3-cycles and chordless 4-cycles that may all be faces: no edge lies on more than two of them.
 
-    Returns
-    -------
-    list of (m, 3) and (m, 4) int64
-        Vertices in running order.
+    Returns list of (m, 3) and (m, 4) vertices in running order.
     """
     triangles, opposite = three_cycles(n, edges)
     count = np.bincount(opposite.ravel(), minlength=len(edges))

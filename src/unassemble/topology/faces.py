@@ -131,18 +131,10 @@ def from_rotation(n: int, edges: NDArray, tail: NDArray, head: NDArray) -> FaceC
 def from_cycles(n: int, edges: NDArray, cycles: list[NDArray]) -> FaceComplex | None:
     """The complex whose faces are given cycles and the loops that bound the surface they make.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-    cycles : list of (m_k, k) int64
-        Triangles, quadrilaterals, ..., in any orientation.
+    `edges` (e, 2); `cycles` list of (m_k, k): triangles, quadrilaterals, ..., in any orientation.
 
-    Returns
-    -------
-    FaceComplex or None
-        Trees that hang on the surface are blocks of their own. None if any other edge lies on no cycle, or one on more
-        than two, or the surfaces do not lie on spheres.
+    Trees that hang on the surface are blocks of their own. None if any other edge lies on no cycle, or one on
+    more than two, or the surfaces do not lie on spheres.
     """
     cycles = _oriented(n, edges, cycles)
     sides = [around(n, edges, c) for c in cycles]

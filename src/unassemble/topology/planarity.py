@@ -25,15 +25,9 @@ def is_planar(n: int, edges: NDArray) -> bool:
 def rotation_system(n: int, edges: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
     """Half-edges tail -> head, grouped by tail, each group in its cyclic order about it in a planar embedding.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
+    `edges` (e, 2).
 
-    Returns
-    -------
-    tail, head : (2 e,) int64
-        None if the graph is not planar.
+    Returns `tail` and `head` (2 e,), None if the graph is not planar.
     """
     if n >= 3 and len(edges) > 3 * n - 6:
         return None

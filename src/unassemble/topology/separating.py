@@ -20,16 +20,7 @@ def not_faces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> 
     A cycle abc has something on both sides exactly if at least two parts of the rest of the graph touch all of a, b
     and c. Where triangles lie on both sides, all edges of such a cycle are on three; these are asked first.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-    triangles, opposite : (m, 3) int64
-        All 3-cycles, and the edges that face their corners.
-
-    Returns
-    -------
-    (m,) bool
+    `triangles` and `opposite` (m, 3): all 3-cycles, and the edges that face their corners.
     """
     false = np.zeros(len(triangles), dtype=bool)
     for crowded in (np.all, np.any):

@@ -16,17 +16,9 @@ def chordless_four_cycles(n: int, edges: NDArray, usable: NDArray[np.bool_]) -> 
     leave it over vertices of lower rank: linear in the number of edges on planar graphs (Chiba and Nishizeki,
     SIAM J. Comput. 14, 1985).
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
-    usable : (e,) bool
+    `edges` (e, 2): pairs i < j in lexicographic order; `usable` (e,).
 
-    Returns
-    -------
-    (m, 4) int64
-        Vertices in running order.
+    Returns (m, 4) vertices in running order.
     """
     pairs = edges[usable]
     if not len(pairs):

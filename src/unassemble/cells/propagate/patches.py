@@ -22,10 +22,7 @@ _LEVELS = 12  # of triangles in a tree; lists end long before, but where long ro
 def arcs_across(sides: NDArray[np.int64]) -> NDArray[np.int64]:
     """(3 m,) for each side 3 t + k of each triangle t the same edge as a side of another triangle, or -1.
 
-    Parameters
-    ----------
-    sides : (m, 3) int64
-        Edges of each triangle; each edge in one or two of them.
+    `sides` (m, 3): edges of each triangle; each edge in one or two of them.
     """
     order = np.argsort(sides, axis=None, kind="stable")
     pair = np.flatnonzero(np.diff(sides.ravel()[order]) == 0)

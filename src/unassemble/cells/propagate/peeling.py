@@ -30,12 +30,7 @@ def lone_scales(sides: NDArray[np.int64], weights: NDArray[np.float64]) -> Itera
     The cotangents a, b, d of a triangle satisfy ab + bd + da = 1, so that triangles whose three sides border no other
     cell tell c, each by itself.
 
-    Parameters
-    ----------
-    sides : (m, 3) int64
-        Rows of edges.
-    weights : (e,) float64
-        -A_ij of each edge.
+    `sides` (m, 3): rows of edges; `weights` (e,): -A_ij of each edge.
     """
     a, b, d = weights[sides].T
     square = a * b + b * d + d * a

@@ -23,11 +23,7 @@ def with_holes(candidates: Candidates, state: NDArray[np.int8]) -> tuple[NDArray
 
     None where some edge lies on no triangle, there are too few equations, or no conformal map.
 
-    Parameters
-    ----------
-    candidates : Candidates
-    state : (m,) int8
-        1 for known cells among its triangles, -1 for known holes, else 0.
+    `state` (m,): 1 for known cells among its triangles, -1 for known holes, else 0.
     """
     sides, e = candidates.triangle_sides, len(candidates.edges)
     count = np.bincount(sides.ravel(), minlength=e)

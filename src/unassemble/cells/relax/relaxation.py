@@ -41,17 +41,9 @@ class PathOptions:
 def relaxed(sheet: Sheet, free: NDArray[np.bool_], options: PathOptions | None = None) -> NDArray[np.bool_] | None:
     """Whole labels at the end of a path that begins with all chosen candidates as cells.
 
-    Parameters
-    ----------
-    sheet : Sheet
-    free : (k,) bool
-        Which of the chosen candidates may be holes; the others are known cells.
-    options : PathOptions, optional
+    `free` (k,): which of the chosen candidates may be holes; the others are known cells.
 
-    Returns
-    -------
-    (cells,) bool or None
-        None where there is no conformal map on the way, or an equation is singular.
+    Returns (cells,), None where there is no conformal map on the way, or an equation is singular.
     """
     options = options or PathOptions()
     strength = np.zeros(sheet.candidates.count)
