@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -178,3 +178,28 @@ def _shown(A: sp.csr_array, i: int, j: int) -> str:
     start, end = A.indptr[i], A.indptr[i + 1]
     k = start + np.searchsorted(A.indices[start:end], j)
     return repr(float(A.data[k])) if k < end and A.indices[k] == j else "not stored"
+
+
+def from_columns(diagonal: NDArray, pairs: Triangles) -> tuple[Triangles, NDArray[np.bool_] | None, tuple[str, ...]]:
+    """Entries of rows without any off the diagonal, which is not zero, taken from their columns where these were kept.
+
+    Returns `replaced` (n,): such rows; None where there are none with a column.
+    """
+    row, column = np.zeros(len(diagonal)), np.zeros(len(diagonal))
+    for end, own, other in ((0, pairs.upper, pairs.lower), (1, pairs.lower, pairs.upper)):
+        np.maximum.at(row, pairs.edges[:, end], np.abs(own))
+        np.maximum.at(column, pairs.edges[:, end], np.abs(other))
+    replaced = (row == 0) & (column > 0) & (diagonal != 0)
+    if not replaced.any():
+        return pairs, None, ()
+    first, second = replaced[pairs.edges].T
+    rest = ~(first | second)
+    size = np.maximum(row, column).max()
+    if not pairs.upper[rest].any() or (np.abs(pairs.upper - pairs.lower)[rest] > SUMMED * size).any():
+        return pairs, None, ()  # not symmetric for other reasons
+    upper, lower = np.where(first, pairs.lower, pairs.upper), np.where(second, pairs.upper, pairs.lower)
+    warning = (
+        f"{count_of(int(replaced.sum()), 'row has', 'rows have')} nothing off the diagonal while the columns have, as "
+        "where a boundary condition was put in: entries were taken from the columns"
+    )
+    return replace(pairs, upper=upper, lower=lower, one_sided=0), replaced, (warning,)

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import planarity
-from .cycles import three_cycles
+from .cycles import chordless_four_cycles, three_cycles
 from .faces import FaceComplex, around, from_cycles, from_rotation
 from .keys import distinct
 from .separating import not_faces
-from .short_cycles import chordless_four_cycles
 
 
 def short_faces(n: int, edges: NDArray) -> list[NDArray[np.int64]]:

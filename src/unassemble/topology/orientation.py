@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from .search import breadth_first
+from .numbering import breadth_first
 
 
 @dataclass(frozen=True, eq=False)
