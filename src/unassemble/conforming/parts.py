@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..budget import SAMPLE
 from ..elements.kinds import Kind
 from ..errors import TopologyError
 from ..topology import Piece
@@ -43,17 +41,6 @@ class Part:
     def degree(self) -> int:
         """Of the elements, along a side."""
         return max(kind.degree for kind in self.blocks)
-
-    @cached_property
-    def few(self) -> tuple[Part, NDArray[np.int64]]:
-        """The part with some of its cells, in the same numbering, and edges that belong to one of these only."""
-        some = {kind: slice(None, None, len(cells) // SAMPLE + 1) for kind, cells in self.blocks.items()}
-        count, own = np.zeros((2, len(self.edges)), np.int64)
-        for kind, rows in self.places.items():
-            count += np.bincount(rows.ravel(), minlength=len(count))
-            own[rows[some[kind]]] = 1
-        blocks, places = ({kind: of[kind][some[kind]] for kind in of} for of in (self.blocks, self.places))
-        return replace(self, blocks=blocks, places=places), np.flatnonzero(own & (count == 1))
 
     def from_corners(self) -> sp.csr_array:
         """(n, n_corners) nodes of straight cells as means of corners."""

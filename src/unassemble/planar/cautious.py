@@ -41,15 +41,7 @@ def cautious_polish(
 ) -> PolishedMesh:
     """Maximum-likelihood mesh from a distant start, with a factorisation for each step.
 
-    Parameters
-    ----------
-    piece : Piece
-    weights : (e,) float64
-    z : (n,) complex128
-    scale : float, optional
-    spread : (e,) float64, optional
-        As for the polish.
-    options : CautiousOptions, optional
+    `weights` (e,); `z` (n,); `spread` (e,): as for the polish.
     """
     options = options or CautiousOptions()
     spread = np.ones(len(weights)) if spread is None else spread

@@ -208,11 +208,7 @@ def smooth_start(n: int, boundary: NDArray, loop_offsets: NDArray) -> NDArray:
     or a hole. Without the ellipses on other loops than the longest, the inversion of a ring would hide the ring from
     the Krylov space. The noise breaks symmetries that would hide the answer from every such space.
 
-    Parameters
-    ----------
-    n : int
-    boundary, loop_offsets
-        As :class:`~unassemble.topology.Piece` has them.
+    `boundary` and `loop_offsets`: as :class:`~unassemble.topology.Piece` has them.
     """
     z = 0.01 * np.random.default_rng(0).standard_normal((n, 2)).view(np.complex128).ravel()
     length = np.diff(loop_offsets)

@@ -67,11 +67,7 @@ class WeightJacobian:
 class NormalEquations:
     """Factorised J'J with some vertices held fixed, which pins the freedoms of a similarity, or of several.
 
-    Parameters
-    ----------
-    jacobian : Jacobian
-    pins : (k,) int
-        Vertices that stay where they are; the farther apart the better.
+    `pins` (k,): vertices that stay where they are; the farther apart the better.
     """
 
     def __init__(self, jacobian: Jacobian, pins: NDArray):

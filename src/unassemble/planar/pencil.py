@@ -45,14 +45,8 @@ def pencil_pattern(n: int, edges: NDArray) -> UpperTriangle:
 class ConformalPencil:
     """M(s) with the last vertex pinned at zero, which removes the constants from its null space.
 
-    Parameters
-    ----------
-    piece : Outline
-        A piece, for instance.
-    weights : (e,) float64
-        c w = -A_ij of each edge.
-    strength : (b,) float64, optional
-        Factors of the boundary edges, such that those that enter a vertex add up to those that leave it; 1 by default.
+    `piece`: a piece, for instance; `weights` (e,): c w = -A_ij of each edge; `strength` (b,): factors of the boundary
+    edges, such that those that enter a vertex add up to those that leave it; 1 by default.
     """
 
     def __init__(self, piece: Outline, weights: NDArray, strength: NDArray | None = None):

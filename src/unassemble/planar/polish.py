@@ -156,12 +156,7 @@ def errors_of_one_size(misfit: NDArray, spread: NDArray) -> bool:
 
     Both likelihoods are at their greatest over the common factor.
 
-    Parameters
-    ----------
-    misfit : (e,) float64
-        a / c - w.
-    spread : (e,) float64
-        Rounding errors, in units of the machine precision.
+    `misfit` (e,): a / c - w; `spread` (e,): rounding errors, in units of the machine precision.
     """
     even, uneven = (float(np.linalg.norm(r)) / np.sqrt(len(r)) for r in (misfit, misfit / spread))
     if not (np.isfinite(uneven) and uneven > ROUNDED):

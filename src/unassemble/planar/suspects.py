@@ -124,12 +124,7 @@ def differences_without(
 
     Infinite where there is no such mesh.
 
-    Parameters
-    ----------
-    piece, weights, z, scale, free_scale
-        As for :func:`find_suspects`.
-    aside : (k,) int64
-        Edges of the piece.
+    `aside` (k,): edges of the piece; the others as for :func:`find_suspects`.
     """
     spread = np.abs(weights) + np.median(np.abs(weights))
     spread[aside] *= 1e6  # they count where nothing else holds a vertex

@@ -136,12 +136,7 @@ def areas_of_mass(skeleton: Skeleton, entries: NDArray, diagonal: NDArray) -> ND
 
     s M has s a / 12 from every triangle on each of its edges, and s a / 6 at each of its corners.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-    entries : (e,) float64
-        A_ij.
-    diagonal : (n,) float64
+    `entries` (e,): A_ij; `diagonal` (n,).
     """
     matrix = sp.csr_array(sp.vstack([skeleton.at_edges / 12, skeleton.at_vertices / 6]))
     given = np.concatenate([entries, diagonal])

@@ -16,11 +16,7 @@ def adjacency(n: int, edges: NDArray) -> sp.csr_array:
 def neighbours(graph: sp.csr_array, vertices: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """All neighbours of some vertices.
 
-    Returns
-    -------
-    place : (k,) int64
-        Which of `vertices`, in increasing order.
-    neighbour : (k,) int64
+    Returns `place` (k,): which of `vertices`, in increasing order; `neighbour` (k,).
     """
     count = graph.indptr[vertices + 1] - graph.indptr[vertices]
     place = np.repeat(np.arange(len(vertices)), count)

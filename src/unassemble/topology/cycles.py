@@ -66,10 +66,7 @@ def three_cycles(n: int, edges: NDArray) -> tuple[NDArray, NDArray]:
 def triangles_everywhere(n: int, edges: NDArray, sample: int = 200) -> bool:
     """Whether every edge at some vertices, evenly spaced by number, lies on a 3-cycle.
 
-    Parameters
-    ----------
-    n, edges
-        As for :func:`three_cycles`.
+    `n` and `edges`: as for :func:`three_cycles`.
     """
     chosen = np.zeros(n, dtype=bool)
     chosen[np.linspace(0, n - 1, min(n, sample)).astype(int)] = True

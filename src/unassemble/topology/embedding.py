@@ -40,11 +40,7 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
     surface that they make by themselves, then an embedding in which all of them are faces, or all but those on edges
     with more than two 3-cycles, last any.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order; at least one.
+    `edges` (e, 2): pairs i < j in lexicographic order; at least one.
     """
     if n >= 3 and len(edges) > 3 * n - 6:  # not planar, and may have very many cycles
         return

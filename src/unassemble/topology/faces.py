@@ -97,9 +97,7 @@ class FaceComplex:
     def joined(self, empty: NDArray[np.bool_]) -> FaceComplex:
         """Blocks hung into each other's empty faces: at each vertex one such face of each block becomes one face.
 
-        Parameters
-        ----------
-        empty : (faces,) bool
+        `empty` (faces,).
         """
         at = np.flatnonzero(empty[self.face])
         # One visit for each block and vertex, that of the longest face.
@@ -114,12 +112,7 @@ class FaceComplex:
 def from_rotation(n: int, edges: NDArray, tail: NDArray, head: NDArray) -> FaceComplex:
     """The complex of a planar embedding.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-    tail, head : (2 e,) int64
-        Half-edges grouped by tail, each group in cyclic order.
+    `edges` (e, 2); `tail` and `head` (2 e,): half-edges grouped by tail, each group in cyclic order.
     """
     half = half_edges(n, edges, tail, head)
     successor = np.empty(2 * len(edges), dtype=np.int64)

@@ -27,12 +27,7 @@ def local_numbering(n: int, edges: NDArray) -> Numbering:
     The rows of a matrix may lie in any order, and on large meshes most of the time would go into waiting for
     memory: after this, what lies near each other on the mesh does so in memory.
 
-    Parameters
-    ----------
-    n : int
-        Number of vertices.
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
+    `n`: number of vertices; `edges` (e, 2): pairs i < j in lexicographic order.
     """
     upper = sp.coo_array((np.ones(len(edges), np.int8), edges.astype(np.int32).T), shape=(n, n)).tocsr()
     vertices, _ = breadth_first(upper + upper.T)
@@ -49,12 +44,7 @@ def local_numbering(n: int, edges: NDArray) -> Numbering:
 def components(n: int, edges: NDArray) -> list[Numbering]:
     """Connected components with edges, each in a numbering of its own, largest first.
 
-    Parameters
-    ----------
-    n : int
-        Number of vertices.
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
+    `n`: number of vertices; `edges` (e, 2): pairs i < j in lexicographic order.
     """
     graph = sp.coo_array((np.ones(len(edges), np.int8), edges.T), shape=(n, n))
     count, label = csgraph.connected_components(graph, directed=False)

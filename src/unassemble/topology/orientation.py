@@ -54,13 +54,8 @@ def reglue(gluing: Gluing, flip: NDArray) -> Gluing:
 def orient(triangles: NDArray, gluing: Gluing) -> tuple[NDArray, NDArray, NDArray]:
     """Turn triangles so that neighbours run along their common edge in opposite directions.
 
-    Returns
-    -------
-    flip : (m,) bool
-        Triangles to be reversed; the first triangle of each piece is kept.
-    piece : (m,) int64
-        Label of the edge-connected piece, in order of the pieces' first triangles.
-    orientable : (number of pieces,) bool
+    Returns `flip` (m,): triangles to be reversed; the first triangle of each piece is kept; `piece` (m,): label of the
+    edge-connected piece, in order of the pieces' first triangles; `orientable` (number of pieces,).
     """
     m = len(triangles)
     inner = gluing.second >= 0

@@ -64,11 +64,8 @@ class Polygons:
     def fans(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Triangles about the first vertex of each polygon.
 
-        Returns
-        -------
-        triangles : (m, 3) int64
-        outline : (m, 3) bool
-            Whether the side from each corner to the next belongs to the polygon; the others are diagonals.
+        Returns `triangles` (m, 3); `outline` (m, 3): whether the side from each corner to the next belongs to the
+        polygon; the others are diagonals.
         """
         size = self.size - 2
         owner = np.repeat(np.arange(self.count), size)
@@ -82,9 +79,7 @@ class Polygons:
     def counter_clockwise(self, points: NDArray) -> Polygons:
         """The same polygons, each in the order in which its area is positive.
 
-        Parameters
-        ----------
-        points : (n, 2) float64
+        `points` (n, 2).
         """
         size = self.size
         owner = np.repeat(np.arange(self.count), size)

@@ -14,10 +14,7 @@ from .surface import Piece
 class Together:
     """Pieces with their vertices, edges, triangles and boundary edges numbered one piece after the other.
 
-    Parameters
-    ----------
-    pieces : sequence of Piece
-        At least one.
+    `pieces`: at least one.
     """
 
     def __init__(self, pieces: Sequence[Piece]):

@@ -26,13 +26,8 @@ def polished(solved: Solved, weights: NDArray, errors: NDArray, misfit: NDArray,
 
     The piece with the most entries to spare tells c, where `scale` is not given.
 
-    Parameters
-    ----------
-    solved : list of (Piece, PieceMesh)
-    weights, errors : (e,) float64
-        Of all edges; errors of those that have vanished are 0.
-    misfit : (e,) float64
-        As in :class:`unassemble.cells.judge.Labelling`.
+    `solved` list of (Piece, PieceMesh); `weights` and `errors` (e,): of all edges; errors of those that have vanished
+    are 0; `misfit` (e,): as in :class:`unassemble.cells.judge.Labelling`.
     """
     if not solved:
         return None

@@ -159,13 +159,7 @@ class Sheet:
     def linearised(self, placed: Placed, strength: NDArray) -> tuple[sp.csr_array, sp.csr_array, NDArray]:
         """Derivatives of the weights over their spread.
 
-        Returns
-        -------
-        by_position : (e, 2 n) csr_array
-        by_label : (e, k) csr_array
-            Labels of the chosen candidates.
-        by_scale : (e,) float64
-            By log c.
+        Returns `by_position` (e, 2 n); `by_label` (e, k): labels of the chosen candidates; `by_scale` (e,): by log c.
         """
         t, z = self.triangles, placed.z
         at, shape = z[t], (len(self.weights), 2 * len(z))
