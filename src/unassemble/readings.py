@@ -106,7 +106,7 @@ class ScalarReadings:
             except RecoveryError as error:
                 failure = error if reading == self._linear else failure or error
                 continue
-            if found is not None and (found.status != "uncertified" or len(found.suspects)):  # entries that are wrong
+            if found is not None and found.status != "uncertified":
                 return found
             nearest = nearest or found
         if nearest is None:

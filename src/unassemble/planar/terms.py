@@ -17,7 +17,6 @@ from ..errors import SolverError
 from ..topology import Piece
 from .cotangent import cotangent, edge_weights
 from .normal import NormalEquations, WeightJacobian, distant_pair
-from .suspects import Complement
 
 MASS, COEFFICIENT, ONE_SIGN = "mass", "coefficient", "one sign"
 
@@ -65,7 +64,7 @@ def lacking_term(
     try:
         jacobian = WeightJacobian(piece, z, spread)
         equations = NormalEquations(jacobian, distant_pair(z))
-        rest = Complement(jacobian, equations, fitted if free_scale else None)
+        rest = _Complement(jacobian, equations, fitted if free_scale else None)
         both = rest(np.column_stack([weights / scale / spread - fitted, terms]))
         equations.release()
     except SolverError:
@@ -112,3 +111,27 @@ def _terms(piece: Piece, z: NDArray) -> tuple[NDArray, NDArray[np.float64]]:
     varying = [summed(halves * factor[:, None]) for factor in powers]
     names = np.array([*([MASS] * len(mass)), *([COEFFICIENT] * len(varying)), ONE_SIGN])
     return names, np.column_stack([*mass, *varying, np.ones(len(piece.edges))])
+
+
+class _Complement:
+    """The projector I - H off what displacements, and a change of scale, can explain."""
+
+    def __init__(self, jacobian: WeightJacobian, equations: NormalEquations, weights: NDArray | None):
+        self._jacobian, self._equations = jacobian, equations
+        self._direction = None
+        if weights is not None:
+            rest = self._off_range(weights[:, None])[:, 0]
+            size = float(np.linalg.norm(rest))
+            self._direction = rest / size if size > 0 else None
+
+    def __call__(self, changes: NDArray) -> NDArray:
+        """(e, k) -> (e, k)."""
+        changes = self._off_range(changes)
+        if self._direction is None:
+            return changes
+        return changes - self._direction[:, None] * (self._direction @ changes)
+
+    def _off_range(self, changes: NDArray) -> NDArray:
+        gradients = np.column_stack([self._jacobian.transpose(column) for column in changes.T])
+        moves = self._equations.solve(gradients)
+        return changes - np.column_stack([self._jacobian.forward(np.ascontiguousarray(move)) for move in moves.T])

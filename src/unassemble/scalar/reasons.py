@@ -110,10 +110,8 @@ def _culprits(evidence: Evidence) -> str:
     """The sentence on entries that are to blame; empty where none are."""
     if not len(evidence.suspects):
         return ""
-    k, (i, j) = len(evidence.suspects), evidence.suspects[0]
-    if k == 1:
-        return f"the entry of rows {i} and {j} stands out: without it a mesh fits all others"
-    return f"{k} entries stand out, first that of rows {i} and {j}: without them a mesh fits all others"
+    i, j = evidence.suspects[0]
+    return f"the entry of rows {i} and {j} stands out from the misfit of all others"
 
 
 def _unexplained(certificate: Certificate) -> str:

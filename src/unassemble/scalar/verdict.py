@@ -129,7 +129,7 @@ def _by_itself(f: Findings) -> tuple[bool, Reason]:
         return _by_noise(f, test)
     doubt = max(mesh.doubt for mesh in f.solved.meshes)
     fits = f"the operator re-assembled on this mesh gives the matrix back to {error:.1e} (relative)"
-    if not good or f.evidence.certain:
+    if not good or len(f.evidence.suspects):
         bare = good and len(topology.bare_edges) > 0
         why = misfit(f, f.trouble)
         return False, _bare(f) if bare else Reason.of(*apart, advice=why.advice) if apart else why
