@@ -173,7 +173,6 @@ def test_eliminated_boundary_is_seen():
     taken = recover(known.matrix[inside][:, inside])
     assert taken.certified
     assert "are determined" in taken.reason
-    assert not any("eliminated" in note for note in found.warnings)
 
 
 def test_the_laplacian_of_a_graph_is_named():
@@ -181,7 +180,7 @@ def test_the_laplacian_of_a_graph_is_named():
     order = np.random.default_rng(0).permutation(len(graph)).tolist()
     found = recover(networkx.laplacian_matrix(graph, nodelist=order).astype(float))
     assert not found.certified
-    assert any("Laplacian of a graph" in note for note in found.warnings)
+    assert "the Laplacian of a graph" in found.reason
 
 
 def test_a_wrong_entry_is_not_taken_for_an_elimination():
@@ -191,7 +190,6 @@ def test_a_wrong_entry_is_not_taken_for_an_elimination():
     spoilt[i, j] = spoilt[j, i] = 1.01 * spoilt[i, j]
     found = recover(spoilt)
     assert found.reason.startswith(f"the entry of rows {i} and {j} stands out")
-    assert not [note for note in found.warnings if "eliminated" in note]
 
 
 @pytest.mark.parametrize("scale", [-1e308, 1e200, 1e40, 1e-40, 5e-324])

@@ -28,22 +28,9 @@ def coordinate_covariances(
     translations, rotation and scaling. Responses to every single entry add up to the covariance exactly;
     above `options.exact_up_to` edges random sign patterns stand in for them.
 
-    Parameters
-    ----------
-    piece : Piece
-    z : (n,) complex128
-        The Laplacian's frame.
-    free_scale : bool
-        Whether c was fitted.
-    stretch : (2, 2) float64, optional
-        Linear map from that frame to the one in which covariances are wanted.
-    spread : (e,) float64, optional
-        Standard deviations of the weights relative to that, for which z is the least-squares estimate.
-    options : SamplingOptions, optional
-
-    Returns
-    -------
-    (n, 2, 2) float64
+    `z` (n,): in the Laplacian's frame; `free_scale`: whether c was fitted; `stretch` (2, 2): linear map from that frame
+    to the one in which covariances are wanted; `spread` (e,): standard deviations of the weights relative to 1, for
+    which z is the least-squares estimate. Returns (n, 2, 2).
     """
     jacobian = WeightJacobian(piece, z, spread)
     weights = edge_weights(piece, z) / jacobian.spread

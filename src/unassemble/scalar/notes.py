@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..matrix import OperatorMatrix
 from ..topology import Topology
 from ..words import count_of, words_of
 
@@ -64,27 +63,6 @@ def vanished_notes(topology: Topology) -> list[str]:
             + " no entry in the matrix"
         )
     return notes
-
-
-def origin_notes(matrix: OperatorMatrix, suspects: NDArray) -> list[str]:
-    """What the entries say of where the matrix may come from, where no mesh fits.
-
-    Row sums tell of unknowns that were taken out; not if the entries that stand out, (k, 2), are in all of these rows:
-    a wrong entry spoils two sums.
-    """
-    rest = np.flatnonzero(matrix.incomplete_rows)
-    if matrix.unweighted:
-        return [
-            "all entries are equal, as in the Laplacian of a graph without weights; on a mesh, entries on the boundary "
-            "have one triangle each and others two"
-        ]
-    if not len(rest) or np.isin(rest, suspects).all():
-        return []
-    return [
-        f"all rows add up to zero but for {len(rest):,}: {_some(rest)}; unknowns next to these seem to have been "
-        "eliminated, on a boundary for one, and entries still contain triangles whose vertices are gone: keep all rows "
-        "and columns"
-    ]
 
 
 def _some(rows: NDArray, count: int = 8) -> str:

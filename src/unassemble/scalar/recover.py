@@ -18,13 +18,13 @@ from ..options import ScalarOptions
 from ..planar.hinges import join
 from ..planar.pencil import pencil_pattern
 from ..recovery import PlanarMesh
-from ..tolerances import CERTIFIED, SIGMAS, SMALL
+from ..tolerances import CERTIFIED, SIGMAS
 from ..topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
 from .deviations import coordinate_deviations
 from .evidence import weigh
 from .joined import JoinedMesh
 from .noise import Noise, NoiseTest
-from .notes import origin_notes, piece_notes, topology_notes, vanished_notes
+from .notes import piece_notes, topology_notes, vanished_notes
 from .placement import Placement
 from .solving import Solved, Task, solve
 from .verdict import Findings, Held, Verdict, verdict
@@ -201,9 +201,6 @@ def _report(
     notes = [*solved.matrix.warnings, *placed.notes]
     if options.noise and evidence.noise is not None and evidence.noise < 0.5 * options.noise:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
-    # What a misfit that small lacks is digits, and not triangles.
-    if refused and not (noise or held.certificate.backward_error < SMALL):
-        notes += origin_notes(findings.stored, evidence.suspects)
     if found.uniqueness == "searched" and np.bincount(components_of(findings.stored)).max() > SEARCHED_ROWS:
         notes.append(f"other meshes were looked for in connected parts of up to {SEARCHED_ROWS:,} rows only")
     return PlanarMesh(

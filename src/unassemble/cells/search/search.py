@@ -15,7 +15,7 @@ from ..candidates.starts import likely_labels
 from ..candidates.widened import widened
 from ..judge.labelling import Labelling
 from ..propagate.peeling import ContradictionError, lone_scales, peeled
-from ..relax.holes import with_holes
+from ..relax.relaxation import with_holes
 from .best_first import BestFirst, Judge, better, leapt
 from .options import DEFAULT, SearchOptions
 
