@@ -16,14 +16,13 @@ Mullen, Tong, Alliez, Desbrun, "Spectral conformal parameterization", CGF 27, 20
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from ..linalg import Factorisation, UpperTriangle, factorisation
+from ..linalg import factorisation
 from ..tolerances import ALIKE, LITTLE, MOST, ROUNDED, SUMMED
 from ..topology import Piece
 from .krylov import ShiftedSearch
@@ -129,7 +128,6 @@ def conformal_map(
     *,
     scale: float | None = None,
     sharp: bool = True,
-    analyse: Callable[[UpperTriangle], Factorisation] = factorisation,
     options: ConformalOptions | None = None,
 ) -> ConformalMap:
     """Positions and scale of one piece.
@@ -144,8 +142,6 @@ def conformal_map(
         tried first, or c = 1 if their median allows it.
     sharp : bool
         Go on until z, not only c, has converged. A polish does not need that.
-    analyse : callable
-        Makes a factorisation from the pattern of :func:`~unassemble.planar.pencil.pencil_pattern`.
     options : ConformalOptions, optional
 
     Raises
@@ -168,7 +164,7 @@ def conformal_map(
         # The energy of a hat function; without it the pencil may be singular, which PARDISO does not survive.
         row = int(piece.vertices[np.argmin(sums)])
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
-    search = ShiftedSearch(ConformalPencil(piece, relative), analyse, options.krylov_steps)
+    search = ShiftedSearch(ConformalPencil(piece, relative), factorisation, options.krylov_steps)
     z = start = smooth_start(piece.n_vertices, piece.boundary, piece.loop_offsets)
     known = scale if scale is not None else estimate.likely
     if known is not None:

@@ -36,12 +36,6 @@ class Outline(Protocol):
         """(b, 2) directed edges with the mesh on their left."""
 
 
-def pencil_pattern(n: int, edges: NDArray) -> UpperTriangle:
-    """The pattern of M(s) on a piece of these edges, (e, 2) in lexicographic order: those with weight or on its rim."""
-    edges = edges[edges[:, 1] < n - 1]  # the pinned vertex is the higher end of all its edges
-    return upper_from_edges(n - 1, edges, np.zeros(len(edges), np.complex128), np.zeros(n - 1))
-
-
 class ConformalPencil:
     """M(s) with the last vertex pinned at zero, which removes the constants from its null space.
 

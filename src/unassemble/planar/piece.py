@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SolverError
-from ..linalg import Factorisation, UpperTriangle
 from ..tolerances import LARGEST_NOISE, LAST_DIGITS, SIGMAS
 from ..topology import Piece
 from .cautious import CautiousOptions, cautious_polish, count_flipped
@@ -38,10 +36,9 @@ def positions(
     *,
     scale: float | None,
     sharp: bool,
-    analyse: Callable[[UpperTriangle], Factorisation],
 ) -> PieceMesh:
     """Conformal solve; `sharp` where no polish follows."""
-    found = conformal_map(piece, weights, scale=scale, sharp=sharp, analyse=analyse)
+    found = conformal_map(piece, weights, scale=scale, sharp=sharp)
     notes = () if found.converged else ("the conformal solve did not converge",)
     return PieceMesh(found.z, found.scale, notes)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 
@@ -12,14 +11,13 @@ from numpy.typing import NDArray
 from ..cells import SEARCHED_ROWS, Alternative, alternatives, components_of
 from ..certify import certify
 from ..clock import Clock
-from ..linalg import AnalysisAhead, Factorisation, UpperTriangle, blas_threads, factorisation
+from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.hinges import join
-from ..planar.pencil import pencil_pattern
 from ..recovery import PlanarMesh
 from ..tolerances import CERTIFIED, SIGMAS
-from ..topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
+from ..topology import Polygons, local_numbering, surfaces
 from .deviations import coordinate_deviations
 from .evidence import weigh
 from .joined import JoinedMesh
@@ -78,10 +76,10 @@ def _recovered(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:
     """The mesh of a matrix whose entries have errors of known size, or those of assembly."""
     free_scale = task.scale is None
     with clock("topology"):
-        topology, analyse = _recognised(stored, task.options)
+        topology = surfaces(stored.n, stored.edges, local_numbering(stored.n, stored.edges))
     if task.noise is not None:
         stored = replace(stored, errors=task.noise.sigma * task.noise.spread)
-    solved = solve(topology, stored, clock, task, analyse)
+    solved = solve(topology, stored, clock, task)
     with clock("place"):
         placed = _place(solved, task)
     with clock("certify"):
@@ -101,23 +99,6 @@ def _recovered(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:
             return _other_meshes(findings, task)
 
     return _report(findings, verdict(findings, other_meshes), placed, deviations, clock, task)
-
-
-def _recognised(
-    stored: OperatorMatrix, options: ScalarOptions
-) -> tuple[Topology, Callable[[UpperTriangle], Factorisation]]:
-    """The surfaces that 3-cycles make; and what analyses pencils, begun already for a matrix of a single piece.
-
-    Most matrices are those of one, and its pencil has their pattern. Others may be large and dense, or lack the
-    diagonals of their cells.
-    """
-    numbering = local_numbering(stored.n, stored.edges)
-    analyse: Callable[[UpperTriangle], Factorisation] = factorisation
-    planar = options.method == "conformal" and len(stored.edges) < 3 * stored.n
-    if planar and triangles_everywhere(stored.n, numbering.edges):
-        used = stored.entries[numbering.edge_rows] != 0
-        analyse = AnalysisAhead(pencil_pattern(stored.n, numbering.edges[used]), options.threads)
-    return surfaces(stored.n, stored.edges, numbering), analyse
 
 
 def _place(solved: Solved, task: Task) -> _Placed:

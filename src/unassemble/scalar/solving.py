@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..cells import Outcome, completed, in_doubt
 from ..errors import GeometryError, RecoveryError, SolverError
-from ..linalg import Factorisation, UpperTriangle, blas_threads, factorisation
+from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.cotangent import left_by_all
@@ -76,9 +76,8 @@ def solve(
     matrix: OperatorMatrix,
     clock: Clock,
     task: Task,
-    analyse: Callable[[UpperTriangle], Factorisation] = factorisation,
 ) -> Solved:
-    """Positions and scale of each piece; `analyse` as for the conformal map.
+    """Positions and scale of each piece.
 
     Raises
     ------
@@ -92,7 +91,7 @@ def solve(
     def start(piece: Piece) -> Outcome:
         try:
             weights = -matrix.entries[piece.edge_rows]
-            mesh = _start(piece, weights, method, scale, sharp=not refine, analyse=analyse)
+            mesh = _start(piece, weights, method, scale, sharp=not refine)
             return brought_near(piece, weights, mesh, scale=scale) if drowning else mesh
         except (GeometryError, SolverError) as error:
             return error
@@ -191,11 +190,10 @@ def _start(
     scale: float | None,
     *,
     sharp: bool,
-    analyse: Callable[[UpperTriangle], Factorisation],
 ) -> PieceMesh:
     if method == "angles":
         return _by_angles(piece, weights, scale)
-    return positions(piece, weights, scale=scale, sharp=sharp, analyse=analyse)
+    return positions(piece, weights, scale=scale, sharp=sharp)
 
 
 def _by_angles(piece: Piece, weights: NDArray, scale: float | None) -> PieceMesh:

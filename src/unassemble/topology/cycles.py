@@ -63,21 +63,6 @@ def three_cycles(n: int, edges: NDArray) -> tuple[NDArray, NDArray]:
     return triangles, opposite
 
 
-def triangles_everywhere(n: int, edges: NDArray, sample: int = 200) -> bool:
-    """Whether every edge at some vertices, evenly spaced by number, lies on a 3-cycle.
-
-    `n` and `edges`: as for :func:`three_cycles`.
-    """
-    chosen = np.zeros(n, dtype=bool)
-    chosen[np.linspace(0, n - 1, min(n, sample)).astype(int)] = True
-    near = chosen.copy()
-    near[edges[chosen[edges].any(axis=1)]] = True
-    around = edges[near[edges].all(axis=1)]
-    _, opposite = three_cycles(n, around)
-    bare = np.bincount(opposite.ravel(), minlength=len(around)) == 0
-    return not (bare & chosen[around].any(axis=1)).any()
-
-
 def lookup(n: int, edges: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
     """A function from pairs of vertices to rows of `edges`, -1 where there is no edge."""
     indptr = np.zeros(n + 1, dtype=np.int32)
