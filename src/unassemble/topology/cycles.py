@@ -8,8 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .adjacency import adjacency, neighbours
 from .faces import joined
+from .numbering import adjacency, neighbours
 
 
 def three_cycles(n: int, edges: NDArray) -> tuple[NDArray, NDArray]:

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..budget import LARGE
-from .adjacency import adjacency, neighbours
 from .keys import contains, distinct
+from .numbering import adjacency, neighbours
 
 _MOST_WORK = 4_000_000  # neighbours of vertices on the rims of balls about cycles
 

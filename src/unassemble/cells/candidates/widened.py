@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from ...tolerances import LITTLE
 from ...topology import Polygons
-from ...topology.adjacency import adjacency
 from ...topology.cycles import three_cycles
 from ...topology.faces import joined
+from ...topology.numbering import adjacency
 from .candidates import Candidates
 
 _MOST_NEIGHBOURS = 12

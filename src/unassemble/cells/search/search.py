@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...budget import Budget
 from ...topology.embedding import face_complexes
 from ..candidates.candidates import Candidates
-from ..candidates.starts import likely_labels
+from ..candidates.choosing import likely_labels
 from ..candidates.widened import widened
 from ..judge.labelling import Labelling
 from ..propagate.peeling import ContradictionError, lone_scales, peeled
