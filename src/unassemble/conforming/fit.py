@@ -59,21 +59,10 @@ def fitted(
 
     Straight cells first; where they do not fit, all nodes move, from there.
 
-    Parameters
-    ----------
-    part : Part
-    weights : (e,) float64
-        -A_ij of the part's edges.
-    scale : float, optional
-        c, where it is known.
-    noise : (e,) float64, optional
-        Standard deviations of the entries' errors, where they are known.
-    refine : bool
-        Whether to polish.
+    `weights` (e,): -A_ij of the part's edges; `scale`: c, where it is known; `noise` (e,): standard deviations of the
+    entries' errors, where they are known; `refine`: whether to polish.
 
-    Raises
-    ------
-    GeometryError, SolverError
+    Raises GeometryError, SolverError.
     """
     z, c = corner_positions(part, weights, scale)
     straight = _by_best_rule(part, weights, z, c, noise, straight=True)

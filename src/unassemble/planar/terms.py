@@ -37,19 +37,8 @@ def lacking_term(
 ) -> Term | None:
     """The term that explains most of a misfit; None where there are too few entries to spare.
 
-    Parameters
-    ----------
-    piece : Piece
-    weights : (e,) float64
-        -A_ij.
-    z : (n,) complex128
-        The fitted mesh.
-    scale : float
-        c.
-    spread : (e,) float64, optional
-        Standard deviations of the weights up to a factor; 1 by default.
-    free_scale : bool
-        Whether c was fitted.
+    `weights` (e,): -A_ij; `z` (n,): the fitted mesh; `scale`: c; `spread` (e,): standard deviations of the weights up
+    to a factor; 1 by default; `free_scale`: whether c was fitted.
     """
     freedom = len(weights) - 2 * piece.n_vertices + 4 - free_scale
     if freedom < 3:

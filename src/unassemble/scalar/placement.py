@@ -46,10 +46,7 @@ def _converted(
 class Placement:
     """What is known of the true frame.
 
-    Raises
-    ------
-    InputError
-        For values that contradict each other or themselves.
+    Raises InputError for values that contradict each other or themselves.
     """
 
     anchors: tuple[Anchor, ...] = ()  # tuple of (row, x, y)
@@ -118,16 +115,9 @@ class Placement:
     def apply(self, piece: Piece, z: NDArray, origin: complex = 0j) -> tuple[NDArray, list[str]]:
         """True positions of a piece, relative to a point, from its positions z (n,) in any frame of the Laplacian's.
 
-        Returns
-        -------
-        positions : (n,) complex128
-        notes : list of str
-            What is arbitrary, or does not fit.
+        Returns `positions` (n,); `notes`: what is arbitrary, or does not fit.
 
-        Raises
-        ------
-        InputError
-            If a tensor is to be undone and the orientation is not known.
+        Raises InputError if a tensor is to be undone and the orientation is not known.
         """
         rows, targets = self._anchors_of(piece)
         targets = targets - origin

@@ -64,17 +64,10 @@ def components(n: int, edges: NDArray) -> list[Numbering]:
 def breadth_first(graph: sp.csr_array) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Search each component from its lowest vertex.
 
-    Parameters
-    ----------
-    graph : (n, n) csr_array
-        Both triangles of a symmetric pattern; entries do not count.
+    `graph` (n, n): both triangles of a symmetric pattern; entries do not count.
 
-    Returns
-    -------
-    order : (n,) int32
-        Vertices in the order in which they are reached.
-    parent : (n,) int32
-        -1 at the start of each component.
+    Returns `order` (n,): vertices in the order in which they are reached; `parent` (n,): -1 at the start of each
+    component.
     """
     n = graph.shape[0]
     order, parent = csgraph.breadth_first_order(graph, 0, directed=True)

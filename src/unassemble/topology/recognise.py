@@ -23,14 +23,8 @@ def surfaces(n: int, edges: NDArray, numbering: Numbering | None = None) -> Topo
     glue together to orientable surfaces with the Euler number of a sphere with as many holes as there are
     boundary loops, then the surfaces are planar and those 3-cycles are faces.
 
-    Parameters
-    ----------
-    n : int
-        Number of vertices.
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
-    numbering : Numbering, optional
-        Of the same graph: in which to work, and which pieces keep where they are the whole graph.
+    `n`: number of vertices; `edges` (e, 2): pairs i < j in lexicographic order; `numbering`: of the same graph: in
+    which to work, and which pieces keep where they are the whole graph.
     """
     pieces = _surfaces_of(numbering or Numbering(np.arange(n), np.arange(len(edges)), edges))
     if pieces is None:
