@@ -7,8 +7,6 @@ one problem of the size of the corners serves all orders, and its null space is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -22,15 +20,6 @@ from ..tolerances import SUMMED
 from ..topology.keys import distinct
 from .parts import Part
 from .sets import pairs_of
-
-
-@dataclass(frozen=True, eq=False)
-class Outline:
-    """What the pencil needs to know of the corners."""
-
-    n_vertices: int
-    edges: NDArray[np.int64]
-    boundary: NDArray[np.int64]
 
 
 def among_corners(part: Part, weights: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -70,7 +59,7 @@ def corner_positions(part: Part, weights: NDArray, scale: float | None) -> tuple
         row = int(part.piece.vertices[np.argmin(sums)])
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     piece, options = part.piece, ConformalOptions()
-    pencil = ConformalPencil(Outline(part.n_corners, edges, piece.boundary), relative)
+    pencil = ConformalPencil(part.n_corners, edges, piece.boundary, relative)
     search = ShiftedSearch(pencil, factorisation, options.krylov_steps)
     start = smooth_start(part.n_corners, piece.boundary, piece.loop_offsets)
     if scale is not None:

@@ -164,7 +164,8 @@ def conformal_map(
         # The energy of a hat function; without it the pencil may be singular, which PARDISO does not survive.
         row = int(piece.vertices[np.argmin(sums)])
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
-    search = ShiftedSearch(ConformalPencil(piece, relative), factorisation, options.krylov_steps)
+    pencil = ConformalPencil(piece.n_vertices, piece.edges, piece.boundary, relative)
+    search = ShiftedSearch(pencil, factorisation, options.krylov_steps)
     z = start = smooth_start(piece.n_vertices, piece.boundary, piece.loop_offsets)
     known = scale if scale is not None else estimate.likely
     if known is not None:

@@ -146,8 +146,8 @@ def polish(
         if better is None and not converged:
             break
         fit = better or fit
-    if system is not None:
-        system.release()
+    if equations is not None:
+        equations.release()
     return PolishedMesh(fit.z * extent, fit.scale, fit.norm, steps, factorisations, converged, length)
 
 
@@ -211,23 +211,10 @@ def downhill(problem: Problem, fit: Fit, move: NDArray) -> Fit | None:
     return None
 
 
-class Equations(Protocol):
-    """The linearised problem without the scale."""
-
-    def renew(self, jacobian: Jacobian) -> None:
-        """Factorise anew for other positions."""
-
-    def fitted(self, jacobian: Jacobian, change: NDArray) -> NDArray:
-        """Displacement d (n,) complex that explains a change (e,) of the weights best: least |J d - r|."""
-
-    def release(self) -> None:
-        """Give the memory of the factor back."""
-
-
 class GaussNewton:
     """Steps of the linearised problem min |J d + g w - r| over displacements d and log-scale g."""
 
-    def __init__(self, jacobian: Jacobian, equations: Equations, weights: NDArray | None):
+    def __init__(self, jacobian: Jacobian, equations: NormalEquations, weights: NDArray | None):
         self._equations = equations
         self._weights = weights  # None where the scale is known
         if weights is not None:
@@ -243,7 +230,3 @@ class GaussNewton:
             return move
         log_scale = float(self._weights @ (misfit - jacobian.forward(move))) / self._complement
         return move - log_scale * self._response
-
-    def release(self) -> None:
-        """Give the memory of the factor back."""
-        self._equations.release()

@@ -32,19 +32,6 @@ _SHIFT = 0.7
 
 
 @dataclass(frozen=True, eq=False)
-class _Graph:
-    """The edges of all candidates, vanished ones among them; what the pencil needs to know."""
-
-    n_vertices: int
-    edges: NDArray[np.int64]
-
-    @property
-    def boundary(self) -> NDArray[np.int64]:
-        """Every edge, from its lower vertex to the higher one."""
-        return self.edges
-
-
-@dataclass(frozen=True, eq=False)
 class Placed:
     """Positions of a sheet."""
 
@@ -134,8 +121,8 @@ class Sheet:
         return np.asarray(np.bincount(self.row.ravel(), sides, len(self.weights)), dtype=np.float64)
 
     def pencil(self, strength: NDArray, unit: float = 1.0) -> ConformalPencil:
-        """The conformal pencil for fractional labels, of weights over some c."""
-        return ConformalPencil(_Graph(self.n_vertices, self.edges), self.weights / unit, self.around(strength))
+        """The conformal pencil for fractional labels, of weights over some c; each edge may be on the boundary."""
+        return ConformalPencil(self.n_vertices, self.edges, self.edges, self.weights / unit, self.around(strength))
 
     def mapped(self, strength: NDArray, start: Placed | None = None) -> Placed:
         """The conformal map for fractional labels.
