@@ -140,6 +140,28 @@ def test_the_symmetric_part_of_convection(mesh, field):
     assert determined(found, points) >= 0.85
 
 
+@needs_shared
+def test_a_rail_with_robin_terms():
+    """Of E it has the areas, another integral over the same mesh; S has the same points in another mesh of the rail."""
+    A, E, S = (recover(SHARED / "classics" / f"rail_371_{name}.mtx.gz") for name in "AES")
+    known = A.node_status == 0
+    assert A.certified
+    assert known.sum() == 363
+    areas = {frozenset(triangle): area for triangle, area in zip(E.triangles.tolist(), E.areas, strict=True)}
+    inside = A.triangles[known[A.triangles].all(axis=1)]
+    assert len(inside) >= 600
+    p, q, r = (A.points @ [1, 1j])[inside].T
+    ratio = (np.conj(q - p) * (r - p)).imag / [areas[frozenset(triangle)] for triangle in inside.tolist()]
+    assert np.ptp(ratio) <= 1e-11 * ratio.mean()
+    coarse = known & (np.arange(len(known)) < 100)  # both meshes refine one, whose vertices come first
+    a, s = (found.points @ [1, 1j] for found in (A, S))
+    factor, shift = np.linalg.lstsq(np.column_stack([a, np.ones(len(a))])[coarse], s[coarse])[0]
+    distance = np.abs((factor * a + shift)[known, None] - s)
+    assert len(np.unique(distance.argmin(axis=1))) == 363
+    assert np.median(distance.min(axis=1)) <= 1e-6 * np.ptp(S.points)
+    assert distance.min(axis=1).max() <= 1e-4 * np.ptp(S.points)
+
+
 def test_robin_terms_of_another_factor_on_each_edge():
     """No Robin condition: row sums give terms, but not those of the mesh."""
     mesh = jittered(seed=5)

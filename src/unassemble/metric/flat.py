@@ -54,9 +54,11 @@ def flattened(surface: Surface, planar: PlanarMesh) -> Surface:
     """A flat surface with the coordinates of the planar mesh that the same matrix gives, and with its certificate.
 
     In the plane there may be more entries than unknowns, and then rows may have any sum. A surface that is flat and no
-    planar mesh, a cylinder for one, stays as it is.
+    planar mesh, a cylinder for one, stays as it is; so does one that is bent, whose lengths are others where rows were
+    taken out.
     """
-    if planar.backward_error > CERTIFIED or planar.n_components != surface.n_components:
+    whole = planar.backward_error <= CERTIFIED and not planar.node_status.any()
+    if not (whole and could_be_planar(surface) and planar.n_components == surface.n_components):
         return surface
     (ax, ay), (bx, by), (cx, cy) = planar.points[surface.triangles].transpose(1, 2, 0)
     turned = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0

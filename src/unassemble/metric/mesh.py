@@ -50,7 +50,7 @@ class SurfaceMesh:
     boundary: NDArray[np.int64]
 
     @classmethod
-    def of(cls, cycles: Cycles, chosen: NDArray[np.bool_]) -> SurfaceMesh:
+    def of(cls, cycles: Cycles, chosen: NDArray[np.bool_] | slice = slice(None)) -> SurfaceMesh:
         """The surface that some of a graph's 3-cycles make."""
         triangles, opposite = cycles.triangles[chosen], cycles.opposite[chosen]
         gluing = glue(len(cycles.edges), opposite)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.special import ndtr
 
 from ..certify_metric import MetricCertificate, certify_metric
 from ..clock import Clock
-from ..errors import GeometryError, TopologyError
+from ..errors import GeometryError, RecoveryError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..recovery import Surface
@@ -22,6 +23,7 @@ from .curvature import curvatures
 from .mesh import SurfaceMesh
 from .noise import length_deviations, row_sum_test, scale_deviation
 from .program import Metric, solve_metric
+from .taken_out import with_vertices_back
 
 _READINGS = 16  # as many choices of triangles as are tried one by one
 
@@ -42,11 +44,25 @@ class _Found:
         held = self.certificate.entries
         return not self.failures and held.backward_error <= CERTIFIED and not len(held.flipped)
 
+    def without_last(self, gone: int) -> _Found:
+        """What is left without the last vertices, none of which are neighbours."""
+        mesh, n = self.mesh, self.mesh.n - gone
+        kept = (mesh.edges < n).all(axis=1)
+        rows = (mesh.triangles < n).all(axis=1)
+        place = np.cumsum(kept) - 1
+        left = SurfaceMesh.of(Cycles(n, mesh.edges[kept], mesh.triangles[rows], place[mesh.opposite[rows]]))
+        length = np.sqrt(self.squared[kept])
+        piece = left.piece_of_edge
+        mean = np.bincount(piece, length) / np.bincount(piece)
+        return replace(self, mesh=left, squared=(length / mean[piece]) ** 2)
+
 
 def recover_surface(
     matrix: OperatorMatrix, clock: Clock, options: ScalarOptions, triangles: NDArray[np.int64] | None = None
 ) -> Surface:
     """The triangles and edge lengths of a surface from its Laplacian, A = c L + D; on given triangles if there are any.
+
+    Vertices of which one alone was taken out in a place count for lengths, and are not among its points.
 
     Raises
     ------
@@ -55,6 +71,18 @@ def recover_surface(
     GeometryError
         If no piece has edge lengths with these entries.
     """
+    if triangles is None and options.noise is None and (whole := with_vertices_back(matrix)) is not None:
+        with suppress(RecoveryError):
+            found = _recovered(whole, clock, options, None, whole.n - matrix.n)
+            if found.status != "uncertified":
+                return found
+    return _recovered(matrix, clock, options, triangles)
+
+
+def _recovered(
+    matrix: OperatorMatrix, clock: Clock, options: ScalarOptions, triangles: NDArray[np.int64] | None, back: int = 0
+) -> Surface:
+    """The same, the last `back` rows being those of vertices that were put back."""
     with clock("topology"):
         _require_few_handles(matrix)
         used, notes = _used(matrix)
@@ -74,7 +102,18 @@ def recover_surface(
     if options.noise is not None and options.standard_deviations:
         with clock("deviations"):
             deviations = _deviations(best, options.noise)
+    if back:
+        best = best.without_last(back)
+        notes.append(f"{count_of(back, 'vertex was', 'vertices were')} put back, with the entries that rows lack")
+        if verdict.status == "certified" and options.scale is None:
+            verdict = _Verdict("ambiguous", "ambiguous", _SEVERAL)
     return _report(best, verdict, notes, clock, deviations)
+
+
+_SEVERAL = (
+    "with one vertex put back into each hole where rows lack entries, lengths give all entries and row sums back, but "
+    "so may several vertices in a hole"
+)
 
 
 def _require_few_handles(matrix: OperatorMatrix) -> None:
