@@ -44,8 +44,8 @@ def surface_matrix(points, triangles):
     return sp.coo_array(entries, shape=(len(points),) * 2).tocsr()
 
 
-@pytest.mark.parametrize("relative", [1e-8, 1e-5, 1e-2, 1.0])
-@pytest.mark.parametrize(("edge", "options"), [*((10, some) for some in OPTIONS), (200, OPTIONS[0])], ids=str)
+@pytest.mark.parametrize("relative", [1e-8, 1e-2])
+@pytest.mark.parametrize(("edge", "options"), [*((10, some) for some in OPTIONS[:3]), (200, OPTIONS[0])], ids=str)
 def test_one_entry_changed(options, relative, edge):
     i, j = map(int, EDGES[edge])
     value = KNOWN.matrix[i, j]
@@ -78,7 +78,7 @@ def redundancy():
 CHECKED = np.flatnonzero(redundancy() > 0.2)  # errors of the others hide in the position of a vertex
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=6, deadline=None, derandomize=True)
 @given(edge=st.sampled_from(CHECKED.tolist()), exponent=st.floats(-7.5, -0.5), sign=st.sampled_from([-1, 1]))
 def test_any_entry_changed_by_any_amount(edge, exponent, sign):
     """Of size one, that is: the change is relative to the typical entry."""
@@ -208,7 +208,7 @@ TAMPERED = {
 }
 
 
-@pytest.mark.parametrize("options", [[], ["--no-refine"], ["--scale", "1"], ["--noise", "1e-10"]], ids=str)
+@pytest.mark.parametrize("options", [[], ["--noise", "1e-10"]], ids=str)
 @pytest.mark.parametrize("what", TAMPERED)
 def test_exit_status_of_the_command_line(tmp_path, monkeypatch, what, options):
     monkeypatch.chdir(tmp_path)
