@@ -182,7 +182,7 @@ def test_single_wrong_entry_does_not_drown_in_a_large_sum():
     assert found.chi_square["p_value"] > 1e-3
     assert found.status == "uncertified"
     assert tuple(found.worst_entries[0]) == (upper.row[5000], upper.col[5000])
-    assert f"The entry of rows {upper.row[5000]} and {upper.col[5000]} is off by" in found.reason
+    assert f"entry of rows {upper.row[5000]} and {upper.col[5000]} is off by" in found.reason
 
 
 def test_sheet_folded_over_is_recovered_flat():
