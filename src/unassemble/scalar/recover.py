@@ -84,7 +84,7 @@ def _recovered(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:
         placed = _place(solved, task)
     with clock("certify"):
         near = _held_against(stored, solved, placed.mesh, placed.mesh.points, task)
-        evidence = weigh(solved, near.certificate, free_scale=free_scale, search=near.in_doubt)
+        evidence = weigh(solved, near.certificate, free_scale=free_scale, search=not near.passes)
     deviations = None
     if task.options.standard_deviations:
         with clock("deviations"):

@@ -49,11 +49,6 @@ class Held:
             return self.test.passed
         return self.certificate.backward_error <= CERTIFIED
 
-    @property
-    def in_doubt(self) -> bool:
-        """Whether wrong entries may hide here: a misfit above rounding level, that noise does not explain."""
-        return not self.passes or (not self.by_noise and self.certificate.backward_error > SUSPICIOUS)
-
 
 @dataclass(frozen=True, eq=False)
 class Findings:
@@ -129,10 +124,9 @@ def _by_itself(f: Findings) -> tuple[bool, Reason]:
         return _by_noise(f, test)
     doubt = max(mesh.doubt for mesh in f.solved.meshes)
     fits = f"the operator re-assembled on this mesh gives the matrix back to {error:.1e} (relative)"
-    if not good or len(f.evidence.suspects):
-        bare = good and len(topology.bare_edges) > 0
+    if not good:
         why = misfit(f, f.trouble)
-        return False, _bare(f) if bare else Reason.of(*apart, advice=why.advice) if apart else why
+        return False, Reason.of(*apart, advice=why.advice) if apart else why
     if not doubt <= PLACED:
         return False, Reason.of(
             f"{fits}, but so may others: in double precision the entries determine the positions to about {doubt:.0e} "
