@@ -1,6 +1,7 @@
 """Boundary conditions on third-party meshes: how much comes back, and whether all of it is right.
 
     python benchmarks/boundaries.py [FOLDER] [--conditions eliminated robin] [--meshes NAME] [--most 3000]
+    python benchmarks/boundaries.py --bound [--conditions eliminated identity]
     python benchmarks/boundaries.py --random 20000 90000 [--runs 3]
 
 Every mesh of the folder (npz with points and triangles; ``../shared/corpus/planar`` unless told) gets each boundary
@@ -10,6 +11,9 @@ processor time in direct solves with the same matrix. The last lines count meshe
 determined. With ``--random``, meshes of random points around two holes are taken instead, all boundary vertices
 eliminated, and the median of several runs is printed, each held against direct solves of its own. Exit status 1 where
 a determined point is off by more than 1e-8.
+
+With ``--bound`` nothing is recovered: the share of the points is printed that whole entries determine and check at the
+very mesh, to first order, which no method can surpass with these entries.
 """
 
 from __future__ import annotations
@@ -18,6 +22,7 @@ import argparse
 import sys
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +35,13 @@ from conditions import convected, eliminated, identity_rows, largest_error_of, m
 
 from meshes import random_mesh  # noqa: E402
 from unassemble import RecoveryError, recover  # noqa: E402
+from unassemble.boundaries import with_boundary_edges, with_diagonals  # noqa: E402
+from unassemble.boundaries.judge import determined  # noqa: E402
+from unassemble.boundaries.rim import Rim  # noqa: E402
 from unassemble.linalg import UpperTriangle, factorisation  # noqa: E402
+from unassemble.matrix import check_matrix  # noqa: E402
+from unassemble.planar.cotangent import edge_weights  # noqa: E402
+from unassemble.topology import Piece, local_numbering, surfaces  # noqa: E402
 
 CONDITIONS = {
     "eliminated": eliminated,
@@ -53,6 +64,7 @@ def main() -> int:
     parser.add_argument("--conditions", nargs="+", choices=CONDITIONS, default=list(CONDITIONS))
     parser.add_argument("--meshes", nargs="+", help="these only")
     parser.add_argument("--most", type=int, default=10**9, help="vertices of the meshes that are used")
+    parser.add_argument("--bound", action="store_true", help="print what the mesh itself determines")
     parser.add_argument("--random", nargs="+", type=int, help="vertices of random meshes, instead of a folder")
     parser.add_argument("--runs", type=int, default=3, help="with each of these")
     arguments = parser.parse_args()
@@ -62,12 +74,13 @@ def main() -> int:
     for condition in arguments.conditions:
         shares = []
         for name, mesh in meshes(arguments.folder, arguments.meshes, arguments.most):
-            share, error, line = measured(*CONDITIONS[condition](mesh))
+            share, error, line = (bound if arguments.bound else measured)(*CONDITIONS[condition](mesh))
             shares.append(share)
             wrong |= error > WRONG
             print(f"{condition:11s} {name:36s} {line}{'   WRONG' if error > WRONG else ''}", flush=True)
         good = [sum(share >= least for share in shares) for least in (0.01, 0.7, 0.9)]
-        print(f"{condition}: of {len(shares)} meshes {good[0]} certified, {good[1]} to 70 %, {good[2]} to 90 %\n")
+        word = "determined" if arguments.bound else "certified"
+        print(f"{condition}: of {len(shares)} meshes {good[0]} {word}, {good[1]} to 70 %, {good[2]} to 90 %\n")
     return int(wrong)
 
 
@@ -94,6 +107,32 @@ def measured(matrix: sp.csr_array, points: np.ndarray) -> tuple[float, float, st
     error = largest_error_of(found, points, known) if known.sum() > 2 else 0.0
     solves = f"{seconds / unit(matrix):5.0f} solves" if len(points) > 1000 else ""
     return float(known.mean()), error, f"{len(points):6d} rows   {known.mean():5.0%} error {error:.0e} {solves}"
+
+
+def bound(matrix: sp.csr_array, points: np.ndarray) -> tuple[float, float, str]:
+    """Share of the points that whole entries determine at these positions, no error, and the share in words."""
+    given = with_boundary_edges(with_diagonals(check_matrix(matrix)))
+    gone = given.incomplete_rows if given.replaced is None else given.replaced
+    known = 0
+    for piece in surfaces(given.n, given.edges, local_numbering(given.n, given.edges)).pieces:
+        outside = gone[piece.vertices][piece.edges].all(axis=1)
+        whole = ~outside if given.replaced is not None else piece.inner | (gone.any() & ~outside)
+        rim = Rim(piece, whole, np.ones(len(piece.triangles), dtype=bool))
+        z = points[piece.vertices] @ [1, 1j]
+        z = z if area(piece, z) > 0 else np.conj(z)
+        with np.errstate(all="ignore"):  # edges without a triangle
+            fits = np.abs(-given.entries[piece.edge_rows] - edge_weights(piece, z)) < 1e-9
+        if not (rim.whole & fits).any():
+            continue
+        known += int(determined(piece, z, rim.whole & fits, partial(factorisation, definite=True))[0].sum())
+    share = known / given.n
+    return share, 0.0, f"{given.n:6d} rows   {share:5.0%}"
+
+
+def area(piece: Piece, z: np.ndarray) -> float:
+    """Twice the area of a piece, with its sign."""
+    a, b, c = z[piece.triangles].T
+    return float((np.conj(b - a) * (c - a)).imag.sum())
 
 
 def timed(n: int, runs: int) -> float:

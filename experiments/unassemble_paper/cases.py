@@ -9,10 +9,17 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from unassemble.paper.corners import Corners, corners_of
-from unassemble.paper.equations import AngleSystem, Unknowns
-from unassemble.paper.newton import NewtonOptions, NewtonResult, solve
-from unassemble.paper.starts import angles_of, start_angles
+from unassemble.paper import (
+    AngleSystem,
+    Corners,
+    NewtonOptions,
+    NewtonResult,
+    Unknowns,
+    angles_of,
+    corners_of,
+    solve,
+    start_angles,
+)
 from unassemble.topology import Piece, surfaces
 
 from . import meshes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from unassemble.paper.nullspace import deficiency
+from unassemble.paper import deficiency
 
 from .cases import case_of
 from .claim import Claim, each

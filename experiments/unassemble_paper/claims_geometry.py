@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from unassemble.paper import recover_angles
-from unassemble.paper.alignment import distance
-from unassemble.paper.bfs import bfs_embedding
-from unassemble.paper.boundary import FixedPointOptions, boundary_fixed_point
-from unassemble.paper.substitution import substitution
+from unassemble.paper import (
+    FixedPointOptions,
+    bfs_embedding,
+    boundary_fixed_point,
+    distance,
+    recover_angles,
+    substitution,
+)
 
 from . import meshes
 from .cases import Case, case, case_of

@@ -6,8 +6,7 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from unassemble.paper.alignment import distance
-from unassemble.paper.layout import least_squares_layout
+from unassemble.paper import distance, least_squares_layout
 
 from .cases import Case, Direct, Run
 from .tables import Table, table

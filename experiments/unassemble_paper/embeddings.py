@@ -7,11 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from unassemble.paper.alignment import aligned, distance
-from unassemble.paper.bfs import bfs_embedding
-from unassemble.paper.layout import least_squares_layout
-from unassemble.paper.smoothing import coordinate_smoothing
-from unassemble.paper.validity import inverted
+from unassemble.paper import aligned, bfs_embedding, coordinate_smoothing, distance, inverted, least_squares_layout
 
 from .cases import Case, Run
 from .multilevel import multilevel_embedding

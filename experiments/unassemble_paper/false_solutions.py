@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lstsq
 from scipy.optimize import brentq
 
-from unassemble.paper.equations import AngleSystem
+from unassemble.paper import AngleSystem
 
 from .cases import Case, case_of
 from .examples import hexagon, perforated

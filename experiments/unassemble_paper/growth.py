@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from unassemble.paper.bfs import bfs_embedding
+from unassemble.paper import bfs_embedding
 
 from . import meshes
 from .cases import Case, case_of

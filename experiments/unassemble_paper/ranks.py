@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from unassemble.paper.equations import AngleSystem
+from unassemble.paper import AngleSystem
 
 
 class Ranks:

@@ -10,8 +10,7 @@ import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
-from unassemble.paper.equations import AngleSystem
-from unassemble.paper.square import square_rows
+from unassemble.paper import AngleSystem, square_rows
 
 from .cases import Case
 from .tables import Table, table

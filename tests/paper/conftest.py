@@ -7,8 +7,7 @@ import pytest
 from skfem import Basis, BilinearForm, ElementTriP1, MeshTri
 from skfem.helpers import dot, grad
 
-from unassemble.paper.corners import corners_of
-from unassemble.paper.starts import angles_of
+from unassemble.paper import angles_of, corners_of
 from unassemble.topology import surfaces
 from unassemble_paper import meshes
 from unassemble_paper.cases import Case, case

@@ -4,14 +4,20 @@ import numpy as np
 import pytest
 
 from unassemble.errors import TopologyError
-from unassemble.paper.alignment import distance
-from unassemble.paper.boundary import FixedPointOptions, boundary_fixed_point, ring
-from unassemble.paper.corners import corners_of
-from unassemble.paper.equations import AngleSystem
-from unassemble.paper.harmonic import HarmonicReduction, tube_triangles
-from unassemble.paper.parts import part
-from unassemble.paper.starts import angles_of
-from unassemble.paper.substitution import cotangents_of, substitution
+from unassemble.paper import (
+    AngleSystem,
+    FixedPointOptions,
+    HarmonicReduction,
+    angles_of,
+    boundary_fixed_point,
+    corners_of,
+    cotangents_of,
+    distance,
+    part,
+    ring,
+    substitution,
+    tube_triangles,
+)
 from unassemble_paper.claims_geometry import perturbed_boundary
 from unassemble_paper.examples import wheel
 from unassemble_paper.ranks import Ranks

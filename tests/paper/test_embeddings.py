@@ -3,12 +3,20 @@
 import numpy as np
 import pytest
 
-from unassemble.paper.alignment import aligned, distance
-from unassemble.paper.bfs import bfs_embedding, dual_order
-from unassemble.paper.layout import corner_equations, least_squares_layout
-from unassemble.paper.smoothing import coordinate_smoothing, law_of_sines
-from unassemble.paper.starts import angles_of
-from unassemble.paper.validity import inverted, signed_angles, violations
+from unassemble.paper import (
+    aligned,
+    angles_of,
+    bfs_embedding,
+    coordinate_smoothing,
+    corner_equations,
+    distance,
+    dual_order,
+    inverted,
+    law_of_sines,
+    least_squares_layout,
+    signed_angles,
+    violations,
+)
 from unassemble_paper.multilevel import multilevel_embedding
 
 

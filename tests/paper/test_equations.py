@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from unassemble.paper.equations import AngleSystem
+from unassemble.paper import AngleSystem
 
 OPTIONS = [
     (unknowns, scale_free, loops, sines)

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from unassemble.paper import AngleOptions, recover_angles
-from unassemble.paper.newton import NewtonOptions
-from unassemble.paper.validity import signed_angles, violations
+from unassemble.paper import AngleOptions, NewtonOptions, recover_angles, signed_angles, violations
 from unassemble_paper.examples import perforated, wheel_of
 from unassemble_paper.false_solutions import WHEEL, exact_root, least_singular_value, rate_table, wheel_roots
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from unassemble.paper.corners import corners_of
+from unassemble.paper import corners_of
 from unassemble_paper import meshes
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "paper-meshes"

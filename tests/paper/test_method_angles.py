@@ -11,9 +11,7 @@ import unassemble_paper as experiments
 from unassemble import paper, recover
 from unassemble.cli import main
 from unassemble.errors import InputError
-from unassemble.paper import AngleOptions
-from unassemble.paper.alignment import distance
-from unassemble.paper.newton import NewtonOptions
+from unassemble.paper import AngleOptions, NewtonOptions, distance
 from unassemble.planar.conformal import conformal_map
 from unassemble_paper.claim import Claim, claims_table
 

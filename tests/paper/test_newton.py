@@ -4,13 +4,18 @@ import numpy as np
 import pytest
 
 from unassemble.errors import InputError
-from unassemble.paper.bicg import bicg
-from unassemble.paper.cgls import cgls
-from unassemble.paper.equations import AngleSystem
-from unassemble.paper.forcing import eisenstat_walker, forcing
-from unassemble.paper.lsqr import lsqr
-from unassemble.paper.newton import NewtonOptions, solve
-from unassemble.paper.square import Picked, square_rows
+from unassemble.paper import (
+    AngleSystem,
+    NewtonOptions,
+    Picked,
+    bicg,
+    cgls,
+    eisenstat_walker,
+    forcing,
+    lsqr,
+    solve,
+    square_rows,
+)
 from unassemble_paper.meshes import square
 
 

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from unassemble.paper.equations import AngleSystem
-from unassemble.paper.nullspace import deficiency, null_vector, spiral_matrix
-from unassemble.paper.square import square_rows
+from unassemble.paper import AngleSystem, deficiency, null_vector, spiral_matrix, square_rows
 from unassemble_paper import meshes
 from unassemble_paper.examples import perforated, wheel
 from unassemble_paper.meshes import square

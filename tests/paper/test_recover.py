@@ -5,9 +5,7 @@ import pytest
 
 from meshes import random_mesh
 from unassemble.errors import GeometryError, InputError
-from unassemble.paper import AngleOptions, recover_angles
-from unassemble.paper.alignment import distance
-from unassemble.paper.newton import NewtonOptions
+from unassemble.paper import AngleOptions, NewtonOptions, distance, recover_angles
 from unassemble_paper.examples import perforated
 from unassemble_paper.meshes import Mesh
 

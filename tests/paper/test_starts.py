@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 
 from unassemble.errors import GeometryError, InputError
-from unassemble.paper.equations import AngleSystem
-from unassemble.paper.newton import NewtonOptions, solve
-from unassemble.paper.starts import angles_of, barycentric_embedding, start_angles
-from unassemble.paper.validity import inverted
+from unassemble.paper import AngleSystem, NewtonOptions, angles_of, barycentric_embedding, inverted, solve, start_angles
 from unassemble_paper.examples import perforated
 
 

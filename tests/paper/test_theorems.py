@@ -6,14 +6,17 @@ import pytest
 from skfem import Basis, BilinearForm, ElementTriP1, MeshTri
 from skfem.helpers import grad
 
-from unassemble.paper import AngleOptions, recover_angles
-from unassemble.paper.alignment import distance
-from unassemble.paper.bfs import bfs_embedding
-from unassemble.paper.corners import corners_of
-from unassemble.paper.equations import AngleSystem
-from unassemble.paper.newton import NewtonOptions
-from unassemble.paper.nullspace import deficiency
-from unassemble.paper.validity import violations
+from unassemble.paper import (
+    AngleOptions,
+    AngleSystem,
+    NewtonOptions,
+    bfs_embedding,
+    corners_of,
+    deficiency,
+    distance,
+    recover_angles,
+    violations,
+)
 from unassemble_paper.cases import case_of
 from unassemble_paper.examples import perforated, spiral_angles, two_hexagonal_holes, wheel
 from unassemble_paper.meshes import Mesh

@@ -5,9 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from unassemble.paper import AngleOptions, recover_angles
-from unassemble.paper.alignment import distance
-from unassemble.paper.newton import NewtonOptions
+from unassemble.paper import AngleOptions, NewtonOptions, distance, recover_angles
 from unassemble.topology import surfaces
 from unassemble_paper.meshes import Mesh, stiffness
 

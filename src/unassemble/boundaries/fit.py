@@ -53,6 +53,8 @@ class FitOptions:
         Of a step, each with ten times the damping.
     guess, most_guess : float
         Weight of a guessed entry: in units of the prior's, and at most, beside 1 of whole entries.
+    shortest : float
+        Part of a step below which the iteration ends after it: a few places hold all others up.
     """
 
     steps: int = 12
@@ -64,6 +66,7 @@ class FitOptions:
     trials: int = 12
     guess: float = 10.0
     most_guess: float = 0.3
+    shortest: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,11 +165,11 @@ class WholeEntries:
         for _ in range(options.steps if mu else options.last_steps):
             if not mu and misfit @ misfit <= count * options.exact**2:
                 break
-            system = _System(self, z, scale, whole, prior, mu, misfit, shape)
+            system = System(self, z, scale, whole, prior, mu, misfit, shape)
             better = None
             for _ in range(options.trials):
                 factorisations += 1
-                step = self._step(system, damping)
+                step = self.step(system, damping)
                 if step is not None:
                     better = self._along(z, scale, *step, whole, prior, mu, cost)
                 if better is not None:
@@ -186,7 +189,7 @@ class WholeEntries:
                 last, cost = cost, float(misfit @ misfit + shape @ shape)
             damping = max(damping / 10, 1e-15) if share == 1 else 1.5 * damping
             small = small + 1 if cost > (1 - options.gain) * before else 0
-            if small >= (1 if mu else 4):
+            if small >= (1 if mu else 4) or share < options.shortest:
                 break
         rest, size = float(np.linalg.norm(misfit[whole])) / np.sqrt(count), float(np.linalg.norm(prior.residual(z)))
         _log.debug("mu %.0e: misfit %.1e, prior %.1e, %d factorisations", mu, rest, size, factorisations)
@@ -213,14 +216,7 @@ class WholeEntries:
         """Misfits of entries (e,) and of the prior, weighted."""
         return self.trust(whole, mu) * self.misfits(z, scale), mu * prior.residual(z)
 
-    def step(
-        self, z: NDArray, scale: float, whole: NDArray, prior: ShapePrior, mu: float, misfit: NDArray, shape: NDArray,
-        damping: NDArray,
-    ) -> tuple[NDArray, float] | None:  # fmt: skip
-        """Displacement and change of log c; None where the normal matrix cannot be factorised."""
-        return self._step(_System(self, z, scale, whole, prior, mu, misfit, shape), damping)
-
-    def _step(self, system: _System, damping: float | NDArray) -> tuple[NDArray, float] | None:
+    def step(self, system: System, damping: float | NDArray) -> tuple[NDArray, float] | None:
         """Displacement and change of log c; None where the normal matrix cannot be factorised."""
         matrix = system.damped(damping)
         try:
@@ -230,7 +226,7 @@ class WholeEntries:
             return None
         return self._solved(system)
 
-    def _solved(self, system: _System) -> tuple[NDArray, float] | None:
+    def _solved(self, system: System) -> tuple[NDArray, float] | None:
         """The same with the factor that is there."""
         assert self._factor is not None
         gradient, response = self._factor.solve(np.column_stack([system.right, system.slope])).T
@@ -260,7 +256,7 @@ class WholeEntries:
         return None
 
 
-class _System:
+class System:
     """The linearised problem: normal matrix, right-hand side, and the column of log c beside them."""
 
     def __init__(
@@ -280,7 +276,7 @@ class _System:
         self.size = float(self._fitted @ self._fitted)
         self.towards(misfit, shape)
 
-    def towards(self, misfit: NDArray, shape: NDArray) -> _System:
+    def towards(self, misfit: NDArray, shape: NDArray) -> System:
         """With other right-hand sides."""
         self.right = self._transposed @ np.concatenate([misfit, -shape])
         self.along = float(self._fitted @ misfit)

@@ -55,7 +55,7 @@ class JudgeOptions:
     shift: float = 1e-14
     moves: float = 1e-9
     unchecked: float = 1e-6
-    probes: int = 4
+    probes: int = 2
     projections: int = 3
     solves: int = 5
     parts: int = 8

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..topology import Piece
-from .fit import WholeEntries, first_flips
+from .fit import System, WholeEntries, first_flips
 from .patch import Patch, distance, spread
 from .shape import ShapePrior
 
@@ -117,7 +117,8 @@ def _fitted(
     for _ in range(steps):
         if not (np.abs(misfit) > 1e-14).any():
             break
-        found = part.step(z, scale, whole, prior, mu, misfit, shape, np.append(damping[part.free], 1.0)[: part.columns])
+        system = System(part, z, scale, whole, prior, mu, misfit, shape)
+        found = part.step(system, np.append(damping[part.free], 1.0)[: part.columns])
         if found is None:
             damping *= 100
             continue

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from ..scalar.placement import Placement
 from ..tolerances import ALIKE, CERTIFIED
 from ..topology import Piece, Topology, local_numbering, surfaces
 from ..words import count_of
+from .deviations import deviations_inside
 from .inside import InsideMesh, fit_inside
 
 
@@ -78,7 +79,11 @@ def recover_partial(
         placed = _Placed.of(topology, meshes, placement, stretch)
     with clock("certify"):
         judged = _Judged.of(matrix, placed, placement, known_scale=scale is not None)
-    return _report(matrix, placed, judged, placement, clock)
+    found = _report(matrix, placed, judged, placement, clock)
+    if found is None or not options.standard_deviations:
+        return found
+    with clock("deviations"):
+        return replace(found, standard_deviations=placed.deviations(matrix, placement, known_scale=scale is not None))
 
 
 def _given(piece: Piece, matrix: OperatorMatrix, whole: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
@@ -115,6 +120,8 @@ class _Placed:
     topology : Topology
         Of these pieces.
     meshes : list of InsideMesh
+    positions : list of (k,) complex128
+        Of each piece in its final frame.
     mesh : JoinedMesh
     status : (n,) int8
         As in :class:`..recovery.Recovery`.
@@ -123,6 +130,7 @@ class _Placed:
 
     topology: Topology
     meshes: list[InsideMesh]
+    positions: list[NDArray[np.complex128]]
     mesh: JoinedMesh
     status: NDArray[np.int8]
     notes: list[str]
@@ -138,9 +146,22 @@ class _Placed:
             status[piece.vertices[mesh.determined]] = 0
         placed = [placement.apply(piece, mesh.z) for piece, mesh in found]
         scales = np.array([mesh.scale for _, mesh in found])
-        joined = JoinedMesh.of(topology, [z for z, _ in placed], scales / stretch)
+        positions = [z for z, _ in placed]
+        joined = JoinedMesh.of(topology, positions, scales / stretch)
         notes = [*piece_notes([some for _, some in placed]), *placement.unused(topology), *topology_notes(topology)]
-        return cls(topology, [mesh for _, mesh in found], joined, status, notes)
+        return cls(topology, [mesh for _, mesh in found], positions, joined, status, notes)
+
+    def deviations(self, matrix: OperatorMatrix, placement: Placement, *, known_scale: bool) -> NDArray[np.float64]:
+        """(n, 2) standard deviations; of a vertex in several pieces those of the first."""
+        result = np.full((matrix.n, 2), np.nan)
+        tensor = placement.tensor
+        for piece, mesh, z in reversed(list(zip(self.topology.pieces, self.meshes, self.positions, strict=True))):
+            drawn, stretch = (tensor.to_laplacian(z), tensor.root) if tensor else (z, None)
+            weights = -matrix.entries[piece.edge_rows]
+            result[piece.vertices] = deviations_inside(
+                piece, mesh, weights, drawn, known_scale=known_scale, stretch=stretch
+            )
+        return result
 
 
 @dataclass(frozen=True, eq=False)

@@ -183,14 +183,14 @@ def _shown(A: sp.csr_array, i: int, j: int) -> str:
 def from_columns(diagonal: NDArray, pairs: Triangles) -> tuple[Triangles, NDArray[np.bool_] | None, tuple[str, ...]]:
     """Entries of rows without any off the diagonal, which is not zero, taken from their columns where these were kept.
 
-    Returns `replaced` (n,): such rows; None where there are none with a column.
+    Returns `replaced` (n,): such rows, those too that have such neighbours only; None where no column is left.
     """
     row, column = np.zeros(len(diagonal)), np.zeros(len(diagonal))
     for end, own, other in ((0, pairs.upper, pairs.lower), (1, pairs.lower, pairs.upper)):
         np.maximum.at(row, pairs.edges[:, end], np.abs(own))
         np.maximum.at(column, pairs.edges[:, end], np.abs(other))
-    replaced = (row == 0) & (column > 0) & (diagonal != 0)
-    if not replaced.any():
+    replaced = (row == 0) & (diagonal != 0) & (np.bincount(pairs.edges.ravel(), minlength=len(row)) > 0)
+    if not (column[replaced] > 0).any():
         return pairs, None, ()
     first, second = replaced[pairs.edges].T
     rest = ~(first | second)
