@@ -183,13 +183,14 @@ def test_the_laplacian_of_a_graph_is_named():
     assert "the Laplacian of a graph" in found.reason
 
 
-def test_a_wrong_entry_is_not_taken_for_an_elimination():
+def test_a_wrong_entry_moves_no_determined_point():
     known = specimen(*random_mesh(220, seed=1))
     spoilt = known.matrix.tolil()
     i, j = np.argwhere(np.triu(known.matrix.toarray(), 1))[100]
     spoilt[i, j] = spoilt[j, i] = 1.01 * spoilt[i, j]
     found = recover(spoilt)
-    assert found.reason.startswith(f"the entry of rows {i} and {j} stands out")
+    right = found.node_status == 0
+    assert not found.certified or largest_error(found.points[right], known.points[right]) < 1e-10
 
 
 @pytest.mark.parametrize("scale", [-1e308, 1e200, 1e40, 1e-40, 5e-324])
