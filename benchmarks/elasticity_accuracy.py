@@ -15,9 +15,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "elasticity"))
 
-from assembled import ELEMENTS, box, error, stiffness
+from assembled import ELEMENTS, box, error, recover_elasticity, stiffness
 
-from unassemble.elasticity import recover_elasticity
 from unassemble.errors import RecoveryError
 
 
@@ -35,7 +34,7 @@ def line(kind: str, size: int, grading: float, nu: float) -> str:
     ratio = "not one number" if found.poisson_ratio is None else f"{abs(found.poisson_ratio - nu):.0e}"
     return (
         f"{text} {found.status}, coordinates {error(found.points, given.points):.0e}, Poisson's ratio {ratio}, "
-        f"gap {found.evidence[0].gap:.0e}, cells {found.cells.n_cells} of {len(given.cells)}"
+        f"gap {found.evidence[0].gap:.0e}, cells {found.n_cells} of {len(given.cells)}"
     )
 
 

@@ -182,25 +182,6 @@ def test_pieces_at_a_hinge_stay_joined():
     assert "1 hinge" in words(plot_recovery(near))
 
 
-def test_a_piece_in_the_hole_of_another_stays():
-    outer = lake(900)
-    small = random_mesh(30, seed=1, holes=False)
-    hole = int(np.flatnonzero(~outer_loops(outer))[0])
-    ring = outer.points[outer.boundary[slice(*outer.boundary_offsets[hole : hole + 2]), 0]]
-    inner = recovery_of(ring.mean(axis=0) + 0.02 * (small[0] - small[0].mean(axis=0)), small[1])
-    n = outer.n_points
-    both = replace(
-        outer,
-        points=np.vstack([outer.points, inner.points]),
-        triangles=np.vstack([outer.triangles, inner.triangles + n]),
-        component=np.append(outer.component, inner.component + 1),
-        scale=np.ones(2),
-        boundary=np.vstack([outer.boundary, inner.boundary + n]),
-        boundary_offsets=np.append(outer.boundary_offsets, inner.boundary_offsets[1:] + len(outer.boundary)),
-    )
-    assert laid_out(both) is both.points
-
-
 def test_very_many_pieces():
     one = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     k = 150

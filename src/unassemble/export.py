@@ -51,7 +51,7 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
     and ``curvature``, and no ``points`` unless there are coordinates, ``areas`` in place of ``points`` for a mass
     matrix, ``row_scaling`` where rows were scaled, ``component``, ``hinges``, ``scale``, ``node_status``, of
     vector-valued matrices ``node_of_row`` and ``direction_of_row``, and what the mesh is worth: ``status``,
-    ``uniqueness`` and ``backward_error``, which ``.vtu`` holds as field data, with ``scale``.
+    ``uniqueness`` and ``backward_error``.
     Other formats are those of meshio (:mod:`unassemble.formats`); of these ``.vtu`` holds polygons, the others get
     them divided into triangles. Those that hold point data have what the mesh is worth as such, see
     :func:`to_meshio`; the rest have no place for it, which :func:`unassemble.formats.lacks_worth` says.
@@ -74,8 +74,6 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
     with whole_file(path, suffix) as draft:
         if mesh_format.name:
             _write_by_meshio(_mesh_for(recovery, mesh_format), draft, suffix, mesh_format)
-            if mesh_format.name == "vtu":
-                _add_field_data(draft, worth(recovery) | {"scale": recovery.scale})
         else:
             np.savez(draft, **arrays(recovery))
 
@@ -251,9 +249,7 @@ def _mesh_for(recovery: Recovery, mesh_format: MeshFormat) -> meshio.Mesh:
     """The mesh with exactly what the format can hold, so that meshio has nothing to drop."""
     data: dict[str, NDArray] = {}
     if mesh_format.data == "all":
-        data = _point_data(recovery)
-        if mesh_format.name != "vtu":  # which has field data
-            data |= _worth_of_points(recovery)
+        data = _point_data(recovery) | _worth_of_points(recovery)
     elif mesh_format.data == "boundary":
         data = {f"{mesh_format.name}:ref": _boundary_flag(recovery)}
     mesh = _mesh(recovery, mesh_format.dimension, data, polygons=mesh_format.polygons)
@@ -297,25 +293,6 @@ def _write_by_meshio(mesh: meshio.Mesh, draft: Path, suffix: str, mesh_format: M
     finally:
         if said.getvalue():
             _log.debug("meshio: %s", " ".join(said.getvalue().split()))
-
-
-def _add_field_data(draft: Path, values: dict[str, NDArray]) -> None:
-    """Put field data into a ``.vtu``, which meshio reads but does not write; words as the codes of their letters."""
-    arrays = []
-    for name, value in values.items():
-        words = value.dtype.kind == "U"
-        numbers = list(str(value).encode()) if words else [repr(float(x)) for x in value.ravel()]
-        kind = "UInt8" if words else "Float64"
-        if not numbers:
-            continue
-        arrays.append(
-            f'<DataArray type="{kind}" Name="{name}" NumberOfTuples="{len(numbers)}" format="ascii">'
-            f"{' '.join(map(str, numbers))}</DataArray>"
-        )
-    opening = b"<UnstructuredGrid>"
-    before, after = draft.read_bytes().split(opening, 1)
-    field = f"<FieldData>{''.join(arrays)}</FieldData>".encode()
-    draft.write_bytes(before + opening + field + after)
 
 
 def _sentence(error: Any) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .errors import FormatError, InputError, OutputError
 from .files import check_target, whole_file
-from .recovery import Body, Recovery
+from .recovery import Recovery
 from .words import count_of
 
 if TYPE_CHECKING:
@@ -22,85 +22,53 @@ if TYPE_CHECKING:
 def modes_of(recovery: Recovery) -> NDArray[np.float64]:
     """Near-null space of a vector-valued matrix, (N, 3) or (N, 6), rows as in the matrix: PyAMG's ``B``.
 
-    Translations, then rotations; nodes without coordinates get translations only. The directions of a vector
-    Laplacian are not coupled: it has translations only, (N, 2) or (N, 3).
+    Translations, then rotations; nodes without coordinates get what they have without moving.
 
     Raises
     ------
     InputError
         If the matrix is scalar.
     """
-    from .structures.layouts import PINNED, layout_named
+    from .structures.layouts import layout_named
 
     node, direction = recovery.node_of_row, recovery.direction_of_row
     if node is None or direction is None:
         raise InputError("a scalar matrix has no rigid-body modes: its near-null space is that of the constants")
     layout = layout_named(recovery.operator)
-    if layout is not None:
-        return _turning_modes(layout, recovery.points, node, direction)
-    if isinstance(recovery, Body) or recovery.operator in ("truss", PINNED.name):
-        return rigid_body_modes(recovery.points, node, direction)
-    return (direction[:, None] == np.arange(direction.max() + 1)).astype(np.float64)
+    return rigid_body_modes(recovery.points, node, direction, layout)
 
 
 def rigid_body_modes(
     points: NDArray[np.float64],
     node_of_row: NDArray[np.int64],
     direction_of_row: NDArray[np.int64],
+    layout: Layout | None = None,
 ) -> NDArray[np.float64]:
-    """Near-null space of an elasticity matrix, in the layout that PyAMG expects.
+    """Near-null space of an elasticity matrix or that of a structure, in the layout that PyAMG expects.
 
     Parameters
     ----------
-    points : (n, d) float64
-        NaN rows get translations only.
-    node_of_row, direction_of_row : (N,) int64
-        A direction of -1 is not known, and gets zeros.
-
-    Returns
-    -------
-    (N, 3) or (N, 6) float64
-        Translations, then rotations, row by row of the matrix. Rotations are about the centroid, each column of norm
-        sqrt(N / d) or so, so that none swamps another.
-    """
-    d = points.shape[1]
-    known = np.asarray(np.isfinite(points).all(axis=1))
-    x = points - points[known].mean(axis=0) if known.any() else np.zeros_like(points)
-    x = np.where(known[:, None], x, 0.0)
-    radius = np.sqrt((x**2).sum(axis=1).mean())
-    x = (x / radius if radius > 0 else x)[node_of_row]
-    row = np.arange(len(node_of_row))
-    planes = [(0, 1)] if d == 2 else [(0, 1), (2, 0), (1, 2)]
-    modes = np.zeros((len(row), d + len(planes)))
-    modes[row, direction_of_row] = direction_of_row >= 0
-    for k, (a, b) in enumerate(planes, start=d):
-        modes[:, k] = np.where(direction_of_row == b, x[:, a], 0) - np.where(direction_of_row == a, x[:, b], 0)
-    return modes
-
-
-def _turning_modes(
-    layout: Layout, points: NDArray[np.float64], node_of_row: NDArray[np.int64], direction_of_row: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Near-null space of a structure whose nodes have rotations: translations, then rotations about the centroid.
-
-    Parameters
-    ----------
-    layout : Layout
     points : (n, d) float64
         NaN rows get what they have without moving: translations, and rotations of the node itself.
     node_of_row, direction_of_row : (N,) int64
         A direction of -1 is not known, and gets zeros.
+    layout : Layout, optional
+        Of structures whose nodes have rotations, too.
 
     Returns
     -------
-    (N, 6) or (N, 3) float64
-        Rotations are divided by the radius of gyration, so that none swamps another.
+    (N, 3) or (N, 6) float64
+        Translations, then rotations, row by row of the matrix. Rotations are about the centroid, divided by the radius
+        of gyration, so that none swamps another.
     """
+    from .structures.layouts import SOLIDS
+
+    layout = layout or SOLIDS[points.shape[1]]
     known = np.asarray(np.isfinite(points).all(axis=1))
-    x = points - points[known].mean(axis=0)
-    radius = float(np.sqrt((x[known] ** 2).sum(axis=1).mean())) or 1.0
-    motions = layout.rigid_motions(np.where(known[:, None], x, 0.0))
-    motions[:, :, len(layout.displacements) :] /= radius
+    x = points - points[known].mean(axis=0) if known.any() else np.zeros_like(points)
+    x = np.where(known[:, None], x, 0.0)
+    motions = layout.rigid_motions(x)
+    motions[:, :, len(layout.displacements) :] /= float(np.sqrt((x**2).sum() / max(known.sum(), 1))) or 1.0
     return np.asarray(motions[node_of_row, direction_of_row] * (direction_of_row >= 0)[:, None])
 
 

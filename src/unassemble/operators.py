@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from .errors import GeometryError, InputError, RecoveryError
 from .matrix import OperatorMatrix
 from .matrix.digits import Digits
-from .tolerances import CANCELLED, ROUNDED
+from .tolerances import CANCELLED
 from .topology import components
 
 if TYPE_CHECKING:
@@ -107,22 +107,17 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
     beam = _beam(matrix)
     if beam is not None:
         return VectorReading(beam, "its rows form one line of nodes, whose blocks are those of members that bend")
-    crowded = matrix.n >= 3 and len(matrix.edges) > 3 * matrix.n - 6
-    if not crowded and not _twins_interleaved(matrix):
+    if matrix.n < 3 or len(matrix.edges) <= 3 * matrix.n - 6:
         return None
     from .nodes.unknowns import numbering_at_sight
-    from .structures import find_structure
+    from .structures import StructuralNumbering, find_structure
 
     whole, rounding = _exact(matrix)
-    structure = find_structure(whole) if crowded else None
-    if structure is not None:
-        why = f"the graph has more edges than a planar one can have, and {_evidence(structure)}"
-        return VectorReading(structure, why, rounding)
-    found = numbering_at_sight(whole)
-    if not _convinces(found):
-        return _truss(whole, rounding, "the graph has more edges than a planar one can have") if crowded else None
-    graph = "the graph has more edges than a planar one can have" if crowded else "no even row is coupled to an odd one"
-    return VectorReading(found, f"{graph}, and {_evidence(found)}", rounding)
+    crowded = "the graph has more edges than a planar one can have"
+    found = find_structure(whole) or numbering_at_sight(whole)
+    if not (isinstance(found, StructuralNumbering) or _convinces(found)):
+        return _truss(whole, rounding, crowded)
+    return VectorReading(found, f"{crowded}, and {_evidence(found)}", rounding)
 
 
 def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
@@ -199,15 +194,3 @@ def _evidence(found: Numbering | StructuralNumbering) -> str:
         f"its rows form {found.n_nodes} nodes with {found.block_size} unknowns each, {order}, whose sums by direction "
         f"vanish in {100 * found.share:.0f} % of the cases"
     )
-
-
-def _twins_interleaved(matrix: OperatorMatrix) -> bool:
-    """Whether rows 2k and 2k + 1 are never coupled across and carry the same numbers: a vector Laplacian."""
-    i, j = matrix.edges.T
-    if matrix.n % 2 or matrix.n < 6 or ((i ^ j) & 1).any():
-        return False
-    even = (i & 1) == 0
-    pairs = matrix.edges // 2
-    if not np.array_equal(pairs[even], pairs[~even]):
-        return False
-    return bool(np.abs(matrix.entries[even] - matrix.entries[~even]).max() <= ROUNDED * np.abs(matrix.entries).max())

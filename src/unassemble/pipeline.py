@@ -56,7 +56,7 @@ def recover(
     Scalar: A = c L + D, where L is the stiffness matrix of the Laplacian with linear elements on triangles in the
     plane and natural boundary conditions, c any nonzero number and D any diagonal matrix, both unknown.
     Vector-valued: isotropic linear elasticity in the plane or in space, with supports; see
-    :func:`unassemble.elasticity.recover_elasticity`. And frames, shells and plates, whose nodes have rotations beside
+    :mod:`unassemble.elasticity`. And frames, shells and plates, whose nodes have rotations beside
     displacements; see :mod:`unassemble.structures`. And the Laplacian of triangulated surfaces in space, c L + D, of
     which the edge lengths are found; see :mod:`unassemble.metric`.
 
@@ -211,7 +211,7 @@ class _Task:
             return self._as_surface()
         if self.about.operator == "laplacian":
             try:
-                return judged(self._as_scalar(self.matrix, self.frame.anchors), self.matrix)
+                return judged(self._readings.likeliest(), self.matrix)
             except RecoveryError as error:
                 raise explained(error, self.matrix) from error
         # Unknowns of one node overlap in more rows than nodes of scalar elements do: this takes no time from them.
@@ -231,13 +231,13 @@ class _Task:
 
     @cached_property
     def _readings(self) -> ScalarReadings:
-        return self._readings_of(self.matrix, self.frame.anchors)
+        return self._readings_with(self.frame.anchors)
 
-    def _readings_of(self, part: OperatorMatrix, anchors: Sequence[Any]) -> ScalarReadings:
+    def _readings_with(self, anchors: Sequence[Any]) -> ScalarReadings:
         frame = self.frame
-        self.planar.check_scale(part.entries)
-        placement = Placement.checked(part.n, anchors, frame.tensor, frame.direction, frame.handed)
-        return ScalarReadings(part, placement, self.clock, self.planar)
+        self.planar.check_scale(self.matrix.entries)
+        placement = Placement.checked(self.matrix.n, anchors, frame.tensor, frame.direction, frame.handed)
+        return ScalarReadings(self.matrix, placement, self.clock, self.planar)
 
     def _first_that_fits(self) -> Recovery:
         """A planar mesh; or a surface in space; or nodes of several unknowns where no rows, or fewer, belong to these.
@@ -247,7 +247,7 @@ class _Task:
         from .metric import unless_planar
 
         try:
-            found = self._as_scalar(self.matrix, self.frame.anchors)
+            found = self._readings.likeliest()
         except RecoveryError as error:
             curved = self._as_certified_surface()
             other = self._as_second_reading() if curved is None else unless_planar(curved)
@@ -277,10 +277,6 @@ class _Task:
         except (RecoveryError, InputError):  # options may be for scalar matrices only
             return None
 
-    def _as_scalar(self, part: OperatorMatrix, anchors: Sequence[Any]) -> PlanarMesh:
-        whole = part is self.matrix and anchors is self.frame.anchors
-        return (self._readings if whole else self._readings_of(part, anchors)).likeliest()
-
     def _as_surface(self) -> Surface:
         """A surface in space, with coordinates on demand; a flat one with those of the planar mesh that it is."""
         from .metric import flattened, perhaps_planar, realised
@@ -292,7 +288,7 @@ class _Task:
             found = error
         if isinstance(found, GeometryError) or perhaps_planar(found):
             with suppress(RecoveryError):
-                planar = self._as_scalar(self.matrix, ())
+                planar = self._readings_with(()).likeliest()
                 triangles = planar.divided()[0]
                 if planar.certified and (isinstance(found, GeometryError) or len(triangles) < len(found.triangles)):
                     found = self._lengths(triangles)  # holes of three edges, that were taken for triangles
@@ -334,7 +330,7 @@ class _Task:
         self._refuse_scalar_options()
         clock, anchors, cells = self.clock, self.frame.anchors, self.about.cells
         try:
-            return recover_vector(self.matrix, reading, clock, anchors=anchors, cells=cells, scalar=self._as_scalar)
+            return recover_vector(self.matrix, reading, clock, anchors=anchors, cells=cells)
         except GeometryError as error:
             raise GeometryError(f"the matrix is {reading.name}, but {error}") from error
 

@@ -125,11 +125,12 @@ def _vector_facts(recovery: Recovery) -> dict[str, Any]:
 def _mechanical_facts(recovery: Mechanical) -> dict[str, Any]:
     """What only bodies and structures have.
 
-    ``poisson_ratio``, and for each piece in ``evidence`` the dimension of the null space, the singular value of the
-    coordinates and that of the best field that is none of them.
+    ``poisson_ratio``, ``position_error`` (of entries with few digits), and for each piece in ``evidence`` the dimension
+    of the null space, the singular value of the coordinates and that of the best field that is none of them.
     """
     return {
         "poisson_ratio": recovery.poisson_ratio if isinstance(recovery, Body) else None,
+        "position_error": recovery.position_error,
         "evidence": [asdict(one) for one in recovery.evidence],
     }
 

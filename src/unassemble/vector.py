@@ -1,19 +1,19 @@
-"""The recovery of a vector-valued matrix on one page: a structure, single directions, a truss, or a solid body."""
+"""The recovery of a vector-valued matrix on one page: a structure, a truss, or a solid body."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from .clock import Clock
-from .elasticity.serving import Request, serve_body
+from .elasticity.description import Request
+from .elasticity.recover import serve_body
 from .errors import RecoveryError
 from .matrix import OperatorMatrix
 from .nodes import Numbering
-from .nodes.nodal import nodal_matrix, uncoupled
+from .nodes.nodal import nodal_matrix
 from .operators import VectorReading
 from .recovery import Recovery
 from .structures import Beam, StructuralNumbering, serve_beam, serve_structure
@@ -21,7 +21,6 @@ from .structures.bars import bars_of
 from .structures.layouts import PINNED
 from .structures.trusses import serve_truss
 from .tolerances import CANCELLED
-from .vector_laplacian import Scalar, parts_of, recover_directions
 
 
 def recover_vector(
@@ -31,7 +30,6 @@ def recover_vector(
     *,
     anchors: Sequence[Any] | None,
     cells: bool,
-    scalar: Scalar,
 ) -> Recovery:
     """Recover a vector-valued matrix whose numbering is known.
 
@@ -43,8 +41,6 @@ def recover_vector(
     anchors : sequence of (row, x, y) or (row, x, y, z), optional
     cells : bool
         Look for elements too, not only where nothing else confirms positions.
-    scalar : callable
-        Recovers a scalar matrix with anchors, for directions that are not coupled.
 
     Raises
     ------
@@ -62,9 +58,6 @@ def recover_vector(
         rounding = reading.rounding
         whole = rounding.exact if rounding else matrix.csr()
         nodal = nodal_matrix(whole, numbering)
-    if uncoupled(nodal):
-        found = recover_directions(parts_of(whole, nodal, numbering), matrix, anchors, scalar)
-        return replace(found, choice=choice, timings=clock.timings)
     bars = bars_of(nodal, rounding.spread if rounding else CANCELLED)
     if bars is not None:
         return serve_truss(matrix, nodal, numbering, bars, clock, anchors=anchors, choice=choice, rounding=rounding)

@@ -6,9 +6,7 @@ import os
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 
-from meshes import random_mesh, specimen
 from unassemble import InputError, inspect_matrix, recover
 
 posix = pytest.mark.skipif(os.name != "posix", reason="links and devices of POSIX")
@@ -92,10 +90,3 @@ def test_anchors_may_be_an_array(work):
     rows = np.array([3, 50, 90])
     found = recover(true.matrix, anchors=np.column_stack([rows, true.points[rows]]))
     assert np.abs(found.points - true.points).max() < 1e-12
-
-
-@pytest.mark.parametrize(("row", "why"), [(10**6, "not in the matrix"), (-1, "not in the matrix"), (1, "one node")])
-def test_anchors_of_a_vector_laplacian(row, why):
-    both = sp.kron(specimen(*random_mesh(60, seed=1)).matrix, sp.eye_array(2), format="csr")
-    with pytest.raises(InputError, match=why):
-        recover(both, anchors=[(0, 0.0, 0.0), (row, 1.0, 0.0)])

@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from unittest import mock
 
 import numpy as np
 import scipy.sparse as sp
 import skfem
 from skfem.helpers import ddot, grad, sym_grad, trace
+
+from unassemble.clock import Clock
+from unassemble.elasticity.description import Request
+from unassemble.elasticity.nullspace.atlas import PATCH
+from unassemble.elasticity.recover import serve_body
+from unassemble.matrix import check_matrix
+from unassemble.nodes.nodal import nodal_matrix
+from unassemble.nodes.rounded import with_exact_sums
+from unassemble.nodes.unknowns import find_numbering
+from unassemble.recovery import Body
 
 ELEMENTS = {
     "tri-p1": (skfem.MeshTri, skfem.ElementTriP1),
@@ -165,3 +176,12 @@ def error(points: np.ndarray, truth: np.ndarray) -> float:
     a, b = a - a.mean(axis=0), b - b.mean(axis=0)
     scale = (a * b).sum() / (a * a).sum()
     return float(np.linalg.norm(scale * a - b, axis=1).max() / np.linalg.norm(np.ptp(b, axis=0)))
+
+
+def recover_elasticity(matrix, *, block_size=None, numbering=None, cells=True, patch=None) -> Body:
+    """The body of a matrix that is one's; `patch` is the most nodes of a chart."""
+    clock, checked = Clock(), check_matrix(matrix)
+    whole, rounding = with_exact_sums(checked.csr())
+    numbering = numbering or find_numbering(whole, block_size)
+    with mock.patch.dict(PATCH, {} if patch is None else {2: patch, 3: patch}):
+        return serve_body(checked, nodal_matrix(whole, numbering), numbering, clock, Request(None, cells, "", rounding))

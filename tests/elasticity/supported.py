@@ -7,9 +7,7 @@ from itertools import permutations
 
 import numpy as np
 import scipy.sparse as sp
-from assembled import Assembled, on_plane
-
-from unassemble.elasticity import recover_elasticity
+from assembled import Assembled, on_plane, recover_elasticity
 
 SUPPORTS = (
     "free", "clamp", "roller", "symmetry", "identity clamp", "identity rollers", "penalty clamp", "penalty rollers",

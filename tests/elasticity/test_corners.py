@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from assembled import Assembled, box, heterogeneous, permuted_nodes, stiffness
+from assembled import Assembled, box, heterogeneous, permuted_nodes, recover_elasticity, stiffness
 from supported import Given, assert_certified, given, judged, with_zeros
-
-from unassemble.elasticity import recover_elasticity
 
 
 def varying_shear(x):

@@ -4,10 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from assembled import ELEMENTS, box, eliminated, error, heterogeneous, on_plane, permuted_nodes, stiffness
+from assembled import (
+    ELEMENTS,
+    box,
+    eliminated,
+    error,
+    heterogeneous,
+    on_plane,
+    permuted_nodes,
+    recover_elasticity,
+    stiffness,
+)
 from supported import with_zeros
-
-from unassemble.elasticity import recover_elasticity
 
 TOLERANCE = 1e-8
 COUNTS = {

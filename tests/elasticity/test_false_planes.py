@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from assembled import box, heterogeneous, on_plane, stiffness
+from assembled import box, heterogeneous, on_plane, recover_elasticity, stiffness
 from supported import Given, assert_certified, judged, with_zeros
 
-from unassemble.elasticity import recover_elasticity
 from unassemble.errors import GeometryError
 
 

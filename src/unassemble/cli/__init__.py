@@ -5,11 +5,7 @@ from __future__ import annotations
 import click
 
 from .._version import __version__
-from .demonstrate import demo
-from .inspecting import inspect
-from .modal import modes
-from .papering import paper
-from .recovering import recover
+from .commands import demo, inspect, modes, paper, recover
 from .status import CommandLine
 
 __all__ = ["main"]

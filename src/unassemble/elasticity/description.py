@@ -2,78 +2,95 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..clock import Clock
+from ..elements.kinds import KINDS
+from ..elements.surface import boundary_loops
+from ..matrix import OperatorMatrix
+from ..nodes.anchoring import Anchors, anchored, digits_lost, near_enough
 from ..nodes.nodal import NodalMatrix, determined
 from ..nodes.numbering import Numbering
 from ..nodes.redrawn import known_to
 from ..nodes.rounded import Rounding
-from ..tolerances import ALIKE
+from ..recovery import Body
+from ..tolerances import ALIKE, LAST_DIGITS
+from ..words import Reason
 from .doubts import guessed_directions, unborne, unconfirmed
-from .materials.cells import no_cells, recognise_cells
-from .nullspace.certificate import largest_residual
+from .materials.cells import Cells, no_cells, recognise_cells
+from .nullspace.certificate import residuals
 from .nullspace.material import lame_ratio, poisson_ratio
 from .nullspace.redundancy import checked
 from .nullspace.solution import Solution
 from .remarks import about_assumptions, about_cells, about_directions, about_nodes
-from .results import ElasticityRecovery
 from .verdict import NOTHING_CHECKED, NOTHING_SHOWN, RESTS_ON_PLANES, hidden, of_few_digits, verdict
 
 
+@dataclass(frozen=True)
+class Request:
+    """What is asked for, and what is known beside the matrix.
+
+    Attributes
+    ----------
+    anchors : sequence of (row, x, y) or (row, x, y, z), optional
+    cells : bool
+        Look for elements too, not only where nothing else confirms positions.
+    choice : str
+        Why the matrix was taken for one of elasticity.
+    rounding : Rounding, optional
+        Of the entries, where they have few digits.
+    """
+
+    anchors: Sequence[Any] | None = None
+    cells: bool = True
+    choice: str = ""
+    rounding: Rounding | None = None
+
+
 def described(
+    matrix: OperatorMatrix,
     nodal: NodalMatrix,
     numbering: Numbering,
     solution: Solution,
     clock: Clock,
-    *,
-    cells: bool,
-    rounding: Rounding | None,
-    placed_again: Callable[[sp.csr_array], NDArray[np.float64]],
-) -> ElasticityRecovery:
-    """The recovery, with its certificate, material and cells, and the sentences that go with them.
+    request: Request,
+    known: Anchors,
+    placed_again: Callable[[sp.csr_array], tuple[NDArray[np.float64], NDArray[np.float64]]],
+) -> Body:
+    """The body, with its certificate, material and cells, and the sentences that go with them.
 
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    numbering : Numbering
-    solution : Solution
-    clock : Clock
-    cells : bool
-        Look for elements too, not only where nothing else confirms positions.
-    rounding : Rounding, optional
-        Of the entries, where they have few digits.
-    placed_again : callable
-        Points (n, d) from another matrix that may have been rounded to the given one.
+    `placed_again` finds points (n, d), and misfits (k,), from another matrix that may have been rounded to the given
+    one.
     """
+    cells, rounding = request.cells, request.rounding
     with clock("certify"):
-        error = largest_residual(nodal, solution.valid, solution.points, solution.ratio)
+        misfits = residuals(nodal, solution.valid, solution.points)
+        error = float(np.abs(misfits).max()) if len(misfits) else float("nan")
         near = not error >= max(ALIKE, rounding.spread if rounding else 0.0)  # NaN where only elements can tell
         ratio = _lame_ratio(nodal, solution) if near else None
     found = no_cells()
     if (cells or solution.straight or solution.hanging is not None) and near:
         with clock("cells"):
             found = recognise_cells(nodal, solution.points, ratio)
-    if solution.cautious is not None and not found.certified:
-        return described(
-            nodal, numbering, solution.cautious, clock, cells=cells, rounding=rounding, placed_again=placed_again
-        )
-    backward = found.backward_error if found.certified else error
     status, reason = verdict(nodal, solution, error, found, numbering)
     alone = status == "certified" and not found.certified
     lone = determined(solution.points) & ~checked(nodal, solution) if alone else np.zeros(nodal.n, dtype=bool)
     if lone.any() and not cells:  # only elements can confirm them
-        return described(nodal, numbering, solution, clock, cells=True, rounding=rounding, placed_again=placed_again)
+        more = replace(request, cells=True)
+        return described(matrix, nodal, numbering, solution, clock, more, known, placed_again)
     if alone and not (determined(solution.points) & ~lone).any():
         status, reason, lone = "uncertified", NOTHING_CHECKED, np.zeros_like(lone)
+    bar = None
     if rounding and near and not any(solution.freedoms):
         with clock("certify"):
-            doubt = known_to(solution.points, solution.component, rounding, placed_again, sized=False)
-        status, reason = of_few_digits(nodal, solution, error, numbering, rounding, doubt)
+            bar = known_to(solution.points, solution.component, misfits, rounding, placed_again, sized=False)
+        status, reason = of_few_digits(nodal, solution, error, numbering, rounding, bar)
     elif rounding:
         reason = hidden(reason, rounding)
     withheld = np.zeros(nodal.n, dtype=bool)
@@ -84,34 +101,50 @@ def described(
         status, reason = "uncertified", RESTS_ON_PLANES
         hanging = np.zeros(nodal.n, dtype=bool)  # said of all of them
     kept = ~(withheld | hanging | lone)
-    points = np.where(kept[:, None], solution.points, np.nan)
-    found = found.among(kept)
-    loose = ~determined(points)
+    placed = np.where(kept[:, None], solution.points, np.nan)
+    shown = found.among(kept)
+    loose = ~determined(placed)
+    component = np.where(loose, -1, solution.component)
     if status == "certified" and loose.all():
         status, reason = "uncertified", NOTHING_SHOWN
+    if status == "certified" and _flat(placed, component):
+        status, reason = "uncertified", Reason("the points lie in one line or plane, and no solid body does")
+    points, factor, notes = anchored(placed, component, len(solution.evidence), known)
+    status, reason = near_enough(status, reason, digits_lost(points, placed, component, factor))
+    lame, scale = _in_units(shown, component, factor, nodal.dim)
+    if np.isnan(factor).any():
+        notes.append("the sign of the scale is free: with a mesh its point reflection fits the matrix as well")
     guessed = guessed_directions(numbering, loose)
-    return ElasticityRecovery(
+    return Body(
+        **_cell_fields(shown),
         points=points,
-        node_of_row=numbering.node_of_row,
-        direction_of_row=np.where(guessed, -1, numbering.direction_of_row),
-        node_status=np.asarray(loose, dtype=np.int8),
-        component=np.where(loose, -1, solution.component),
-        evidence=solution.evidence,
-        poisson_ratio=None if ratio is None else poisson_ratio(ratio),
-        cells=found,
-        backward_error=backward,
+        component=component,
+        scale=scale,
+        node_status=loose.astype(np.int8),
         status=status,
+        uniqueness="searched" if status == "certified" else None,
         reason=reason.text,
         advice=reason.advice,
-        numbering=numbering.kind,
+        operator="elasticity",
+        backward_error=found.backward_error if found.certified else error,
+        position_error=bar.error if bar and bar.explained else None,
+        timings=clock.timings,
         warnings=(
+            *matrix.warnings,
             *solution.warnings,
-            *(about_cells(found) if cells else ()),
+            *(about_cells(shown) if cells else ()),
             *about_nodes(nodal, loose, withheld, hanging, lone),
             *about_assumptions(solution),
             *about_directions(int(guessed.sum())),
+            *notes,
         ),
-        timings=clock.timings,
+        node_of_row=numbering.node_of_row,
+        direction_of_row=np.where(guessed, -1, numbering.direction_of_row),
+        numbering=numbering.kind,
+        choice=request.choice,
+        poisson_ratio=None if ratio is None else poisson_ratio(ratio),
+        lame=lame,
+        evidence=solution.evidence,
     )
 
 
@@ -129,3 +162,46 @@ def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
             return None
         told.append(read)
     return told[0] if np.ptp([poisson_ratio(one) for one in told]) < ALIKE else None
+
+
+def _flat(points: NDArray[np.float64], component: NDArray[np.int64]) -> bool:
+    """Whether the nodes of a piece do not span space, so that no element there has a volume."""
+    d = points.shape[1]
+    for piece in np.unique(component[component >= 0]):
+        x = points[component == piece]
+        spread = np.linalg.eigvalsh(np.cov(x.T, bias=True)) if len(x) > d else np.zeros(d)
+        if spread[0] <= LAST_DIGITS * max(spread[-1], 1.0):  # mean edges have length one
+            return True
+    return False
+
+
+_FIELD = {"triangle": "triangles", "quad": "quads", "tetra": "tetrahedra", "hexahedron": "hexahedra"}
+
+
+def _cell_fields(found: Cells) -> dict[str, Any]:
+    """Corners of the cells by their name in a Body, their further nodes, and in the plane their boundary."""
+    fields = {}
+    for name, cells in found.blocks.items():
+        kind = KINDS[name]
+        fields[_FIELD[kind.base]] = np.ascontiguousarray(cells[:, : kind.corners])
+        if kind.quadratic:
+            fields["mid_nodes"] = np.ascontiguousarray(cells[:, kind.corners :])
+    if any(KINDS[name].dim == 2 for name in found.blocks):
+        fields["boundary"], fields["boundary_offsets"] = boundary_loops(found.blocks)
+    return fields
+
+
+def _in_units(found: Cells, component: NDArray, factor: NDArray, d: int) -> tuple[NDArray, NDArray]:
+    """Lame coefficients of the cells, and the mean shear modulus of each piece, for the size that it was given.
+
+    Entries go like the modulus times length to the power d - 2.
+    """
+    scale = np.full(len(factor), np.nan)
+    if not found.certified:
+        return np.empty((0, 2)), scale
+    piece = component[np.concatenate([cells[:, 0] for cells in found.blocks.values()])]
+    lame = found.lame / np.where(np.isnan(factor), 1.0, np.abs(factor))[piece, None] ** (d - 2)
+    count = np.bincount(piece, minlength=len(factor))
+    some = count > 0
+    scale[some] = np.bincount(piece, lame[:, 1], len(factor))[some] / count[some]
+    return lame, scale

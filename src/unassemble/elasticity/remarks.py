@@ -63,8 +63,7 @@ def about_nodes(
     if resting:
         told.append(
             f"{count_of(resting, 'node is', 'nodes are')} determined only if nodes that lack a direction lie in planes "
-            "across it, or if Poisson's ratio is the same there, which neither another equation nor an element "
-            "confirms. No coordinates are given there"
+            "across it, which neither another equation nor an element confirms. No coordinates are given there"
         )
     if lone.any():
         told.append(
@@ -93,8 +92,6 @@ def about_assumptions(solution: Solution) -> list[str]:
             "the body is homogeneous and held all around, where the identities leave an affine map free that the "
             "elements determined"
         )
-    if solution.ratio is not None:
-        told.append("Poisson's ratio, read off the nodes that determine it, was used to determine others")
     return told
 
 

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from ..nodes.nodal import NodalMatrix, without_trace
 from ..nodes.numbering import Numbering
+from ..nodes.redrawn import Known
 from ..nodes.rounded import Rounding
 from ..nodes.shape import SOFT
-from ..tolerances import ALIKE, CERTIFIED
+from ..tolerances import CERTIFIED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, sentences
 from .materials.cells import Cells
 from .nullspace.solution import Solution
@@ -70,21 +71,23 @@ def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solu
 
 
 def of_few_digits(
-    nodal: NodalMatrix, solution: Solution, error: float, numbering: Numbering, rounding: Rounding, doubt: float
+    nodal: NodalMatrix, solution: Solution, error: float, numbering: Numbering, rounding: Rounding, known: Known
 ) -> tuple[str, Reason]:
-    """Status and reason where the entries are rounded, which is an error bar: the `doubt` about positions."""
+    """Status and reason where the entries are rounded, which is an error bar: how well positions are known."""
     objection = _to_positions(nodal, solution, numbering, exact=False) or _to_identities(nodal, solution, numbering)
     if objection.text:
         return "uncertified", hidden(objection, rounding)
     if np.isnan(error):
         return "uncertified", NOTHING_LEFT
     holds = f"the entries are rounded to {rounding.name}, and the identities hold to {error:.1e} (relative)"
-    if not error <= max(rounding.spread, CERTIFIED):
+    if not (error <= max(rounding.spread, CERTIFIED) and known.explained):
         return "uncertified", Reason(
-            f"{holds}, which is more than that leaves: positions may be off by {doubt:.0e} of the size"
+            f"{holds}, which is more than that leaves, so that positions may be off by more than it moves them"
         )
-    known = f"{holds}, which is what that leaves, so that positions are known to {doubt:.0e} of the size"
-    return ("certified", Reason(known)) if doubt <= ALIKE else ("uncertified", Reason(known, _MORE_DIGITS))
+    said = f"{holds}, which is what that leaves, so that positions are known to {known.error:.0e} of the size"
+    return (
+        ("certified", Reason(said)) if known.error <= rounding.needed else ("uncertified", Reason(said, _MORE_DIGITS))
+    )
 
 
 def hidden(reason: Reason, rounding: Rounding) -> Reason:
@@ -136,8 +139,8 @@ def verdict(
 
 
 def _softest(solution: Solution) -> float:
-    """Least singular value of a field that is no translation or scale, of pieces that are not settled."""
-    return min((one.gap for one in solution.evidence if one.gap > 0 and not one.settled), default=1.0)
+    """Least singular value of a field that is no translation or scale."""
+    return min((one.gap for one in solution.evidence if one.gap > 0), default=1.0)
 
 
 def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, *, exact: bool = True) -> Reason:
@@ -163,12 +166,6 @@ def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, 
             f"a field that is no translation or scale satisfies the identities up to {_softest(solution):.1e}, and "
             "nodes that it moves may be wrong by more than 1e-8",
             "slender bodies have such fields, and nodes that few rows hold",
-        )
-    if not solution.strict:
-        return Reason.of(
-            "supports leave too few rows that are surely whole",
-            "those that add up to zero were taken for whole",
-            advice=WITHOUT_SUPPORTS,
         )
     if _torn(nodal, solution):
         return Reason.of(

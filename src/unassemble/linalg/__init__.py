@@ -3,7 +3,6 @@
 from .definite import nearly_singular, solved
 from .factorisation import Factorisation, backend, factorisation
 from .least_norm import least_norm
-from .quiet import quiet
 from .singular import svd
 from .threads import blas_threads, threads
 from .upper import UpperTriangle, upper_from_edges
@@ -16,7 +15,6 @@ __all__ = [
     "factorisation",
     "least_norm",
     "nearly_singular",
-    "quiet",
     "solved",
     "svd",
     "threads",

@@ -111,18 +111,15 @@ def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
     return NodalMatrix.of(blocks.indptr, blocks.indices, blocks.data, row_of.reshape(n, d))
 
 
-def valid_pairs(nodal: NodalMatrix, *, strict: bool = True, inferred: bool = False) -> NDArray[np.bool_]:
+def valid_pairs(nodal: NodalMatrix) -> NDArray[np.bool_]:
     """Which rows of which blocks hold every coefficient that assembly gave them.
 
     Row i of A^{cb} annihilates constants, unless a coupled unknown of component b was taken away or the
     diagonal was changed. The converse fails on regular meshes, where what is missing can add up to zero (two
-    eliminated nodes opposite each other). So the strict rule asks it of all rows of a node at once: they couple to
+    eliminated nodes opposite each other). So it is asked of all rows of a node at once: they couple to
     the same unknowns, and a neighbour that is known to lack the direction spoils it. So does what they miss of another
     direction, if no neighbour is known to lack that: a whole node was taken away, whose entries add up to zero in
     meshes that are the same all along an axis. A penalty on the diagonal explains itself and spoils its own row only.
-
-    Not even that if diagonals may be `inferred`: what makes the row annihilate constants is what assembly put there,
-    if the row is whole. Only the others of the node can tell whether it is, which is less than is asked elsewhere.
 
     Returns
     -------
@@ -130,14 +127,10 @@ def valid_pairs(nodal: NodalMatrix, *, strict: bool = True, inferred: bool = Fal
         Component c of the row, component b of the columns.
     """
     present: NDArray[np.bool_] = nodal.row_of >= 0
-    zero, penalty = annihilating(nodal), _with_penalty(nodal)
+    zero, penalty = annihilating(nodal), nodal.penalised[:, None, :] & np.eye(nodal.dim, dtype=bool)
     valid = np.asarray(zero & ~penalty & present[:, :, None] & present[:, None, :] & (nodal.size > 0)[:, None, None])
-    if not strict:
-        return valid
     whole: NDArray[np.bool_] = np.asarray((zero | ~present[:, :, None]).all(axis=1))
     lacking = nodal.graph @ eliminated(nodal).astype(float)
-    if inferred:
-        valid |= penalty & valid.any(axis=1, keepdims=True)
     lost = (~whole & (lacking == 0)).any(axis=1, keepdims=True)
     sure: NDArray[np.bool_] = whole & (lacking == 0) & ~lost
     return np.asarray(valid & sure[:, None, :])
@@ -164,7 +157,7 @@ def surrounded(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_
     ----------
     nodal : NodalMatrix
     valid : (n, d, d) bool
-        By the strict rule.
+        See :func:`valid_pairs`.
     """
     present = nodal.row_of >= 0
     lacking = nodal.graph @ eliminated(nodal).astype(float) > 0
@@ -190,13 +183,8 @@ def annihilating(nodal: NodalMatrix) -> NDArray[np.bool_]:
     return np.asarray(np.abs(nodal.row_sums()) <= CANCELLED * size)
 
 
-def _with_penalty(nodal: NodalMatrix) -> NDArray[np.bool_]:
-    """(n, d, d) rows of blocks whose diagonal entry is inferred."""
-    return nodal.penalised[:, None, :] & np.eye(nodal.dim, dtype=bool)
-
-
 def uncoupled(nodal: NodalMatrix) -> bool:
-    """Whether no component is coupled to another: a vector Laplacian, several scalar matrices side by side."""
+    """Whether no component is coupled to another: as of a vector Laplacian."""
     off = np.abs(nodal.data[:, ~np.eye(nodal.dim, dtype=bool)])
     return bool(off.max(initial=0) <= 1e-12 * np.median(nodal.size[nodal.size > 0])) if nodal.size.any() else True
 

@@ -3,32 +3,54 @@
 Entries as far off as rounding may have left them are drawn anew, and positions are found from these as from those given
 (a parametric bootstrap; Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6). So errors that
 cancel do, and those that a weak equation magnifies are seen where it does.
+
+That holds if rounding is all that entries are off by: the misfits that they leave then are as large as the changes that
+drawing anew brings to them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+import scipy.stats
 from numpy.typing import NDArray
 
 from ..budget import REDRAWN
 from ..errors import GeometryError
-from ..tolerances import SIGMAS
+from ..tolerances import CONFIDENCE, LAST_DIGITS, NOISY, SIGMAS
 from .nodal import determined
 from .rounded import Rounding
+
+
+@dataclass(frozen=True)
+class Known:
+    """How well positions are known.
+
+    Attributes
+    ----------
+    error : float
+        Largest one of a node, relative to the diameter of its piece; infinite where a node may get lost.
+    explained : bool
+        Whether rounding explains the misfits, so that the error is all that there is.
+    """
+
+    error: float
+    explained: bool = True
 
 
 def known_to(
     points: NDArray[np.float64],
     component: NDArray[np.int64],
+    misfits: NDArray[np.float64],
     rounding: Rounding,
-    place: Callable[[sp.csr_array], NDArray[np.float64]],
+    place: Callable[[sp.csr_array], tuple[NDArray[np.float64], NDArray[np.float64]]],
     *,
     sized: bool,
-) -> float:
-    """Largest error of a node, relative to the diameter of its piece; infinite where a node may get lost.
+) -> Known:
+    """Find positions anew, with other rounding.
 
     Parameters
     ----------
@@ -36,24 +58,45 @@ def known_to(
         NaN where not determined.
     component : (n,) int64
         Piece of each node, -1 where not determined.
+    misfits : (m,) float64
+        Of what certifies these points.
     rounding : Rounding
     place : callable
-        Such points from a matrix that may have been rounded to the given one.
+        Such points, and their misfits, from a matrix that may have been rounded to the given one.
     sized : bool
         Whether the matrix tells size and sign.
     """
     pieces = [np.flatnonzero(component == one) for one in range(component.max(initial=-1) + 1)]
-    moved = np.zeros(len(points))
+    moved, changes = np.zeros(len(points)), np.zeros((REDRAWN, len(misfits)))
     try:
         for seed in range(REDRAWN):
-            other = place(rounding.redrawn(seed))
-            if not determined(other)[component >= 0].all():
-                return float("inf")
+            other, left = place(rounding.redrawn(seed))
+            if not determined(other)[component >= 0].all() or len(left) != len(misfits):
+                return Known(float("inf"))
             for piece in pieces:
                 moved[piece] += _moved(points[piece], other[piece], sized=sized)
+            mirrored = not sized and np.nansum(points * other) < 0
+            changes[seed] = (-left if mirrored else left) - misfits
     except GeometryError:
-        return float("inf")
-    return SIGMAS * float(np.sqrt(moved.max(initial=0.0) / REDRAWN))
+        return Known(float("inf"))
+    return Known(SIGMAS * float(np.sqrt(moved.max(initial=0.0) / REDRAWN)), _explained(misfits, changes))
+
+
+def _explained(misfits: NDArray[np.float64], changes: NDArray[np.float64]) -> bool:
+    """Whether misfits (m,) are no larger than changes (k, m) of them, by an F test, or as arithmetic leaves them.
+
+    Misfits depend on each other: that of few degrees of freedom shows by changes that are alike or opposite.
+    """
+    if (np.abs(misfits) <= LAST_DIGITS).all():  # as in regular meshes, whatever the numbers are
+        return True
+    products, draws = changes @ changes.T, len(changes)
+    size = np.trace(products) / draws
+    if not size > 0:
+        return False
+    alike = (np.square(products).sum() - np.square(products.diagonal()).sum()) / (draws * (draws - 1))
+    freedom = max(1.0, size**2 / alike)
+    bound = scipy.stats.f.isf(CONFIDENCE, freedom, draws * freedom)
+    return bool(misfits @ misfits <= size * max(NOISY**2, bound))
 
 
 def _moved(x: NDArray[np.float64], y: NDArray[np.float64], *, sized: bool) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..matrix.digits import Digits
-from ..tolerances import CANCELLED, HARDLY_ANY, LAST_DIGITS, SIGMAS
+from ..tolerances import ALIKE, CANCELLED, HARDLY_ANY, LAST_DIGITS, SIGMAS
 from .orders import ORDERS, regular
 from .searching import directions_in_order, live_part
 
@@ -36,7 +36,9 @@ class Rounding:
     exact : (N, N) sparse
         The matrix, with exact sums.
     unit : (N, N) sparse
-        Of the last place of each entry.
+        Of the last place of each entry, with the entry's sign.
+    number : (nnz,) int64
+        Entries that are the same number, but for the sign: these were rounded alike.
     direction : (N,) int64
         Of each row; -1 where not known.
     zero : (N, b) bool
@@ -47,6 +49,7 @@ class Rounding:
     level: float
     exact: sp.csr_array
     unit: sp.csr_array
+    number: NDArray[np.int64]
     direction: NDArray[np.int64]
     zero: NDArray[np.bool_]
 
@@ -55,15 +58,23 @@ class Rounding:
         """What an identity, or a sum of forces, may be off by, relative to what makes it up."""
         return SIGMAS * self.level
 
+    @property
+    def needed(self) -> float:
+        """How far off positions may be, relative to the size, to be certified: half of the digits of the entries."""
+        return max(ALIKE, float(np.sqrt(self.level)))
+
     def redrawn(self, seed: int) -> sp.csr_array:
-        """The matrix off by what rounding may have done to each entry, with exact sums again."""
-        upper = sp.triu(self.unit, format="csr")
-        upper.data *= np.random.default_rng(seed).uniform(-0.5, 0.5, upper.nnz)
-        return _without_sums(sp.csr_array(self.exact + upper + sp.triu(upper, 1).T), self.direction, self.zero)
+        """The matrix off by what rounding may have done to each number, with exact sums again."""
+        off = self.unit.copy()
+        off.data *= np.random.default_rng(seed).uniform(-0.5, 0.5, int(self.number.max()) + 1)[self.number]
+        return _without_sums(sp.csr_array(self.exact + off), self.direction, self.zero)
 
 
 def with_exact_sums(
-    matrix: sp.csr_array, candidates: Iterable[tuple[NDArray[np.int64], int]] = ()
+    matrix: sp.csr_array,
+    candidates: Iterable[tuple[NDArray[np.int64], int]] = (),
+    *,
+    known: tuple[NDArray[np.int64], int] | None = None,
 ) -> tuple[sp.csr_array, Rounding | None]:
     """Take the rounding out of rows that annihilate translations, if unknowns stand in one of the usual orders.
 
@@ -72,6 +83,8 @@ def with_exact_sums(
     matrix : (N, N) sparse
     candidates : iterable of ((N,) int64, int)
         Further directions of rows to try, -1 where not known, and how many there are.
+    known : ((N,) int64, int), optional
+        The directions, in place of all that could be tried: with others few rows add up to zero.
 
     Returns
     -------
@@ -83,12 +96,14 @@ def with_exact_sums(
     digits = Digits.of(matrix.data)
     if digits is None:
         return matrix, None
-    unit = sp.csr_array((digits.unit, matrix.indices, matrix.indptr), shape=matrix.shape)
-    size, error = abs(matrix), unit / 2
+    _, number = np.unique(np.abs(matrix.data), return_inverse=True)
+    unit = sp.csr_array((digits.unit * np.sign(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
+    size, error = abs(matrix), abs(unit) / 2
     total, of_row = (np.asarray(part.sum(axis=1)).ravel() for part in (size, error))
     off = of_row / np.where(total > 0, total, np.inf)
     best, most, excess = None, HARDLY_ANY, 0.0
-    for direction, b in chain(_readings(matrix, np.maximum(off, CANCELLED)), candidates):
+    readings = [known] if known else chain(_readings(matrix, np.maximum(off, CANCELLED)), candidates)
+    for direction, b in readings:
         labels = (direction[:, None] == np.arange(b)).astype(float)
         sums, sizes = matrix @ labels, size @ labels
         zero = (np.abs(sums) <= error @ labels + LAST_DIGITS * total[:, None]) & (sizes > LAST_DIGITS * total[:, None])
@@ -99,7 +114,7 @@ def with_exact_sums(
     if best is None or excess <= LAST_DIGITS:  # dyadic numbers are exact, few digits or not
         return matrix, None
     exact = _without_sums(matrix, *best)
-    return exact, Rounding(digits.name, float(np.median(off)), exact, unit, *best)
+    return exact, Rounding(digits.name, float(np.median(off)), exact, unit, number, *best)
 
 
 def _readings(matrix: sp.csr_array, off: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.int64], int]]:

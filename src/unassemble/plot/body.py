@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..recovery import Body, ConformingMesh, Recovery, Structure, Surface
 from . import style
 from .canvas import panel
+from .layout import apart
 from .mesh import line_handle
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ _LIGHT = np.array([0.25, -0.55, 0.80]) / np.linalg.norm([0.25, -0.55, 0.80])
 def plot_body(recovery: Recovery, ax: Axes | None = None) -> tuple[Figure, list[Artist]]:
     """A body or structure, pieces side by side, and handles for the legend."""
     flat, depth = _projected(recovery.points)
-    flat = _side_by_side(flat, recovery)
+    flat = apart(flat, recovery.component)
     known = np.isfinite(flat).all(axis=1)
     shown = flat[known] if known.any() else np.array([[0.0, 0.0], [1.0, 1.0]])
     figure, ax = panel(np.stack([shown.min(axis=0), shown.max(axis=0)]), ax)
@@ -59,19 +60,6 @@ def _projected(points: NDArray) -> tuple[NDArray, NDArray]:
         return points.copy(), np.zeros(len(points))
     across = _ACROSS / np.linalg.norm(_ACROSS)
     return points @ np.column_stack([across, np.cross(_TOWARDS, across)]), points @ _TOWARDS
-
-
-def _side_by_side(flat: NDArray, recovery: Recovery) -> NDArray:
-    """Each piece has its own frame: put them in a row."""
-    left = 0.0
-    for piece in range(recovery.n_components if recovery.n_components > 1 else 0):
-        here = recovery.component == piece
-        if not here.any():
-            continue
-        low, high = np.nanmin(flat[here], axis=0), np.nanmax(flat[here], axis=0)
-        flat[here] += [left - low[0], -low[1]]
-        left += 1.1 * (high[0] - low[0])
-    return flat
 
 
 def _faces(recovery: Recovery) -> list[NDArray]:

@@ -73,12 +73,8 @@ def panels(extents: Sequence[NDArray]) -> tuple[Figure, list[Axes]]:
     left = style.PAGE.margin + (width - content) / 2
     for (low, high), size in zip(extents, sizes, strict=True):
         bottom = style.PAGE.footer + (height - size[1]) / 2
-        # A margin inside the box keeps the boundary line from being cut.
-        pad = 0.012 * float((high - low).max())
         ax = figure.add_axes((left / total[0], bottom / total[1], size[0] / total[0], size[1] / total[1]))
-        ax.set(xlim=(low[0] - pad, high[0] + pad), ylim=(low[1] - pad, high[1] + pad), aspect="equal")
-        ax.set_axis_off()
-        axes.append(ax)
+        axes.append(_showing(ax, low, high))
         left += size[0] + 2 * style.PAGE.margin
     return figure, axes
 
@@ -88,11 +84,15 @@ def panel(extent: NDArray, ax: Axes | None) -> tuple[Figure, Axes]:
     if ax is None:
         figure, (ax,) = panels([extent])
         return figure, ax
-    low, high = extent
+    return _showing(ax, *extent).figure, ax  # type: ignore[return-value]
+
+
+def _showing(ax: Axes, low: NDArray, high: NDArray) -> Axes:
+    """The axes with the limits of a box, and a margin, which keeps the boundary line from being cut."""
     pad = 0.012 * float((high - low).max())
     ax.set(xlim=(low[0] - pad, high[0] + pad), ylim=(low[1] - pad, high[1] + pad), aspect="equal")
     ax.set_axis_off()
-    return ax.figure, ax  # type: ignore[return-value]
+    return ax
 
 
 def header(figure: Figure, headline: str, details: str, colour: str) -> None:

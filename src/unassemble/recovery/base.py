@@ -51,10 +51,9 @@ class Recovery:
     reason, advice : str
         Why, in one sentence or two; what to do next, where the mesh is not certified.
     operator : str
-        ``"laplacian"``, or ``"anisotropic laplacian"`` where a tensor was undone; ``"mass"``; ``"elasticity"``, or
-        ``"vector laplacian"`` where the directions of a vector-valued matrix are not coupled; ``"frame or shell"``,
-        ``"plane frame"``, ``"plate"`` or ``"beam"`` where nodes have rotations too; ``"truss"``; ``"structure"`` where
-        they have displacements only and elements are of any kind; ``"surface laplacian"``.
+        ``"laplacian"``, or ``"anisotropic laplacian"`` where a tensor was undone; ``"mass"``; ``"elasticity"``;
+        ``"frame or shell"``, ``"plane frame"``, ``"plate"`` or ``"beam"`` where nodes have rotations too; ``"truss"``;
+        ``"structure"`` where they have displacements only and elements are of any kind; ``"surface laplacian"``.
     reaction : float
         The factor s of the mass matrix in the operator, 0 if none.
     density : float or None

@@ -25,15 +25,12 @@ class Evidence:
         Singular value of the best field that is none of these; an upper bound on large bodies.
     rows : int
         Nodes with valid identities.
-    settled : bool
-        Whether the residual is that small beside the gap that no other field has a part in the coordinates.
     """
 
     null_dimension: int
     residual: float
     gap: float
     rows: int
-    settled: bool = False
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -44,11 +41,14 @@ class Mechanical(Recovery):
     ----------
     evidence : tuple of Evidence
         The null space of each piece's identities.
+    position_error : float or None
+        Of entries with few digits: how far off a node may be, ten standard deviations, over its piece's diameter.
     quads : (m, 4) int64
         Cells of four corners, counter-clockwise in the plane.
     """
 
     evidence: tuple[Evidence, ...] = ()
+    position_error: float | None = None
     quads: NDArray[np.int64] = field(default_factory=none_of(4))
 
 

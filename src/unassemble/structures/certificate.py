@@ -22,7 +22,7 @@ def forces(
     points: NDArray[np.float64],
     counted: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Forces that rigid rotations of the nodes bring about, relative to what makes them up.
+    """Forces that rigid rotations of the nodes bring about, with their signs, relative to what makes them up.
 
     That is bounded, without signs, by nodes that move by their distance from the centroid and turn by one: about
     single axes both may be nothing but rounding.
@@ -49,7 +49,7 @@ def forces(
     moves = len(layout.displacements)
     known, moving = determined(points), direction_of_row >= 0
     motions = layout.rigid_motions(np.where(known[:, None], points, 0.0))[:, :, moves:]
-    force = np.abs(matrix @ (motions[node_of_row, direction_of_row] * moving[:, None]))
+    force = matrix @ (motions[node_of_row, direction_of_row] * moving[:, None])
     lever = np.where(direction_of_row < moves, np.linalg.norm(points, axis=1)[node_of_row], 1.0)
     size = abs(matrix) @ np.where(moving & known[node_of_row], lever, 0.0)
     touched = abs(matrix) @ (~known[node_of_row]).astype(float) > 0

@@ -52,7 +52,7 @@ class Equations:
         return Equations(*(getattr(self, one.name)[which] for one in fields(self)))
 
 
-def equations(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool) -> Equations:
+def equations(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool, allowed: float = CANCELLED) -> Equations:
     """Collect the valid equations.
 
     Parameters
@@ -64,6 +64,8 @@ def equations(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool) -> Equat
         Allow for springs between the rotations of a node and the ground, as programs add them where a flat shell has
         no stiffness against drilling. They add an unknown symmetric matrix to the three moments' rows; what is left
         are the differences of its two triangles.
+    allowed : float
+        What rounding leaves of coefficients that cancel, relative to them.
     """
     b, moves = nodes.layout.block_size, len(nodes.layout.displacements)
     every = [_rotation(nodes, k) for k in range(valid.shape[2])]
@@ -82,7 +84,7 @@ def equations(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool) -> Equat
                 one.rotation,
             )
         )
-    return _relative(joined(*parts))
+    return _relative(joined(*parts), allowed)
 
 
 def joined(*parts: Equations) -> Equations:
@@ -100,13 +102,13 @@ def told_by(members: Straight, nodes: Nodes) -> Equations:
     return Equations(sp.csr_array(half, shape=(m, nodes.n * d)), right, np.ones(m), np.abs(right), unknown, unknown)
 
 
-def _relative(given: Equations) -> Equations:
+def _relative(given: Equations, allowed: float) -> Equations:
     """Equations relative to the size of their coefficients; those without any, or none but rounding, are left out.
 
     What comes in has the size of what the coefficients are differences of.
     """
     size = np.asarray(abs(given.operator).sum(axis=1)).ravel()
-    tells = np.flatnonzero(size > CANCELLED * given.size)
+    tells = np.flatnonzero(size > allowed * given.size)
     some, size = given[tells], size[tells]
     operator = sp.csr_array(sp.diags_array(1 / size) @ some.operator)
     return replace(some, operator=operator, right=some.right / size, size=size, lever=some.lever / size)

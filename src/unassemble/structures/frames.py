@@ -13,7 +13,7 @@ from ..clock import Clock
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..nodes.anchoring import anchored, checked_anchors, digits_lost, near_enough
-from ..nodes.redrawn import known_to
+from ..nodes.redrawn import Known, known_to
 from ..nodes.rounded import Rounding, with_exact_sums
 from ..recovery import Structure
 from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SUMMED
@@ -60,28 +60,19 @@ def serve_structure(
     """
     layout = numbering.layout
     node, direction = numbering.node_of_row, numbering.direction_of_row
-    known = checked_anchors(anchors, node, layout.space)
-    whole, rounding = with_exact_sums(matrix.csr(), [(direction, layout.block_size)])
+    held = checked_anchors(anchors, node, layout.space)
+    whole, rounding = with_exact_sums(matrix.csr(), known=(direction, layout.block_size))
     spread = rounding.spread if rounding else 0.0
     with clock("solve"):
-        nodes, members, found, valid = _placed(whole, numbering, rounding)
+        answer = _placed(whole, numbering, rounding)
+        nodes, members, found, valid = answer
     with clock("certify"):
-        counted = np.zeros((len(node), len(layout.turning)), dtype=bool)
-        counted[nodes.row_of[nodes.present]] = valid[nodes.present]
-        force, used = forces(whole, layout, node, direction, found.points, counted)
+        force, used = _forces(whole, numbering, *answer)
         ends, misfit = members_misfits(members, layout, found.points)
         used = (used | np.isin(node, ends)) & ~np.isin(node, found.spoiled)
-        error = float(np.concatenate([force, misfit]).max()) if used.any() else float("inf")
-        doubt = _doubt(error, found, numbering, rounding)
-        status, reason = _verdict(
-            error,
-            max(CERTIFIED, spread),
-            doubt,
-            found,
-            len(misfit),
-            rounding.name if rounding else "",
-            sized=bool(layout.rotations),
-        )
+        error = float(np.concatenate([abs(force), misfit]).max()) if used.any() else float("inf")
+        known = _known(error, force, found, members, numbering, rounding)
+        status, reason = _verdict(error, known, found, len(ends), rounding, sized=bool(layout.rotations))
         inner: NDArray[np.bool_] = np.asarray(valid[:, : len(layout.displacements)].all(axis=(1, 2)))
         pair = (
             mispaired(nodes, found.points, inner, max(CANCELLED, spread))
@@ -101,11 +92,11 @@ def serve_structure(
     notes = [said_of(nodes, found.spoiled)] if len(found.spoiled) else []
     notes += found.notes
     placed = np.pad(found.points, ((0, 0), (0, layout.space - layout.dim)))
-    points, factor, more = anchored(placed, found.component, len(found.evidence), known, sized=bool(layout.rotations))
+    points, factor, more = anchored(placed, found.component, len(found.evidence), held, sized=bool(layout.rotations))
     fields: dict[str, Any] = {}
     if np.isnan(factor).any():
         notes.append("size and sign are free: nodes have no rotations, from which angles would tell lengths")
-    if cells and error < ALIKE:
+    if cells and error < max(ALIKE, spread):
         with clock("members"):
             fields = members_and_cells(nodes, placed, max(CANCELLED, spread))
         notes.append("members and cells were read off the graph: what is certified is the coordinates")
@@ -131,6 +122,7 @@ def serve_structure(
         advice=reason.advice,
         operator=layout.name,
         backward_error=error,
+        position_error=known.error if rounding and known.explained else None,
         timings=clock.timings,
         warnings=(*matrix.warnings, *notes, *more),
         choice=choice,
@@ -144,40 +136,68 @@ def _edge_length(nodes: Nodes, found: Placed) -> float:
     return float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
 
 
-def _doubt(error: float, found: Placed, numbering: StructuralNumbering, rounding: Rounding | None) -> float:
+def _known(
+    error: float,
+    force: NDArray[np.float64],
+    found: Placed,
+    members: Straight,
+    numbering: StructuralNumbering,
+    rounding: Rounding | None,
+) -> Known:
     """How far positions may be off, relative to the size; without rounding if each equation were off by as much."""
-    if rounding is not None:
-        return known_to(
-            found.points,
-            found.component,
-            rounding,
-            lambda other: _placed(other, numbering, rounding)[2].points,
-            sized=bool(numbering.layout.rotations),
-        )
-    loosest = min(found.evidence, key=lambda one: one.gap / np.sqrt(one.rows))
-    return float(error * np.sqrt(loosest.rows) / loosest.gap)
+    if rounding is None:
+        loosest = min(found.evidence, key=lambda one: one.gap / np.sqrt(one.rows))
+        return Known(float(error * np.sqrt(loosest.rows) / loosest.gap))
+
+    def place(other: sp.csr_array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        answer = _placed(other, numbering, rounding, members.ends)
+        return answer[2].points, _forces(other, numbering, *answer)[0]
+
+    sized = bool(numbering.layout.rotations)
+    return known_to(found.points, found.component, force, rounding, place, sized=sized)
+
+
+def _forces(
+    matrix: sp.csr_array,
+    numbering: StructuralNumbering,
+    nodes: Nodes,
+    _members: Straight,
+    found: Placed,
+    valid: NDArray[np.bool_],
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Forces of what :func:`_placed` found in a matrix; see :func:`.certificate.forces`."""
+    layout, node = numbering.layout, numbering.node_of_row
+    counted = np.zeros((len(node), len(layout.turning)), dtype=bool)
+    counted[nodes.row_of[nodes.present]] = valid[nodes.present]
+    return forces(matrix, layout, node, numbering.direction_of_row, found.points, counted)
 
 
 def _placed(
-    matrix: sp.csr_array, numbering: StructuralNumbering, rounding: Rounding | None
+    matrix: sp.csr_array,
+    numbering: StructuralNumbering,
+    rounding: Rounding | None,
+    ends: NDArray[np.int64] | None = None,
 ) -> tuple[Nodes, Straight, Placed, NDArray[np.bool_]]:
-    """Nodes, straight members, positions, and on which rows and rotations these rest."""
-    spread, level = (rounding.spread, rounding.level) if rounding else (0.0, 0.0)
+    """Nodes, straight members, positions, and on which rows and rotations these rest; members between given ends."""
+    spread = rounding.spread if rounding else 0.0
     nodes = nodes_of(matrix, numbering.layout, numbering.node_of_row, numbering.direction_of_row)
     with blas_threads(1):
-        members = straight_members(nodes, max(SUMMED, level))
+        members = straight_members(nodes, max(SUMMED, spread / 2), ends)  # the certificate has other formulas
         return nodes, members, *turning_positions(nodes, members, max(CERTIFIED, spread))
 
 
 def _verdict(
-    error: float, allowed: float, doubt: float, found: Placed, members: int, digits: str, *, sized: bool
+    error: float, known: Known, found: Placed, members: int, rounding: Rounding | None, *, sized: bool
 ) -> tuple[str, Reason]:
-    if not error <= allowed or doubt > ALIKE:
+    allowed, needed = (max(CERTIFIED, rounding.spread), rounding.needed) if rounding else (CERTIFIED, ALIKE)
+    forced = f"rigid rotations of the nodes cause forces of {error:.1e} of those that make them up"
+    if rounding and not known.explained:
+        return "uncertified", Reason(f"{forced}, more than rounding to {rounding.name} leaves")
+    if not error <= allowed or known.error > needed:
         gap = min(one.gap for one in found.evidence)
-        of = f" of entries rounded to {digits}" if digits else ""
         return "uncertified", Reason(
-            f"rigid rotations of the nodes cause forces of {error:.1e} of those{of} that make them up, and another "
-            f"field, no translation, only {gap:.1e}: positions may be off by {doubt:.0e} of the size"
+            f"{forced}, and another field, no translation, only {gap:.1e}: positions may be off by {known.error:.0e} "
+            "of the size"
         )
     if found.unnoticed.any():
         count = count_of(int(np.count_nonzero(found.unnoticed)), "equation has", "equations have")
@@ -186,10 +206,10 @@ def _verdict(
             WITHOUT_SUPPORTS,
         )
     blocks = f", {count_of(members, 'block is that', 'blocks are those')} of straight members" if members else ""
-    if digits:
+    if rounding:
         return "certified", Reason(
-            f"rigid rotations of the nodes cause no more forces than entries rounded to {digits} leave{blocks}, "
-            f"so that positions are known to {doubt:.0e} of the size"
+            f"rigid rotations of the nodes cause no more forces than entries rounded to {rounding.name} leave{blocks}, "
+            f"so that positions are known to {known.error:.0e} of the size"
         )
     nothing = "translations change" if sized else "translations and a change of size change"
     return "certified", Reason(f"rigid rotations of the nodes cause no forces{blocks}, and only {nothing} nothing")

@@ -41,7 +41,7 @@ class Layout:
     @property
     def turning(self) -> tuple[int, ...]:
         """Axes of the rigid rotations that nodes follow."""
-        return self.rotations or (0, 1, 2)
+        return self.rotations or tuple(axis for axis in range(3) if self.turned(axis))
 
     @property
     def free(self) -> int:
@@ -91,6 +91,7 @@ PLATE = Layout("plate", 2, (2,), (0, 1))
 BEAM = Layout("beam", 1, (1, 2), (1, 2))  # straight along x, bending in two planes that do not know of each other
 PINNED = Layout("structure", 3, (0, 1, 2), ())  # bars, membranes and solids, of any material, in one
 LAYOUTS = (SPACE, PLANE, PLATE, BEAM)
+SOLIDS = {d: Layout("solid", d, tuple(range(d)), ()) for d in (3, 2)}
 
 
 def layout_named(name: str) -> Layout | None:

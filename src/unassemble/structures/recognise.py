@@ -19,12 +19,12 @@ from ..nodes.grouping import by_first_row
 from ..nodes.likeness import pattern_of
 from ..nodes.orders import ORDERS, regular
 from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST
-from .layouts import LAYOUTS, SPACE, Layout
+from .layouts import LAYOUTS, SOLIDS, SPACE, Layout
 from .runs import shortest_runs
 from .straight import shown_by_members
 
 # On regular meshes some of a solid's rows annihilate whatever is asked; read as what it is it has more of them.
-_SOLIDS = (Layout("solid", 3, (0, 1, 2), ()), Layout("solid", 2, (0, 1), ()))
+_KNOWN = (*SOLIDS.values(), *LAYOUTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ def find_structure(
     block_size : int, optional
     """
     orders = ORDERS if kind is None else (kind,)
-    sizes = {layout.block_size for layout in (*_SOLIDS, *LAYOUTS)}
+    sizes = {layout.block_size for layout in _KNOWN}
     usual = {
         (b, name): regular(matrix.shape[0], b, name)
         for b in sizes
@@ -108,7 +108,7 @@ def _best(
 ) -> StructuralNumbering | None:
     """The layout and the numbering, by its block size and name, with most rows that annihilate translations."""
     best, most = None, HARDLY_ANY
-    for layout in (*_SOLIDS, *LAYOUTS):
+    for layout in _KNOWN:
         for (b, name), numbering in numberings.items():
             if numbering is None or layout.block_size != b or block_size not in (None, b):
                 continue

@@ -42,8 +42,8 @@ class Straight:
     blocks: NDArray[np.float64]
 
 
-def straight_members(nodes: Nodes, allowed: float = SUMMED) -> Straight:
-    """Members between two nodes that have all their unknowns; up to an allowed misfit."""
+def straight_members(nodes: Nodes, allowed: float = SUMMED, ends: NDArray[np.int64] | None = None) -> Straight:
+    """Members between two nodes that have all their unknowns; up to an allowed misfit, or those of given ends."""
     b = nodes.layout.block_size
     whole: NDArray[np.bool_] = np.asarray(nodes.present.all(axis=1))
     if not nodes.layout.rotations:
@@ -52,10 +52,13 @@ def straight_members(nodes: Nodes, allowed: float = SUMMED) -> Straight:
     i = np.repeat(np.arange(nodes.n), np.diff(bsr.indptr))
     j = bsr.indices.astype(np.int64)
     upper = (i < j) & whole[i] & whole[j]
-    ends, blocks = np.column_stack([i[upper], j[upper]]), bsr.data[upper]
+    pairs, blocks = np.column_stack([i[upper], j[upper]]), bsr.data[upper]
     vectors = told_by_blocks(blocks, nodes.layout)
-    good = np.flatnonzero(misfits(blocks, vectors, nodes.layout) <= allowed)
-    return Straight(ends[good], vectors[good], blocks[good])
+    if ends is None:
+        good = np.flatnonzero(misfits(blocks, vectors, nodes.layout) <= allowed)
+    else:
+        good = np.flatnonzero(np.isin(pairs @ [nodes.n, 1], ends @ [nodes.n, 1]))
+    return Straight(pairs[good], vectors[good], blocks[good])
 
 
 def told_by_blocks(blocks: NDArray[np.float64], layout: Layout) -> NDArray[np.float64]:

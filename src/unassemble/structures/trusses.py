@@ -20,7 +20,7 @@ from ..matrix import OperatorMatrix
 from ..nodes.anchoring import anchored, checked_anchors, digits_lost, near_enough
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix
 from ..nodes.numbering import Numbering
-from ..nodes.redrawn import known_to
+from ..nodes.redrawn import Known, known_to
 from ..nodes.rounded import Rounding
 from ..nodes.shape import in_gauge, shape
 from ..recovery import Evidence, Structure
@@ -55,7 +55,9 @@ def serve_truss(
     with clock("solve"):
         found = place_joints(bars, nodal.n, rounding.spread if rounding else CERTIFIED)
     with clock("certify"):
-        error = largest_misfit(nodal, found.points)
+        misfits = bars_misfits(nodal, found.points)
+        error = float(np.abs(misfits).max(initial=0.0))
+        certain = _known(misfits, found, numbering, rounding)
     loose = found.component < 0
     points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
     if loose.any():
@@ -64,7 +66,7 @@ def serve_truss(
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: the point reflection of a truss has the same matrix")
     lost = digits_lost(points, found.points, found.component, factor)
-    status, reason = _verdict(error, found, *_rounded(found, numbering, rounding))
+    status, reason = _verdict(error, found, certain, rounding)
     if status == "certified":
         rows = ~loose[numbering.node_of_row]
         reason = Reason(f"{reason.text}: {covered(rows, rows)}")
@@ -79,42 +81,45 @@ def serve_truss(
         advice=reason.advice,
         operator="truss",
         backward_error=error,
+        position_error=certain.error if rounding and certain.explained else None,
         timings=clock.timings,
         warnings=(*matrix.warnings, *found.notes, *notes),
         choice=choice,
     )
 
 
-def _rounded(found: Placed, numbering: Numbering, rounding: Rounding | None) -> tuple[float, float, str]:
-    """What bars may leave of blocks, how far positions may be off, relative to the size, and digits of the entries."""
+def _known(misfits: NDArray, found: Placed, numbering: Numbering, rounding: Rounding | None) -> Known:
+    """How far positions may be off, relative to the size."""
     if rounding is None:
-        return CERTIFIED, max(one.residual / one.gap for one in found.evidence), ""
+        return Known(max(one.residual / one.gap for one in found.evidence))
     allowed = rounding.spread
 
-    def place(matrix: sp.csr_array) -> NDArray[np.float64]:
-        bars = bars_of(nodal_matrix(matrix, numbering), allowed)
+    def place(matrix: sp.csr_array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        nodal = nodal_matrix(matrix, numbering)
+        bars = bars_of(nodal, allowed)
         if bars is None:
             raise GeometryError("blocks are no longer those of bars")
-        return place_joints(bars, numbering.n_nodes, allowed).points
+        points = place_joints(bars, numbering.n_nodes, allowed).points
+        return points, bars_misfits(nodal, points)
 
-    return allowed, known_to(found.points, found.component, rounding, place, sized=False), rounding.name
+    return known_to(found.points, found.component, misfits, rounding, place, sized=False)
 
 
-def _verdict(error: float, found: Placed, allowed: float, doubt: float, digits: str) -> tuple[str, Reason]:
-    if not error <= allowed:
+def _verdict(error: float, found: Placed, known: Known, rounding: Rounding | None) -> tuple[str, Reason]:
+    if not (error <= (rounding.spread if rounding else CERTIFIED) and known.explained):
         return "uncertified", Reason(f"a block differs from that of a bar by {error:.1e} of the row's largest entry")
     if found.unnoticed.any():
         return "uncertified", Reason(
             "supports leave parts of bars only, and nothing contradicts other directions of these"
         )
-    if doubt > ALIKE:
+    if known.error > (rounding.needed if rounding else ALIKE):
         return "uncertified", Reason(
             f"the directions of the bars contradict each other by {found.residual:.1e}: positions are known to about "
-            f"{doubt:.0e} of the size"
+            f"{known.error:.0e} of the size"
         )
-    known = f", to {doubt:.0e} of the size as entries rounded to {digits} leave it" if digits else ""
+    digits = f", to {known.error:.0e} of the size as entries rounded to {rounding.name} leave it" if rounding else ""
     return "certified", Reason(
-        f"bars along these directions re-assemble to the matrix, and these determine the nodes{known}"
+        f"bars along these directions re-assemble to the matrix, and these determine the nodes{digits}"
     )
 
 
@@ -161,8 +166,8 @@ def _across(ends: NDArray[np.int64], directions: NDArray[np.float64], n: int) ->
     return sp.bsr_array((blocks, ends.ravel(), np.arange(0, 2 * m + 1, 2)), shape=(m * d, n * d)).tocsr()
 
 
-def largest_misfit(nodal: NodalMatrix, points: NDArray[np.float64]) -> float:
-    """Largest entry that is left of a block once the bar between the given points is taken away.
+def bars_misfits(nodal: NodalMatrix, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Entries that are left of blocks, (k,), once the bars between the given points are taken away.
 
     Relative to the largest off-diagonal entry of the node's rows; pairs with undetermined nodes do not count. Infinite
     where both ends of a bar lie in one point.
@@ -174,13 +179,13 @@ def largest_misfit(nodal: NodalMatrix, points: NDArray[np.float64]) -> float:
     along = points[i] - points[j]
     length = np.linalg.norm(along, axis=1, keepdims=True)
     if (length == 0).any():
-        return float("inf")  # a bar without length has no direction
+        return np.array([np.inf])  # a bar without length has no direction
     along /= length
     present = nodal.row_of >= 0
     bar = along[:, :, None] * along[:, None, :] * (present[i][:, :, None] & present[j][:, None, :])
     weight = (bar * bar).sum(axis=(1, 2))
     force = (blocks * bar).sum(axis=(1, 2)) / np.where(weight > 0, weight, 1)
-    left = np.abs(blocks - force[:, None, None] * bar).max(axis=(1, 2), initial=0)
+    left = blocks - force[:, None, None] * bar
     size = np.zeros(nodal.n)
     np.maximum.at(size, i, np.abs(blocks).max(axis=(1, 2), initial=0))
-    return float((left / np.where(size[i] > 0, size[i], 1)).max(initial=0.0))
+    return np.asarray(left / np.where(size[i] > 0, size[i], 1)[:, None, None]).ravel()

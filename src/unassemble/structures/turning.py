@@ -51,7 +51,8 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     for but_for_some, springs in ways:
         if but_for_some and (allowed > CERTIFIED or any(found.residual <= allowed for found, _ in attempts)):
             break  # of entries with few digits other ones would be left out each time that these are drawn anew
-        given, counted = joined(equations(nodes, valid, springs=springs), told_by(members, nodes)), valid.copy()
+        given = joined(equations(nodes, valid, springs=springs, allowed=allowed), told_by(members, nodes))
+        counted = valid.copy()
         if springs:
             counted[:, len(layout.displacements) :] = False
         spoiled = np.empty(0, np.int64)

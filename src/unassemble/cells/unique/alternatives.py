@@ -58,10 +58,6 @@ class Alternative:
     cells: tuple[Cell, ...]
     other_cells: tuple[Cell, ...]
 
-    def renumbered(self, number: NDArray[np.int64]) -> Alternative:
-        """The same with row v called ``number[v]``."""
-        return Alternative(_named(self.cells, number), _named(self.other_cells, number))
-
 
 def alternatives(
     stored: OperatorMatrix, cells: Polygons, z: NDArray[np.complex128], scale: float | None, agree: float

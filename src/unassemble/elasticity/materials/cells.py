@@ -46,22 +46,6 @@ class Cells:
     shown: NDArray[np.bool_] | None = None
 
     @property
-    def kind(self) -> str:
-        """The kind of all cells; several are joined by a plus sign."""
-        return "+".join(self.blocks)
-
-    @property
-    def cells(self) -> NDArray[np.int64]:
-        """(m, k) the cells, where they are of one kind."""
-        (cells,) = self.blocks.values()
-        return cells
-
-    @property
-    def first_nodes(self) -> NDArray[np.int64]:
-        """(n_cells,) a node of each cell, in the order of `lame`."""
-        return np.concatenate([cells[:, 0] for cells in self.blocks.values()])
-
-    @property
     def recognised(self) -> bool:
         """Whether there are cells."""
         return bool(self.blocks)
@@ -115,7 +99,7 @@ def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: floa
     which fewer rows can tell.
     """
     graph, known = coupled(nodal, points), determined(points)
-    likely = Entries.of(nodal, known, surrounded(nodal, valid_pairs(nodal, inferred=True)))
+    likely = Entries.of(nodal, known, surrounded(nodal, valid_pairs(nodal)))
     found = no_cells()
     # The power of two next to the largest entry: squares of what is measured in it neither overflow nor vanish.
     unit = float(2.0 ** np.frexp(nodal.size.max(initial=0.0))[1])

@@ -13,14 +13,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...budget import LARGE, REFINEMENTS
 from ...elements.candidates import Block
 from ...elements.reference import Rule, rules
-from ...errors import SolverError
 from ...linalg import threads
-from ...linalg.factorisation import factorisation
-from ...linalg.upper import UpperTriangle
-from ...tolerances import CERTIFIED, LAST_DIGITS, LITTLE, ROUNDED, SINGULAR
+from ...tolerances import CERTIFIED, LITTLE, ROUNDED, SINGULAR
 from .entries import Entries, Model, Pairs, added, claims
 
 _SAMPLE = 60  # cells on which quadrature rules are tried
@@ -192,36 +188,8 @@ def _least_squares(model: Model, entries: Entries, ratio: float | None = None) -
     scaled = sp.csr_array(design[:, np.flatnonzero(seen)] @ sp.diags_array(1 / weight[seen]))
     coefficients = np.zeros(design.shape[1])
     with threads(1):  # many short vectors are not worth waking threads for
-        found = _refined(scaled, target) if scaled.shape[1] <= LARGE else None
-        if found is None:
-            found = sp.linalg.lsmr(scaled, target, atol=1e-15, btol=1e-15, conlim=0, maxiter=600)[0]
+        found = sp.linalg.lsmr(scaled, target, atol=1e-15, btol=1e-15, conlim=0, maxiter=600)[0]
     coefficients[seen] = found / weight[seen]
     left = (target - design @ coefficients).reshape(entries.value.shape) * entries.size[:, None, None]
     lame = coefficients.reshape(-1, 2) if ratio is None else coefficients[:, None] * [ratio, 1]
     return lame, replace(entries, value=left)
-
-
-def _refined(design: sp.csr_array, target: NDArray) -> NDArray[np.float64] | None:
-    """The least coefficients that fit best, by normal equations whose errors are taken off again and again.
-
-    Columns have length one. Each step divides what is left of a combination of squared singular value s by 1 + s /
-    `ROUNDED`; combinations that fit nothing stay zero. None where they have no factors.
-    """
-    if not (design.shape[1] and np.isfinite(design.data).all() and np.isfinite(target).all()):
-        return None
-    transposed = sp.csr_array(design.T)
-    normal = UpperTriangle.of(sp.csr_array(transposed @ design + ROUNDED * sp.eye_array(design.shape[1])))
-    solver = factorisation(normal, definite=True)
-    try:
-        solver.factorise(normal)
-    except SolverError:
-        solver.release()
-        return None
-    found = np.zeros(design.shape[1])
-    for _ in range(REFINEMENTS):
-        step = solver.solve(transposed @ (target - design @ found))
-        found += step
-        if np.abs(step).max(initial=0) <= LAST_DIGITS * np.abs(found).max(initial=0):
-            break
-    solver.release()
-    return found

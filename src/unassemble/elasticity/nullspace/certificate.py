@@ -16,10 +16,8 @@ from numpy.typing import NDArray
 from ...nodes.nodal import NodalMatrix, determined
 
 
-def largest_residual(
-    nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64], ratio: float | None = None
-) -> float:
-    """Largest misfit of a valid identity among determined nodes.
+def residuals(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Misfits of valid identities among determined nodes.
 
     Parameters
     ----------
@@ -27,12 +25,10 @@ def largest_residual(
     valid : (n, d, d) bool
     points : (n, d) float64
         NaN where not determined; identities that touch such a node are skipped.
-    ratio : float, optional
-        lambda / mu, where it was used to determine nodes.
 
     Returns
     -------
-    float
+    (k,) float64
         Relative to the size of a row, times the mean distance between coupled nodes.
     """
     d = nodal.dim
@@ -43,17 +39,14 @@ def largest_residual(
     ) @ (~known).astype(float)
     usable = valid & (blind == 0)[:, None, None]
     if not usable.any():
-        return float("nan")
+        return np.empty(0)
     size = np.where(nodal.size > 0, nodal.size, 1.0) * _mean_distance(nodal, points)
     value = np.empty((d, d, d, nodal.n))
     for c, b in product(range(d), repeat=2):
         entries = np.ascontiguousarray(nodal.data[:, c, b])
         block = sp.csr_array((entries, nodal.indices, nodal.indptr), shape=(nodal.n, nodal.n))
         value[c, b] = (block @ x).T / size
-    worst = 0.0
-    for misfit, needed in _differences(value, usable, d, ratio):
-        worst = max(worst, float(np.abs(misfit[needed]).max(initial=0)))
-    return worst
+    return np.concatenate([misfit[needed] for misfit, needed in _differences(value, usable, d)])
 
 
 def _mean_distance(nodal: NodalMatrix, points: NDArray) -> float:
@@ -62,9 +55,7 @@ def _mean_distance(nodal: NodalMatrix, points: NDArray) -> float:
     return float(np.nanmean(length)) if np.isfinite(length).any() else 1.0
 
 
-def _differences(
-    value: NDArray, usable: NDArray[np.bool_], d: int, ratio: float | None
-) -> Iterator[tuple[NDArray, NDArray]]:
+def _differences(value: NDArray, usable: NDArray[np.bool_], d: int) -> Iterator[tuple[NDArray, NDArray]]:
     """Pairs of misfit and mask, (n,) each; value[c, b, a] is A^{cb} x_a."""
     for c, b, a in product(range(d), repeat=3):
         if len({a, b, c}) == 3:  # A^{cb} x_a = 0
@@ -78,9 +69,3 @@ def _differences(
         if a != b:  # A^{bb} x_b = p_b + 2 q_b
             misfit = value[b, b, b] - value[b, a, a] - 2 * value[a, b, a]
             yield misfit, usable[:, b, b] & usable[:, b, a] & usable[:, a, b]
-    if ratio is None:
-        return
-    for a, b in product(range(d), repeat=2):
-        if a != b:  # p_b = ratio q_b
-            yield value[b, a, a] - ratio * value[a, b, a], usable[:, b, a] & usable[:, a, b]
-            yield value[b, b, b] - (ratio + 2) * value[a, a, b], usable[:, b, b] & usable[:, a, a]

@@ -5,9 +5,9 @@ to the coordinate x_a, is
 
     (A^{cb} x_a)_i = delta_ab p_c + delta_ac q_b + delta_cb q_a.
 
-At each node these d^3 numbers lie in a space of dimension 2 d, known beforehand; of dimension d, where lambda / mu is
-known; and where homogeneous material surrounds the node, they vanish. What sticks out of that space is
-linear in the coordinates and vanishes for the true ones. p and q never appear as unknowns.
+At each node these d^3 numbers lie in a space of dimension 2 d, known beforehand, and where homogeneous material
+surrounds the node, they vanish. What sticks out of that space is linear in the coordinates and vanishes for the true
+ones. p and q never appear as unknowns.
 """
 
 from __future__ import annotations
@@ -22,18 +22,15 @@ from numpy.typing import NDArray
 from ...nodes.nodal import NodalMatrix
 
 
-def boundary_terms(d: int, ratio: float | None = None) -> NDArray[np.float64]:
-    """(d, d, d, 2 d) what p_1 .. p_d, q_1 .. q_d put into the places c, b, a.
-
-    With p = ratio q known, (d, d, d, d) what q_1 .. q_d put there.
-    """
+def boundary_terms(d: int) -> NDArray[np.float64]:
+    """(d, d, d, 2 d) what p_1 .. p_d, q_1 .. q_d put into the places c, b, a."""
     terms = np.zeros((d, d, d, 2 * d))
     for k in range(d):
         for m in range(d):
             terms[k, m, m, k] += 1  # delta_ab p_c
             terms[m, k, m, d + k] += 1  # delta_ac q_b
             terms[m, m, k, d + k] += 1  # delta_cb q_a
-    return terms if ratio is None else ratio * terms[..., :d] + terms[..., d:]
+    return terms
 
 
 def no_terms(d: int) -> NDArray[np.float64]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -12,10 +10,9 @@ from ...errors import GeometryError
 from ...nodes.nodal import NodalMatrix, determined, linked
 from ...nodes.shape import Shape, in_gauge, shape
 from ...recovery import Evidence
-from ...tolerances import PLACED, SINGULAR, SMALL
+from ...tolerances import SINGULAR
 from ..springs import drawn_together
 from .atlas import NullFields, null_fields
-from .slender import affordable, unbent
 from .solution import Solution
 
 # Nodes of a body whose best fit, where none is exact, one factorisation finds. Charts are no help there: each fits in
@@ -23,22 +20,8 @@ from .solution import Solution
 _WHOLE = {2: 250_000, 3: 30_000}
 
 
-def placed(
-    nodal: NodalMatrix,
-    valid: NDArray[np.bool_],
-    patch: int | None,
-    terms: NDArray[np.float64] | None = None,
-) -> Solution:
-    """Positions piece by piece.
-
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    valid : (n, d, d) or (n, d, d, d) bool
-    patch : int, optional
-        Most nodes per chart.
-    terms : (d, d, d, t) float64, optional
-        Unknown boundary terms; see :func:`.identities.identities`.
+def placed(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> Solution:
+    """Positions piece by piece, from valid identities, (n, d, d) or (n, d, d, d).
 
     Raises
     ------
@@ -52,10 +35,10 @@ def placed(
     failure: GeometryError | None = None
     for piece in range(n_pieces):
         body = np.flatnonzero(component == piece)
-        found = null_fields(nodal, valid, body, patch=patch, terms=terms)
+        found = null_fields(nodal, valid, body)
         if found.charts > 1 and not _settled(found):
             if len(body) <= _WHOLE[nodal.dim]:
-                found = null_fields(nodal, valid, body, patch=len(body), terms=terms)
+                found = null_fields(nodal, valid, body, patch=len(body))
             else:
                 warnings.append(
                     f"piece {piece} with node {body[0]} is too large for the best fit by one factorisation. The "
@@ -73,14 +56,6 @@ def placed(
         points[found.nodes] = one.points
         points[body] = in_gauge(points[body], graph[body][:, body])
         evidence.append(_evidence(found, one))
-        if one.exact and not one.freedom and evidence[-1].gap < SMALL and affordable(points[body]):
-            whole = np.full_like(points, np.nan)
-            whole[body] = points[body]
-            better, residual = unbent(nodal, valid, whole, evidence[-1].gap, terms)
-            if residual < evidence[-1].residual:
-                points[body] = in_gauge(better[body], graph[body][:, body])
-                settled = residual <= PLACED * evidence[-1].gap
-                evidence[-1] = replace(evidence[-1], residual=residual, settled=settled)
         freedoms.append(one.freedom)
         exact.append(one.exact)
     points[drawn_together(nodal, valid, points)] = np.nan

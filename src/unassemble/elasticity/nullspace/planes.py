@@ -26,7 +26,7 @@ def with_planes(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NodalMatr
     ----------
     nodal : NodalMatrix
     valid : (n, d, d) bool
-        By the strict rule.
+        See :func:`.nodal.valid_pairs`.
 
     Returns
     -------

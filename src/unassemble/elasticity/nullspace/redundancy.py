@@ -7,8 +7,6 @@ by what is left of random right-hand sides g there, P g.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +16,7 @@ from ...linalg.definite import STEPS
 from ...nodes.nodal import NodalMatrix, determined
 from ...tolerances import SMALL
 from .atlas import PATCH
-from .identities import boundary_terms, identities
+from .identities import identities
 from .placing import placed
 from .solution import Solution
 
@@ -29,12 +27,11 @@ def checked(nodal: NodalMatrix, solution: Solution) -> NDArray[np.bool_]:
     Of bodies with more nodes than a chart all are taken for such: their normal matrix is never factorised as a whole.
     """
     known = determined(solution.firm_points)
-    terms = None if solution.ratio is None else boundary_terms(nodal.dim, solution.ratio)
     while nodal.n <= PATCH[nodal.dim] and len(lone := _unnoticed(nodal, solution)):
         valid = solution.valid.copy()
         valid[lone] = False
         try:
-            solution = replace(placed(nodal, valid, None, terms), ratio=solution.ratio)
+            solution = placed(nodal, valid)
         except GeometryError:
             return np.zeros_like(known)
         if not solution.unique:
@@ -48,7 +45,7 @@ def _unnoticed(nodal: NodalMatrix, solution: Solution) -> NDArray[np.int64]:
     """Nodes with identities that a disturbance might change without being noticed."""
     d = nodal.dim
     blind = nodal.graph @ (~determined(solution.firm_points)).astype(float) > 0
-    local = identities(nodal, solution.valid, np.flatnonzero(~blind), boundary_terms(d, solution.ratio))
+    local = identities(nodal, solution.valid, np.flatnonzero(~blind))
     n, m = len(local.columns), len(local.rows)
     if not m:
         return local.rows

@@ -27,18 +27,12 @@ class Solution:
     exact : bool
         Whether all pieces have exact null fields.
     warnings : tuple of str
-    ratio : float or None
-        lambda / mu, where it was used.
-    strict : bool
-        Whether rows were judged by the strict rule.
     planes : bool
         Whether nodes that lack a direction were taken to lie in planes across it.
     straight : tuple of float
         lambda / mu of the pieces whose axes the identities leave free and elements told; see :mod:`.straight`.
     hanging : (n,) bool, optional
-        Nodes that only equations determine that rest on an assumption, of planes or of one Poisson's ratio.
-    cautious : Solution, optional
-        The solution to fall back on where no elements show nodes that rows in doubt determine.
+        Nodes that only equations determine that rest on an assumption, of planes.
     """
 
     valid: NDArray[np.bool_]
@@ -48,12 +42,9 @@ class Solution:
     freedoms: tuple[str, ...]
     exact: bool
     warnings: tuple[str, ...]
-    ratio: float | None = None
-    strict: bool = True
     planes: bool = False
     straight: tuple[float, ...] = ()
     hanging: NDArray[np.bool_] | None = None
-    cautious: Solution | None = None
 
     @property
     def unique(self) -> bool:

@@ -46,9 +46,7 @@ class Straight:
         return int(found.component[self.nodes].max())
 
 
-def straightened(
-    nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.bool_], patch: int | None
-) -> Solution | None:
+def straightened(nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.bool_]) -> Solution | None:
     """The solution with as many of its bent pieces straight as elements explain; unchanged where there are none.
 
     Parameters
@@ -57,12 +55,9 @@ def straightened(
     found : Solution or None
         None where the identities determine nothing.
     valid : (n, d, d) bool
-        By the strict rule.
-    patch : int, optional
-        Most nodes per chart.
     """
     inside = valid & (valid.all(axis=(1, 2)) & _bent(nodal, found))[:, None, None]
-    straight = list(_straight(nodal, inside, patch)) if inside.any() else []
+    straight = list(_straight(nodal, inside)) if inside.any() else []
     return in_place(found, valid, straight) if straight else found
 
 
@@ -73,13 +68,13 @@ def _bent(nodal: NodalMatrix, found: Solution | None) -> NDArray[np.bool_]:
     return np.isin(found.component, [piece for piece, freedom in enumerate(found.freedoms) if freedom])
 
 
-def _straight(nodal: NodalMatrix, inside: NDArray[np.bool_], patch: int | None) -> Iterator[Straight]:
+def _straight(nodal: NodalMatrix, inside: NDArray[np.bool_]) -> Iterator[Straight]:
     """Pieces that rows inside, (n, d, d) bool, hold together, and of which elements tell the axes."""
     component, n_pieces = pieces_of(nodal, inside)
     graph = nodal.graph
     for piece in range(n_pieces):
         body = np.flatnonzero(component == piece)
-        null = null_fields(nodal, inside, body, patch=patch, terms=no_terms(nodal.dim))
+        null = null_fields(nodal, inside, body, terms=no_terms(nodal.dim))
         exact = null.values <= SINGULAR
         if not len(exact) or exact[-1] or exact.sum() <= nodal.dim:
             continue
