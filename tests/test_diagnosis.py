@@ -87,16 +87,6 @@ UNREAD = {
         "quadrilaterals",
     ),
     "quadratic triangles": ("quadratic", lambda: stiffness(DISC, fem.ElementTriP2()), "quadratic"),
-    "quadratic triangles with right angles": (
-        "quadratic",
-        lambda: stiffness(fem.MeshTri().refined(3), fem.ElementTriP2()),  # without the zeros, which scikit-fem drops
-        "quadratic",
-    ),
-    "quadratic triangles whose zeros are not stored": (
-        "quadratic",
-        lambda: without_zeros(stiffness(DISC, fem.ElementTriP2())),
-        "quadratic",
-    ),
     "quadratic tetrahedra": ("tetrahedra", lambda: stiffness(TETS, fem.ElementTetP2()), "quadratic"),
     "cubic triangles": ("cubic", lambda: stiffness(DISC, fem.ElementTriP3()), "cubic"),
     "mass, triangles": ("mass", lambda: masses(DISC, fem.ElementTriP1()), "mass matrix"),

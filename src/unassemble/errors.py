@@ -28,19 +28,10 @@ class MatrixError(RecoveryError):
 
 
 class NotPlanarError(RecoveryError):
-    """The graph of the matrix is not planar.
+    """The graph of the matrix is not planar; `why` may say how that shows."""
 
-    Attributes
-    ----------
-    witness : tuple of (int, int)
-        Edges of a subdivision of K5 or K3,3 in the graph.
-    why : str
-        What the message says before the witness; it may be empty.
-    """
-
-    def __init__(self, message: str, witness: tuple[tuple[int, int], ...] = (), why: str = ""):
+    def __init__(self, message: str, why: str = ""):
         super().__init__(message)
-        self.witness = witness
         self.why = why
 
 

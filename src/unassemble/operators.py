@@ -22,21 +22,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class VectorReading:
-    """A matrix read as vector-valued.
+    """A matrix read as vector-valued."""
 
-    Attributes
-    ----------
-    numbering : Numbering or StructuralNumbering
-        Of solids, or of frames, shells and plates, whose nodes have rotations too.
-    why : str
-        What speaks for it; empty where the caller asked for it.
-    rounding : Rounding, optional
-        Of entries with few digits.
-    """
-
+    # of solids, or of frames, shells and plates, whose nodes have rotations too
     numbering: Numbering | StructuralNumbering
-    why: str
-    rounding: Rounding | None = None
+    why: str  # what speaks for it; empty where the caller asked for it
+    rounding: Rounding | None = None  # of entries with few digits
 
     @property
     def name(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -25,7 +25,7 @@ from .further_terms import less_mass, recover_elements_with_terms, recover_with_
 from .matrix import OperatorMatrix
 from .options import ScalarOptions
 from .recovery import PlanarMesh
-from .scalar import of_other_scale, recover_scalar
+from .scalar import recover_scalar
 from .scalar.placement import Placement
 from .tolerances import CERTIFIED, LITTLE
 
@@ -91,8 +91,6 @@ class ScalarReadings:
         """
         if self.options.method != "conformal":
             return self._plain(self.matrix)
-        if (other := self._lattice_of_other_scale()) is not None:
-            return other
         order: list[tuple[int, Callable[[], PlanarMesh | None]]] = [(0, lambda: self.lattice)]
         replaced, incomplete = self.matrix.replaced is not None, self.matrix.incomplete_rows.any()
         if replaced or not self.matrix.adds_up.all():  # else nothing was taken out
@@ -108,7 +106,7 @@ class ScalarReadings:
             except RecoveryError as error:
                 failure = error if reading == self._linear else failure or error
                 continue
-            if found is not None and (found.status != "uncertified" or len(found.suspects)):  # entries that are wrong
+            if found is not None and found.status != "uncertified":
                 return found
             nearest = nearest or found
         if nearest is None:
@@ -121,13 +119,6 @@ class ScalarReadings:
         if self.matrix.replaced is not None or self.options.noise is not None:
             return None
         return recover_without_boundary_terms(self.matrix, self._plain, self.options.scale)
-
-    def _lattice_of_other_scale(self) -> PlanarMesh | None:
-        """A lattice that does not have the scale given."""
-        if self.options.scale is None or self.lattice is not None:
-            return None
-        free = recover_lattice(self.matrix, self.placement, self.clock, replace(self.options, scale=None))
-        return None if free is None else of_other_scale(free, self.options.scale)
 
     def _partial(self) -> PlanarMesh | None:
         matrix = with_boundary_edges(with_diagonals(self.matrix))

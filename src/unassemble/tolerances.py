@@ -63,7 +63,7 @@ CERTIFIED = 1e-9
 """Largest backward error of a certified mesh: the polish leaves rounding, and a wrong cell leaves far more."""
 
 SUSPICIOUS = 1e-12
-"""Backward error above which a mesh is certified only if no few entries carry the misfit."""
+"""Backward error up to which nothing but rounding is left; above it one entry may be wrong."""
 
 # Noise.
 

@@ -128,7 +128,7 @@ def test_a_krylov_space_whose_first_vector_has_a_negative_area():
     edges = edge_list(known.triangles)
     (piece,) = surfaces(len(known.points), edges).pieces
     weights = -np.asarray(known.matrix[edges[:, 0], edges[:, 1]]).ravel()
-    pencil = ConformalPencil(piece, weights[piece.edge_rows])
+    pencil = ConformalPencil(piece.n_vertices, piece.edges, piece.boundary, weights[piece.edge_rows])
     z = known.points[piece.vertices] @ [1, 1j]
     image = np.conj(z) if (np.conj(z) @ pencil.area_form(z)).real > 0 else z
     noise = np.random.default_rng(0).standard_normal((len(z), 2)) @ [1, 1j]

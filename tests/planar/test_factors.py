@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from meshes import largest_error, random_mesh, specimen, triangle_set
+from meshes import random_mesh, specimen, triangle_set
 from unassemble import recover
-from unassemble.planar.cotangent import edge_weights
-from unassemble.planar.deviations import factor_deviations
-from unassemble.planar.polish import PolishOptions
-from unassemble.topology import surfaces
 
 C = 1.7
 
@@ -36,86 +32,6 @@ def noisy(matrix, sigma, seed):
     value = upper.data + sigma * np.random.default_rng(seed).standard_normal(upper.nnz)
     ends = np.r_[upper.row, upper.col], np.r_[upper.col, upper.row]
     return sp.coo_array((np.r_[value, value], ends), shape=matrix.shape)
-
-
-@pytest.mark.parametrize("sigma", [1e-6, 1e-4])
-@pytest.mark.parametrize("heights", [(1.0,), (0.8, 1.5)])
-@pytest.mark.parametrize("count", [8, 20])
-def test_noise_explains_that_factors_differ(count, heights, sigma):
-    known = specimen(*chain(count, count, heights), c=C, seed=3)
-    found = recover(noisy(known.matrix, sigma * C, 1), noise=sigma * C)
-    assert "no entry to spare" in found.reason  # of each piece
-    assert triangle_set(found.triangles) == triangle_set(known.triangles)
-    assert np.ptp(found.scale) == 0  # all pieces are fitted with one
-    assert found.chi_square["degrees_of_freedom"] == count - 1
-
-
-def deviates(found, known, rows):
-    """Error of a piece, the best similarity onto the truth being taken off, over its error bars; root mean squares."""
-    true, z = known.points[rows] @ [1, 1j], found.points[rows] @ [1, 1j]
-    true, z = true - true.mean(), z - z.mean()
-    errors = [z - s * (np.vdot(s, z) / np.vdot(s, s)) for s in (true, true.conj())]
-    return min(map(np.linalg.norm, errors)) / np.linalg.norm(found.standard_deviations[rows])
-
-
-def test_error_bars_of_pieces_with_one_factor():
-    """A triangle by itself tells neither c nor how large the noise is; all together do."""
-    known, sigma = specimen(*chain(12, 5), c=C, seed=3), 1e-5 * C
-    squares, levels = [], []
-    for seed in range(40):
-        found = recover(noisy(known.matrix, sigma, seed), noise=sigma, standard_deviations=True)
-        squares += [deviates(found, known, rows) ** 2 for rows in known.triangles]
-        levels.append(found.estimated_noise / sigma)
-    assert np.mean(np.square(levels)) == pytest.approx(1, abs=0.3)
-    assert np.mean(squares) == pytest.approx(1, abs=0.3)
-
-
-def with_tied_triangles(n, count, seed):
-    """A random mesh in which some triangles have lost their three neighbours: each hangs by all of its corners."""
-    points, triangles = random_mesh(n, seed, holes=False)
-    sides = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]], axis=2) @ [len(points), 1]
-    boundary = np.bincount(np.unique(sides, return_inverse=True)[1].ravel()) == 1
-    keep, taken = np.ones(len(triangles), bool), np.zeros(len(points), bool)
-    edge = np.unique(sides)[boundary]
-    taken[np.r_[edge // len(points), edge % len(points)]] = True
-    for k in np.random.default_rng(seed).permutation(len(triangles)).tolist():
-        around = np.isin(sides, sides[k]).any(axis=1)
-        around[k] = False
-        if count and not taken[triangles[around]].any():
-            keep[around] = False
-            taken[triangles[around]] = True
-            count -= 1
-    assert not count
-    return points, triangles[keep]
-
-
-@pytest.mark.parametrize("options", [{}, {"scale": C}], ids=str)
-@pytest.mark.parametrize("sigma", [1e-9, 1e-5])
-def test_pieces_that_hold_each_other_are_fitted_as_they_do(sigma, options):
-    """Each by itself has no reason to meet the others where it should."""
-    known = specimen(*with_tied_triangles(120, 3, 1), c=C, seed=3)
-    found = recover(noisy(known.matrix, sigma * C, 1), noise=sigma * C, **options)
-    assert found.certified, found.reason
-    assert triangle_set(found.triangles) == triangle_set(known.triangles)
-    assert len(found.scale) == 4
-    entries = sp.triu(known.matrix, 1).nnz
-    assert found.chi_square["degrees_of_freedom"] == entries - 2 * len(known.points) + 4 - ("scale" not in options)
-    assert found.chi_square["p_value"] > 1e-3
-    assert largest_error(found.points, known.points) < 20 * sigma
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("told", [True, False])
-def test_error_bars_of_pieces_that_hold_each_other(told):
-    known, sigma = specimen(*with_tied_triangles(80, 2, 1), c=C, seed=3), 3e-8 * C
-    every = np.arange(len(known.points))
-    squares, levels = [], []
-    for seed in range(20):
-        found = recover(noisy(known.matrix, sigma, seed), noise=sigma if told else None, standard_deviations=True)
-        squares.append(deviates(found, known, every) ** 2)
-        levels.append(found.estimated_noise / sigma)
-    assert np.mean(np.square(levels)) == pytest.approx(1, abs=0.35)
-    assert np.mean(squares) == pytest.approx(1, abs=0.5)
 
 
 @pytest.mark.parametrize("sigma", [1e-8, 1e-4])
@@ -183,40 +99,23 @@ def test_single_triangles_on_a_mesh_that_tells_the_factor():
     assert found.certified, found.reason
 
 
-@pytest.mark.parametrize(("sigma", "enough"), [(1e-9, True), (1e-5, False)])
-def test_loose_pieces_do_not_vouch_for_each_other(sigma, enough):
+def test_loose_pieces_prove_too_little_under_noise():
     """Of each of five the triangle in the middle may be a hole, and that it is none has to be told by itself."""
     known = specimen(*with_rings(5, 0, filled=True), c=C, seed=3)
-    found = recover(noisy(known.matrix, sigma * C, 1), noise=sigma * C)
+    found = recover(noisy(known.matrix, 1e-9 * C, 1), noise=1e-9 * C)
     assert triangle_set(found.triangles) == triangle_set(known.triangles)
-    assert found.certified == enough
-    assert enough or "They agree too roughly" in found.reason
-
-
-def test_common_fit_that_does_not_converge_is_left_out(monkeypatch):
-    known, sigma = specimen(*chain(8, 1), c=C, seed=3), 1e-6 * C
-    monkeypatch.setattr("unassemble.scalar.factors.refined_together", lambda *_, **__: None)
-    found = recover(noisy(known.matrix, sigma, 1), noise=sigma)
     assert found.status == "uncertified"
-    assert "did not converge, and each was fitted by itself" in found.reason
-    assert "more than noise" not in found.reason
-    assert any("each was fitted by itself" in warning for warning in found.warnings)
-    assert max(largest_error(found.points[rows], known.points[rows]) for rows in known.triangles) < 20 * sigma
+    assert "too few entries to tell" in found.reason
 
 
-def test_pieces_too_large_to_be_fitted_together_are_said_to_be(monkeypatch):
-    known, sigma = specimen(*chain(8, 1), c=C, seed=3), 1e-6 * C
-    monkeypatch.setattr("unassemble.scalar.factors.PolishOptions", lambda: PolishOptions(direct_limit=10))
-    found = recover(noisy(known.matrix, sigma, 1), noise=sigma)
-    assert found.status == "uncertified"
-    assert "Errors of the entries explain that, but they have too many vertices to be fitted together" in found.reason
-
-
-def test_deviation_of_a_factor():
-    """That of log c over many draws, for a lone triangle."""
-    piece = surfaces(3, np.array([(0, 1), (0, 2), (1, 2)])).pieces[0]
-    z = np.array([0, 1 + 0.1j, 0.4 + 0.8j])
-    z = z if edge_weights(piece, z).sum() > 0 else np.conj(z)
-    a, b, c = (edge_weights(piece, z) + 1e-6 * np.random.default_rng(0).standard_normal((4000, 3))).T
-    expected = np.log(2 * np.sqrt(a * b + b * c + c * a)).std() / 1e-6
-    assert factor_deviations([piece], [z], [None])[0] == pytest.approx(expected, rel=0.1)
+@pytest.mark.parametrize("sigma", [1e-9, 1e-5])
+def test_large_pieces_that_share_a_vertex_are_fitted_with_one_factor(sigma):
+    one, other = random_mesh(60, 1), random_mesh(60, 2)
+    at = int(np.argmax(one[0][:, 0])), int(np.argmin(other[0][:, 0]))
+    number = np.r_[len(one[0]) + np.arange(at[1]), at[0], len(one[0]) + np.arange(at[1], len(other[0]) - 1)]
+    moved = np.delete(other[0] - other[0][at[1]] + one[0][at[0]] + [0, 0], at[1], axis=0)
+    known = specimen(np.vstack([one[0], moved]), np.vstack([one[1], number[other[1]]]), c=C, seed=3)
+    found = recover(noisy(known.matrix, sigma * C, 1), noise=sigma * C)
+    assert found.certified, found.reason
+    assert len(found.scale) == 2
+    assert np.ptp(found.scale) == 0

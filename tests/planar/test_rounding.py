@@ -6,7 +6,6 @@ import scipy.sparse as sp
 
 from meshes import delaunay, largest_error, random_mesh, specimen
 from unassemble import recover
-from unassemble.scalar import evidence
 from unassemble.tolerances import SUSPICIOUS
 from vanishing import forgotten, half_jittered, holes, squares
 
@@ -130,9 +129,8 @@ def test_weights_of_no_mesh_are_not_certified(form):
             assert found.status == "uncertified", found.reason
 
 
-def test_no_entries_are_blamed_for_what_rounding_leaves_beside_slivers(monkeypatch):
+def test_no_entries_are_blamed_for_what_rounding_leaves_beside_slivers():
     """The hull of random points has triangles that are nearly flat: the misfit there is larger than elsewhere."""
-    monkeypatch.setattr(evidence, "find_suspects", None)
     known = specimen(*delaunay(np.random.default_rng(3).random((20_000, 2))))
     found = recover(known.matrix)
     assert found.certified

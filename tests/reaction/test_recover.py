@@ -260,20 +260,6 @@ def test_through_the_command(tmp_path):
     assert report["reaction"] > 0
 
 
-def test_a_hole_of_three_edges_is_no_triangle():
-    points, triangles = random_mesh(200, seed=14)
-    sides = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]], axis=2)
-    key, inverse, count = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True)
-    inside = (count[inverse.ravel()] == 2).reshape(-1, 3).all(axis=1)
-    corner = np.isin(triangles, np.unique(key[count == 1])).any(axis=1)
-    hole = int(np.flatnonzero(inside & ~corner)[5])
-    matrix, true, cells = assembled(points, np.delete(triangles, hole, axis=0), 1.0, 80.0)
-    found = recover(matrix)
-    assert found.certified
-    assert triangle_set(found.triangles) == triangle_set(cells)
-    assert largest_error(found.points, true) < 1e-9
-
-
 def test_scaled_unknowns_of_a_mesh_whose_sides_have_vanished():
     """Of right triangles zeros are not stored, and the graph does not show the cells."""
     basis = Basis(MeshTri().refined(3), ElementTriP1())

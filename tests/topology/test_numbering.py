@@ -1,10 +1,8 @@
 """Renumbering: the same graph, neighbours near each other, and the same topology."""
 
 import numpy as np
-import scipy.sparse as sp
 
 from meshes import edge_list
-from unassemble import inspect_matrix
 from unassemble.topology import local_numbering, surfaces
 
 
@@ -48,13 +46,3 @@ def test_topology_is_the_same_in_any_numbering():
     assert np.array_equal(np.sort(local.vertices[local.edges], axis=1), edges[local.edge_rows])
     rows = np.array([7, 3, 100])
     assert np.array_equal(local.vertices[local.local(rows)], rows)
-
-
-def test_witness_is_in_the_numbering_of_the_matrix():
-    ends = np.array([(i, j) for i in range(5) for j in range(i + 1, 5)])
-    edges = np.sort(np.array([11, 3, 8, 5, 6])[ends], axis=1)
-    edges = np.unique(np.concatenate([edges, [[0, 1], [1, 2], [2, 4], [4, 7], [7, 9], [9, 10], [3, 10]]]), axis=0)
-    half = sp.coo_array((-np.ones(len(edges)), edges.T), shape=(12, 12)).tocsr()
-    found = inspect_matrix(half + half.T)
-    assert not found.planar
-    assert set(np.ravel(found.witness)) == {3, 5, 6, 8, 11}

@@ -43,7 +43,7 @@ def deviations_inside(
         pins = np.append(np.flatnonzero(~known), np.flatnonzero(known)[distant_pair(z[known])])
         covariance = covariances(
             jacobian, np.where(used, own, 0.0), z[known], pins,
-            beside=None if known_scale else 0.0, stretch=stretch, nodes=lambda moves: moves[known],
+            free_scale=not known_scale, stretch=stretch, nodes=lambda moves: moves[known],
         )  # fmt: skip
         result[known] = sigma * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     return result

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from ..certify import certify
 from ..clock import Clock
 from ..errors import GeometryError, SolverError
-from ..linalg import factorisation
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.cotangent import edge_weights
@@ -103,7 +102,7 @@ def _nothing_gone(piece: Piece, matrix: OperatorMatrix, mesh: InsideMesh, scale:
         found = mesh.z, mesh.scale
     else:
         try:
-            whole = positions(piece, weights, scale=scale, sharp=False, analyse=factorisation)
+            whole = positions(piece, weights, scale=scale, sharp=False)
         except (GeometryError, SolverError):
             return False
         others, found = ~mesh.given, (whole.z, whole.scale)

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeometryError, RecoveryError, SolverError
-from ..linalg import factorisation
 from ..matrix import OperatorMatrix
 from ..planar.cotangent import edge_weights
 from ..planar.piece import positions
@@ -159,7 +158,7 @@ class _Loops:
         """(e,) of the conformal map; None where there is none."""
         weights = -self.without(matrix, terms).entries[self.piece.edge_rows]
         try:
-            mesh = positions(self.piece, weights, scale=scale, sharp=False, analyse=factorisation)
+            mesh = positions(self.piece, weights, scale=scale, sharp=False)
         except (GeometryError, SolverError):
             return None
         with np.errstate(all="ignore"):

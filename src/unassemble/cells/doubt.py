@@ -38,7 +38,7 @@ def in_doubt(
     scale: float | None = None,
     noise: float | None = None,
 ) -> NDArray[np.bool_]:
-    """(n,) rows of components with nonzero entries on no triangle, entries that do not fit, or several factors c.
+    """(n,) rows of components with nonzero entries on no triangle, or entries that do not fit.
 
     A misfit that is small and spread evenly, at the latest after a short polish, is that of errors in the entries, and
     raises no doubt. Pieces of components that are in doubt without it are not solved. `scale` is c, where it is known,
@@ -47,9 +47,6 @@ def in_doubt(
     doubtful = unexplained(matrix, topology)
     solved = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
     misfit = misfits_of(matrix, solved)
-    if not noise:
-        doubtful |= _discordant(matrix, solved, scale, misfit)
-    solved = [(piece, mesh) for piece, mesh in solved if not doubtful[piece.vertices[0]]]
     rest = np.flatnonzero(~doubtful[matrix.edges[:, 0]])
     misfit = misfit[rest]
     wrong = misfit > ALIKE
@@ -60,31 +57,6 @@ def in_doubt(
     ):
         return doubtful
     return doubtful | _components_of(matrix, rest[wrong])
-
-
-def _discordant(matrix: OperatorMatrix, solved: Solved, scale: float | None, misfit: NDArray) -> NDArray[np.bool_]:
-    """(n,) rows of components whose pieces all fit, but loose ones with another factor c than is known or others have.
-
-    With a hole filled such a piece still fits, with another c. That of pieces with more entries than unknowns is right,
-    if any is: where these differ from each other, or from the known one, other cells are no help.
-    """
-    having = [(piece, mesh) for piece, mesh in solved if isinstance(mesh, PieceMesh)]
-    if not having:
-        return np.zeros(matrix.n, dtype=bool)
-    label = components_of(matrix)
-    own = label[[piece.vertices[0] for piece, _ in having]]
-    loose = np.array([piece.redundancy <= 0 for piece, _ in having])
-    c = np.array([mesh.scale for _, mesh in having])
-    order = np.lexsort((np.array([piece.n_vertices for piece, _ in having]), ~loose))
-    telling = np.full(int(label.max()) + 1, -1)  # the piece that tells c: the largest of those with entries to spare
-    telling[own[order]] = order
-    with np.errstate(all="ignore"):
-        apart = ~(np.abs(c / (scale or c[telling[own]]) - 1) <= ALIKE)
-    wrong, hopeless = np.zeros((2, len(telling)), dtype=bool)
-    wrong[own[apart]] = True
-    hopeless[own[apart & ~loose]] = True
-    hopeless[label[matrix.edges[misfit > ALIKE, 0]]] = True
-    return np.asarray((wrong & ~hopeless)[label])
 
 
 def _like_noise(misfit: NDArray, n: int) -> bool:
@@ -147,13 +119,7 @@ def components_of(matrix: OperatorMatrix) -> NDArray[np.int32]:
 def with_pieces(n: int, edges: NDArray[np.int64], pieces: Sequence[Piece]) -> list[tuple[Numbering, list[Piece]]]:
     """Each component, the largest first, and its pieces in their order; in linear time.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
-    pieces : sequence of Piece
-        None of which belongs to two components.
+    `edges` (e, 2): pairs i < j in lexicographic order; `pieces`: none of which belongs to two components.
     """
     parts = components(n, edges)
     label = np.full(n, -1)

@@ -17,11 +17,7 @@ from ..topology.together import Together
 def undivided(pieces: Sequence[Piece], vanished: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Polygons]:
     """Cells in the numbering of ``piece.vertices``: triangles, and the outlines of those made of several triangles.
 
-    Parameters
-    ----------
-    pieces : sequence of Piece
-    vanished : (e,) bool
-        Rows of the edge list that ``piece.edge_rows`` refer to.
+    `vanished` (e,): rows of the edge list that ``piece.edge_rows`` refer to.
     """
     if not pieces:
         return np.empty((0, 3), np.int64), Polygons.none()

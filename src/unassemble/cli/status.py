@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from ..errors import InputError, NotPlanarError, OutputError, RecoveryError, UnassembleError
+from ..errors import InputError, OutputError, RecoveryError, UnassembleError
 from .spelling import as_typed
 
 if TYPE_CHECKING:
@@ -64,10 +64,6 @@ class CommandLine(click.Group):
             status, sentence = verdict(error)
             if debug and not isinstance(error, (SystemExit, click.exceptions.ClickException)):
                 traceback.print_exception(error)
-            if debug and isinstance(error, NotPlanarError) and error.witness:
-                from ..topology.obstruction import obstruction_text
-
-                click.echo(f"unassemble: {obstruction_text(error.witness)}", err=True)
             if sentence:
                 click.echo(f"unassemble: {as_typed(sentence, self.in_use(given))}", err=True)
         sys.exit(status or Exit.CERTIFIED)

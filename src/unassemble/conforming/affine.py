@@ -39,14 +39,8 @@ def _components(kind: Kind, mass: bool) -> NDArray[np.float64]:
 class ElementEntries:
     """Entries among the nodes of cells, split evenly among the cells that have a part in them.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    sets : (m, k) int64
-    every : (p,) int64
-        Keys of the pairs of all cells, of other sizes too, increasing, one for each cell.
-    mass : bool
-        Whether there is a mass term.
+    `sets` (m, k); `every` (p,): keys of the pairs of all cells, of other sizes too, increasing, one for each cell;
+    `mass`: whether there is a mass term.
     """
 
     def __init__(self, matrix: OperatorMatrix, sets: NDArray[np.int64], every: NDArray[np.int64], *, mass: bool):

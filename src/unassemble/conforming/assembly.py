@@ -33,12 +33,7 @@ class Entries:
 
     A :class:`~unassemble.planar.polish.Model`.
 
-    Parameters
-    ----------
-    part : Part
-    rules : mapping of Kind to Rule
-    straight : bool
-        Whether positions are those of corners, from which all nodes follow.
+    `straight`: whether positions are those of corners, from which all nodes follow.
     """
 
     def __init__(self, part: Part, rules: Mapping[Kind, Rule], *, straight: bool):

@@ -16,13 +16,7 @@ from .fit import Fitted
 def deviations_of(n: int, fits: Sequence[Fitted], placed: Sequence[NDArray], task: Task) -> NDArray[np.float64]:
     """(n, 2) standard deviations in the final frame, NaN for rows of no cell.
 
-    Parameters
-    ----------
-    n : int
-    fits : sequence of Fitted
-    placed : sequence of (k,) complex128
-        Nodes of each part in that frame.
-    task : Task
+    `placed` sequence of (k,): nodes of each part in that frame.
     """
     result = np.full((n, 2), np.nan)
     tensor = task.placement.tensor
@@ -42,7 +36,7 @@ def deviations_of(n: int, fits: Sequence[Fitted], placed: Sequence[NDArray], tas
             fit.entries.weights(parameters) / spread,
             z,
             distant_pair(parameters),
-            beside=0.0 if task.scale is None else None,
+            free_scale=task.scale is None,
             stretch=stretch,
             nodes=fit.entries.nodes,
         )

@@ -22,38 +22,18 @@ _ALIKE = 1.01  # ratio of misfits of rules between which only rounding or noise 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A part with positions.
-
-    Attributes
-    ----------
-    part : Part
-    weights : (e,) float64
-        -A_ij of the part's edges.
-    entries : Entries
-        What its entries are for given parameters.
-    z : (entries.n,) complex128
-        Positions of corners where the part is straight, else of all nodes.
-    scale : float
-        c.
-    rule : dict of str to str
-        Quadrature of each kind of cell.
-    straight : bool
-    spread : (e,) float64
-        Standard deviations of the entries' errors, up to a common factor, for which z is the least-squares solution.
-    misfit : (e,) float64
-        What is left of the weights.
-    notes : tuple of str
-    """
+    """A part with positions."""
 
     part: Part
-    weights: NDArray[np.float64]
-    entries: Entries
-    z: NDArray[np.complex128]
-    scale: float
-    rule: dict[str, str]
+    weights: NDArray[np.float64]  # (e,) -A_ij of the part's edges
+    entries: Entries  # what its entries are for given parameters
+    z: NDArray[np.complex128]  # (entries.n,) positions of corners where the part is straight, else of all nodes
+    scale: float  # c
+    rule: dict[str, str]  # quadrature of each kind of cell
     straight: bool
+    # (e,) standard deviations of the entries' errors, up to a common factor, for which z is the least-squares solution
     spread: NDArray[np.float64]
-    misfit: NDArray[np.float64]
+    misfit: NDArray[np.float64]  # (e,) what is left of the weights
     notes: tuple[str, ...] = ()
 
     @property
@@ -79,21 +59,10 @@ def fitted(
 
     Straight cells first; where they do not fit, all nodes move, from there.
 
-    Parameters
-    ----------
-    part : Part
-    weights : (e,) float64
-        -A_ij of the part's edges.
-    scale : float, optional
-        c, where it is known.
-    noise : (e,) float64, optional
-        Standard deviations of the entries' errors, where they are known.
-    refine : bool
-        Whether to polish.
+    `weights` (e,): -A_ij of the part's edges; `scale`: c, where it is known; `noise` (e,): standard deviations of the
+    entries' errors, where they are known; `refine`: whether to polish.
 
-    Raises
-    ------
-    GeometryError, SolverError
+    Raises GeometryError, SolverError.
     """
     z, c = corner_positions(part, weights, scale)
     straight = _by_best_rule(part, weights, z, c, noise, straight=True)
@@ -121,8 +90,8 @@ def _settled(start: Fitted, scale: float | None, noise: NDArray | None) -> Fitte
         return best
     for rule in _rules(best.part, straight=best.straight):
         given = best.part, best.weights, best.z, best.scale
-        if rule == best.rule or LITTLE * _least_size(*given, rule, straight=best.straight) > best.size:
-            continue  # no polish changes that
+        if rule == best.rule:
+            continue
         other = _with_rule(*given, noise, rule, straight=best.straight)
         if LITTLE * other.size < best.size and not np.array_equal(other.misfit, best.misfit):
             other = _polished(other, start.weights, scale, noise)
@@ -145,35 +114,20 @@ def _by_best_rule(
     straight: bool,
 ) -> Fitted:
     """With the quadrature that fits best; of those that fit alike the first."""
-    rules, found = list(_rules(part, straight=straight)), dict[int, Fitted]()
-    for k, rule in enumerate(rules):
-        if _least_size(part, weights, z, c, rule, straight=straight) <= AGREED:
-            found[k] = _with_rule(part, weights, z, c, noise, rule, straight=straight)
-            if found[k].size <= AGREED:
-                return found[k]
-    trials = [
-        found.get(k) or _with_rule(part, weights, z, c, noise, rule, straight=straight) for k, rule in enumerate(rules)
-    ]
+    trials = []
+    for rule in _rules(part, straight=straight):
+        trials.append(_with_rule(part, weights, z, c, noise, rule, straight=straight))
+        if trials[-1].size <= AGREED:
+            return trials[-1]
     least = min(trial.size for trial in trials)
     return next((trial for trial in trials if trial.size <= _ALIKE * least), trials[0])
-
-
-def _least_size(part: Part, weights: NDArray, z: NDArray, c: float, rule: dict[str, str], *, straight: bool) -> float:
-    """What the size of the misfit is at least: that of some entries, which belong to one cell each."""
-    few, alone = part.few
-    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        misfit = (weights / c - _entries(few, rule, straight).weights(z))[alone]
-    return float(np.sqrt(np.sum(misfit**2) / len(weights)))
-
-
-def _entries(part: Part, rule: dict[str, str], straight: bool) -> Entries:
-    return Entries(part, {kind: planar_rules(kind)[rule[kind.name]] for kind in part.blocks}, straight=straight)
 
 
 def _with_rule(
     part: Part, weights: NDArray, z: NDArray, c: float, noise: NDArray | None, rule: dict[str, str], *, straight: bool
 ) -> Fitted:
-    entries = _entries(part, rule, straight)
+    rules = {kind: planar_rules(kind)[rule[kind.name]] for kind in part.blocks}
+    entries = Entries(part, rules, straight=straight)
     spread = entries.roundings(z) if noise is None else noise
     with np.errstate(invalid="ignore", over="ignore"):  # cells without an area; see `flipped`
         misfit = weights - c * entries.weights(z)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..budget import SAMPLE
 from ..elements.kinds import Kind
 from ..errors import TopologyError
 from ..topology import Piece
@@ -23,29 +21,16 @@ Blocks = dict[Kind, NDArray[np.int64]]
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One edge-connected, oriented part of a mesh; its corners are numbered first.
+    """One edge-connected, oriented part of a mesh; its corners are numbered first."""
 
-    Attributes
-    ----------
-    piece : Piece
-        The part as triangles between corners, quadrilaterals divided; its `vertices` are the rows of all nodes,
-        and its `edges` the sides of cells.
-    n_corners : int
-    n_holes : int
-    blocks : dict of Kind to (m, k) int64
-        Cells, local nodes, all of one orientation.
-    edges : (e, 2) int64
-        Pairs i < j of local nodes that a cell has, in lexicographic order.
-    places : dict of Kind to (m, k (k - 1) / 2) int64
-        Rows of `edges` of all pairs of each cell.
-    """
-
+    # the part as triangles between corners, quadrilaterals divided; its `vertices` are the rows of all nodes, and its
+    # `edges` the sides of cells
     piece: Piece
     n_corners: int
     n_holes: int
-    blocks: Blocks
-    edges: NDArray[np.int64]
-    places: Blocks
+    blocks: Blocks  # cells, local nodes, all of one orientation
+    edges: NDArray[np.int64]  # (e, 2) pairs i < j of local nodes that a cell has, in lexicographic order
+    places: Blocks  # rows of `edges` of all pairs of each cell
 
     @property
     def n(self) -> int:
@@ -56,17 +41,6 @@ class Part:
     def degree(self) -> int:
         """Of the elements, along a side."""
         return max(kind.degree for kind in self.blocks)
-
-    @cached_property
-    def few(self) -> tuple[Part, NDArray[np.int64]]:
-        """The part with some of its cells, in the same numbering, and edges that belong to one of these only."""
-        some = {kind: slice(None, None, len(cells) // SAMPLE + 1) for kind, cells in self.blocks.items()}
-        count, own = np.zeros((2, len(self.edges)), np.int64)
-        for kind, rows in self.places.items():
-            count += np.bincount(rows.ravel(), minlength=len(count))
-            own[rows[some[kind]]] = 1
-        blocks, places = ({kind: of[kind][some[kind]] for kind in of} for of in (self.blocks, self.places))
-        return replace(self, blocks=blocks, places=places), np.flatnonzero(own & (count == 1))
 
     def from_corners(self) -> sp.csr_array:
         """(n, n_corners) nodes of straight cells as means of corners."""

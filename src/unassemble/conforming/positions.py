@@ -7,8 +7,6 @@ one problem of the size of the corners serves all orders, and its null space is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -24,23 +22,10 @@ from .parts import Part
 from .sets import pairs_of
 
 
-@dataclass(frozen=True, eq=False)
-class Outline:
-    """What the pencil needs to know of the corners."""
-
-    n_vertices: int
-    edges: NDArray[np.int64]
-    boundary: NDArray[np.int64]
-
-
 def among_corners(part: Part, weights: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Pairs of corners, lexicographic, and the weights of L restricted to straight cells.
 
-    Parameters
-    ----------
-    part : Part
-    weights : (e,) float64
-        -A_ij of the part's edges.
+    `weights` (e,): -A_ij of the part's edges.
     """
     if part.degree == 1:
         return part.edges, weights
@@ -60,18 +45,9 @@ def among_corners(part: Part, weights: NDArray) -> tuple[NDArray[np.int64], NDAr
 def corner_positions(part: Part, weights: NDArray, scale: float | None) -> tuple[NDArray[np.complex128], float]:
     """Positions of corners up to a similarity, and c.
 
-    Parameters
-    ----------
-    part : Part
-    weights : (e,) float64
-        -A_ij of the part's edges.
-    scale : float, optional
-        c, where it is known.
+    `weights` (e,): -A_ij of the part's edges; `scale`: c, where it is known.
 
-    Raises
-    ------
-    GeometryError
-        If no map of positive area is found, or the entries make no positive energy.
+    Raises GeometryError if no map of positive area is found, or the entries make no positive energy.
     """
     edges, weights = among_corners(part, weights)
     unit = float(np.sign(weights.sum()) * np.median(np.abs(weights[weights != 0]))) if weights.any() else 0.0
@@ -83,7 +59,7 @@ def corner_positions(part: Part, weights: NDArray, scale: float | None) -> tuple
         row = int(part.piece.vertices[np.argmin(sums)])
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     piece, options = part.piece, ConformalOptions()
-    pencil = ConformalPencil(Outline(part.n_corners, edges, piece.boundary), relative)
+    pencil = ConformalPencil(part.n_corners, edges, piece.boundary, relative)
     search = ShiftedSearch(pencil, factorisation, options.krylov_steps)
     start = smooth_start(part.n_corners, piece.boundary, piece.loop_offsets)
     if scale is not None:

@@ -30,23 +30,11 @@ _MOST = 6  # rows of a cell whose sides only entries tell
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Cells in meshio's order, in either orientation.
-
-    Attributes
-    ----------
-    blocks : dict of Kind to (m, k) int64
-    told : bool
-        Whether the graph alone tells them, and no entries.
-    order : (n,) int64
-        All rows, those near each other on the mesh near each other, too.
-    even : bool
-        Whether those that come next are as likely.
-    """
+    """Cells in meshio's order, in either orientation."""
 
     blocks: dict[Kind, NDArray[np.int64]]
-    told: bool
-    order: NDArray[np.int64]
-    even: bool = False
+    told: bool  # whether the graph alone tells them, and no entries
+    order: NDArray[np.int64]  # (n,) all rows, those near each other on the mesh near each other, too
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 
 from ..budget import AT_ONCE, LARGE, SAMPLE
 from ..elements.cliques import Graph, simplices
-from ..elements.surface import among
 from ..matrix import OperatorMatrix
 from ..tolerances import ROUNDED
 from ..topology.keys import contains, distinct, pair_keys
-from .halves import halves
 
 _ABSENT = {4: 0, 6: 3, 8: 4, 9: 6, 10: 9}
 """Pairs that a cell of so many nodes may lack, because the entry vanishes and is not stored."""
@@ -27,24 +25,11 @@ _DENSEST = 10  # entries above the diagonal, of a row in the mean: cubic triangl
 
 @dataclass(frozen=True, eq=False)
 class NodeSets:
-    """Cells as sets of rows.
+    """Cells as sets of rows."""
 
-    Attributes
-    ----------
-    order : int
-        Polynomial degree along a side, which has order + 1 nodes.
-    sets : tuple of (m, k) int64
-        One for each number of nodes; rows increase within a cell.
-    told : bool
-        Whether no other sets would do as well.
-    even : bool
-        Whether those that come next are as likely.
-    """
-
-    order: int
-    sets: tuple[NDArray[np.int64], ...]
-    told: bool = False
-    even: bool = False
+    order: int  # polynomial degree along a side, which has order + 1 nodes
+    sets: tuple[NDArray[np.int64], ...]  # tuple of (m, k) one for each number of nodes; rows increase within a cell
+    told: bool = False  # whether no other sets would do as well
 
 
 class Common:
@@ -208,12 +193,9 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
         if len(triangles) and _cover(common, [triangles, quads]):
             yield NodeSets(1, (triangles, quads), len(choices) == 1)
     if not _cover(common, [found]):
-        likeliest, other = halves(matrix, common.nonzero)
-        rest = common.quadratic_triangles(once(np.concatenate([found, likeliest])))
+        rest = common.quadratic_triangles(found)
         if _cover(common, [rest]):
-            yield NodeSets(2, (rest,), even=other is not None)
-            if other is not None:
-                yield NodeSets(2, (once(np.concatenate([rest[~among(rest, likeliest)], other])),))
+            yield NodeSets(2, (rest,))
 
 
 def _choices(common: Common, quads: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:

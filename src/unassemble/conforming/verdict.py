@@ -30,16 +30,8 @@ class Verdict:
 def verdict(stored: OperatorMatrix, fits: Sequence[Fitted], held: Sequence[Held], task: Task, *, told: bool) -> Verdict:
     """The status of a mesh.
 
-    Parameters
-    ----------
-    stored : OperatorMatrix
-    fits : sequence of Fitted
-        Its parts.
-    held : (Held, Held)
-        The mesh about the origins of its parts, and as it is written.
-    task : Task
-    told : bool
-        Whether the graph alone tells the cells.
+    `fits`: its parts; `held` (Held, Held): the mesh about the origins of its parts, and as it is written; `told`:
+    whether the graph alone tells the cells.
     """
     near, written = held
     reason = _obstacle(fits, near, task) or _bare(stored, fits)

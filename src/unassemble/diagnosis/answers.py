@@ -27,7 +27,7 @@ def explained(error: RecoveryError, matrix: OperatorMatrix) -> RecoveryError:
         else:
             like = replace(found, advice=where_nothing_fits(found, matrix))
             said = like.sentence(f"{begun}, and no mesh that was found has these entries, though the graph is that of")
-        return NotPlanarError(said, error.witness, error.why)
+        return NotPlanarError(said, error.why)
     return (
         GeometryError(found.sentence("no planar mesh has these entries: they are those of")) if found.unread else error
     )

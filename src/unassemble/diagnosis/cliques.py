@@ -38,32 +38,18 @@ CELLS = {
 
 @dataclass(frozen=True)
 class Cells:
-    """What pairs of coupled rows have in common.
+    """What pairs of coupled rows have in common."""
 
-    Attributes
-    ----------
-    nodes : int
-        Of a cell, where pairs show such; else 0.
-    shared : int
-        Nodes that neighbouring ones of these have in common.
-    often : float
-        Share of pairs that show a cell.
-    in_fours, in_threes : float
-        Share of pairs that lie in a clique of four, and of three.
-    around : float
-        To how many others, in the mean, the common neighbours of a pair are coupled among these: two, where the cells
-        around an edge are tetrahedra and close a ring, or less where they do not; some more by chance.
-    twins : float
-        Share of rows with the neighbours of another row: several unknowns of one node.
-    """
-
-    nodes: int
-    shared: int
-    often: float
+    nodes: int  # of a cell, where pairs show such; else 0
+    shared: int  # nodes that neighbouring ones of these have in common
+    often: float  # share of pairs that show a cell
+    # share of pairs that lie in a clique of four, and of three
     in_fours: float
     in_threes: float
+    # to how many others, in the mean, the common neighbours of a pair are coupled among these: two, where the cells
+    # around an edge are tetrahedra and close a ring, or less where they do not; some more by chance
     around: float
-    twins: float
+    twins: float  # share of rows with the neighbours of another row: several unknowns of one node
 
     @property
     def tetrahedral(self) -> bool:
@@ -74,13 +60,7 @@ class Cells:
 def cells_of(n: int, edges: NDArray[np.int64], most: int = 1500) -> Cells:
     """Look at some pairs of a graph, all near to each other.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-        Pairs i < j, at least one.
-    most : int
-        Pairs to look at, in a part of four times as many rows.
+    `edges` (e, 2): pairs i < j, at least one; `most`: pairs to look at, in a part of four times as many rows.
     """
     graph = sp.csr_array((np.ones(len(edges), np.int32), edges.T), shape=(n, n))
     graph = graph + graph.T

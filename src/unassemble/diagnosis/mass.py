@@ -60,13 +60,9 @@ def refuse_masses(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) 
 def mass_matrix(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) -> Diagnosis | None:
     """What kind of mass matrix this is; None where it is none.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    planar : bool
-        Whether it may still be that of a mesh in the plane, which are read with much mass beside little stiffness.
-    exact : bool
-        Whether only equations count: small bodies that are held all around have such eigenvalues as well.
+    `planar`: whether it may still be that of a mesh in the plane, which are read with much mass beside little
+    stiffness; `exact`: whether only equations count: small bodies that are held all around have such eigenvalues as
+    well.
     """
     # Most matrices of meshes in the plane are seen to be none by their signs alone, which takes no time.
     sign, nothing = np.sign(matrix.diagonal[np.abs(matrix.diagonal).argmax()]), ROUNDED * np.abs(matrix.entries).max()
@@ -108,17 +104,10 @@ def _is_lumped(matrix: OperatorMatrix) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Masses:
-    """A matrix with diagonal entries of one sign, made positive, without the rows of zeros.
+    """A matrix with diagonal entries of one sign, made positive, without the rows of zeros."""
 
-    Attributes
-    ----------
-    M : (k, k) sparse
-    n_massless : int
-        Rows of zeros: unknowns without a mass, or points inside of a mesh whose boundary has one.
-    """
-
-    M: sp.csr_array
-    n_massless: int
+    M: sp.csr_array  # (k, k)
+    n_massless: int  # rows of zeros: unknowns without a mass, or points inside of a mesh whose boundary has one
 
     @classmethod
     def of(cls, matrix: OperatorMatrix) -> _Masses | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,26 +21,16 @@ _SMALL = 10  # rows: fewer may be a mesh of few triangles, whatever their entrie
 
 @dataclass(frozen=True, eq=False)
 class Sums:
-    """What rows add up to.
+    """What rows add up to."""
 
-    Attributes
-    ----------
-    zero, positive : (n,) bool
-        Rows that add up to nothing, and to more than nothing, alone ones left out.
-    alone, identity : (n,) bool
-        Rows with nothing beside the diagonal; those of them that have something on it.
-    penalised : (n,) bool
-        Rows whose diagonal is beyond everything else.
-    sign : int
-        That of all sums that are not zero, where these are not few and all have one; else 0.
-    """
-
+    # (n,) each: rows that add up to nothing, and to more than nothing, alone ones left out
     zero: NDArray[np.bool_]
     positive: NDArray[np.bool_]
+    # (n,) each: rows with nothing beside the diagonal; those of them that have something on it
     alone: NDArray[np.bool_]
     identity: NDArray[np.bool_]
-    penalised: NDArray[np.bool_]
-    sign: int
+    penalised: NDArray[np.bool_]  # (n,) rows whose diagonal is beyond everything else
+    sign: int  # that of all sums that are not zero, where these are not few and all have one; else 0
 
     @classmethod
     def of(cls, matrix: OperatorMatrix) -> Sums:
@@ -104,11 +93,7 @@ class Sums:
 def diagnosed(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis:
     """What a scalar matrix is, at linear cost.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    planar : bool
-        Whether its graph is one of triangles, or of other cells with linear elements, in the plane.
+    `planar`: whether its graph is one of triangles, or of other cells with linear elements, in the plane.
     """
     sums = Sums.of(matrix)
     if (mass := mass_matrix(matrix, planar=planar)) is not None:
@@ -144,9 +129,6 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
         if not (often(cells.often) or several) and cells.tetrahedral:
             shown = f"{cells.in_fours:.0%} of the coupled pairs of rows lie in a clique of four"
             return _of_kind("tetrahedra", f"{operator} of linear elements on tetrahedra", shown, sums)
-        if _has_middles(matrix):
-            shown = "most rows have the entries of middles of sides, four times those of the ends and of the other sign"
-            return _of_kind("quadratic", "a stiffness matrix of quadratic elements on triangles", shown, sums)
         if not (often(cells.in_fours) or several) and mostly(cells.in_threes) and len(edges) >= 2.5 * matrix.n:
             shown = f"{cells.in_threes:.0%} of the coupled pairs of rows lie in triangles, few in a clique of four"
             name = f"{operator} of linear elements on triangles, on a surface that cannot be laid flat"
@@ -194,32 +176,6 @@ def further_terms(matrix: OperatorMatrix) -> str:
         return ", plus a diagonal or a mass matrix, as of a reaction"
     scaled = (matrix.diagonal > 0).all() or (matrix.diagonal < 0).all()  # squares of factors keep signs
     return ", plus a diagonal, or with rows and columns scaled" if scaled else ", plus a diagonal"
-
-
-def _has_middles(matrix: OperatorMatrix, most: int = 400) -> bool:
-    """Whether rows m have neighbours i, j with A_im = A_jm = -4 A_ij, as middles of the sides of quadratic triangles.
-
-    Middles are coupled to the eight other nodes of two cells at most. Both entries are multiples of the same
-    cotangents, so that neither is left out without the other; of zeros that are
-    not stored there is no trace. Looked for in `most` rows.
-    """
-    A, least = matrix.csr(), ROUNDED * matrix.row_size
-    sample = range(0, matrix.n, max(1, matrix.n // most))
-
-    @cache
-    def entries(i: int) -> dict[int, float]:
-        row = slice(A.indptr[i], A.indptr[i + 1])
-        return {j: v for j, v in zip(A.indices[row].tolist(), A.data[row].tolist(), strict=True) if abs(v) > least[i]}
-
-    def between(m: int) -> bool:
-        ends = sorted((value, i) for i, value in entries(m).items() if i != m)
-        return len(ends) <= 8 and any(
-            abs(u - v) <= SUMMED * abs(u) and abs(entries(i).get(j, 0.0) + u / 4) <= SUMMED * abs(u)
-            for k, (u, i) in enumerate(ends)
-            for v, j in ends[k + 1 : k + 4]
-        )
-
-    return sum(map(between, sample)) >= (1 - MOST) * len(sample)
 
 
 def _is_grid(n: int, edges: NDArray[np.int64], cells: Cells) -> bool:

@@ -35,20 +35,11 @@ Sized = Callable[[OperatorMatrix, Sequence[Cells]], PlanarMesh]
 
 @dataclass(frozen=True, eq=False)
 class LessMass:
-    """A matrix less its mass term.
+    """A matrix less its mass term."""
 
-    Attributes
-    ----------
-    matrix : OperatorMatrix
-        c L.
-    cells : Cells
-    weights : mapping of Kind to (m, q) float64
-        Times s.
-    """
-
-    matrix: OperatorMatrix
+    matrix: OperatorMatrix  # c L
     cells: Cells
-    weights: Weights
+    weights: Weights  # times s
 
 
 def less_mass(matrix: OperatorMatrix) -> LessMass | None:

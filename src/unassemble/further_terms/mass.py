@@ -5,22 +5,17 @@ Areas are taken off the matrix, what is left is a Laplacian and recovered as one
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..certify import Terms
 from ..clock import Clock
-from ..errors import RecoveryError
 from ..matrix import OperatorMatrix
-from ..planar.conformal import conformal_map
-from ..reaction import Metric, MetricFit, Skeleton, areas_of_mass, fit_metric
+from ..reaction import MetricFit, Skeleton, areas_of_mass, fit_metric
 from ..recovery import PlanarMesh
-from ..tolerances import ALIKE, CERTIFIED, NEARLY_ALL, ROUNDED
+from ..tolerances import ALIKE, CERTIFIED
 from ..topology import Topology
-from ..topology.pieces import planar_pieces
 from ..words import sentences
 from .again import Held, Plain, areas_of
 from .row_sums import RowSums
@@ -80,8 +75,8 @@ def with_consistent_mass(
     if not sums.positive().all():  # rows of zeros
         return None
     with clock("metric"):
-        fit = _fit(skeleton, sums.sign * held.matrix.entries, sums)
-    if fit is None:
+        fit = fit_metric(skeleton, sums.sign * held.matrix.entries, sums.positive(), sums.trust())
+    if fit is None or fit.residual >= ALIKE:
         return None
     found = plain(_without_mass(held.matrix, sums.sign, fit), fit.metric.u)
     reaction = sums.sign * float(fit.metric.areas.sum() / areas_of(found).sum())
@@ -89,63 +84,6 @@ def with_consistent_mass(
     terms = Terms(held.matrix.diagonal, reaction)
     operator = "c L + s M, M the consistent mass matrix,"
     return held.with_terms(found, terms, operator, size_note(reaction), *((_OTHER,) if found.certified else ()))
-
-
-def _fit(skeleton: Skeleton, entries: NDArray, sums: RowSums) -> MetricFit | None:
-    """The metric; where the fit ends elsewhere, anew without a hole of three edges or from an embedding."""
-    fit = fit_metric(skeleton, entries, sums.positive(), sums.trust())
-    for _ in range(12):  # one for each hole of three edges, six on meshes graded over eight orders
-        if fit is None or fit.residual < ROUNDED:
-            break
-        better = (new for new in _other_starts(fit, entries, sums) if new.residual < NEARLY_ALL * fit.residual)
-        found = next(better, None)
-        if found is None:
-            break
-        fit = found
-    return fit if fit and fit.residual < ALIKE else None
-
-
-def _other_starts(fit: MetricFit, entries: NDArray, sums: RowSums) -> Iterator[MetricFit]:
-    """Fits that begin where another ended, but for what may have held it up."""
-    for start in (None if fit.held else _without_hole(fit, sums), _embedded(fit, entries, sums)):
-        again = start and fit_metric(start.metric.skeleton, entries, sums.positive(), sums.trust(), start=start)
-        if again:
-            yield again
-
-
-def _without_hole(fit: MetricFit, sums: RowSums) -> MetricFit | None:
-    """Without the triangle that is likeliest a hole of three edges; None where none is likely.
-
-    Such a triangle has too much area for all three of its corners, as no misfit of another kind has.
-    """
-    skeleton = fit.metric.skeleton
-    excess = skeleton.at_vertices @ fit.metric.areas / (3 * sums.positive()) - 1
-    inside = (skeleton.sides[skeleton.opposite] == 2).all(axis=1)
-    least = np.where(inside, excess[skeleton.triangles].min(axis=1), 0)
-    worst = int(np.argmax(least))
-    if not least[worst] > fit.residual:
-        return None
-    return replace(fit, metric=Metric(skeleton.without(worst), fit.metric.u))
-
-
-def _embedded(fit: MetricFit, entries: NDArray, sums: RowSums) -> MetricFit | None:
-    """With lengths in the plane, those of the Laplacian that is left if areas are right; None without a plane.
-
-    The fit knows sizes where they stand, and is slow about flat triangles; their areas hardly matter to entries, and
-    the embedding, a linear problem, finds their shapes at once.
-    """
-    skeleton = fit.metric.skeleton
-    weights = (skeleton.at_edges @ fit.metric.areas / 12 - entries) / fit.scale
-    u = fit.metric.u.copy()
-    for piece in planar_pieces(skeleton.n, skeleton.edges, skeleton.triangles, skeleton.opposite) or ():
-        try:
-            z = conformal_map(piece, weights[piece.edge_rows]).z
-        except RecoveryError:
-            return None
-        a, b, c = z[piece.triangles].T
-        size = 2 * sums.positive()[piece.vertices].sum() / np.abs(((b - a).conj() * (c - a)).imag).sum()
-        u[piece.edge_rows] = size * np.abs(z[piece.edges[:, 0]] - z[piece.edges[:, 1]]) ** 2
-    return replace(fit, metric=Metric(skeleton, u))
 
 
 def _without_mass(matrix: OperatorMatrix, sign: int, fit: MetricFit) -> OperatorMatrix:

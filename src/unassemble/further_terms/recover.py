@@ -8,7 +8,6 @@ import numpy as np
 
 from ..clock import Clock
 from ..errors import RecoveryError
-from ..linalg import factorisation
 from ..matrix import OperatorMatrix
 from ..planar.conformal import conformal_map
 from ..planar.cotangent import edge_weights
@@ -73,7 +72,7 @@ def _is_laplacian(matrix: OperatorMatrix, topology: Topology) -> bool:
     for piece in topology.pieces:
         weights = -matrix.entries[piece.edge_rows]
         try:
-            found = conformal_map(piece, weights, sharp=False, analyse=factorisation)
+            found = conformal_map(piece, weights, sharp=False)
         except RecoveryError:
             return False
         with np.errstate(all="ignore"):

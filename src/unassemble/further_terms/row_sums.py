@@ -13,17 +13,10 @@ from ..tolerances import CERTIFIED, SIGMAS
 
 @dataclass(frozen=True, eq=False)
 class RowSums:
-    """A 1.
+    """A 1."""
 
-    Attributes
-    ----------
-    values : (n,) float64
-    rounding : (n,) float64
-        About their errors.
-    """
-
-    values: NDArray[np.float64]
-    rounding: NDArray[np.float64]
+    values: NDArray[np.float64]  # (n,)
+    rounding: NDArray[np.float64]  # (n,) about their errors
 
     @classmethod
     def of(cls, matrix: OperatorMatrix) -> RowSums:

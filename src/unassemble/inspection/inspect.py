@@ -45,8 +45,6 @@ class Inspection:
         Rows that sum to zero, relative to their largest off-diagonal entry; isolated ones not counted.
     planar : bool
         Whether the graph is that of a planar mesh, as far as that is known.
-    witness : tuple of (int, int)
-        If not: edges of a subdivision of K5 or K3,3.
     obstacle : str
         Why no mesh is recognised; empty where one is.
     n_triangles, n_faces, n_holes, n_boundary_edges : int
@@ -105,7 +103,6 @@ class Inspection:
     n_zero_sums: int
     warnings: tuple[str, ...]
     planar: bool = True
-    witness: tuple[tuple[int, int], ...] = ()
     obstacle: str = ""
     n_triangles: int = 0
     n_faces: int = 0
@@ -263,8 +260,7 @@ def _inspected(matrix: OperatorMatrix) -> Inspection:
             if vector is not None:
                 return _vector_valued(matrix, facts, vector)
             read_as = _diagnosis(matrix, planar=planar)
-            witness = getattr(error, "witness", ())
-            return Inspection(**facts, **read_as, planar=planar, obstacle=str(error or _NO_CELLS), witness=witness)
+            return Inspection(**facts, **read_as, planar=planar, obstacle=str(error or _NO_CELLS))
     found = mesh_facts(read, topology)
     if found["mixed_signs"] or found["n_undetermined"] > MOST * matrix.n:  # as in recovery where no mesh fits
         if (mass := mass_matrix(matrix, planar=False)) is not None:

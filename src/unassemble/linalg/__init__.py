@@ -1,6 +1,5 @@
 """Sparse linear algebra behind one small interface."""
 
-from .ahead import AnalysisAhead
 from .definite import nearly_singular, solved
 from .factorisation import Factorisation, backend, factorisation
 from .least_norm import least_norm
@@ -9,7 +8,6 @@ from .threads import blas_threads, threads
 from .upper import UpperTriangle, upper_from_edges
 
 __all__ = [
-    "AnalysisAhead",
     "Factorisation",
     "UpperTriangle",
     "backend",

@@ -1,8 +1,7 @@
 """From a file or a scipy matrix to a clean symmetric operator."""
 
 from .check import as_csr, check_matrix
-from .loading import is_file, load
 from .operator import OperatorMatrix
-from .read import read_matrix
+from .read import is_file, load, read_matrix
 
 __all__ = ["OperatorMatrix", "as_csr", "check_matrix", "is_file", "load", "read_matrix"]

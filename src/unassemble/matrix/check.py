@@ -13,8 +13,7 @@ from ..errors import InputError, MatrixError
 from ..words import count_of
 from .canonical import canonical, place, working_dtype
 from .operator import OperatorMatrix, row_sizes
-from .replaced import from_columns
-from .symmetry import symmetric_entries, triangles
+from .symmetry import from_columns, symmetric_entries, triangles
 
 
 def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None = None) -> OperatorMatrix:

@@ -20,17 +20,10 @@ _SHORT, _NEARLY, _SINGLE = 12, 20, 24  # binary digits: of numbers exact by natu
 
 @dataclass(frozen=True, eq=False)
 class Digits:
-    """The precision that numbers were rounded to.
+    """The precision that numbers were rounded to."""
 
-    Attributes
-    ----------
-    name : str
-        ``"6 digits"``, ``"6 decimals"`` or ``"single precision"``.
-    unit : (k,) float64
-        Of the last place of each number. That of zeros is 0, unless they were rounded to decimals as well.
-    """
-
-    name: str
+    name: str  # ``"6 digits"``, ``"6 decimals"`` or ``"single precision"``
+    # (k,) of the last place of each number. That of zeros is 0, unless they were rounded to decimals as well.
     unit: NDArray[np.float64]
 
     @classmethod

@@ -40,22 +40,12 @@ class _Flag(IntFlag):
 
 @dataclass(frozen=True, eq=False)
 class Variable:
-    """A variable of a MATLAB file.
-
-    Attributes
-    ----------
-    name : str
-    shape : tuple of int
-    sparse : scipy sparse array or None
-        The value of a sparse variable, its index arrays still to be checked.
-    fields : tuple of Variable
-        Of a structure with one element.
-    """
+    """A variable of a MATLAB file."""
 
     name: str
     shape: tuple[int, ...]
-    sparse: Any = None
-    fields: tuple[Variable, ...] = ()
+    sparse: Any = None  # the value of a sparse variable, its index arrays still to be checked
+    fields: tuple[Variable, ...] = ()  # of a structure with one element
 
 
 def read_mat5(content: bytes) -> list[Variable]:

@@ -15,38 +15,22 @@ from ..tolerances import ROUNDED, SUMMED
 
 @dataclass(frozen=True, eq=False)
 class OperatorMatrix:
-    """A real symmetric matrix that passed every check at the door.
+    """A real symmetric matrix that passed every check at the door."""
 
-    Attributes
-    ----------
-    n : int
-        Order.
-    edges : (e, 2) int64
-        Pairs i < j with a stored off-diagonal entry, in lexicographic order. Explicit zeros count: they
-        are structure.
-    entries : (e,) float64
-        A_ij of each pair, the mean of both triangles.
-    diagonal : (n,) float64
-        Absent entries are zero.
-    asymmetry : float
-        Largest difference between an entry and its transpose, relative to the largest off-diagonal entry
-        of the two rows; at rounding level.
-    warnings : tuple of str
-        What was changed on the way, in sentences.
-    errors : (e,) float64 or None
-        Standard deviations of the errors of the entries, where they are known; 0 for those that have vanished.
-    replaced : (n,) bool or None
-        Rows that were replaced by those of the identity while their columns were kept: of an entry between two of
-        them nothing is left.
-    """
-
-    n: int
+    n: int  # order
+    # (e, 2) pairs i < j with a stored off-diagonal entry, in lexicographic order. Explicit zeros count: they are
+    # structure.
     edges: NDArray[np.int64]
-    entries: NDArray[np.float64]
-    diagonal: NDArray[np.float64]
+    entries: NDArray[np.float64]  # (e,) A_ij of each pair, the mean of both triangles
+    diagonal: NDArray[np.float64]  # (n,) absent entries are zero
+    # largest difference between an entry and its transpose, relative to the largest off-diagonal entry of the two rows;
+    # at rounding level
     asymmetry: float = 0.0
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  # what was changed on the way, in sentences
+    # (e,) standard deviations of the errors of the entries, where they are known; 0 for those that have vanished
     errors: NDArray[np.float64] | None = None
+    # (n,) rows that were replaced by those of the identity while their columns were kept: of an entry between two of
+    # them nothing is left
     replaced: NDArray[np.bool_] | None = None
 
     @property

@@ -18,9 +18,11 @@ import scipy.sparse as sp
 from ..errors import InputError, MatrixFileError, UnassembleError
 from ..formats import FORMATS
 from .canonical import canonical, inconsistency
+from .check import check_matrix
 from .market import read_market
 from .mat import read_mat, read_mat4, read_mat73
 from .npz import read_npy, read_npz
+from .operator import OperatorMatrix
 from .signatures import HEAD, foreign, kind_of
 from .triplets import read_triplets
 
@@ -163,3 +165,32 @@ def _rewindable(stream: Any, name: str) -> BinaryIO:
 
 def _as_bytes(content: str | bytes | None) -> bytes:
     return content.encode("utf-8", "replace") if isinstance(content, str) else content or b""
+
+
+def load(
+    source: Any, *, variable: str | None = None, drop_zeros: float | None = None, noise: float | None = None
+) -> OperatorMatrix:
+    """Read a matrix where `source` names a file, and check it.
+
+    Parameters
+    ----------
+    source : path, "-", open file, scipy sparse matrix or array, or array_like
+    variable : str, optional
+        See :func:`read_matrix`.
+    drop_zeros, noise : float, optional
+        See :func:`check_matrix`.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or an option is out of range.
+    MatrixError
+        If the matrix fails a check.
+    """
+    matrix = read_matrix(source, variable=variable) if is_file(source) else source
+    return check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
+
+
+def is_file(source: Any) -> bool:
+    """Whether `source` names a file, or is an open one."""
+    return isinstance(source, (str, bytes, os.PathLike)) or hasattr(source, "read")

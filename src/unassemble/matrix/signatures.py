@@ -21,34 +21,6 @@ _FOREIGN: tuple[tuple[int, bytes, str], ...] = (
     (257, b"ustar", "is a tar archive: unpack it and pass the .mtx file in it"),
     (0, b"version https://git-lfs", "is only a Git LFS pointer: fetch the file itself with 'git lfs pull'"),
 )
-# First words of mesh files, in small letters: a mesh is what comes out.
-_MESHES = (
-    (b"$meshformat", "Gmsh"),
-    (b"# vtk", "VTK"),
-    (b"<vtkfile", "VTK"),
-    (b"<xdmf", "XDMF"),
-    (b"<dolfin", "DOLFIN"),
-    (b"off", "OFF"),
-    (b"ply", "PLY"),
-    (b"solid", "STL"),
-    (b"v ", "OBJ"),
-    (b"*heading", "Abaqus"),
-    (b"*node", "Abaqus"),
-    (b"meshversionformatted", "MEDIT"),
-    (b"mesh3d", "Netgen"),
-    (b"ndime=", "SU2"),
-    (b"grid", "Nastran"),
-    (b"begin bulk", "Nastran"),
-    (b"cend", "Nastran"),
-    (b"/prep7", "ANSYS"),
-    (b"(0 ", "ANSYS"),
-    (b"(1 ", "ANSYS"),
-    (b"title", "Tecplot"),
-    (b"begin modelpartdata", "Kratos"),
-    (b"!permas", "PERMAS"),
-    (b"* flac3d", "FLAC3D"),
-    (b"tin", "WKT"),
-)
 # Two row and column numbers and an entry, after comments at most.
 _TRIPLET = re.compile(
     rb"\s*(?:[%#][^\n]*\n\s*)*[+]?\d+(?:\.\d*)?(?:[eE][+]?\d+)?[ \t,;]+[+]?\d+(?:\.\d*)?(?:[eE][+]?\d+)?[ \t,;]+"
@@ -83,7 +55,7 @@ def kind_of(head: bytes) -> str | None:
 def foreign(head: bytes, suffix: str = "") -> str:
     """What a file is that no reader takes, and what to do, to follow the name of the file.
 
-    Binary files are told by their names where `suffix` is that of a mesh format; else it is empty.
+    Meshes are told by their names, where `suffix` is that of a mesh format; else it is empty.
     """
     if not head:
         return "is empty"
@@ -92,11 +64,9 @@ def foreign(head: bytes, suffix: str = "") -> str:
             return sentence
     if _is_pickle(head):
         return "is a Python pickle, which can run any code and is never loaded: save with scipy.sparse.save_npz"
-    binary = b"\0" in head or _is_hdf5(head)
-    mesh = _mesh(head) or (suffix if binary else "")
-    if mesh:
-        return f"is a mesh ({mesh}), and a matrix is asked for: name the file of the matrix that was assembled on it"
-    if binary:
+    if suffix:
+        return f"is a mesh ({suffix}), and a matrix is asked for: name the file of the matrix that was assembled on it"
+    if b"\0" in head or _is_hdf5(head):
         return "is a binary file of unknown format, not Matrix Market, .npz, .npy or .mat"
     text = head.removeprefix(_UTF8_MARK).lstrip()
     if not text:
@@ -105,21 +75,6 @@ def foreign(head: bytes, suffix: str = "") -> str:
         return "is a web page or XML, not a matrix: the download may have failed"
     first = text.splitlines()[0][:40].decode("ascii", "backslashreplace")
     return f"begins with {first!r} and not with '%%MatrixMarket': save it as Matrix Market, .npz (scipy) or .mat"
-
-
-def _mesh(head: bytes) -> str:
-    """The kind of mesh file that a text is; empty for none."""
-    text = head.removeprefix(_UTF8_MARK).lstrip().lower()
-    if text.startswith(b"<?xml"):
-        text = text[text.find(b"?>") + 2 :].lstrip()
-    for comment in (b"", b"# ", b"$ ", b"** "):  # which may come before the first word
-        while comment and text.startswith(comment) and b"\n" in text:
-            text = text.split(b"\n", 1)[1].lstrip()
-        words = [(word, kind) for word, kind in _MESHES if text.startswith(word)]
-        found = next((kind for word, kind in words if not text[len(word) - 1 : len(word) + 1].isalnum()), "")
-        if found:
-            return found
-    return ""
 
 
 def _is_hdf5(head: bytes) -> bool:

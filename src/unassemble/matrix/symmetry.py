@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,22 +17,13 @@ from .operator import row_sizes
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
-    """Both triangles of a matrix on one pattern.
+    """Both triangles of a matrix on one pattern."""
 
-    Attributes
-    ----------
-    edges : (e, 2) int64
-        Pairs i < j with A_ij or A_ji stored, in lexicographic order.
-    upper, lower : (e,) float64
-        A_ij and A_ji; zero where only the other one is stored.
-    one_sided : int
-        Number of pairs of which only one entry is stored.
-    """
-
-    edges: NDArray[np.int64]
+    edges: NDArray[np.int64]  # (e, 2) pairs i < j with A_ij or A_ji stored, in lexicographic order
+    # (e,) each: A_ij and A_ji; zero where only the other one is stored
     upper: NDArray[np.float64]
     lower: NDArray[np.float64]
-    one_sided: int
+    one_sided: int  # number of pairs of which only one entry is stored
 
 
 def triangles(A: sp.csr_array) -> Triangles:
@@ -187,3 +178,28 @@ def _shown(A: sp.csr_array, i: int, j: int) -> str:
     start, end = A.indptr[i], A.indptr[i + 1]
     k = start + np.searchsorted(A.indices[start:end], j)
     return repr(float(A.data[k])) if k < end and A.indices[k] == j else "not stored"
+
+
+def from_columns(diagonal: NDArray, pairs: Triangles) -> tuple[Triangles, NDArray[np.bool_] | None, tuple[str, ...]]:
+    """Entries of rows without any off the diagonal, which is not zero, taken from their columns where these were kept.
+
+    Returns `replaced` (n,): such rows, those too that have such neighbours only; None where no column is left.
+    """
+    row, column = np.zeros(len(diagonal)), np.zeros(len(diagonal))
+    for end, own, other in ((0, pairs.upper, pairs.lower), (1, pairs.lower, pairs.upper)):
+        np.maximum.at(row, pairs.edges[:, end], np.abs(own))
+        np.maximum.at(column, pairs.edges[:, end], np.abs(other))
+    replaced = (row == 0) & (diagonal != 0) & (np.bincount(pairs.edges.ravel(), minlength=len(row)) > 0)
+    if not (column[replaced] > 0).any():
+        return pairs, None, ()
+    first, second = replaced[pairs.edges].T
+    rest = ~(first | second)
+    size = np.maximum(row, column).max()
+    if not pairs.upper[rest].any() or (np.abs(pairs.upper - pairs.lower)[rest] > SUMMED * size).any():
+        return pairs, None, ()  # not symmetric for other reasons
+    upper, lower = np.where(first, pairs.lower, pairs.upper), np.where(second, pairs.upper, pairs.lower)
+    warning = (
+        f"{count_of(int(replaced.sum()), 'row has', 'rows have')} nothing off the diagonal while the columns have, as "
+        "where a boundary condition was put in: entries were taken from the columns"
+    )
+    return replace(pairs, upper=upper, lower=lower, one_sided=0), replaced, (warning,)

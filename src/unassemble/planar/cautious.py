@@ -22,24 +22,12 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class CautiousOptions:
-    """Settings of the iteration.
+    """Settings of the iteration."""
 
-    Attributes
-    ----------
-    max_steps : int
-        Each with a factorisation.
-    most_vertices : int
-        Of a piece for which so many factorisations are worth their time; callers ask.
-    least_area : float
-        What a step must leave of the area of every triangle, relative.
-    settled : float
-        As in :class:`~unassemble.planar.polish.PolishOptions`.
-    """
-
-    max_steps: int = 40
-    most_vertices: int = 200_000
-    least_area: float = 0.1
-    settled: float = 1e-3
+    max_steps: int = 40  # each with a factorisation
+    most_vertices: int = 200_000  # of a piece for which so many factorisations are worth their time; callers ask
+    least_area: float = 0.1  # what a step must leave of the area of every triangle, relative
+    settled: float = 1e-3  # as in :class:`~unassemble.planar.polish.PolishOptions`
 
 
 def cautious_polish(
@@ -49,27 +37,17 @@ def cautious_polish(
     *,
     scale: float | None = None,
     spread: NDArray | None = None,
-    pins: NDArray | None = None,
     options: CautiousOptions | None = None,
 ) -> PolishedMesh:
     """Maximum-likelihood mesh from a distant start, with a factorisation for each step.
 
-    Parameters
-    ----------
-    piece : Piece
-    weights : (e,) float64
-    z : (n,) complex128
-    scale : float, optional
-    spread : (e,) float64, optional
-    pins : (k,) int, optional
-        As for the polish.
-    options : CautiousOptions, optional
+    `weights` (e,); `z` (n,); `spread` (e,): as for the polish.
     """
     options = options or CautiousOptions()
     spread = np.ones(len(weights)) if spread is None else spread
     extent = np.abs(z - z.mean()).max()
     z = (z - z.mean()) / extent
-    pins = distant_pair(z) if pins is None else pins
+    pins = distant_pair(z)
     problem = Problem(Cotangents(piece), weights, spread, scale)
     fit, steps, length, converged = problem.at(z), 0, np.inf, False
     history: list[tuple[float, float]] = []

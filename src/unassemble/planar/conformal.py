@@ -16,14 +16,13 @@ Mullen, Tong, Alliez, Desbrun, "Spectral conformal parameterization", CGF 27, 20
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from ..linalg import Factorisation, UpperTriangle, factorisation
+from ..linalg import factorisation
 from ..tolerances import ALIKE, LITTLE, MOST, ROUNDED, SUMMED
 from ..topology import Piece
 from .krylov import ShiftedSearch
@@ -36,51 +35,28 @@ _MANY = 100  # triangles that agree, if they are no small share: mirrored neighb
 
 @dataclass(frozen=True)
 class ConformalOptions:
-    """Settings of the search; the defaults serve every matrix that we know.
+    """Settings of the search; the defaults serve every matrix that we know."""
 
-    Attributes
-    ----------
-    krylov_steps : int
-        Most solves with one factorisation.
-    max_factorisations : int
-        Factorisations before giving up.
-    first_shift : float
-        Relative to the estimate of c; any value well inside (0, 1) will do.
-    scatters, nearest : float
-        Where triangles agree it is nearer: at least so many times their scatter, and so much, below the estimate.
-    margin : float
-        Distance of the last shift below c, relative. Nearer, M would be singular to working accuracy.
-    """
-
-    krylov_steps: int = 8
-    max_factorisations: int = 8
-    first_shift: float = 0.7
+    krylov_steps: int = 8  # most solves with one factorisation
+    max_factorisations: int = 8  # factorisations before giving up
+    first_shift: float = 0.7  # relative to the estimate of c; any value well inside (0, 1) will do
+    # where triangles agree it is nearer: at least so many times their scatter, and so much, below the estimate
     scatters: float = 3.0
     nearest: float = 0.03
+    # distance of the last shift below c, relative. Nearer, M would be singular to working accuracy.
     margin: float = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
 class ConformalMap:
-    """Result of :func:`conformal_map`.
+    """Result of :func:`conformal_map`."""
 
-    Attributes
-    ----------
-    z : (n,) complex128
-        Positions x + iy, in no particular gauge.
-    scale : float
-        c, with its sign.
-    factorisations, solves : int
-        What it cost.
-    converged : bool
-        Whether position changes fell to the level that the conditioning allows.
-    """
-
-    z: NDArray[np.complex128]
-    scale: float
+    z: NDArray[np.complex128]  # (n,) positions x + iy, in no particular gauge
+    scale: float  # c, with its sign
+    # what it cost
     factorisations: int
     solves: int
-    converged: bool
+    converged: bool  # whether position changes fell to the level that the conditioning allows
 
 
 def estimate_scale(piece: Piece, weights: NDArray) -> float:
@@ -99,21 +75,11 @@ def estimate_scale(piece: Piece, weights: NDArray) -> float:
 
 @dataclass(frozen=True)
 class _Estimate:
-    """What triangles say of c.
+    """What triangles say of c."""
 
-    Attributes
-    ----------
-    scale : float
-        Their median.
-    scatter : float
-        The range, relative, of the middle four fifths of them.
-    likely : float or None
-        What is probably right to all digits: what many of them say, as on grids, or 1.
-    """
-
-    scale: float
-    scatter: float
-    likely: float | None
+    scale: float  # their median
+    scatter: float  # the range, relative, of the middle four fifths of them
+    likely: float | None  # what is probably right to all digits: what many of them say, as on grids, or 1
 
 
 def _estimate(piece: Piece, weights: NDArray) -> _Estimate:
@@ -162,7 +128,6 @@ def conformal_map(
     *,
     scale: float | None = None,
     sharp: bool = True,
-    analyse: Callable[[UpperTriangle], Factorisation] = factorisation,
     options: ConformalOptions | None = None,
 ) -> ConformalMap:
     """Positions and scale of one piece.
@@ -177,8 +142,6 @@ def conformal_map(
         tried first, or c = 1 if their median allows it.
     sharp : bool
         Go on until z, not only c, has converged. A polish does not need that.
-    analyse : callable
-        Makes a factorisation from the pattern of :func:`~unassemble.planar.pencil.pencil_pattern`.
     options : ConformalOptions, optional
 
     Raises
@@ -201,7 +164,8 @@ def conformal_map(
         # The energy of a hat function; without it the pencil may be singular, which PARDISO does not survive.
         row = int(piece.vertices[np.argmin(sums)])
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
-    search = ShiftedSearch(ConformalPencil(piece, relative), analyse, options.krylov_steps)
+    pencil = ConformalPencil(piece.n_vertices, piece.edges, piece.boundary, relative)
+    search = ShiftedSearch(pencil, factorisation, options.krylov_steps)
     z = start = smooth_start(piece.n_vertices, piece.boundary, piece.loop_offsets)
     known = scale if scale is not None else estimate.likely
     if known is not None:
@@ -241,11 +205,7 @@ def smooth_start(n: int, boundary: NDArray, loop_offsets: NDArray) -> NDArray:
     or a hole. Without the ellipses on other loops than the longest, the inversion of a ring would hide the ring from
     the Krylov space. The noise breaks symmetries that would hide the answer from every such space.
 
-    Parameters
-    ----------
-    n : int
-    boundary, loop_offsets
-        As :class:`~unassemble.topology.Piece` has them.
+    `boundary` and `loop_offsets`: as :class:`~unassemble.topology.Piece` has them.
     """
     z = 0.01 * np.random.default_rng(0).standard_normal((n, 2)).view(np.complex128).ravel()
     length = np.diff(loop_offsets)

@@ -47,13 +47,7 @@ def left_by_all(
 
     Not finite at flat triangles.
 
-    Parameters
-    ----------
-    pieces : sequence of Piece
-    weights : (edges of the whole graph,) float64
-        -A_ij of each.
-    positions : sequence of (n,) complex128
-    scales : (pieces,) float64
+    `weights` (edges of the whole graph,): -A_ij of each; `positions` sequence of (n,); `scales` (pieces,).
     """
     c = np.repeat(scales, [len(piece.edge_rows) for piece in pieces])
     with np.errstate(all="ignore"):
@@ -91,10 +85,8 @@ def corner_gradients(u: NDArray, w: NDArray) -> tuple[NDArray, NDArray]:
 
     From gamma = arg(w / u), d cot(gamma) = -Im(dw / w - du / u) / sin(gamma)^2.
 
-    Returns
-    -------
-    at_u, at_w : complex128, of the shape of u
-        g with d cot / 2 = Re(g dz) for the ends of u and w; the corner itself has minus their sum.
+    Returns `at_u` and `at_w`: g with d cot / 2 = Re(g dz) for the ends of u and w; the corner itself has minus their
+    sum.
     """
     factor = 0.5j / _sine(u, w) ** 2
     return -factor / u, factor / w
@@ -103,10 +95,7 @@ def corner_gradients(u: NDArray, w: NDArray) -> tuple[NDArray, NDArray]:
 def weight_gradient(piece: Piece, z: NDArray) -> NDArray[np.complex128]:
     """Derivative of the weights: dw_e = Re sum_k g_ke dz_(v_ke) over the vertices v_ke of ``piece.stencil``.
 
-    Returns
-    -------
-    (4, e) complex128
-        Zero in the last row on the boundary; not finite at flat triangles.
+    Returns (4, e), zero in the last row on the boundary; not finite at flat triangles.
     """
     left, right = _sides(piece, z)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

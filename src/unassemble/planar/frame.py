@@ -89,11 +89,7 @@ def _ambiguity(axis: bool, x: bool, y: bool) -> str | None:
 def fit_similarity(z: NDArray, target: NDArray, *, mirror: bool = False) -> tuple[Similarity, float]:
     """Least-squares similarity from positions to targets, both (k,) complex with k >= 2.
 
-    Returns
-    -------
-    Similarity
-    float
-        Root mean square misfit.
+    Returns it and the root mean square misfit.
     """
     source = np.conj(z) if mirror else z
     a, b = source - source.mean(), target - target.mean()

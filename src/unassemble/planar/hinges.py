@@ -48,28 +48,6 @@ def join(
     return _joined(topology, joined, held)[0]
 
 
-def free_images(topology: Topology, joined: list[NDArray]) -> NDArray[np.int64]:
-    """Pieces in rings of which the mirror image meets the others as well: the matrix does not tell these apart.
-
-    Parameters
-    ----------
-    topology : Topology
-    joined : list of (n_p,) complex128
-        Positions by :func:`join`.
-    """
-    if rings(topology) <= 0 or len(joined) > _DENSE:
-        return np.empty(0, dtype=np.int64)
-    held = _held(groups(topology), np.zeros(len(joined), dtype=np.int64))
-    shared = [np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces]
-    free = []
-    for piece in np.flatnonzero(~held & (np.array(shared) > 1)):
-        turned = list(joined)
-        turned[piece] = np.conj(turned[piece])
-        if _joined(topology, turned, held)[1] <= ALIKE:
-            free.append(piece)
-    return np.array(free, dtype=np.int64)
-
-
 def gap(topology: Topology, positions: list[NDArray], closed: float = ALIKE) -> float:
     """How far apart the pieces stay at shared vertices when they are joined, relative to the largest piece.
 

@@ -19,13 +19,8 @@ _log = logging.getLogger(__name__)
 class ShiftedSearch:
     """Shift-and-invert Krylov steps on the pencil, in units in which c is near 1.
 
-    Parameters
-    ----------
-    pencil : ConformalPencil
-    analyse : callable
-        Makes a factorisation from the pencil's pattern; called once.
-    most_steps : int
-        Most solves with one factorisation.
+    `analyse`: makes a factorisation from the pencil's pattern; called once; `most_steps`: most solves with one
+    factorisation.
     """
 
     def __init__(
@@ -44,12 +39,7 @@ class ShiftedSearch:
     def at(self, shift: float, z: NDArray, steps: int | None = None) -> tuple[NDArray, float, float]:
         """Rayleigh-Ritz over the Krylov space of M(shift)^-1 T from z.
 
-        Returns
-        -------
-        z : (n,) complex128
-        c : float
-        spread : float
-            Relative change of c in the last step.
+        Returns `z` (n,); `spread`: relative change of c in the last step.
         """
         matrix = self._pencil.matrix(shift)
         factor = self._factor = self._factor or self._analyse(matrix)

@@ -33,12 +33,7 @@ class Jacobian(Protocol):
 class WeightJacobian:
     """J = dw / d(x, y) at given positions; displacements are complex (n,).
 
-    Parameters
-    ----------
-    piece : Piece
-    z : (n,) complex128
-    spread : (e,) float64, optional
-        Standard deviation of each weight, by which its row is divided.
+    `z` (n,); `spread` (e,): standard deviation of each weight, by which its row is divided.
     """
 
     def __init__(self, piece: Piece, z: NDArray, spread: NDArray | None = None):
@@ -72,11 +67,7 @@ class WeightJacobian:
 class NormalEquations:
     """Factorised J'J with some vertices held fixed, which pins the freedoms of a similarity, or of several.
 
-    Parameters
-    ----------
-    jacobian : Jacobian
-    pins : (k,) int
-        Vertices that stay where they are; the farther apart the better.
+    `pins` (k,): vertices that stay where they are; the farther apart the better.
     """
 
     def __init__(self, jacobian: Jacobian, pins: NDArray):

@@ -11,8 +11,6 @@ is positive semidefinite for 0 <= s <= c; M(c) z = 0 exactly for similarities of
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,50 +18,23 @@ from ..linalg import UpperTriangle, upper_from_edges
 from ..topology.keys import contains, pair_keys
 
 
-class Outline(Protocol):
-    """What the pencil needs to know of a piece."""
-
-    @property
-    def n_vertices(self) -> int:
-        """Number of vertices."""
-
-    @property
-    def edges(self) -> NDArray[np.int64]:
-        """(e, 2) pairs i < j in lexicographic order."""
-
-    @property
-    def boundary(self) -> NDArray[np.int64]:
-        """(b, 2) directed edges with the mesh on their left."""
-
-
-def pencil_pattern(n: int, edges: NDArray) -> UpperTriangle:
-    """The pattern of M(s) on a piece of these edges, (e, 2) in lexicographic order: those with weight or on its rim."""
-    edges = edges[edges[:, 1] < n - 1]  # the pinned vertex is the higher end of all its edges
-    return upper_from_edges(n - 1, edges, np.zeros(len(edges), np.complex128), np.zeros(n - 1))
-
-
 class ConformalPencil:
     """M(s) with the last vertex pinned at zero, which removes the constants from its null space.
 
-    Parameters
-    ----------
-    piece : Outline
-        A piece, for instance.
-    weights : (e,) float64
-        c w = -A_ij of each edge.
-    strength : (b,) float64, optional
-        Factors of the boundary edges, such that those that enter a vertex add up to those that leave it; 1 by default.
+    Of n vertices; `edges` (e, 2): pairs i < j in lexicographic order; `boundary` (b, 2): directed edges with the mesh
+    on their left; `weights` (e,): c w = -A_ij of each edge; `strength` (b,): factors of the boundary edges, such that
+    those that enter a vertex add up to those that leave it; 1 by default.
     """
 
-    def __init__(self, piece: Outline, weights: NDArray, strength: NDArray | None = None):
-        self.n = piece.n_vertices
-        self._strength = np.ones(len(piece.boundary)) if strength is None else strength
-        self.tail, self.head = piece.boundary.T
+    def __init__(self, n: int, edges: NDArray, boundary: NDArray, weights: NDArray, strength: NDArray | None = None):
+        self.n = n
+        self._strength = np.ones(len(boundary)) if strength is None else strength
+        self.tail, self.head = boundary.T
         # An edge without weight has no entries, unless it lies on the boundary: diagonals of undivided cells.
         used = weights != 0
         if not used.all():
-            used |= contains(np.sort(pair_keys(self.n, *piece.boundary.T)), pair_keys(self.n, *piece.edges.T))
-        edges, weights = piece.edges[used], weights[used]
+            used |= contains(np.sort(pair_keys(n, *boundary.T)), pair_keys(n, *edges.T))
+        edges, weights = edges[used], weights[used]
         self._low, self._high = (np.ascontiguousarray(end) for end in edges.T)
         self._half_weights = weights / 2
         diagonal = np.bincount(edges.ravel(), np.repeat(weights, 2), self.n)

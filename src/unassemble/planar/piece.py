@@ -2,50 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SolverError
-from ..linalg import Factorisation, UpperTriangle
 from ..tolerances import LARGEST_NOISE, LAST_DIGITS, SIGMAS
 from ..topology import Piece
 from .cautious import CautiousOptions, cautious_polish, count_flipped
 from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
-from .hinged import Hinged
 from .polish import PolishedMesh, errors_of_one_size, polish
-from .robust import ASIDE
-from .side_by_side import SideBySide
 
 
 @dataclass(frozen=True, eq=False)
 class PieceMesh:
-    """Positions of a piece in the frame in which they were found.
+    """Positions of a piece in the frame in which they were found."""
 
-    Attributes
-    ----------
-    z : (n,) complex128
-    scale : float
-    notes : tuple of str
-        Stages that did not converge.
-    spread : (e,) float64 or None
-        Standard deviations of the entries' errors, up to a common factor, for which z is the least-squares solution;
-        all equal by default.
-    doubt : float
-        About the error of z relative to its extent, where a polish came to no end for reasons of conditioning.
-    aside : (k,) int64 or None
-        Edges whose entries are wrong and have no part in the fit, see :mod:`unassemble.planar.robust`.
-    """
-
-    z: NDArray[np.complex128]
+    z: NDArray[np.complex128]  # (n,)
     scale: float
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # stages that did not converge
+    # (e,) standard deviations of the entries' errors, up to a common factor, for which z is the least-squares solution;
+    # all equal by default
     spread: NDArray[np.float64] | None = None
+    # about the error of z relative to its extent, where a polish came to no end for reasons of conditioning
     doubt: float = 0.0
-    aside: NDArray[np.int64] | None = None
 
 
 def positions(
@@ -54,10 +36,9 @@ def positions(
     *,
     scale: float | None,
     sharp: bool,
-    analyse: Callable[[UpperTriangle], Factorisation],
 ) -> PieceMesh:
     """Conformal solve; `sharp` where no polish follows."""
-    found = conformal_map(piece, weights, scale=scale, sharp=sharp, analyse=analyse)
+    found = conformal_map(piece, weights, scale=scale, sharp=sharp)
     notes = () if found.converged else ("the conformal solve did not converge",)
     return PieceMesh(found.z, found.scale, notes)
 
@@ -70,7 +51,7 @@ def brought_near(piece: Piece, weights: NDArray, mesh: PieceMesh, *, scale: floa
     if _fits_roughly(piece, weights, mesh.z, mesh.scale):
         return mesh
     try:
-        found = _polished(piece, weights, mesh.z, scale, None, None)
+        found = _polished(piece, weights, mesh.z, scale, None)
     except SolverError:
         return mesh
     near = found.converged and _fits_roughly(piece, weights, found.z, found.scale)
@@ -94,14 +75,12 @@ def refined(
     scale: float | None,
     rounding: bool,
     noise: NDArray[np.float64] | None = None,
-    pins: NDArray[np.int64] | None = None,
 ) -> PieceMesh:
     """Gauss-Newton polish; where it cannot be done the mesh stays as it is, with a note.
 
     `noise`, (e,), are standard deviations of the entries' errors, up to a common factor, all equal by default. With
     `rounding`, errors are taken to be those of assembly in floating-point arithmetic, unless the misfit is beyond that
-    and more likely to be such noise. Without it the noise is known, and tested: entries set aside count as any other.
-    `pins` are as for the polish.
+    and more likely to be such noise. Without it the noise is known, and tested.
     """
     noise = None if noise is None or (noise == 1).all() else noise
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -109,19 +88,15 @@ def refined(
     if flat:
         return replace(mesh, notes=(*mesh.notes, "no polish: triangles are flat"))
     spread = weight_roundings(piece, mesh.z) if rounding else noise
-    if rounding and mesh.aside is not None:  # fitted as what they should have been, or what they are counts as noise
-        weights, noise = weights.copy(), _set_aside(mesh.aside, len(weights), noise)
-        weights[mesh.aside] = mesh.scale * edge_weights(piece, mesh.z)[mesh.aside]
-        spread = _set_aside(mesh.aside, len(weights), spread)
     try:
-        found = _polished(piece, weights, mesh.z, scale, spread, pins)
+        found = _polished(piece, weights, mesh.z, scale, spread)
         if (
             rounding
             and spread is not None
             and errors_of_one_size(weights / found.scale - edge_weights(piece, found.z), spread)
         ):
             spread = noise
-            found = _polished(piece, weights, found.z, scale, spread, pins)
+            found = _polished(piece, weights, found.z, scale, spread)
     except SolverError as error:
         shortest = _shortest(piece, mesh.z)
         too_far = f"the start is too far off, with edges of {shortest:.0e} of its size"
@@ -129,63 +104,9 @@ def refined(
     if not (np.isfinite(found.z).all() and np.isfinite(found.scale)):
         return replace(mesh, notes=(*mesh.notes, "the polish did not stay finite and was left out"))
     if found.converged:
-        return PieceMesh(found.z, found.scale, mesh.notes, spread, aside=mesh.aside)
+        return PieceMesh(found.z, found.scale, mesh.notes, spread)
     note = f"the polish did not converge: its last step moved points by {found.last_step:.0e} of the size"
-    return PieceMesh(found.z, found.scale, (*mesh.notes, note), spread, found.last_step, mesh.aside)
-
-
-def refined_together(
-    pieces: Sequence[Piece],
-    weights: NDArray,
-    meshes: Sequence[PieceMesh],
-    joined: Hinged | None,
-    scale: float | None,
-    *,
-    rounding: bool,
-    noise: NDArray[np.float64],
-) -> list[PieceMesh] | None:
-    """Polish several pieces with a single c; None if that does not converge.
-
-    Parameters
-    ----------
-    pieces : sequence of Piece
-    weights : (e,) float64
-        -A_ij of each edge of the whole graph.
-    meshes : sequence of PieceMesh
-        Starts.
-    joined : Hinged or None
-        The pieces, where rings of them hold each other; without it each has a similarity of its own.
-    scale : float, optional
-        c, where it is known.
-    rounding : bool
-        As for :func:`refined`.
-    noise : (e,) float64
-        Of the entries of the whole graph, as for :func:`refined`.
-    """
-    beside = SideBySide.of(pieces, [mesh.z for mesh in meshes])
-    union = joined or beside
-    aside = [first + mesh.aside for first, mesh in zip(beside.edges, meshes, strict=False) if mesh.aside is not None]
-    notes = tuple(dict.fromkeys(note for mesh in meshes for note in mesh.notes))
-    start = PieceMesh(union.z, meshes[0].scale, notes, aside=np.concatenate(aside) if aside else None)
-    rows = union.piece.edge_rows
-    found = refined(
-        union.piece, weights[rows], start, scale=scale, rounding=rounding, noise=noise[rows], pins=union.pins
-    )
-    if found.notes != notes:
-        return None
-    spreads = [None] * len(pieces) if found.spread is None else beside.split(found.spread, beside.edges)
-    positions = [found.z[own] for own in joined.local] if joined else beside.split(found.z, beside.vertices)
-    return [
-        PieceMesh(z, found.scale, found.notes, spread, found.doubt, mesh.aside)
-        for z, spread, mesh in zip(positions, spreads, meshes, strict=True)
-    ]
-
-
-def _set_aside(edges: NDArray[np.int64], count: int, spread: NDArray | None) -> NDArray[np.float64]:
-    """The standard deviations with those of some edges beyond all others."""
-    spread = np.ones(count) if spread is None else spread.copy()
-    spread[edges] *= ASIDE
-    return spread
+    return PieceMesh(found.z, found.scale, (*mesh.notes, note), spread, found.last_step)
 
 
 def _polished(
@@ -194,18 +115,17 @@ def _polished(
     start: NDArray,
     scale: float | None,
     spread: NDArray | None,
-    pins: NDArray[np.int64] | None,
 ) -> PolishedMesh:
     """By the chord iteration; where it fails, by small steps from the better of start and result.
 
     Rounding in the normal equations of long thin pieces is one reason to fail.
     """
     try:
-        found = polish(piece, weights, start, scale=scale, spread=spread, pins=pins)
+        found = polish(piece, weights, start, scale=scale, spread=spread)
     except SolverError:  # steps that led to flat triangles; small ones do not
         if piece.n_vertices > CautiousOptions().most_vertices:
             raise
-        return cautious_polish(piece, weights, start, scale=scale, spread=spread, pins=pins)
+        return cautious_polish(piece, weights, start, scale=scale, spread=spread)
     finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
     flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
     if found.converged and not flipped:
@@ -213,7 +133,7 @@ def _polished(
     if piece.n_vertices > CautiousOptions().most_vertices:
         return found
     nearest = found.z if flipped <= count_flipped(piece, start) else start
-    again = cautious_polish(piece, weights, nearest, scale=scale, spread=spread, pins=pins)
+    again = cautious_polish(piece, weights, nearest, scale=scale, spread=spread)
     return again if again.residual < found.residual or not finite else found
 
 

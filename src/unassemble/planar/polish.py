@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from ..tolerances import LAST_DIGITS, ROUNDED
 from ..topology import Piece
 from .cotangent import edge_weights
-from .iterative import IterativeNormalEquations
 from .normal import Jacobian, NormalEquations, WeightJacobian, distant_pair
 
 _log = logging.getLogger(__name__)
@@ -26,31 +25,16 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class PolishOptions:
-    """Settings of the iteration; lengths are relative to the mesh's extent.
-
-    Attributes
-    ----------
-    max_steps, max_factorisations : int
-    tolerance : float
-        The iteration ends when the next step is expected to be below this.
-    rounding : float
-        Below this a step that does not contract is taken for rounding.
-    contraction : float
-        A step longer than this times the one before asks for a new factorisation.
-    settled : float
-        The iteration also ends when a step changes the fitted weights by less than this times the noise that the misfit
-        shows: the mesh then moves by as small a part of its error bars.
-    direct_limit : int
-        Up to this many vertices J'J is factorised; above, conjugate gradients take a tenth of the memory.
-    """
+    """Settings of the iteration; lengths are relative to the mesh's extent."""
 
     max_steps: int = 40
     max_factorisations: int = 8
-    tolerance: float = 5e-16
-    rounding: float = 1e-10
-    contraction: float = 0.2
+    tolerance: float = 5e-16  # the iteration ends when the next step is expected to be below this
+    rounding: float = 1e-10  # below this a step that does not contract is taken for rounding
+    contraction: float = 0.2  # a step longer than this times the one before asks for a new factorisation
+    # the iteration also ends when a step changes the fitted weights by less than this times the noise that the misfit
+    # shows: the mesh then moves by as small a part of its error bars
     settled: float = 1e-3
-    direct_limit: int = 1_500_000
 
 
 SHORT = PolishOptions(max_steps=8, max_factorisations=3)
@@ -59,27 +43,15 @@ SHORT = PolishOptions(max_steps=8, max_factorisations=3)
 
 @dataclass(frozen=True, eq=False)
 class PolishedMesh:
-    """Result of :func:`polish`.
+    """Result of :func:`polish`."""
 
-    Attributes
-    ----------
-    z : (n,) complex128
-    scale : float
-    residual : float
-        Root of the sum of squares of (c w - a) / s.
-    steps, factorisations : int
-    converged : bool
-        Whether steps fell to rounding level.
-    last_step : float
-        Length of the last step that was computed, relative to the mesh's extent: about the error that remains.
-    """
-
-    z: NDArray[np.complex128]
+    z: NDArray[np.complex128]  # (n,)
     scale: float
-    residual: float
+    residual: float  # root of the sum of squares of (c w - a) / s
     steps: int
     factorisations: int
-    converged: bool
+    converged: bool  # whether steps fell to rounding level
+    # length of the last step that was computed, relative to the mesh's extent: about the error that remains
     last_step: float
 
 
@@ -115,7 +87,6 @@ def polish(
     *,
     scale: float | None = None,
     spread: NDArray | None = None,
-    pins: NDArray | None = None,
     options: PolishOptions | None = None,
 ) -> PolishedMesh:
     """Improve positions to the level that the entries allow.
@@ -133,35 +104,28 @@ def polish(
     spread : (e,) float64, optional
         Standard deviations of the errors of a up to a common factor, for instance
         :func:`~unassemble.planar.cotangent.weight_roundings`; of one size by default.
-    pins : (k,) int, optional
-        Vertices that are held, two of each part where the piece falls apart; by default two that are far apart.
     options : PolishOptions, optional
     """
     options = options or PolishOptions()
     extent = np.abs(z - z.mean()).max()
     z = (z - z.mean()) / extent
-    pins = distant_pair(z) if pins is None else pins
+    pins = distant_pair(z)
     spread = np.ones(len(weights)) if spread is None else spread
     model = Cotangents(drawn) if isinstance(drawn, Piece) else drawn
     problem = Problem(model, weights, spread, scale)
     fit = problem.at(z)
     equations: NormalEquations | None = None
-    system: GaussNewton | IterativeGaussNewton | None = None
+    system: GaussNewton | None = None
     factorisations, steps, length, converged = 0, 0, np.inf, False
     while steps < options.max_steps and not converged:
         jacobian = model.jacobian(fit.z, spread)
         fresh = system is None
         if system is None:
-            fitted = fit.weights if scale is None else None
-            if not (isinstance(drawn, Piece) and len(z) > options.direct_limit):
-                if equations is None:
-                    equations = NormalEquations(jacobian, pins)
-                else:
-                    equations.renew(jacobian)
-                system = GaussNewton(jacobian, equations, fitted)
+            if equations is None:
+                equations = NormalEquations(jacobian, pins)
             else:
-                near = WeightJacobian(drawn, fit.z, spread)
-                system = IterativeGaussNewton(IterativeNormalEquations(drawn, near, fit.z, fitted))
+                equations.renew(jacobian)
+            system = GaussNewton(jacobian, equations, fit.weights if scale is None else None)
             factorisations += 1
         move = system(jacobian, fit.misfit)
         previous, length = length, float(np.abs(move).max())
@@ -169,8 +133,6 @@ def polish(
         if slow and length > options.rounding and not fresh:
             if factorisations == options.max_factorisations:
                 break
-            if isinstance(system, IterativeGaussNewton):
-                system.release()
             system, length = None, np.inf
             continue
         better = downhill(problem, fit, move)
@@ -184,8 +146,8 @@ def polish(
         if better is None and not converged:
             break
         fit = better or fit
-    if system is not None:
-        system.release()
+    if equations is not None:
+        equations.release()
     return PolishedMesh(fit.z * extent, fit.scale, fit.norm, steps, factorisations, converged, length)
 
 
@@ -194,12 +156,7 @@ def errors_of_one_size(misfit: NDArray, spread: NDArray) -> bool:
 
     Both likelihoods are at their greatest over the common factor.
 
-    Parameters
-    ----------
-    misfit : (e,) float64
-        a / c - w.
-    spread : (e,) float64
-        Rounding errors, in units of the machine precision.
+    `misfit` (e,): a / c - w; `spread` (e,): rounding errors, in units of the machine precision.
     """
     even, uneven = (float(np.linalg.norm(r)) / np.sqrt(len(r)) for r in (misfit, misfit / spread))
     if not (np.isfinite(uneven) and uneven > ROUNDED):
@@ -254,23 +211,10 @@ def downhill(problem: Problem, fit: Fit, move: NDArray) -> Fit | None:
     return None
 
 
-class Equations(Protocol):
-    """The linearised problem without the scale."""
-
-    def renew(self, jacobian: Jacobian) -> None:
-        """Factorise anew for other positions."""
-
-    def fitted(self, jacobian: Jacobian, change: NDArray) -> NDArray:
-        """Displacement d (n,) complex that explains a change (e,) of the weights best: least |J d - r|."""
-
-    def release(self) -> None:
-        """Give the memory of the factor back."""
-
-
 class GaussNewton:
     """Steps of the linearised problem min |J d + g w - r| over displacements d and log-scale g."""
 
-    def __init__(self, jacobian: Jacobian, equations: Equations, weights: NDArray | None):
+    def __init__(self, jacobian: Jacobian, equations: NormalEquations, weights: NDArray | None):
         self._equations = equations
         self._weights = weights  # None where the scale is known
         if weights is not None:
@@ -286,22 +230,3 @@ class GaussNewton:
             return move
         log_scale = float(self._weights @ (misfit - jacobian.forward(move))) / self._complement
         return move - log_scale * self._response
-
-    def release(self) -> None:
-        """Give the memory of the factor back."""
-        self._equations.release()
-
-
-class IterativeGaussNewton:
-    """The same steps: conjugate gradients take the scale along."""
-
-    def __init__(self, equations: IterativeNormalEquations):
-        self._equations = equations
-
-    def __call__(self, jacobian: Jacobian, misfit: NDArray) -> NDArray:
-        """Displacement d (n,) complex; the best scale has left nothing of w in the misfit."""
-        return self._equations.solve(jacobian.transpose(misfit))
-
-    def release(self) -> None:
-        """Give the memory of the factor back."""
-        self._equations.release()

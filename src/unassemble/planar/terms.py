@@ -17,53 +17,31 @@ from ..errors import SolverError
 from ..topology import Piece
 from .cotangent import cotangent, edge_weights
 from .normal import NormalEquations, WeightJacobian, distant_pair
-from .polish import PolishOptions
-from .suspects import Complement
 
 MASS, COEFFICIENT, ONE_SIGN = "mass", "coefficient", "one sign"
 
 
 @dataclass(frozen=True)
 class Term:
-    """A term that explains a misfit.
+    """A term that explains a misfit."""
 
-    Attributes
-    ----------
-    name : {"mass", "coefficient", "one sign"}
-        Entries of a mass matrix; of a coefficient that varies in space; all off by one number. Densities and
-        coefficients are quadratic polynomials.
-    share : float
-        Part of the sum of squares that it explains.
-    probability : float
-        That independent normal errors have as much in common with all the terms looked for.
-    """
-
+    # {"mass", "coefficient", "one sign"} entries of a mass matrix; of a coefficient that varies in space; all off by
+    # one number. Densities and coefficients are quadratic polynomials.
     name: str
-    share: float
-    probability: float
+    share: float  # part of the sum of squares that it explains
+    probability: float  # that independent normal errors have as much in common with all the terms looked for
 
 
 def lacking_term(
     piece: Piece, weights: NDArray, z: NDArray, scale: float, spread: NDArray | None, *, free_scale: bool
 ) -> Term | None:
-    """The term that explains most of a misfit; None where there are too few entries to spare, or too many vertices.
+    """The term that explains most of a misfit; None where there are too few entries to spare.
 
-    Parameters
-    ----------
-    piece : Piece
-    weights : (e,) float64
-        -A_ij.
-    z : (n,) complex128
-        The fitted mesh.
-    scale : float
-        c.
-    spread : (e,) float64, optional
-        Standard deviations of the weights up to a factor; 1 by default.
-    free_scale : bool
-        Whether c was fitted.
+    `weights` (e,): -A_ij; `z` (n,): the fitted mesh; `scale`: c; `spread` (e,): standard deviations of the weights up
+    to a factor; 1 by default; `free_scale`: whether c was fitted.
     """
     freedom = len(weights) - 2 * piece.n_vertices + 4 - free_scale
-    if freedom < 3 or piece.n_vertices > PolishOptions().direct_limit:
+    if freedom < 3:
         return None
     names, terms = _terms(piece, z)
     count = min(len(names), freedom // 3)  # of few entries the first ones only
@@ -75,7 +53,7 @@ def lacking_term(
     try:
         jacobian = WeightJacobian(piece, z, spread)
         equations = NormalEquations(jacobian, distant_pair(z))
-        rest = Complement(jacobian, equations, fitted if free_scale else None)
+        rest = _Complement(jacobian, equations, fitted if free_scale else None)
         both = rest(np.column_stack([weights / scale / spread - fitted, terms]))
         equations.release()
     except SolverError:
@@ -122,3 +100,27 @@ def _terms(piece: Piece, z: NDArray) -> tuple[NDArray, NDArray[np.float64]]:
     varying = [summed(halves * factor[:, None]) for factor in powers]
     names = np.array([*([MASS] * len(mass)), *([COEFFICIENT] * len(varying)), ONE_SIGN])
     return names, np.column_stack([*mass, *varying, np.ones(len(piece.edges))])
+
+
+class _Complement:
+    """The projector I - H off what displacements, and a change of scale, can explain."""
+
+    def __init__(self, jacobian: WeightJacobian, equations: NormalEquations, weights: NDArray | None):
+        self._jacobian, self._equations = jacobian, equations
+        self._direction = None
+        if weights is not None:
+            rest = self._off_range(weights[:, None])[:, 0]
+            size = float(np.linalg.norm(rest))
+            self._direction = rest / size if size > 0 else None
+
+    def __call__(self, changes: NDArray) -> NDArray:
+        """(e, k) -> (e, k)."""
+        changes = self._off_range(changes)
+        if self._direction is None:
+            return changes
+        return changes - self._direction[:, None] * (self._direction @ changes)
+
+    def _off_range(self, changes: NDArray) -> NDArray:
+        gradients = np.column_stack([self._jacobian.transpose(column) for column in changes.T])
+        moves = self._equations.solve(gradients)
+        return changes - np.column_stack([self._jacobian.forward(np.ascontiguousarray(move)) for move in moves.T])

@@ -30,49 +30,24 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class MetricOptions:
-    """Settings of the iteration.
+    """Settings of the iteration."""
 
-    Attributes
-    ----------
-    steps, patience : int
-        The iteration ends after so many steps, or when as many as the second have not lowered the residual by a fifth.
-    damping : float
-        The first; relative to the diagonal of the normal equations.
-    nearly : float
-        Share of the way to a flat triangle that a step may go.
-    tolerance : float
-        Root mean square of the equations' residuals at which nothing but rounding is left.
-    """
-
+    # the iteration ends after so many steps, or when as many as the second have not lowered the residual by a fifth
     steps: int = 400
     patience: int = 25
-    damping: float = 1e-2
-    nearly: float = 0.9
-    tolerance: float = 1e-15
+    damping: float = 1e-2  # the first; relative to the diagonal of the normal equations
+    nearly: float = 0.9  # share of the way to a flat triangle that a step may go
+    tolerance: float = 1e-15  # root mean square of the equations' residuals at which nothing but rounding is left
 
 
 @dataclass(frozen=True, eq=False)
 class MetricFit:
-    """Result of :func:`fit_metric`.
+    """Result of :func:`fit_metric`."""
 
-    Attributes
-    ----------
-    metric : Metric
-        In units of length in which s = 1.
-    scale : float
-        c.
-    residual : float
-        Root mean square of the equations' residuals: cosines, and relative areas.
-    steps : int
-    held : bool
-        Whether at its end flat triangles were in the way: no minimum then.
-    """
-
-    metric: Metric
-    scale: float
-    residual: float
+    metric: Metric  # in units of length in which s = 1
+    scale: float  # c
+    residual: float  # root mean square of the equations' residuals: cosines, and relative areas
     steps: int
-    held: bool
 
 
 def _cosine(x: NDArray) -> NDArray[np.float64]:
@@ -135,7 +110,6 @@ def fit_metric(
     sums: NDArray,
     trust: NDArray,
     options: MetricOptions | None = None,
-    start: MetricFit | None = None,
 ) -> MetricFit | None:
     """The metric and the factor c with which a mesh has these entries; None where the iteration breaks down.
 
@@ -150,13 +124,11 @@ def fit_metric(
     trust : (n,) float64
         Weights of the row sums, relative to those of entries: less than 1 where they have lost digits.
     options : MetricOptions, optional
-    start : MetricFit, optional
-        Where to begin; with circles about the vertices unless told.
     """
     options = options or MetricOptions()
     equations = Equations(skeleton, entries, sums, trust)
     with np.errstate(all="ignore"):  # of a misfit that is not finite nothing comes
-        metric, c = (start.metric, start.scale) if start else equations.start()
+        metric, c = equations.start()
         try:
             return _descended(equations, metric, c, options) if c else None
         except SolverError:
@@ -191,7 +163,7 @@ def _descended(equations: Equations, metric: Metric, c: float, options: MetricOp
         settled = not stopped and left > 0.5 * before and left < 1e-9 * root
         if left < options.tolerance * root or settled:
             break
-    return MetricFit(metric, c, float(np.linalg.norm(residual)) / root, step, stopped > 0)
+    return MetricFit(metric, c, float(np.linalg.norm(residual)) / root, step)
 
 
 def _solved(derivative: sp.csr_array, by_c: NDArray, residual: NDArray, damping: float) -> tuple[NDArray, float]:

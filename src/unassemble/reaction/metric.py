@@ -9,50 +9,33 @@ For squared sides u_0, u_1, u_2 of a triangle of area a, and g_k half the cotang
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..errors import SolverError
+from ..linalg.normal import NormalEquations
 from ..topology import Piece
 from ..topology.together import Together
 
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """Triangles glued along edges; no orientation or planarity is needed.
+    """Triangles glued along edges; no orientation or planarity is needed."""
 
-    Attributes
-    ----------
-    n : int
-        Number of vertices.
-    edges : (e, 2) int64
-    triangles : (m, 3) int64
-        Vertices.
-    opposite : (m, 3) int64
-        The edge that faces each corner.
-    """
-
-    n: int
-    edges: NDArray[np.int64]
-    triangles: NDArray[np.int64]
-    opposite: NDArray[np.int64]
+    n: int  # number of vertices
+    edges: NDArray[np.int64]  # (e, 2)
+    triangles: NDArray[np.int64]  # (m, 3) vertices
+    opposite: NDArray[np.int64]  # (m, 3) the edge that faces each corner
 
     @classmethod
     def of(cls, n: int, edges: NDArray, pieces: Sequence[Piece]) -> Skeleton:
         """Pieces of a graph, in its numbering."""
         union = Together(pieces)
         return cls(n, edges, union.vertices[union.triangles], union.edge_rows[union.opposite])
-
-    def without(self, triangle: int) -> Skeleton:
-        """All triangles but one."""
-        return replace(
-            self,
-            triangles=np.delete(self.triangles, triangle, axis=0),
-            opposite=np.delete(self.opposite, triangle, axis=0),
-        )
 
     @cached_property
     def sides(self) -> NDArray[np.int64]:
@@ -146,3 +129,24 @@ class Metric:
             root = np.sqrt(b * b - a * c)  # not a number where the area never vanishes
             ends = np.column_stack([c / (root - b), c / (-root - b), -u / d])
         return np.asarray(np.where(ends > 0, ends, np.inf).min(axis=1))
+
+
+def areas_of_mass(skeleton: Skeleton, entries: NDArray, diagonal: NDArray) -> NDArray[np.float64] | None:
+    """(m,) s times the area of each triangle, by least squares; None where they are not determined.
+
+    s M has s a / 12 from every triangle on each of its edges, and s a / 6 at each of its corners.
+
+    `entries` (e,): A_ij; `diagonal` (n,).
+    """
+    matrix = sp.csr_array(sp.vstack([skeleton.at_edges / 12, skeleton.at_vertices / 6]))
+    given = np.concatenate([entries, diagonal])
+    size = 1 / np.maximum(np.abs(given), np.finfo(float).tiny)  # graded meshes: all to the same number of digits
+    weighted = sp.csr_array(sp.diags_array(size) @ matrix)
+    try:
+        equations = NormalEquations(weighted)
+    except SolverError:
+        return None
+    areas = equations.solve(size * given)
+    areas = areas + equations.solve(size * given - weighted @ areas)
+    equations.release()
+    return np.asarray(areas)

@@ -2,50 +2,34 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..certify import Certificate
-from ..errors import SolverError
-from ..planar.cautious import CautiousOptions
 from ..planar.cotangent import edge_weights, weight_roundings
-from ..planar.piece import PieceMesh
-from ..planar.robust import differences_without
-from ..planar.suspects import find_suspects
 from ..planar.terms import Term, lacking_term
-from ..tolerances import CERTIFIED, CHANCE, LARGEST_NOISE, LITTLE, NOISY, SUMMED
-from ..topology import Piece
+from ..tolerances import CERTIFIED, CHANCE, LARGEST_NOISE, SUMMED
 from .solving import Solved
-from .wrong_entries import settled
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What can be said about a misfit beyond its size.
+    """What can be said about a misfit beyond its size."""
 
-    Attributes
-    ----------
-    noise : float or None
-        Standard deviation of independent errors of one size in the entries that would leave this misfit; None where
-        there are no more entries than unknowns, and where the misfit is no noise.
-    suspects : (k, 2) int64
-        Entries without which a mesh fits all others, as well as right entries are fitted.
-    certain : bool
-        Whether that few entries explain nearly all of the misfit cannot be chance.
-    term : Term or None
-        A term that the model lacks, where it cannot be chance that it explains so much of the misfit.
-    """
-
+    # standard deviation of independent errors of one size in the entries that would leave this misfit; None where there
+    # are no more entries than unknowns, and where the misfit is no noise
     noise: float | None
-    suspects: NDArray[np.int64]
-    certain: bool
+    suspects: NDArray[np.int64]  # (k, 2) entries that hold much of the misfit, which cannot be chance
+    # a term that the model lacks, where it cannot be chance that it explains so much of the misfit
     term: Term | None = None
 
 
 NONE = np.empty((0, 2), dtype=np.int64)
+
+_SPARE = 10  # entries beyond the unknowns, of fewer chance may give one much of the misfit
+_OF_ALL, _OF_MEAN = 0.15, 25.0  # squared misfit of an entry that stands out: of the sum, and in units of the mean
 
 
 def weigh(solved: Solved, certificate: Certificate, *, free_scale: bool, search: bool) -> Evidence:
@@ -55,13 +39,11 @@ def weigh(solved: Solved, certificate: Certificate, *, free_scale: bool, search:
     """
     freedom = solved.freedom(free_scale=free_scale)
     noise = _norm(certificate.differences) / float(np.sqrt(freedom)) if freedom > 0 else None
-    suspects, certain = NONE, False
-    if search and freedom > 1:
-        suspects, certain = _suspects(solved, free_scale=free_scale)
+    suspects = _standing_out(solved) if search else NONE
     term = None
     if noise and certificate.backward_error > CERTIFIED and not len(certificate.flipped):
         term = _term(solved, noise, free_scale=free_scale)
-    return Evidence(None if term else noise, suspects, certain, term)
+    return Evidence(None if term else noise, suspects, term)
 
 
 def _term(solved: Solved, noise: float, *, free_scale: bool) -> Term | None:
@@ -71,9 +53,8 @@ def _term(solved: Solved, noise: float, *, free_scale: bool) -> Term | None:
     found = []
     for piece, mesh in zip(solved.topology.pieces, solved.meshes, strict=True):
         weights = -solved.matrix.entries[piece.edge_rows]
-        if mesh.aside is None:
-            term = lacking_term(piece, weights, mesh.z, mesh.scale, mesh.spread, free_scale=free_scale)
-            found += [] if term is None else [term]
+        term = lacking_term(piece, weights, mesh.z, mesh.scale, mesh.spread, free_scale=free_scale)
+        found += [] if term is None else [term]
     least = min(found, key=lambda term: term.probability, default=None)
     return least if least and least.probability * len(found) < CHANCE else None
 
@@ -93,45 +74,23 @@ def _norm(values: NDArray) -> float:
     return largest * float(np.linalg.norm(values / largest)) if 0 < largest < np.inf else largest
 
 
-def _suspects(solved: Solved, *, free_scale: bool) -> tuple[NDArray[np.int64], bool]:
-    """Entries to blame: those without which all others fit, in all pieces; and whether few explain the misfit."""
-    matrix, topology, noise = solved.matrix, solved.topology, solved.noise
-    pairs, certain, explained = [], False, True
-    errors = None if noise is None else noise.sigma * noise.on(topology)
-    for piece, mesh in zip(topology.pieces, solved.meshes, strict=True):
-        if mesh.aside is not None:  # and all others fit
-            pairs.append(matrix.edges[piece.edge_rows[mesh.aside]])
-            certain = True
-            continue
-        weights = -matrix.entries[piece.edge_rows]
-        before = np.nan_to_num(weights - mesh.scale * edge_weights(piece, mesh.z), nan=np.inf)
-        if noise is None and _rounded(piece, mesh, before):
-            continue
-        found, own = None, None if errors is None else errors[piece.edge_rows]
-        if piece.n_vertices <= CautiousOptions().most_vertices:
-            spread = weight_roundings(piece, mesh.z) if noise is None else mesh.spread
-            with suppress(SolverError):  # flat triangles: nothing can be told apart there
-                found = find_suspects(piece, weights, mesh.z, mesh.scale, spread, free_scale=free_scale)
-        if found is None or found.log_p >= np.log(CHANCE):
-            explained = explained and _fitted(weights, before, own)
-            continue
-        certain = certain or (found.left < LITTLE**2 and found.size > SUMMED)
-        explained = explained and not np.isin(piece.edge_rows[found.edges], topology.vanished).any()  # these are exact
-        left = differences_without(piece, weights, mesh.z, mesh.scale, found.edges, free_scale=free_scale)
-        explained = explained and _fitted(weights, left, own) and bool(_norm(left) ** 2 < LITTLE * _norm(before) ** 2)
-        pairs.append(matrix.edges[piece.edge_rows[found.edges]])
-    return (np.concatenate(pairs) if pairs and explained else NONE), certain
+def _standing_out(solved: Solved) -> NDArray[np.int64]:
+    """(k, 2) at most one entry of each piece: that which holds much of the squared misfit, more than chance gives it.
 
-
-def _rounded(piece: Piece, mesh: PieceMesh, left: NDArray) -> bool:
-    """Whether a misfit is so small, where errors are as large as rounding makes them, that it proves nothing."""
-    with np.errstate(all="ignore"):  # flat triangles
-        return _norm(left / mesh.scale / weight_roundings(piece, mesh.z)) <= SUMMED
-
-
-def _fitted(weights: NDArray, differences: NDArray, errors: NDArray | None) -> bool:
-    """Whether differences are those of right cells: below what any wrong one leaves, or noise, known or not."""
-    if errors is not None:
-        return bool(_norm(differences / errors) <= NOISY * np.sqrt(len(differences)))
-    with np.errstate(over="ignore"):  # triangles that are nearly flat
-        return settled(np.abs(differences) / (np.abs(weights) + np.median(np.abs(weights))))
+    Of a wrong entry's error its own misfit is the part that the positions do not follow.
+    """
+    gone = np.zeros(len(solved.topology.edges), dtype=bool)
+    gone[solved.topology.vanished] = True  # these are exact
+    found = [NONE]
+    for piece, mesh in zip(solved.topology.pieces, solved.meshes, strict=True):
+        with np.errstate(all="ignore"):  # flat triangles
+            left = -solved.matrix.entries[piece.edge_rows] / mesh.scale - edge_weights(piece, mesh.z)
+            rounding = weight_roundings(piece, mesh.z)
+            squares = (left / (rounding if mesh.spread is None else mesh.spread)) ** 2
+            if piece.redundancy < _SPARE or (solved.noise is None and _norm(left / rounding) <= SUMMED):
+                continue
+        squares[gone[piece.edge_rows]] = 0.0
+        most = squares.max()
+        if np.isfinite(squares).all() and most > _OF_ALL * squares.sum() and most > _OF_MEAN * squares.mean():
+            found.append(solved.matrix.edges[piece.edge_rows[[squares.argmax()]]])
+    return np.concatenate(found)

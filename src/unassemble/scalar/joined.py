@@ -14,36 +14,17 @@ from ..topology.together import Together, reversed_within
 
 @dataclass(frozen=True, eq=False)
 class JoinedMesh:
-    """All pieces in the numbering of the matrix.
+    """All pieces in the numbering of the matrix."""
 
-    Attributes
-    ----------
-    points : (n, 2) float64
-        NaN for vertices of no piece.
-    triangles : (m, 3) int64
-        Counter-clockwise; those of divided polygons included.
-    triangle_piece : (m,) int64
-    in_polygon : (m,) bool
-        Triangles that are part of a polygon.
-    polygons : Polygons
-        Counter-clockwise.
-    component : (n,) int64
-        Piece of each point, the lowest at hinges, -1 for none.
-    scale : (number of pieces,) float64
-    boundary : (b, 2) int64
-        Directed edges with the mesh on their left, loop by loop.
-    boundary_offsets : (loops + 1,) int64
-    """
-
-    points: NDArray[np.float64]
-    triangles: NDArray[np.int64]
-    triangle_piece: NDArray[np.int64]
-    in_polygon: NDArray[np.bool_]
-    polygons: Polygons
-    component: NDArray[np.int64]
-    scale: NDArray[np.float64]
-    boundary: NDArray[np.int64]
-    boundary_offsets: NDArray[np.int64]
+    points: NDArray[np.float64]  # (n, 2) NaN for vertices of no piece
+    triangles: NDArray[np.int64]  # (m, 3) counter-clockwise; those of divided polygons included
+    triangle_piece: NDArray[np.int64]  # (m,)
+    in_polygon: NDArray[np.bool_]  # (m,) triangles that are part of a polygon
+    polygons: Polygons  # counter-clockwise
+    component: NDArray[np.int64]  # (n,) piece of each point, the lowest at hinges, -1 for none
+    scale: NDArray[np.float64]  # (number of pieces,)
+    boundary: NDArray[np.int64]  # (b, 2) directed edges with the mesh on their left, loop by loop
+    boundary_offsets: NDArray[np.int64]  # (loops + 1,)
 
     def fields(self, *, triangulate: bool = False) -> dict[str, Any]:
         """What every planar mesh's recovery says of cells, pieces and boundary; polygons in triangles on request."""

@@ -18,27 +18,14 @@ from ..topology.keys import pair_keys
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Independent errors of known size in the stored entries.
+    """Independent errors of known size in the stored entries."""
 
-    Attributes
-    ----------
-    sigma : float
-        Standard deviation of those of typical entries.
-    spread : (e,) float64
-        Standard deviations, over `sigma`.
-    digits : str or None
-        What the entries were rounded to; None where the noise was given.
-    repeats : float
-        How often an error occurs, in the mean over the entries: entries that are equal were rounded alike.
-    different : float
-        Share of the entries that are not equal to others.
-    """
-
-    sigma: float
-    spread: NDArray[np.float64]
-    digits: str | None = None
+    sigma: float  # standard deviation of those of typical entries
+    spread: NDArray[np.float64]  # (e,) standard deviations, over `sigma`
+    digits: str | None = None  # what the entries were rounded to; None where the noise was given
+    # how often an error occurs, in the mean over the entries: entries that are equal were rounded alike
     repeats: float = 1.0
-    different: float = 1.0
+    different: float = 1.0  # share of the entries that are not equal to others
 
     @classmethod
     def known(cls, matrix: OperatorMatrix, sigma: float | None) -> Noise | None:
@@ -83,26 +70,13 @@ class Noise:
 
 @dataclass(frozen=True)
 class NoiseTest:
-    """A misfit held against the errors that entries have.
-
-    Attributes
-    ----------
-    noise : Noise
-    freedom : int
-        Entries less fitted unknowns.
-    figures : dict
-        See :func:`unassemble.certify.chi_square_verdict`.
-    limit : float
-        Standard deviation of noise that drowns the cotangents.
-    worst : int
-        Where the misfit is largest.
-    """
+    """A misfit held against the errors that entries have."""
 
     noise: Noise
-    freedom: int
-    figures: dict[str, float]
-    limit: float
-    worst: int
+    freedom: int  # entries less fitted unknowns
+    figures: dict[str, float]  # see :func:`unassemble.certify.chi_square_verdict`
+    limit: float  # standard deviation of noise that drowns the cotangents
+    worst: int  # where the misfit is largest
 
     @classmethod
     def of(cls, noise: Noise, misfit: NDArray[np.float64], freedom: int, factors: NDArray[np.float64]) -> NoiseTest:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..matrix import OperatorMatrix
 from ..topology import Topology
 from ..words import count_of, words_of
 
@@ -18,7 +17,7 @@ def topology_notes(topology: Topology) -> list[str]:
     if len(topology.pieces) > 1:
         notes.append(
             f"{len(topology.pieces)} pieces: the matrix does not say how they lie relative to each other, "
-            "so each has a frame of its own"
+            "so each has a frame and a mirror image of its own"
         )
     if k := len(topology.hinges):
         notes.append(
@@ -43,22 +42,6 @@ def piece_notes(remarks: Sequence[Sequence[str]]) -> list[str]:
     return [f"{_pieces(labels)}: {remark}" for remark, labels in pieces.items()]
 
 
-def image_notes(topology: Topology, free: NDArray) -> list[str]:
-    """Pieces, by number, of which the mirror image fits as well."""
-    if len(free) == 1:
-        (label,) = free.tolist()
-        return [
-            f"piece {label}, of row {topology.pieces[label].vertices.min()}: its mirror image meets the other pieces "
-            "in the same vertices, and the matrix does not tell which of the two it is"
-        ]
-    if not len(free):
-        return []
-    return [
-        f"{_pieces(free.tolist())}: their mirror images meet the other pieces in the same vertices, and the matrix "
-        "does not tell which of the two each is"
-    ]
-
-
 def _pieces(labels: list[int]) -> str:
     return f"piece {labels[0]}" if len(labels) == 1 else f"{len(labels):,} pieces ({_some(np.array(labels))})"
 
@@ -80,27 +63,6 @@ def vanished_notes(topology: Topology) -> list[str]:
             + " no entry in the matrix"
         )
     return notes
-
-
-def origin_notes(matrix: OperatorMatrix, suspects: NDArray) -> list[str]:
-    """What the entries say of where the matrix may come from, where no mesh fits.
-
-    Row sums tell of unknowns that were taken out; not if the entries that stand out, (k, 2), are in all of these rows:
-    a wrong entry spoils two sums.
-    """
-    rest = np.flatnonzero(matrix.incomplete_rows)
-    if matrix.unweighted:
-        return [
-            "all entries are equal, as in the Laplacian of a graph without weights; on a mesh, entries on the boundary "
-            "have one triangle each and others two"
-        ]
-    if not len(rest) or np.isin(rest, suspects).all():
-        return []
-    return [
-        f"all rows add up to zero but for {len(rest):,}: {_some(rest)}; unknowns next to these seem to have been "
-        "eliminated, on a boundary for one, and entries still contain triangles whose vertices are gone: keep all rows "
-        "and columns"
-    ]
 
 
 def _some(rows: NDArray, count: int = 8) -> str:

@@ -46,25 +46,15 @@ def _converted(
 class Placement:
     """What is known of the true frame.
 
-    Attributes
-    ----------
-    anchors : tuple of (row, x, y)
-    tensor : ConstantTensor or None
-    direction : (row, row, degrees) or None
-        Angle, from the x axis, of the line from the first row's point to the second's.
-    handed : {"left", "right"} or None
-        On which side of that line (with two anchors: of the line from the first to the second) the centroid of
-        the piece lies.
-
-    Raises
-    ------
-    InputError
-        For values that contradict each other or themselves.
+    Raises InputError for values that contradict each other or themselves.
     """
 
-    anchors: tuple[Anchor, ...] = ()
+    anchors: tuple[Anchor, ...] = ()  # tuple of (row, x, y)
     tensor: ConstantTensor | None = None
+    # (row, row, degrees) angle, from the x axis, of the line from the first row's point to the second's
     direction: Direction | None = None
+    # {"left", "right"} or None on which side of that line (with two anchors: of the line from the first to the second)
+    # the centroid of the piece lies
     handed: str | None = None
 
     @property
@@ -125,16 +115,9 @@ class Placement:
     def apply(self, piece: Piece, z: NDArray, origin: complex = 0j) -> tuple[NDArray, list[str]]:
         """True positions of a piece, relative to a point, from its positions z (n,) in any frame of the Laplacian's.
 
-        Returns
-        -------
-        positions : (n,) complex128
-        notes : list of str
-            What is arbitrary, or does not fit.
+        Returns `positions` (n,); `notes`: what is arbitrary, or does not fit.
 
-        Raises
-        ------
-        InputError
-            If a tensor is to be undone and the orientation is not known.
+        Raises InputError if a tensor is to be undone and the orientation is not known.
         """
         rows, targets = self._anchors_of(piece)
         targets = targets - origin

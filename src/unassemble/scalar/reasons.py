@@ -27,6 +27,7 @@ _MANY = 50  # entries, of which it can be said what their misfit looks like
 _CHECK_MODEL = "see what `inspect_matrix` says the matrix is: a wrong model leaves a misfit everywhere"
 _ONE_COEFFICIENT = "see whether a coefficient varies from cell to cell, the surface is curved or it is a network"
 _KEEP_ROWS = "keep the rows and columns of all unknowns, those on the boundary too: some rows do not add up to zero"
+_LEAVE_SCALE = "leave out `scale`: it is found where it is not given"
 _GIVE_NOISE = "if the entries are measured, give the standard deviation of their errors as `noise`"
 
 
@@ -38,6 +39,7 @@ def misfit(f: Findings, notes: Sequence[str]) -> Reason:
         return Reason.of(f"{parts} no mesh: {topology.failures[0]}", advice=_CHECK_MODEL)
     without = f.stored.incomplete_rows.any()
     model = _KEEP_ROWS if without else _ONE_COEFFICIENT if _adds_up(f.stored) else _CHECK_MODEL
+    model = _LEAVE_SCALE if f.known_scale else model
     bare = topology.bare_edges[f.solved.matrix.entries[topology.bare_edges] != 0]
     if len(bare):
         i, j = topology.edges[bare[0]]
@@ -48,9 +50,9 @@ def misfit(f: Findings, notes: Sequence[str]) -> Reason:
         return Reason.of("the mesh has triangles that are flat, or points that are not finite", advice=model)
     if len(certificate.flipped):
         return Reason.of(_turned_over(topology, certificate), *notes, advice=model)
-    if evidence.term:
-        return lacking(f, evidence.term)
     differs = _differs(certificate)
+    if evidence.term and not f.known_scale:
+        return lacking(f, evidence.term)
     if len(evidence.suspects):
         return Reason.of(
             _culprits(evidence), *notes, differs, advice="check the entries that stand out, which the report lists"
@@ -108,10 +110,8 @@ def _culprits(evidence: Evidence) -> str:
     """The sentence on entries that are to blame; empty where none are."""
     if not len(evidence.suspects):
         return ""
-    k, (i, j) = len(evidence.suspects), evidence.suspects[0]
-    if k == 1:
-        return f"the entry of rows {i} and {j} stands out: without it a mesh fits all others"
-    return f"{k} entries stand out, first that of rows {i} and {j}: without them a mesh fits all others"
+    i, j = evidence.suspects[0]
+    return f"the entry of rows {i} and {j} stands out from the misfit of all others"
 
 
 def _unexplained(certificate: Certificate) -> str:
@@ -240,15 +240,6 @@ def far_away(origins: NDArray, written: Certificate, near: Certificate) -> Reaso
         f"the origin that they have too few digits left: as written they give it back to "
         f"{written.backward_error:.1e} (relative)",
         advice=f"subtract a point near ({origin.real:.6g}, {origin.imag:.6g}) from all of `anchors`",
-    )
-
-
-def other_scale(given: float, fitting: float, backward_error: float) -> Reason:
-    """The reason of a mesh whose scale was given, and is not the one that fits."""
-    return Reason.of(
-        f"the scale {given:.10g} does not fit, and {fitting:.10g} does: with that the mesh gives the matrix back to "
-        f"{backward_error:.1e} of each row's largest entry",
-        advice=f"leave out `scale`, or give `scale={fitting:.10g}`",
     )
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import nullcontext, suppress
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,22 +11,19 @@ from numpy.typing import NDArray
 from ..cells import SEARCHED_ROWS, Alternative, alternatives, components_of
 from ..certify import certify
 from ..clock import Clock
-from ..errors import RecoveryError
-from ..linalg import AnalysisAhead, Factorisation, UpperTriangle, blas_threads, factorisation
+from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..planar.hinges import free_images, join
-from ..planar.pencil import pencil_pattern
+from ..planar.hinges import join
 from ..recovery import PlanarMesh
-from ..tolerances import ALIKE, CERTIFIED, SIGMAS, SMALL
-from ..topology import Polygons, Topology, local_numbering, surfaces, triangles_everywhere
+from ..tolerances import CERTIFIED, SIGMAS
+from ..topology import Polygons, local_numbering, surfaces
 from .deviations import coordinate_deviations
 from .evidence import weigh
 from .joined import JoinedMesh
 from .noise import Noise, NoiseTest
-from .notes import image_notes, origin_notes, piece_notes, topology_notes, vanished_notes
+from .notes import piece_notes, topology_notes, vanished_notes
 from .placement import Placement
-from .reasons import other_scale
 from .solving import Solved, Task, solve
 from .verdict import Findings, Held, Verdict, verdict
 
@@ -62,41 +58,7 @@ def recover_scalar(
         Of the edges, where they are known from elsewhere: they give pieces their relative sizes.
     """
     noise = Noise.known(stored, options.noise)
-    task = Task(options=options, placement=placement, noise=noise, squared_lengths=squared_lengths)
-    if options.scale is None:
-        return _by_digits(stored, clock, task)
-    found = None
-    with suppress(RecoveryError):
-        found = _by_digits(stored, clock, replace(task, search=noise is not None))
-        if found.status != "uncertified":
-            return found
-    # Where no cells fit, a search for them does not come to an end soon: first see whether another scale does.
-    free = _of_any_scale(stored, clock, replace(task, options=replace(options, scale=None)))
-    other = None if free is None else of_other_scale(free, options.scale)
-    if other is not None:
-        return other if found is None else replace(found, reason=other.reason, advice=other.advice)
-    return _by_digits(stored, clock, task) if found is None or noise is None else found
-
-
-def _of_any_scale(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh | None:
-    """The certified mesh of a matrix whose scale is free, if there is one; cells that the graph shows come first."""
-    for search in (False, True):
-        with suppress(RecoveryError):
-            found = _by_digits(stored, clock, replace(task, search=search))
-            if found.certified:
-                return found
-    return None
-
-
-def of_other_scale(found: PlanarMesh, given: float) -> PlanarMesh | None:
-    """A certified mesh with the scale that fits, uncertified since another was given; None if that is the same."""
-    fitting = float(found.scale[0])
-    if not found.certified or np.abs(found.scale - fitting).max() > ALIKE * abs(fitting):
-        return None
-    if abs(given - fitting) <= ALIKE * abs(fitting):
-        return None
-    why = other_scale(given, fitting, found.backward_error)
-    return replace(found, status="uncertified", uniqueness=None, reason=why.text, advice=why.advice)
+    return _by_digits(stored, clock, Task(options, placement, noise, squared_lengths))
 
 
 def _by_digits(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:
@@ -114,15 +76,15 @@ def _recovered(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:
     """The mesh of a matrix whose entries have errors of known size, or those of assembly."""
     free_scale = task.scale is None
     with clock("topology"):
-        topology, analyse = _recognised(stored, task.options)
+        topology = surfaces(stored.n, stored.edges, local_numbering(stored.n, stored.edges))
     if task.noise is not None:
         stored = replace(stored, errors=task.noise.sigma * task.noise.spread)
-    solved = solve(topology, stored, clock, task, analyse)
+    solved = solve(topology, stored, clock, task)
     with clock("place"):
         placed = _place(solved, task)
     with clock("certify"):
         near = _held_against(stored, solved, placed.mesh, placed.mesh.points, task)
-        evidence = weigh(solved, near.certificate, free_scale=free_scale, search=near.in_doubt)
+        evidence = weigh(solved, near.certificate, free_scale=free_scale, search=not near.passes)
     deviations = None
     if task.options.standard_deviations:
         with clock("deviations"):
@@ -139,23 +101,6 @@ def _recovered(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:
     return _report(findings, verdict(findings, other_meshes), placed, deviations, clock, task)
 
 
-def _recognised(
-    stored: OperatorMatrix, options: ScalarOptions
-) -> tuple[Topology, Callable[[UpperTriangle], Factorisation]]:
-    """The surfaces that 3-cycles make; and what analyses pencils, begun already for a matrix of a single piece.
-
-    Most matrices are those of one, and its pencil has their pattern. Others may be large and dense, or lack the
-    diagonals of their cells.
-    """
-    numbering = local_numbering(stored.n, stored.edges)
-    analyse: Callable[[UpperTriangle], Factorisation] = factorisation
-    planar = options.method == "conformal" and len(stored.edges) < 3 * stored.n
-    if planar and triangles_everywhere(stored.n, numbering.edges):
-        used = stored.entries[numbering.edge_rows] != 0
-        analyse = AnalysisAhead(pencil_pattern(stored.n, numbering.edges[used]), options.threads)
-    return surfaces(stored.n, stored.edges, numbering), analyse
-
-
 def _place(solved: Solved, task: Task) -> _Placed:
     """Every piece in its final frame, relative to its origin, hinges joined; and what is to be said about it."""
     topology, placement = solved.topology, task.placement
@@ -168,8 +113,7 @@ def _place(solved: Solved, task: Task) -> _Placed:
         remarks.append((*mesh.notes, *more))
     known = np.array([placement.known_positions(piece) for piece in topology.pieces])
     placed = join(topology, placed, known)
-    images = image_notes(topology, free_images(topology, placed))
-    notes = [*piece_notes(remarks), *placement.unused(topology), *topology_notes(topology), *images]
+    notes = [*piece_notes(remarks), *placement.unused(topology), *topology_notes(topology)]
     notes += [*vanished_notes(topology), *topology.failures]
     joined = JoinedMesh.of(topology, placed, solved.scales / task.stretch)
     shift = origins[joined.component]
@@ -238,9 +182,6 @@ def _report(
     notes = [*solved.matrix.warnings, *placed.notes]
     if options.noise and evidence.noise is not None and evidence.noise < 0.5 * options.noise:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
-    # What a misfit that small lacks is digits, and not triangles.
-    if refused and not (noise or held.certificate.backward_error < SMALL):
-        notes += origin_notes(findings.stored, evidence.suspects)
     if found.uniqueness == "searched" and np.bincount(components_of(findings.stored)).max() > SEARCHED_ROWS:
         notes.append(f"other meshes were looked for in connected parts of up to {SEARCHED_ROWS:,} rows only")
     return PlanarMesh(

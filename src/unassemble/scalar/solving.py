@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..cells import Outcome, completed, in_doubt
 from ..errors import GeometryError, RecoveryError, SolverError
-from ..linalg import Factorisation, UpperTriangle, blas_threads, factorisation
+from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.cotangent import left_by_all
@@ -20,35 +20,22 @@ from ..planar.piece import PieceMesh, brought_near, collapsed, positions, refine
 from ..tolerances import NOISY
 from ..topology import Piece, Polygons, Topology
 from ..words import sentences
-from .factors import Factors, fitted_together
+from .factors import leaders
 from .noise import Noise, with_vanished
 from .placement import Placement
-from .wrong_entries import wrong_entries
 
 Clock = Callable[[str], AbstractContextManager[None]]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Task:
-    """What is asked of a scalar matrix, and known of it.
-
-    Attributes
-    ----------
-    options : ScalarOptions
-    placement : Placement
-    noise : Noise or None
-        Errors of the entries, where they are not those of assembly.
-    squared_lengths : (e,) float64 or None
-        Of the edges of the matrix, where they are known from elsewhere.
-    search : bool
-        Whether to look for other cells where those that the graph shows do not fit.
-    """
+    """What is asked of a scalar matrix, and known of it."""
 
     options: ScalarOptions
     placement: Placement
-    noise: Noise | None
+    noise: Noise | None  # errors of the entries, where they are not those of assembly
+    # (e,) of the edges of the matrix, where they are known from elsewhere
     squared_lengths: NDArray[np.float64] | None = None
-    search: bool = True
 
     @property
     def stretch(self) -> float:
@@ -63,26 +50,13 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Positions and scale of each piece, in no particular frame.
+    """Positions and scale of each piece, in no particular frame."""
 
-    Attributes
-    ----------
-    matrix : OperatorMatrix
-        With entries that had vanished as zeros.
-    topology : Topology
-        Of that matrix, without the pieces that have no positions; these are listed in its ``failures``.
-    meshes : list of PieceMesh
-    factors : Factors
-        What each piece by itself says of c.
-    noise : Noise or None
-        Without that of rounding, if the misfit is far beyond it.
-    """
-
-    matrix: OperatorMatrix
+    matrix: OperatorMatrix  # with entries that had vanished as zeros
+    # of that matrix, without the pieces that have no positions; these are listed in its ``failures``
     topology: Topology
     meshes: list[PieceMesh]
-    factors: Factors
-    noise: Noise | None
+    noise: Noise | None  # without that of rounding, if the misfit is far beyond it
 
     @property
     def scales(self) -> NDArray[np.float64]:
@@ -90,9 +64,11 @@ class Solved:
         return np.array([mesh.scale for mesh in self.meshes])
 
     def freedom(self, *, free_scale: bool) -> int:
-        """Entries less unknowns: 2 v - 4 coordinates of each piece, as far as rings do not tie them, and each c."""
-        coordinates = sum(2 * piece.n_vertices - 4 for piece in self.topology.pieces) - int(self.factors.closings.sum())
-        return len(self.topology.edges) - coordinates - (self.factors.count if free_scale else 0)
+        """Entries less unknowns: 2 v - 4 coordinates of each piece, and each c that was fitted."""
+        coordinates = sum(2 * piece.n_vertices - 4 for piece in self.topology.pieces)
+        lead = leaders(self.topology)
+        fitted = int(np.sum((lead == np.arange(len(lead))) | (self.scales != self.scales[lead])))
+        return len(self.topology.edges) - coordinates - (fitted if free_scale else 0)
 
 
 def solve(
@@ -100,9 +76,8 @@ def solve(
     matrix: OperatorMatrix,
     clock: Clock,
     task: Task,
-    analyse: Callable[[UpperTriangle], Factorisation] = factorisation,
 ) -> Solved:
-    """Positions and scale of each piece; `analyse` as for the conformal map.
+    """Positions and scale of each piece.
 
     Raises
     ------
@@ -116,29 +91,22 @@ def solve(
     def start(piece: Piece) -> Outcome:
         try:
             weights = -matrix.entries[piece.edge_rows]
-            mesh = _start(piece, weights, method, scale, sharp=not refine, analyse=analyse)
+            mesh = _start(piece, weights, method, scale, sharp=not refine)
             return brought_near(piece, weights, mesh, scale=scale) if drowning else mesh
         except (GeometryError, SolverError) as error:
             return error
 
     with clock(method):
         doubtful = in_doubt(matrix, topology, start, scale, noise.sigma if noise and not noise.digits else None)
-        spoilt: dict[Piece, PieceMesh] = {}
-        if doubtful.any():
-            spoilt, doubtful = wrong_entries(matrix, topology, start, doubtful, scale)
 
-    def attempt(piece: Piece) -> Outcome:
-        return spoilt.get(piece) or start(piece)
-
-    if doubtful.any() and task.search:
+    if doubtful.any():
         with clock("faces"), blas_threads(1):  # hundreds of small readings
-            matrix, topology, outcomes = completed(matrix, topology, attempt, doubtful, scale)
+            matrix, topology, outcomes = completed(matrix, topology, start, doubtful, scale)
             # The search leaves c free in its solves, stops early and knows one method, which is polished.
             if scale is not None or not refine:
-                found = zip(topology.pieces, outcomes, strict=True)
-                outcomes = [mesh if _is_spoilt(mesh) else attempt(piece) for piece, mesh in found]
+                outcomes = [start(piece) for piece in topology.pieces]
     else:
-        outcomes = [attempt(piece) for piece in topology.pieces]
+        outcomes = [start(piece) for piece in topology.pieces]
     topology, meshes = _successes(topology, outcomes)
     with clock("polish") if refine else nullcontext():
         starts = meshes
@@ -147,8 +115,7 @@ def solve(
             noise = None
             meshes = _polished(topology, matrix, starts, scale, noise) if refine else starts
         topology, meshes = _successes(topology, [_sound(*both) for both in zip(topology.pieces, meshes, strict=True)])
-        meshes, factors = fitted_together(topology, -matrix.entries, meshes, noise, scale, refine=refine)
-    return Solved(matrix, topology, meshes, factors, noise)
+    return Solved(matrix, topology, meshes, noise)
 
 
 def _is_rounding(topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], noise: Noise) -> bool:
@@ -163,30 +130,29 @@ def _is_rounding(topology: Topology, matrix: OperatorMatrix, meshes: list[PieceM
 def _polished(
     topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], scale: float | None, noise: Noise | None
 ) -> list[PieceMesh]:
-    """Each piece by itself."""
+    """Each piece by itself; under known noise those that share vertices with the c of the one that tells it best."""
     errors = with_vanished(topology) if noise is None else noise.on(topology)
-    return [
-        refined(
-            piece,
-            -matrix.entries[piece.edge_rows],
-            mesh,
+
+    def polished(p: int, scale: float | None) -> PieceMesh:
+        rows = topology.pieces[p].edge_rows
+        return refined(
+            topology.pieces[p],
+            -matrix.entries[rows],
+            meshes[p],
             scale=scale,
             rounding=noise is None,
-            noise=errors[piece.edge_rows],
+            noise=errors[rows],
         )
-        for piece, mesh in zip(topology.pieces, meshes, strict=True)
-    ]
+
+    lead = leaders(topology) if noise else np.arange(len(meshes))
+    first = {p: polished(p, scale) for p in np.unique(lead).tolist()}
+    return [first.get(p) or polished(p, scale or first[int(lead[p])].scale) for p in range(len(meshes))]
 
 
 def _sound(piece: Piece, mesh: PieceMesh) -> Outcome:
     """A mesh whose points have places of their own; else why it is none."""
     why = collapsed(piece, mesh.z)
     return GeometryError(sentences([f"no mesh fits, and {why} in the nearest one", *mesh.notes])) if why else mesh
-
-
-def _is_spoilt(mesh: Outcome) -> bool:
-    """Whether it leaves out entries that are wrong."""
-    return isinstance(mesh, PieceMesh) and mesh.aside is not None
 
 
 def _successes(topology: Topology, outcomes: list[Outcome]) -> tuple[Topology, list[PieceMesh]]:
@@ -224,11 +190,10 @@ def _start(
     scale: float | None,
     *,
     sharp: bool,
-    analyse: Callable[[UpperTriangle], Factorisation],
 ) -> PieceMesh:
     if method == "angles":
         return _by_angles(piece, weights, scale)
-    return positions(piece, weights, scale=scale, sharp=sharp, analyse=analyse)
+    return positions(piece, weights, scale=scale, sharp=sharp)
 
 
 def _by_angles(piece: Piece, weights: NDArray, scale: float | None) -> PieceMesh:

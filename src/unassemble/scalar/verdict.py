@@ -49,38 +49,20 @@ class Held:
             return self.test.passed
         return self.certificate.backward_error <= CERTIFIED
 
-    @property
-    def in_doubt(self) -> bool:
-        """Whether wrong entries may hide here: a misfit above rounding level, that noise does not explain."""
-        return not self.passes or (not self.by_noise and self.certificate.backward_error > SUSPICIOUS)
-
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """All that a verdict is made of.
+    """All that a verdict is made of."""
 
-    Attributes
-    ----------
-    stored : OperatorMatrix
-        The matrix as given.
-    solved : Solved
-    mesh : JoinedMesh
-        Relative to the origins of its pieces.
-    origins : (pieces,) complex128
-    near, written : Held
-        The mesh about these origins, and as it is written.
-    evidence : Evidence
-    known_scale, polished : bool
-        Whether c is known, and whether a polish was asked for.
-    """
-
-    stored: OperatorMatrix
+    stored: OperatorMatrix  # the matrix as given
     solved: Solved
-    mesh: JoinedMesh
-    origins: NDArray[np.complex128]
+    mesh: JoinedMesh  # relative to the origins of its pieces
+    origins: NDArray[np.complex128]  # (pieces,)
+    # the mesh about these origins, and as it is written
     near: Held
     written: Held
     evidence: Evidence
+    # whether c is known, and whether a polish was asked for
     known_scale: bool
     polished: bool
 
@@ -102,24 +84,14 @@ class Findings:
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What a mesh is worth.
+    """What a mesh is worth."""
 
-    Attributes
-    ----------
-    status : {"certified", "uncertified", "ambiguous"}
-    uniqueness : {"proved", "searched", "ambiguous"} or None
-        Whether other meshes fit; None where this one does not.
-    reason : Reason
-    others : sequence of Alternative
-        Other meshes that fit.
-    distant : bool
-        Whether coordinates so far from the origin that they have too few digits are the only obstacle.
-    """
-
-    status: str
+    status: str  # {"certified", "uncertified", "ambiguous"}
+    # {"proved", "searched", "ambiguous"} or None whether other meshes fit; None where this one does not
     uniqueness: str | None
     reason: Reason
-    others: Sequence[Alternative] = ()
+    others: Sequence[Alternative] = ()  # other meshes that fit
+    # whether coordinates so far from the origin that they have too few digits are the only obstacle
     distant: bool = False
 
 
@@ -145,17 +117,16 @@ def verdict(f: Findings, other_meshes: Callable[[], tuple[list[Alternative], str
 def _by_itself(f: Findings) -> tuple[bool, Reason]:
     """Whether the mesh fits as well as it is sure of its positions, and the reason."""
     error, test, topology = f.certificate.backward_error, f.near.test, f.solved.topology
-    good, apart = f.near.passes, discord(topology, f.solved.factors, error, f.solved.noise)
+    good, apart = f.near.passes, discord(topology, f.solved.meshes, error, f.solved.noise)
     if good and apart:
         return False, Reason.of(f"the matrix is given back to {error:.1e} (relative), but {apart[0]}", *apart[1:])
     if test and f.near.by_noise:
         return _by_noise(f, test)
     doubt = max(mesh.doubt for mesh in f.solved.meshes)
     fits = f"the operator re-assembled on this mesh gives the matrix back to {error:.1e} (relative)"
-    if not good or f.evidence.certain:
-        bare = good and len(topology.bare_edges) > 0
+    if not good:
         why = misfit(f, f.trouble)
-        return False, _bare(f) if bare else Reason.of(*apart, advice=why.advice) if apart else why
+        return False, Reason.of(*apart, advice=why.advice) if apart else why
     if not doubt <= PLACED:
         return False, Reason.of(
             f"{fits}, but so may others: in double precision the entries determine the positions to about {doubt:.0e} "

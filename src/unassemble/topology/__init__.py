@@ -1,6 +1,5 @@
 """From the sparsity graph to faces, orientation, boundary loops and pieces; no coordinates here."""
 
-from .cycles import triangles_everywhere
 from .numbering import Numbering, components, local_numbering
 from .polygons import Polygons
 from .recognise import located, require_planar, surfaces
@@ -16,5 +15,4 @@ __all__ = [
     "located",
     "require_planar",
     "surfaces",
-    "triangles_everywhere",
 ]

@@ -44,12 +44,8 @@ def following(triangles: NDArray, gluing: Gluing, corners: NDArray) -> NDArray:
 def loops(successor: NDArray) -> tuple[NDArray, NDArray]:
     """Cut the permutation `successor` (b,) into its cycles.
 
-    Returns
-    -------
-    loop : (b,) int64
-        Cycle of each element.
-    order : (b,) int64
-        Elements cycle by cycle, each in the order in which it is run through.
+    Returns `loop` (b,): cycle of each element; `order` (b,): elements cycle by cycle, each in the order in which it is
+    run through.
     """
     b = len(successor)
     if not b:

@@ -8,20 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import planarity
-from .cycles import three_cycles
+from .cycles import chordless_four_cycles, three_cycles
 from .faces import FaceComplex, around, from_cycles, from_rotation
 from .keys import distinct
 from .separating import not_faces
-from .short_cycles import chordless_four_cycles
 
 
 def short_faces(n: int, edges: NDArray) -> list[NDArray[np.int64]]:
     """3-cycles and chordless 4-cycles that may all be faces: no edge lies on more than two of them.
 
-    Returns
-    -------
-    list of (m, 3) and (m, 4) int64
-        Vertices in running order.
+    Returns list of (m, 3) and (m, 4) vertices in running order.
     """
     triangles, opposite = three_cycles(n, edges)
     count = np.bincount(opposite.ravel(), minlength=len(edges))
@@ -44,11 +40,7 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
     surface that they make by themselves, then an embedding in which all of them are faces, or all but those on edges
     with more than two 3-cycles, last any.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order; at least one.
+    `edges` (e, 2): pairs i < j in lexicographic order; at least one.
     """
     if n >= 3 and len(edges) > 3 * n - 6:  # not planar, and may have very many cycles
         return

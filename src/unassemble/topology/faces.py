@@ -22,19 +22,11 @@ class FaceComplex:
     """A graph and, for each side of each edge, the side that follows it along a face.
 
     Half-edge 2 k runs along edge k from its lower to its higher vertex, 2 k + 1 back: ``h ^ 1`` is the other side.
-
-    Attributes
-    ----------
-    n_vertices : int
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
-    successor : (2 e,) int64
-        The next half-edge of the face on the left.
     """
 
     n_vertices: int
-    edges: NDArray[np.int64]
-    successor: NDArray[np.int64]
+    edges: NDArray[np.int64]  # (e, 2) pairs i < j in lexicographic order
+    successor: NDArray[np.int64]  # (2 e,) the next half-edge of the face on the left
 
     @property
     def tail(self) -> NDArray[np.int64]:
@@ -105,9 +97,7 @@ class FaceComplex:
     def joined(self, empty: NDArray[np.bool_]) -> FaceComplex:
         """Blocks hung into each other's empty faces: at each vertex one such face of each block becomes one face.
 
-        Parameters
-        ----------
-        empty : (faces,) bool
+        `empty` (faces,).
         """
         at = np.flatnonzero(empty[self.face])
         # One visit for each block and vertex, that of the longest face.
@@ -122,12 +112,7 @@ class FaceComplex:
 def from_rotation(n: int, edges: NDArray, tail: NDArray, head: NDArray) -> FaceComplex:
     """The complex of a planar embedding.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-    tail, head : (2 e,) int64
-        Half-edges grouped by tail, each group in cyclic order.
+    `edges` (e, 2); `tail` and `head` (2 e,): half-edges grouped by tail, each group in cyclic order.
     """
     half = half_edges(n, edges, tail, head)
     successor = np.empty(2 * len(edges), dtype=np.int64)
@@ -139,18 +124,10 @@ def from_rotation(n: int, edges: NDArray, tail: NDArray, head: NDArray) -> FaceC
 def from_cycles(n: int, edges: NDArray, cycles: list[NDArray]) -> FaceComplex | None:
     """The complex whose faces are given cycles and the loops that bound the surface they make.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-    cycles : list of (m_k, k) int64
-        Triangles, quadrilaterals, ..., in any orientation.
+    `edges` (e, 2); `cycles` list of (m_k, k): triangles, quadrilaterals, ..., in any orientation.
 
-    Returns
-    -------
-    FaceComplex or None
-        Trees that hang on the surface are blocks of their own. None if any other edge lies on no cycle, or one on more
-        than two, or the surfaces do not lie on spheres.
+    Trees that hang on the surface are blocks of their own. None if any other edge lies on no cycle, or one on
+    more than two, or the surfaces do not lie on spheres.
     """
     cycles = _oriented(n, edges, cycles)
     sides = [around(n, edges, c) for c in cycles]

@@ -1,4 +1,4 @@
-"""Vertices renumbered so that neighbours have nearby numbers."""
+"""Vertices renumbered so that neighbours have nearby numbers, by breadth-first search."""
 
 from __future__ import annotations
 
@@ -10,26 +10,15 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from .keys import Grouped
-from .search import breadth_first
 
 
 @dataclass(frozen=True, eq=False)
 class Numbering:
-    """A graph whose vertices have numbers of its own.
+    """A graph whose vertices have numbers of its own."""
 
-    Attributes
-    ----------
-    vertices : (k,) int64
-        Vertex of the original graph behind each number.
-    edge_rows : (e,) int64
-        Row of the original edge list behind each edge.
-    edges : (e, 2) int64
-        New numbers i < j in lexicographic order.
-    """
-
-    vertices: NDArray[np.int64]
-    edge_rows: NDArray[np.int64]
-    edges: NDArray[np.int64]
+    vertices: NDArray[np.int64]  # (k,) vertex of the original graph behind each number
+    edge_rows: NDArray[np.int64]  # (e,) row of the original edge list behind each edge
+    edges: NDArray[np.int64]  # (e, 2) new numbers i < j in lexicographic order
 
 
 def local_numbering(n: int, edges: NDArray) -> Numbering:
@@ -38,12 +27,7 @@ def local_numbering(n: int, edges: NDArray) -> Numbering:
     The rows of a matrix may lie in any order, and on large meshes most of the time would go into waiting for
     memory: after this, what lies near each other on the mesh does so in memory.
 
-    Parameters
-    ----------
-    n : int
-        Number of vertices.
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
+    `n`: number of vertices; `edges` (e, 2): pairs i < j in lexicographic order.
     """
     upper = sp.coo_array((np.ones(len(edges), np.int8), edges.astype(np.int32).T), shape=(n, n)).tocsr()
     vertices, _ = breadth_first(upper + upper.T)
@@ -60,12 +44,7 @@ def local_numbering(n: int, edges: NDArray) -> Numbering:
 def components(n: int, edges: NDArray) -> list[Numbering]:
     """Connected components with edges, each in a numbering of its own, largest first.
 
-    Parameters
-    ----------
-    n : int
-        Number of vertices.
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
+    `n`: number of vertices; `edges` (e, 2): pairs i < j in lexicographic order.
     """
     graph = sp.coo_array((np.ones(len(edges), np.int8), edges.T), shape=(n, n))
     count, label = csgraph.connected_components(graph, directed=False)
@@ -80,3 +59,46 @@ def components(n: int, edges: NDArray) -> list[Numbering]:
         Numbering(vertices.order[v[k] : v[k + 1]], rows.order[e[k] : e[k + 1]], local[e[k] : e[k + 1]])
         for k in order.tolist()
     ]
+
+
+def breadth_first(graph: sp.csr_array) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Search each component from its lowest vertex.
+
+    `graph` (n, n): both triangles of a symmetric pattern; entries do not count.
+
+    Returns `order` (n,): vertices in the order in which they are reached; `parent` (n,): -1 at the start of each
+    component.
+    """
+    n = graph.shape[0]
+    order, parent = csgraph.breadth_first_order(graph, 0, directed=True)
+    if len(order) == n:
+        return order, np.maximum(parent, -1)
+    # One search from an extra node that is joined to every component, however many there are.
+    n_components, component = csgraph.connected_components(graph, directed=False)
+    first = np.full(n_components, n)
+    np.minimum.at(first, component, np.arange(n))
+    indptr = np.append(graph.indptr, graph.indptr[-1] + n_components)
+    joined = sp.csr_array(
+        (np.ones(indptr[-1], np.int8), np.append(graph.indices, first.astype(graph.indices.dtype)), indptr),
+        shape=(n + 1, n + 1),
+    )
+    order, parent = csgraph.breadth_first_order(joined, n, directed=True)
+    parent = parent[:n]
+    return order[1:], np.where(parent == n, -1, parent)
+
+
+def adjacency(n: int, edges: NDArray) -> sp.csr_array:
+    """(n, n) pattern with both triangles."""
+    ends = np.concatenate([edges, edges[:, ::-1]]).astype(np.int32)
+    return sp.coo_array((np.ones(len(ends), np.int8), ends.T), shape=(n, n)).tocsr()
+
+
+def neighbours(graph: sp.csr_array, vertices: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """All neighbours of some vertices.
+
+    Returns `place` (k,): which of `vertices`, in increasing order; `neighbour` (k,).
+    """
+    count = graph.indptr[vertices + 1] - graph.indptr[vertices]
+    place = np.repeat(np.arange(len(vertices)), count)
+    within = np.arange(len(place)) - np.repeat(np.cumsum(count) - count, count)
+    return place, graph.indices[graph.indptr[vertices[place]] + within].astype(np.int64)

@@ -9,22 +9,15 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from .search import breadth_first
+from .numbering import breadth_first
 
 
 @dataclass(frozen=True, eq=False)
 class Gluing:
-    """Which corners face each edge.
+    """Which corners face each edge."""
 
-    Attributes
-    ----------
-    count : (e,) int64
-        Number of triangles at each edge.
-    first, second : (e,) int64
-        Corners (3 * triangle + position) that face the edge, -1 where there is none.
-    """
-
-    count: NDArray[np.int64]
+    count: NDArray[np.int64]  # (e,) number of triangles at each edge
+    # (e,) each: corners (3 * triangle + position) that face the edge, -1 where there is none
     first: NDArray[np.int64]
     second: NDArray[np.int64]
 
@@ -61,13 +54,8 @@ def reglue(gluing: Gluing, flip: NDArray) -> Gluing:
 def orient(triangles: NDArray, gluing: Gluing) -> tuple[NDArray, NDArray, NDArray]:
     """Turn triangles so that neighbours run along their common edge in opposite directions.
 
-    Returns
-    -------
-    flip : (m,) bool
-        Triangles to be reversed; the first triangle of each piece is kept.
-    piece : (m,) int64
-        Label of the edge-connected piece, in order of the pieces' first triangles.
-    orientable : (number of pieces,) bool
+    Returns `flip` (m,): triangles to be reversed; the first triangle of each piece is kept; `piece` (m,): label of the
+    edge-connected piece, in order of the pieces' first triangles; `orientable` (number of pieces,).
     """
     m = len(triangles)
     inner = gluing.second >= 0

@@ -26,14 +26,7 @@ class _Surfaces:
 def planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> tuple[Piece, ...] | None:
     """Cut triangles into oriented pieces; None where one of them is not a sphere with holes.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-    triangles : (m, 3) int64
-        In any orientation.
-    opposite : (m, 3) int64
-        Rows of `edges` that face the corners.
+    `edges` (e, 2); `triangles` (m, 3): in any orientation; `opposite` (m, 3): rows of `edges` that face the corners.
     """
     if not len(triangles):
         return ()

@@ -22,32 +22,12 @@ def is_planar(n: int, edges: NDArray) -> bool:
     return bool(networkx.check_planarity(networkx.Graph(edges.tolist()))[0])
 
 
-def kuratowski_edges(n: int, edges: NDArray) -> tuple[tuple[int, int], ...]:
-    """Edges of a subdivision of K5 or K3,3 in a graph that is not planar, each pair in increasing order."""
-    if n >= 3:  # any 3 n - 5 edges will do
-        edges = edges[: 3 * n - 5]
-    if _suite is not None:
-        pairs = [pair[:2] for pair in _suite.kuratowski_edges(edges.tolist())]
-    else:
-        import networkx
-
-        graph = networkx.Graph(edges.tolist())
-        pairs = networkx.check_planarity(graph, counterexample=True)[1].edges()
-    return tuple(sorted((min(a, b), max(a, b)) for a, b in pairs))
-
-
 def rotation_system(n: int, edges: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
     """Half-edges tail -> head, grouped by tail, each group in its cyclic order about it in a planar embedding.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
+    `edges` (e, 2).
 
-    Returns
-    -------
-    tail, head : (2 e,) int64
-        None if the graph is not planar.
+    Returns `tail` and `head` (2 e,), None if the graph is not planar.
     """
     if n >= 3 and len(edges) > 3 * n - 6:
         return None

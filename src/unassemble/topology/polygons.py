@@ -11,17 +11,10 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Polygons:
-    """Cycles of vertices.
+    """Cycles of vertices."""
 
-    Attributes
-    ----------
-    offsets : (count + 1,) int64
-    vertices : (offsets[-1],) int64
-        Polygon k is ``vertices[offsets[k]:offsets[k + 1]]``, in running order.
-    """
-
-    offsets: NDArray[np.int64]
-    vertices: NDArray[np.int64]
+    offsets: NDArray[np.int64]  # (count + 1,)
+    vertices: NDArray[np.int64]  # (offsets[-1],) polygon k is ``vertices[offsets[k]:offsets[k + 1]]``, in running order
 
     @classmethod
     def none(cls) -> Polygons:
@@ -71,11 +64,8 @@ class Polygons:
     def fans(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Triangles about the first vertex of each polygon.
 
-        Returns
-        -------
-        triangles : (m, 3) int64
-        outline : (m, 3) bool
-            Whether the side from each corner to the next belongs to the polygon; the others are diagonals.
+        Returns `triangles` (m, 3); `outline` (m, 3): whether the side from each corner to the next belongs to the
+        polygon; the others are diagonals.
         """
         size = self.size - 2
         owner = np.repeat(np.arange(self.count), size)
@@ -89,9 +79,7 @@ class Polygons:
     def counter_clockwise(self, points: NDArray) -> Polygons:
         """The same polygons, each in the order in which its area is positive.
 
-        Parameters
-        ----------
-        points : (n, 2) float64
+        `points` (n, 2).
         """
         size = self.size
         owner = np.repeat(np.arange(self.count), size)

@@ -23,14 +23,8 @@ def surfaces(n: int, edges: NDArray, numbering: Numbering | None = None) -> Topo
     glue together to orientable surfaces with the Euler number of a sphere with as many holes as there are
     boundary loops, then the surfaces are planar and those 3-cycles are faces.
 
-    Parameters
-    ----------
-    n : int
-        Number of vertices.
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
-    numbering : Numbering, optional
-        Of the same graph: in which to work, and which pieces keep where they are the whole graph.
+    `n`: number of vertices; `edges` (e, 2): pairs i < j in lexicographic order; `numbering`: of the same graph: in
+    which to work, and which pieces keep where they are the whole graph.
     """
     pieces = _surfaces_of(numbering or Numbering(np.arange(n), np.arange(len(edges)), edges))
     if pieces is None:
@@ -55,10 +49,7 @@ def in_whole(piece: Piece, part: Numbering) -> Piece:
 def located(error: RecoveryError, part: Numbering, *, named: bool) -> RecoveryError:
     """The same error in the numbering of the whole, on demand with the place of its part of the graph."""
     where = f"in the component of row {part.vertices.min()} ({len(part.vertices)} rows): " if named else ""
-    if isinstance(error, NotPlanarError):
-        witness = tuple((int(part.vertices[a]), int(part.vertices[b])) for a, b in error.witness)
-        return _not_planar_witness(where, error.why, witness)
-    return type(error)(where + str(error))
+    return _not_planar(error.why, where) if isinstance(error, NotPlanarError) else type(error)(where + str(error))
 
 
 def triangulated(n: int, edges: NDArray) -> tuple[Piece, ...] | None:
@@ -72,7 +63,7 @@ def triangulated(n: int, edges: NDArray) -> tuple[Piece, ...] | None:
         If there are more edges than a planar graph can have.
     """
     if n >= 3 and len(edges) > 3 * n - 6:
-        raise _not_planar(n, edges, f"{len(edges)} edges on {n} rows are more than 3 n - 6")
+        raise _not_planar(f"{len(edges)} edges on {n} rows are more than 3 n - 6")
     triangles, opposite = three_cycles(n, edges)
     if (np.bincount(opposite.ravel(), minlength=1) > 2).any():
         face = ~not_faces(n, edges, triangles, opposite)
@@ -86,18 +77,12 @@ def require_planar(n: int, edges: NDArray) -> None:
     Raises
     ------
     NotPlanarError
-        With a Kuratowski subgraph as witness.
     """
     if n >= 3 and len(edges) > 3 * n - 6:
-        raise _not_planar(n, edges, f"{len(edges)} edges on {n} rows are more than 3 n - 6")
+        raise _not_planar(f"{len(edges)} edges on {n} rows are more than 3 n - 6")
     if not planarity.is_planar(n, edges):
-        raise _not_planar(n, edges, "")
+        raise _not_planar()
 
 
-def _not_planar(n: int, edges: NDArray, why: str) -> NotPlanarError:
-    return _not_planar_witness("", why, planarity.kuratowski_edges(n, edges))
-
-
-def _not_planar_witness(where: str, why: str, witness: tuple[tuple[int, int], ...]) -> NotPlanarError:
-    said = f"{where}the graph of the matrix is not planar" + (f": {why}" if why else "")
-    return NotPlanarError(said, witness, why)
+def _not_planar(why: str = "", where: str = "") -> NotPlanarError:
+    return NotPlanarError(f"{where}the graph of the matrix is not planar" + (f": {why}" if why else ""), why)

@@ -7,88 +7,35 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from .adjacency import adjacency, neighbours
+from ..budget import LARGE
 from .keys import contains, distinct
+from .numbering import adjacency, neighbours
 
-_MOST_WORK = 4_000_000  # cycles looked at again, or neighbours of vertices on the rims of balls about cycles
+_MOST_WORK = 4_000_000  # neighbours of vertices on the rims of balls about cycles
 
 
 def not_faces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> NDArray[np.bool_]:
     """Mark 3-cycles that cannot be faces, on graphs where some edge lies on more than two.
 
-    A cycle abc has something on both sides exactly if at least two parts of the rest of the graph
-    touch all of a, b and c. Nearly always one of these is a single vertex of degree three inside; such vertices
-    are peeled off, round by round. Whether there is a second part, which there is not if a, b, c and this vertex are
-    all that does not hang on two vertices, and what is then left are tested cycle by cycle.
+    A cycle abc has something on both sides exactly if at least two parts of the rest of the graph touch all of a, b
+    and c. Where triangles lie on both sides, all edges of such a cycle are on three; these are asked first.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-    triangles, opposite : (m, 3) int64
-        All 3-cycles, and the edges that face their corners.
-
-    Returns
-    -------
-    (m,) bool
+    `triangles` and `opposite` (m, 3): all 3-cycles, and the edges that face their corners.
     """
-    false = _peel_inner_vertices(n, edges, triangles, opposite)
-    false[false] = _separating(n, edges, triangles[false], otherwise=True)
-    count = np.bincount(opposite[~false].ravel(), minlength=len(edges))
-    doubtful = np.flatnonzero((count[opposite] > 2).any(axis=1) & ~false)
-    false[doubtful] = _separating(n, edges, triangles[doubtful])
+    false = np.zeros(len(triangles), dtype=bool)
+    for crowded in (np.all, np.any):
+        count = np.bincount(opposite[~false].ravel(), minlength=len(edges))
+        doubtful = np.flatnonzero(crowded(count[opposite] > 2, axis=1) & ~false)
+        for some in np.array_split(doubtful, 1 + len(doubtful) // LARGE):
+            false[some] = _separating(n, edges, triangles[some])
     return false
 
 
-def _peel_inner_vertices(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> NDArray[np.bool_]:
-    """Take out vertices of degree three whose neighbours form a cycle; that cycle is no face."""
-    false = np.zeros(len(triangles), dtype=bool)
-    alive = np.ones(len(triangles), dtype=bool)
-    degree = np.bincount(edges.ravel(), minlength=n)
-    order, key = _by_edges(len(edges), opposite)
-    work = 0
-    while True:
-        rows = np.flatnonzero(alive)
-        work += len(rows)
-        if work > _MOST_WORK:  # many rounds that peel off a vertex or two
-            return false
-        count = np.bincount(opposite[rows].ravel(), minlength=len(edges))
-        cycles_at = np.bincount(triangles[rows].ravel(), minlength=n)
-        inner = (degree == 3) & (cycles_at == 3)
-        corner = np.flatnonzero(inner[triangles[rows].ravel()])
-        if not len(corner):
-            return false
-        # Group the three cycles at each inner vertex: their edges facing it are the cycle around it.
-        vertex = triangles[rows].ravel()[corner]
-        by_vertex = np.argsort(vertex, kind="stable")
-        around = np.sort(opposite[rows].ravel()[corner][by_vertex].reshape(-1, 3), axis=1)
-        own = rows[corner[by_vertex].reshape(-1, 3) // 3]
-        wanted = around[:, 0] * len(edges) + around[:, 2]
-        place = np.minimum(np.searchsorted(key, wanted), len(key) - 1)
-        cycle = order[place]
-        hit = (key[place] == wanted) & (count[around] > 2).all(axis=1) & alive[cycle] & ~false[cycle]
-        if not hit.any():
-            return false
-        cycle, once = np.unique(cycle[hit], return_index=True)
-        own = own[hit][once]
-        false[cycle] = True  # but alive: once its inside is gone it is like a face to the rest
-        alive[own] = False
-        degree[vertex[by_vertex].reshape(-1, 3)[hit][once, 0]] = 0
-        np.subtract.at(degree, triangles[cycle].ravel(), 1)
-
-
-def _by_edges(n_edges: int, opposite: NDArray) -> tuple[NDArray, NDArray]:
-    """Cycles sorted by their lowest and highest edge, which identify them."""
-    key = opposite.min(axis=1) * n_edges + opposite.max(axis=1)
-    order = np.argsort(key)
-    return order, key[order]
-
-
-def _separating(n: int, edges: NDArray, cycles: NDArray, *, otherwise: bool = False) -> NDArray[np.bool_]:
+def _separating(n: int, edges: NDArray, cycles: NDArray) -> NDArray[np.bool_]:
     """(m,) whether at least two components of the graph without a cycle have neighbours at all of its vertices.
 
     Looked for in balls about all cycles at once, which grow until they tell: nearly always one of the components is
-    small. What would take too long is `otherwise`.
+    small. What would take too long is not.
     """
     graph = adjacency(n, edges)
     separating = np.zeros(len(cycles), dtype=bool)
@@ -96,7 +43,6 @@ def _separating(n: int, edges: NDArray, cycles: NDArray, *, otherwise: bool = Fa
     while len(left):
         parts = _parts_nearby(graph, cycles[left], radius)
         if parts is None:
-            separating[left] = otherwise
             break
         separating[left] = parts > 1
         left, radius = left[parts < 0], 2 * radius

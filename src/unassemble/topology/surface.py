@@ -13,36 +13,18 @@ from .polygons import Polygons
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """One edge-connected, oriented planar surface of triangles, in a numbering of its own.
+    """One edge-connected, oriented planar surface of triangles, in a numbering of its own."""
 
-    Attributes
-    ----------
-    vertices : (k,) int64
-        Rows of the matrix, in any order.
-    edge_rows : (e,) int64
-        Rows of the whole graph's edge list.
-    edges : (e, 2) int64
-        Local vertices i < j.
-    triangles : (m, 3) int64
-        Local vertices; neighbours run along a common edge in opposite directions.
-    opposite : (m, 3) int64
-        The local edge that faces each corner.
-    facing : (e, 2) int64
-        The corners (3 * triangle + position) that face each edge; -1 in the second place on the boundary.
-    boundary : (b, 2) int64
-        Local directed edges with the surface on the left, loop by loop in running order.
-    loop_offsets : (loops + 1,) int64
-        Loop k is ``boundary[loop_offsets[k]:loop_offsets[k + 1]]``.
-    """
-
-    vertices: NDArray[np.int64]
-    edge_rows: NDArray[np.int64]
-    edges: NDArray[np.int64]
-    triangles: NDArray[np.int64]
-    opposite: NDArray[np.int64]
+    vertices: NDArray[np.int64]  # (k,) rows of the matrix, in any order
+    edge_rows: NDArray[np.int64]  # (e,) rows of the whole graph's edge list
+    edges: NDArray[np.int64]  # (e, 2) local vertices i < j
+    triangles: NDArray[np.int64]  # (m, 3) local vertices; neighbours run along a common edge in opposite directions
+    opposite: NDArray[np.int64]  # (m, 3) the local edge that faces each corner
+    # (e, 2) the corners (3 * triangle + position) that face each edge; -1 in the second place on the boundary
     facing: NDArray[np.int64]
+    # (b, 2) local directed edges with the surface on the left, loop by loop in running order
     boundary: NDArray[np.int64]
-    loop_offsets: NDArray[np.int64]
+    loop_offsets: NDArray[np.int64]  # (loops + 1,) loop k is ``boundary[loop_offsets[k]:loop_offsets[k + 1]]``
 
     @property
     def n_vertices(self) -> int:
@@ -100,31 +82,16 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Topology:
-    """All pieces of a graph, and what belongs to none.
-
-    Attributes
-    ----------
-    n_vertices : int
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
-    pieces : tuple of Piece
-        In order of their lowest vertex.
-    method : str
-        How the faces were found: ``"3-cycles"``, ``"cliques"`` or ``"the numbers"``.
-    failures : tuple of str
-        Why connected components of the graph have no mesh, where others have one.
-    vanished : (k,) int64
-        Rows of `edges` that the matrix does not have: sides of the pieces' triangles on which the entry is zero.
-    polygons : Polygons
-        Cells with more than three vertices, whose diagonals are among those.
-    """
+    """All pieces of a graph, and what belongs to none."""
 
     n_vertices: int
-    edges: NDArray[np.int64]
-    pieces: tuple[Piece, ...]
-    method: str
-    failures: tuple[str, ...] = ()
+    edges: NDArray[np.int64]  # (e, 2) pairs i < j in lexicographic order
+    pieces: tuple[Piece, ...]  # in order of their lowest vertex
+    method: str  # how the faces were found: ``"3-cycles"``, ``"cliques"`` or ``"the numbers"``
+    failures: tuple[str, ...] = ()  # why connected components of the graph have no mesh, where others have one
+    # (k,) rows of `edges` that the matrix does not have: sides of the pieces' triangles on which the entry is zero
     vanished: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    # cells with more than three vertices, whose diagonals are among those
     polygons: Polygons = field(default_factory=Polygons.none)
 
     @cached_property

@@ -14,10 +14,7 @@ from .surface import Piece
 class Together:
     """Pieces with their vertices, edges, triangles and boundary edges numbered one piece after the other.
 
-    Parameters
-    ----------
-    pieces : sequence of Piece
-        At least one.
+    `pieces`: at least one.
     """
 
     def __init__(self, pieces: Sequence[Piece]):
@@ -90,26 +87,6 @@ class Together:
     def n_loops(self) -> NDArray[np.int64]:
         """(pieces,)."""
         return np.array([piece.n_loops for piece in self._pieces])
-
-
-def united(pieces: Sequence[Piece]) -> Piece:
-    """The disjoint union as one piece that falls apart; vertices that several share are there several times."""
-    if len(pieces) == 1:
-        return pieces[0]
-    union = Together(pieces)
-    facing = np.concatenate([piece.facing for piece in pieces])
-    first_corner = 3 * np.repeat(_starts(union.n_triangles), union.n_edges)[:, None]
-    first_vertex = np.repeat(_starts(union.n_vertices), union.n_edges)[:, None]
-    return Piece(
-        vertices=union.vertices,
-        edge_rows=union.edge_rows,
-        edges=np.concatenate([piece.edges for piece in pieces]) + first_vertex,
-        triangles=union.triangles,
-        opposite=union.opposite,
-        facing=np.where(facing >= 0, facing + first_corner, -1),
-        boundary=union.boundary,
-        loop_offsets=np.append(0, np.cumsum(union.loop_lengths)),
-    )
 
 
 def reversed_within(counts: NDArray, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -61,11 +61,7 @@ def vertex_excess(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]
 def likeliest_scale(complex_: FaceComplex, weights: NDArray) -> float:
     """The c for which half of the short faces, or the shortest, have angle sums below pi, weights being shared equally.
 
-    Parameters
-    ----------
-    complex_ : FaceComplex
-    weights : (e,) float64
-        -A_ij = c w_ij.
+    `weights` (e,): -A_ij = c w_ij.
     """
     unit = float(np.median(np.abs(weights[weights != 0]))) * np.sign(weights.sum())
     if not unit:
@@ -98,11 +94,7 @@ def scales_of_faces(complex_: FaceComplex, cotangents: NDArray, faces: NDArray[n
 def outer_faces(blocks: FaceComplex, sums: NDArray) -> NDArray[np.bool_]:
     """The face that bounds each block from outside: its longest, among equals that of the largest angle sum.
 
-    Parameters
-    ----------
-    blocks : FaceComplex
-    sums : (faces,) float64
-        Of angles.
+    `sums` (faces,): of angles.
     """
     block = blocks.block[blocks.order[blocks.offsets[:-1]]]
     order = np.lexsort((sums, blocks.size, block))

@@ -9,55 +9,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...topology import Polygons
-from ...topology.faces import FaceComplex
+from ...topology.faces import FaceComplex, joined
 from .angles import SHORT, face_sums, facing_angles, likeliest_scale, outer_faces, vertex_excess
-from .corners import corners_of
 
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Cells that a graph may have; a labelling is any set of them that shares no half-edge.
-
-    Attributes
-    ----------
-    n_vertices : int
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
-    weights : (e,) float64
-        -A_ij of each edge.
-    scale : float or None
-        c, where it is known.
-    cells : Polygons
-    corner : (cells,) bool
-        Triangles a-b-c of two edges a-b, b-c; the third has vanished from the boundary, which it does if the angle at b
-        is a right one.
-    embedding : FaceComplex
-    relative : (e,) float64
-        The weights over c, or over the likeliest c, from the angles.
-    sides : (s, 2) int64
-        Pairs (cell, half-edge) of what each cell takes up.
-    belief : (cells,) float64
-        From the angles: 1 for a certain cell, 0 for a certain hole, about.
-    first : (cells,) bool
-        The faces that make the likeliest labelling without vanished boundary edges.
-    outer : (cells,) bool
-        The face of each block that bounds it from outside.
-    errors : (e,) float64 or None
-        Standard deviations of the errors of the weights, where they are known.
-    """
+    """Cells that a graph may have; a labelling is any set of them that shares no half-edge."""
 
     n_vertices: int
-    edges: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    scale: float | None
+    edges: NDArray[np.int64]  # (e, 2) pairs i < j in lexicographic order
+    weights: NDArray[np.float64]  # (e,) -A_ij of each edge
+    scale: float | None  # c, where it is known
     cells: Polygons
+    # (cells,) triangles a-b-c of two edges a-b, b-c; the third has vanished from the boundary, which it does if the
+    # angle at b is a right one
     corner: NDArray[np.bool_]
     embedding: FaceComplex
-    relative: NDArray[np.float64]
-    sides: NDArray[np.int64]
-    belief: NDArray[np.float64]
-    first: NDArray[np.bool_]
-    outer: NDArray[np.bool_]
+    relative: NDArray[np.float64]  # (e,) the weights over c, or over the likeliest c, from the angles
+    sides: NDArray[np.int64]  # (s, 2) pairs (cell, half-edge) of what each cell takes up
+    belief: NDArray[np.float64]  # (cells,) from the angles: 1 for a certain cell, 0 for a certain hole, about
+    first: NDArray[np.bool_]  # (cells,) the faces that make the likeliest labelling without vanished boundary edges
+    outer: NDArray[np.bool_]  # (cells,) the face of each block that bounds it from outside
+    # (e,) standard deviations of the errors of the weights, where they are known
     errors: NDArray[np.float64] | None = field(default=None, kw_only=True)
 
     @classmethod
@@ -133,3 +107,25 @@ class Candidates:
         order = np.argsort(self.sides[:, 1], kind="stable")
         start = np.flatnonzero(np.diff(self.sides[order, 1], prepend=-1))
         return self.sides[order], np.append(start, len(order))
+
+
+def corners_of(embedding: FaceComplex, outside: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Corners a-b-c, (k, 3), of which a-c is no edge, and pairs (corner, half-edge) of what each takes up as a cell.
+
+    The side of a triangle that faces a right angle has the weight cot(pi / 2) / 2 = 0, and on the boundary no other
+    triangle adds to it: such an entry is often not stored, and the triangle shows as two edges only. They lie along the
+    half-edges `outside`, (2 e,) bool, those of empty faces.
+
+    Where nothing else meets at b, a face beyond both edges would contain the vanished side as a diagonal: the
+    corner takes up the far sides as well, if they belong to such a face.
+    """
+    n, one = embedding.n_vertices, np.flatnonzero(outside)
+    other = embedding.successor[one]
+    a, b, c = embedding.tail[one], embedding.head[one], embedding.head[other]
+    apart = (a != c) & ~joined(n, embedding.edges, a, c)
+    halves, vertices = np.column_stack([one, other])[apart], np.column_stack([a, b, c])[apart]
+    near = np.column_stack([np.repeat(np.arange(len(halves)), 2), halves.ravel()])
+    lone = np.bincount(embedding.tail, minlength=n)[vertices[:, 1]] == 2
+    lone &= ~outside[halves[:, 0] ^ 1]
+    far = np.column_stack([np.repeat(np.flatnonzero(lone), 2), halves[lone].ravel() ^ 1])
+    return vertices, np.concatenate([near, far])

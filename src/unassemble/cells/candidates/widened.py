@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from ...tolerances import LITTLE
 from ...topology import Polygons
-from ...topology.adjacency import adjacency
 from ...topology.cycles import three_cycles
 from ...topology.faces import joined
+from ...topology.numbering import adjacency
 from .candidates import Candidates
 
 _MOST_NEIGHBOURS = 12
@@ -25,12 +25,7 @@ _MOST_NEIGHBOURS = 12
 def widened(candidates: Candidates, edges: NDArray[np.int64], misfit: NDArray[np.float64]) -> Candidates:
     """With further candidates, in both orientations, which claim no half-edges.
 
-    Parameters
-    ----------
-    candidates : Candidates
-    edges : (e, 2) int64
-    misfit : (e,) float64
-        What a labelling leaves on these edges.
+    `edges` (e, 2); `misfit` (e,): what a labelling leaves on these edges.
     """
     n = candidates.n_vertices
     at = np.zeros(n)

@@ -19,37 +19,21 @@ from ...topology.pieces import planar_pieces
 from ..candidates.candidates import Candidates
 from .maps import map_of
 from .triangulation import triangulation
-from .within_errors import GAP, beyond, factor_tolerances, polished
+from .within_errors import GAP, beyond, polished
 
 
 @dataclass(frozen=True, eq=False)
 class Labelling:
-    """Cells, the triangulated pieces that they make, and how the weights of these fit.
-
-    Attributes
-    ----------
-    candidates : Candidates
-    labels : (cells,) bool
-        What is taken for a cell.
-    edges : (e', 2) int64
-        Those of the graph, with the vanished ones of the cells' triangles.
-    weights : (e',) float64
-        Zero for these.
-    pieces : tuple of Piece
-        Empty where the cells do not make planar surfaces.
-    meshes : tuple of PieceMesh or None
-        None where a piece has no positions.
-    misfit : (e',) float64
-        |c w - a| relative to the smaller of both rows' largest entries, at most 1; 1 on edges of no piece. Where errors
-        of the weights are known, and it is not far beyond them, less what they explain.
-    """
+    """Cells, the triangulated pieces that they make, and how the weights of these fit."""
 
     candidates: Candidates
-    labels: NDArray[np.bool_]
-    edges: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    pieces: tuple[Piece, ...]
-    meshes: tuple[PieceMesh | None, ...]
+    labels: NDArray[np.bool_]  # (cells,) what is taken for a cell
+    edges: NDArray[np.int64]  # (e', 2) those of the graph, with the vanished ones of the cells' triangles
+    weights: NDArray[np.float64]  # (e',) zero for these
+    pieces: tuple[Piece, ...]  # empty where the cells do not make planar surfaces
+    meshes: tuple[PieceMesh | None, ...]  # None where a piece has no positions
+    # (e',) |c w - a| relative to the smaller of both rows' largest entries, at most 1; 1 on edges of no piece. Where
+    # errors of the weights are known, and it is not far beyond them, less what they explain.
     misfit: NDArray[np.float64]
 
     @classmethod
@@ -83,7 +67,7 @@ class Labelling:
         solved = [(piece, mesh) for piece, mesh in zip(self.pieces, meshes, strict=True) if mesh]
         misfit = misfits(n, edges, self.weights, solved)
         errors = self._errors
-        better = None if errors is None else polished(solved, self.weights, errors, misfit)
+        better = None if errors is None else polished(solved, self.weights, errors, misfit, candidates.scale)
         if better is None or errors is None:
             errors = None
         else:
@@ -162,8 +146,7 @@ def _add_discord(
     """
     if not solved or (len(solved) == 1 and scale is None):
         return
-    tolerance = 0.0 if errors is None else factor_tolerances(solved, errors, scale)
-    add_differing_factors(solved, misfit, scale, tolerance)
+    add_differing_factors(solved, misfit, scale)
     if (misfit > ALIKE).any():  # whether rings close is the last question, and the dearest
         return
     topology = Topology(n, edges, tuple(piece for piece, _ in solved), "")
@@ -174,16 +157,10 @@ def _add_discord(
     misfit[at_hinges] = np.maximum(misfit[at_hinges], min(left, 1.0))
 
 
-def add_differing_factors(
-    solved: list[tuple[Piece, PieceMesh]], misfit: NDArray, scale: float | None, tolerance: NDArray | float = 0.0
-) -> None:
-    """Raise the misfit of pieces with another factor than is known, or than the largest has, by that difference.
-
-    Differences up to `tolerance`, (pieces,), are none.
-    """
+def add_differing_factors(solved: list[tuple[Piece, PieceMesh]], misfit: NDArray, scale: float | None) -> None:
+    """Raise the misfit of pieces with another factor than is known, or than the largest has, by that difference."""
     scale = scale or max(solved, key=lambda item: item[0].n_vertices)[1].scale
     apart = np.minimum(np.abs(np.array([mesh.scale for _, mesh in solved]) / scale - 1), 1.0)
-    apart[apart <= tolerance] = 0.0
     rows = np.concatenate([piece.edge_rows for piece, _ in solved])
     misfit[rows] = np.maximum(misfit[rows], np.repeat(apart, [len(piece.edge_rows) for piece, _ in solved]))
 

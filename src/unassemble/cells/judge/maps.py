@@ -19,11 +19,7 @@ _SMALL = 40
 def map_of(piece: Piece, weights: NDArray) -> PieceMesh | None:
     """The conformal map; None where the entries allow none.
 
-    Parameters
-    ----------
-    piece : Piece
-    weights : (e,) float64
-        -A_ij of its edges.
+    `weights` (e,): -A_ij of its edges.
     """
     if piece.n_vertices <= _SMALL:
         return small_map(piece, weights)

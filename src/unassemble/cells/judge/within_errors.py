@@ -9,7 +9,6 @@ from scipy.special import chdtrc
 from ...errors import SolverError
 from ...matrix.operator import row_sizes
 from ...planar.cotangent import left_by_all
-from ...planar.deviations import factor_deviations
 from ...planar.piece import PieceMesh
 from ...planar.polish import SHORT, polish
 from ...tolerances import CHANCE, LITTLE, MAGNIFIED, SIGMAS, SMALL
@@ -22,16 +21,13 @@ GAP = 30.0
 Solved = list[tuple[Piece, PieceMesh]]
 
 
-def polished(solved: Solved, weights: NDArray, errors: NDArray, misfit: NDArray) -> Solved | None:
-    """Pieces as the entries ask for in the mean; None where their misfit is more than errors explain.
+def polished(solved: Solved, weights: NDArray, errors: NDArray, misfit: NDArray, scale: float | None) -> Solved | None:
+    """Pieces as the entries ask for in the mean, with one c; None where their misfit is more than errors explain.
 
-    Parameters
-    ----------
-    solved : list of (Piece, PieceMesh)
-    weights, errors : (e,) float64
-        Of all edges; errors of those that have vanished are 0.
-    misfit : (e,) float64
-        As in :class:`unassemble.cells.judge.Labelling`.
+    The piece with the most entries to spare tells c, where `scale` is not given.
+
+    `solved` list of (Piece, PieceMesh); `weights` and `errors` (e,): of all edges; errors of those that have vanished
+    are 0; `misfit` (e,): as in :class:`unassemble.cells.judge.Labelling`.
     """
     if not solved:
         return None
@@ -39,25 +35,26 @@ def polished(solved: Solved, weights: NDArray, errors: NDArray, misfit: NDArray)
     if not misfit.max() <= min(allowed, LITTLE):
         return None
     spread = np.maximum(errors, SMALL * np.median(errors[errors > 0]))
-    found = []
-    for piece, mesh in solved:
+    found: dict[Piece, PieceMesh] = {}
+    for piece, mesh in sorted(solved, key=lambda both: -both[0].redundancy):
         rows = piece.edge_rows
         try:
             with np.errstate(all="ignore"):
-                better = polish(piece, weights[rows], mesh.z, spread=spread[rows], options=SHORT)
+                better = polish(piece, weights[rows], mesh.z, scale=scale, spread=spread[rows], options=SHORT)
         except SolverError:
             return None
         if not (np.isfinite(better.z).all() and np.isfinite(better.scale)):
             return None
-        found.append((piece, PieceMesh(better.z, better.scale)))
-    return found if _likely(found, weights, spread) else None
+        found[piece], scale = PieceMesh(better.z, better.scale), better.scale
+    again = [(piece, found[piece]) for piece, _ in solved]
+    return again if _likely(again, weights, spread) else None
 
 
 def _likely(solved: Solved, weights: NDArray, errors: NDArray) -> bool:
-    """Whether the sum of squares of the misfit is not improbably large; c is fitted in each piece."""
+    """Whether the sum of squares of the misfit is not improbably large; c is fitted once."""
     pieces, meshes = zip(*solved, strict=True)
     left = left_by_all(pieces, weights, [mesh.z for mesh in meshes], np.array([mesh.scale for mesh in meshes]))
-    freedom = max(sum(piece.redundancy for piece in pieces), 1)
+    freedom = max(sum(piece.redundancy + 1 for piece in pieces) - 1, 1)
     with np.errstate(all="ignore"):  # flat triangles
         squares = float(np.sum((left / errors[np.concatenate([piece.edge_rows for piece in pieces])]) ** 2))
     return bool(chdtrc(freedom, squares) >= CHANCE)
@@ -75,14 +72,3 @@ def beyond(n: int, edges: NDArray, solved: Solved, weights: NDArray, errors: NDA
         excess = np.maximum(np.abs(left) - SIGMAS * error, 0.0) / smaller
     misfit[rows] = np.where(excess < 1, excess, 1.0)
     return misfit
-
-
-def factor_tolerances(solved: Solved, errors: NDArray, scale: float | None) -> NDArray[np.float64]:
-    """(pieces,) what errors explain of how far factors c are from a known one, or from that of the largest piece."""
-    pieces, meshes = zip(*solved, strict=True)
-    typical = float(np.median(errors[errors > 0]))
-    spreads = [np.maximum(errors[piece.edge_rows] / typical, SMALL) for piece in pieces]
-    deviation = factor_deviations(pieces, [mesh.z for mesh in meshes], spreads)
-    deviation *= typical / np.abs([mesh.scale for mesh in meshes])
-    largest = int(np.argmax([piece.n_vertices for piece in pieces]))
-    return SIGMAS * np.hypot(deviation, 0.0 if scale else deviation[largest])

@@ -22,10 +22,7 @@ _LEVELS = 12  # of triangles in a tree; lists end long before, but where long ro
 def arcs_across(sides: NDArray[np.int64]) -> NDArray[np.int64]:
     """(3 m,) for each side 3 t + k of each triangle t the same edge as a side of another triangle, or -1.
 
-    Parameters
-    ----------
-    sides : (m, 3) int64
-        Edges of each triangle; each edge in one or two of them.
+    `sides` (m, 3): edges of each triangle; each edge in one or two of them.
     """
     order = np.argsort(sides, axis=None, kind="stable")
     pair = np.flatnonzero(np.diff(sides.ravel()[order]) == 0)
@@ -40,16 +37,9 @@ def patches(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Triangles of patches, and the holes around them; patches that contradict each other are left out.
 
-    Parameters
-    ----------
-    sides : (m, 3) int64
-        Edges of each triangle that may be a cell; each edge in one or two of them.
-    cotangents : (e,) float64
-        Sums of the cotangents of the angles of these triangles that face each edge.
-    size : (e,) float64
-        Of the numbers that these have been computed from.
-    state : (m,) int8
-        1 for a known cell, -1 for a known hole, else 0.
+    `sides` (m, 3): edges of each triangle that may be a cell; each edge in one or two of them; `cotangents` (e,): sums
+    of the cotangents of the angles of these triangles that face each edge; `size` (e,): of the numbers that these have
+    been computed from; `state` (m,): 1 for a known cell, -1 for a known hole, else 0.
     """
     trees = _Trees(sides, cotangents, LAST_DIGITS * size, state)
     for _ in range(_LEVELS):

@@ -30,12 +30,7 @@ def lone_scales(sides: NDArray[np.int64], weights: NDArray[np.float64]) -> Itera
     The cotangents a, b, d of a triangle satisfy ab + bd + da = 1, so that triangles whose three sides border no other
     cell tell c, each by itself.
 
-    Parameters
-    ----------
-    sides : (m, 3) int64
-        Rows of edges.
-    weights : (e,) float64
-        -A_ij of each edge.
+    `sides` (m, 3): rows of edges; `weights` (e,): -A_ij of each edge.
     """
     a, b, d = weights[sides].T
     square = a * b + b * d + d * a
@@ -53,17 +48,10 @@ def lone_scales(sides: NDArray[np.int64], weights: NDArray[np.float64]) -> Itera
 def peeled(sides: NDArray[np.int64], cotangents: NDArray[np.float64]) -> NDArray[np.int8]:
     """(m,) 1 for a cell, -1 for a hole, 0 where it does not follow from the boundary and from patches cut off by holes.
 
-    Parameters
-    ----------
-    sides : (m, 3) int64
-        Edges of each triangle that may be a cell; each edge in one or two of them.
-    cotangents : (e,) float64
-        Sums of the cotangents of the angles facing each edge, 2 w.
+    `sides` (m, 3): edges of each triangle that may be a cell; each edge in one or two of them; `cotangents` (e,): sums
+    of the cotangents of the angles facing each edge, 2 w.
 
-    Raises
-    ------
-    ContradictionError
-        If an edge is left with no cell, or with a weight that no cell has.
+    Raises ContradictionError if an edge is left with no cell, or with a weight that no cell has.
     """
     peeling = _Peeling(sides, cotangents)
     peeling.run()

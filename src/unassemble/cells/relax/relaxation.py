@@ -20,53 +20,31 @@ from numpy.typing import NDArray
 
 from ...errors import RecoveryError
 from ...linalg import solved
+from ..candidates.candidates import Candidates
 from .sheet import Placed, Sheet, unpinned
 
 
 @dataclass(frozen=True)
 class PathOptions:
-    """The path of the barrier.
+    """The path of the barrier."""
 
-    Attributes
-    ----------
-    first, last, factor : float
-        Barriers t, and the ratio of one to the one before.
-    slack : float
-        q at the first barrier.
-    near : float
-        Strength of the first labels.
-    nearest : float
-        Of the way to 0 or 1 that one step leaves.
-    outlier : float
-        Misfit beyond which an edge counts by its misfit, not by the square.
-    held : float
-        Keeps the problem definite where labels of zero leave vertices free.
-    """
-
+    # barriers t, and the ratio of one to the one before
     first: float = 0.3
     last: float = 1e-3
     factor: float = 0.75
-    slack: float = 0.03
-    near: float = 0.95
-    nearest: float = 0.1
-    outlier: float = 0.3
-    held: float = 1e-9
+    slack: float = 0.03  # q at the first barrier
+    near: float = 0.95  # strength of the first labels
+    nearest: float = 0.1  # of the way to 0 or 1 that one step leaves
+    outlier: float = 0.3  # misfit beyond which an edge counts by its misfit, not by the square
+    held: float = 1e-9  # keeps the problem definite where labels of zero leave vertices free
 
 
 def relaxed(sheet: Sheet, free: NDArray[np.bool_], options: PathOptions | None = None) -> NDArray[np.bool_] | None:
     """Whole labels at the end of a path that begins with all chosen candidates as cells.
 
-    Parameters
-    ----------
-    sheet : Sheet
-    free : (k,) bool
-        Which of the chosen candidates may be holes; the others are known cells.
-    options : PathOptions, optional
+    `free` (k,): which of the chosen candidates may be holes; the others are known cells.
 
-    Returns
-    -------
-    (cells,) bool or None
-        None where there is no conformal map on the way, or an equation is singular.
+    Returns (cells,), None where there is no conformal map on the way, or an equation is singular.
     """
     options = options or PathOptions()
     strength = np.zeros(sheet.candidates.count)
@@ -103,3 +81,31 @@ def _step(
     rhs[moving : moving + k] += 1.0 + t / s - t / (1 - s)  # labels are drawn to 1
     step = solved((weighted @ columns + sp.diags_array(held)).tocsr(), rhs)
     return np.clip(s + step[moving : moving + k], options.nearest * s, 1 - options.nearest * (1 - s))
+
+
+_SPARE = 2  # edges to each vertex, with which a mesh has far more equations than unknowns
+
+
+def with_holes(candidates: Candidates, state: NDArray[np.int8]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]] | None:
+    """Labels of triangles of which many are holes, relaxed from a mesh without any, and which of them may be wrong.
+
+    Nearly every edge between two triangles is one equation, and a planar mesh has three edges to every two coordinates:
+    so there are more conditions than holes, unless these are very many. Labels between 0 and 1 then need no good start
+    as long as what is certain is left as it is: a triangle with a side of its own is a cell.
+
+    None where some edge lies on no triangle, there are too few equations, or no conformal map.
+
+    `state` (m,): 1 for known cells among its triangles, -1 for known holes, else 0.
+    """
+    sides, e = candidates.triangle_sides, len(candidates.edges)
+    count = np.bincount(sides.ravel(), minlength=e)
+    if e <= _SPARE * candidates.n_vertices or candidates.weights[count == 0].any():
+        return None
+    number = np.flatnonzero(candidates.triangles)
+    cells, free = np.zeros((2, candidates.count), dtype=bool)
+    cells[number] = state >= 0
+    free[number] = (state == 0) & ~(count == 1)[sides].any(axis=1)
+    sheet = Sheet(candidates, candidates.scale or candidates.judged_by, cells)
+    with np.errstate(all="ignore"):  # a given scale may be out of all proportion
+        labels = relaxed(sheet, free[cells])
+    return None if labels is None else (labels, free)

@@ -32,31 +32,11 @@ _SHIFT = 0.7
 
 
 @dataclass(frozen=True, eq=False)
-class _Graph:
-    """The edges of all candidates, vanished ones among them; what the pencil needs to know."""
-
-    n_vertices: int
-    edges: NDArray[np.int64]
-
-    @property
-    def boundary(self) -> NDArray[np.int64]:
-        """Every edge, from its lower vertex to the higher one."""
-        return self.edges
-
-
-@dataclass(frozen=True, eq=False)
 class Placed:
-    """Positions of a sheet.
+    """Positions of a sheet."""
 
-    Attributes
-    ----------
-    z : (n,) complex128
-    c : float
-        Scale in units of the sheet's.
-    """
-
-    z: NDArray[np.complex128]
-    c: float
+    z: NDArray[np.complex128]  # (n,)
+    c: float  # scale in units of the sheet's
 
 
 class Sheet:
@@ -141,8 +121,8 @@ class Sheet:
         return np.asarray(np.bincount(self.row.ravel(), sides, len(self.weights)), dtype=np.float64)
 
     def pencil(self, strength: NDArray, unit: float = 1.0) -> ConformalPencil:
-        """The conformal pencil for fractional labels, of weights over some c."""
-        return ConformalPencil(_Graph(self.n_vertices, self.edges), self.weights / unit, self.around(strength))
+        """The conformal pencil for fractional labels, of weights over some c; each edge may be on the boundary."""
+        return ConformalPencil(self.n_vertices, self.edges, self.edges, self.weights / unit, self.around(strength))
 
     def mapped(self, strength: NDArray, start: Placed | None = None) -> Placed:
         """The conformal map for fractional labels.
@@ -166,13 +146,7 @@ class Sheet:
     def linearised(self, placed: Placed, strength: NDArray) -> tuple[sp.csr_array, sp.csr_array, NDArray]:
         """Derivatives of the weights over their spread.
 
-        Returns
-        -------
-        by_position : (e, 2 n) csr_array
-        by_label : (e, k) csr_array
-            Labels of the chosen candidates.
-        by_scale : (e,) float64
-            By log c.
+        Returns `by_position` (e, 2 n); `by_label` (e, k): labels of the chosen candidates; `by_scale` (e,): by log c.
         """
         t, z = self.triangles, placed.z
         at, shape = z[t], (len(self.weights), 2 * len(z))

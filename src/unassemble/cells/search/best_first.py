@@ -83,12 +83,7 @@ def leapt(start: Labelling, judge: Judge, options: SearchOptions = DEFAULT) -> L
 class BestFirst:
     """A search from one labelling, that has pieces.
 
-    Parameters
-    ----------
-    start : Labelling
-    free : (cells,) bool, optional
-        Labels that may change; all of them by default.
-    options : SearchOptions
+    `free` (cells,): labels that may change; all of them by default.
     """
 
     def __init__(self, start: Labelling, free: NDArray[np.bool_] | None = None, options: SearchOptions = DEFAULT):

@@ -30,17 +30,9 @@ class ChangedMaps:
 
     M(s) is factorised once, and what columns of its inverse have been asked for are kept.
 
-    Parameters
-    ----------
-    sheet : Sheet
-    labels : (cells,) bool
-    near : float
-        Of the shift, relative, to the c of their map.
+    `labels` (cells,); `near`: of the shift, relative, to the c of their map.
 
-    Raises
-    ------
-    RecoveryError
-        If there is no conformal map.
+    Raises RecoveryError if there is no conformal map.
     """
 
     def __init__(self, sheet: Sheet, labels: NDArray[np.bool_], near: float):

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from ...budget import Budget
 from ...topology.embedding import face_complexes
 from ..candidates.candidates import Candidates
-from ..candidates.starts import likely_labels
+from ..candidates.choosing import likely_labels
 from ..candidates.widened import widened
 from ..judge.labelling import Labelling
 from ..propagate.peeling import ContradictionError, lone_scales, peeled
-from ..relax.holes import with_holes
+from ..relax.relaxation import with_holes
 from .best_first import BestFirst, Judge, better, leapt
 from .options import DEFAULT, SearchOptions
 

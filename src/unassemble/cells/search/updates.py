@@ -22,12 +22,7 @@ _BATCH = 5e4  # triangles times moves that are computed together
 class Updates:
     """Changes of the labels in one embedding.
 
-    Parameters
-    ----------
-    sheet : Sheet
-    free : (cells,) bool, optional
-        Labels that may change; all of them by default.
-    options : SearchOptions
+    `free` (cells,): labels that may change; all of them by default.
     """
 
     def __init__(self, sheet: Sheet, free: NDArray[np.bool_] | None = None, options: SearchOptions = DEFAULT):
@@ -50,12 +45,7 @@ class Updates:
 
         Single labels and pairs, then also threes: these are told after a few of the others only.
 
-        Parameters
-        ----------
-        labelling : Labelling
-            In this drawing; with pieces.
-        levels : int
-            Labels in one move, at most.
+        `labelling`: in this drawing; with pieces; `levels`: labels in one move, at most.
         """
         labels = labelling.labels
         try:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ...errors import RecoveryError
 from ...matrix import OperatorMatrix
-from ...tolerances import ALIKE
+from ...tolerances import ALIKE, CANCELLED
 from ...topology import Numbering, Polygons, components
 from ...topology.embedding import face_complexes
 from ...topology.faces import FaceComplex, from_rotation
@@ -36,7 +36,6 @@ from ..search.moves import Move, turned
 from ..search.updates import Updates
 from ..undivided import undivided
 from .around import Around, Cell, cycles
-from .cracks import cracked
 
 SEARCHED_ROWS = 1000
 """Rows of a component around whose answer others are looked for: the cost grows like the square."""
@@ -148,3 +147,30 @@ def as_cell(corners: list[int] | Cell) -> Cell:
     place = min(range(len(corners)), key=corners.__getitem__)
     cell = (*corners[place:], *corners[:place])
     return cell if cell[1] < cell[-1] else (cell[0], *cell[:0:-1])
+
+
+def cracked(labelling: Labelling) -> bool:
+    """Whether a hole has no area, and a vertex lies on the side of the cell beyond.
+
+    A slit whose vertices lie in the same places on both sides is none of these: such meshes are made on purpose.
+    """
+    for piece, mesh in zip(labelling.pieces, labelling.meshes, strict=True):
+        if mesh is None:
+            continue
+        begin = piece.loop_offsets[:-1]
+        tail, head = mesh.z[piece.boundary.T]
+        first = np.repeat(tail[begin], np.diff(piece.loop_offsets))
+        area = np.add.reduceat((np.conj(tail - first) * (head - first)).imag / 2, begin)
+        length = np.add.reduceat(np.abs(head - tail), begin)
+        flat = np.abs(area) <= CANCELLED * length**2
+        flat[np.argmax(np.abs(area))] = False  # the outer boundary
+        for k in np.flatnonzero(flat).tolist():
+            if not _is_slit(tail[begin[k] : piece.loop_offsets[k + 1]] / length[k]):
+                return True
+    return False
+
+
+def _is_slit(z: NDArray[np.complex128]) -> bool:
+    """Whether a loop (k,) of length 1 runs along a tree and back: all k / 2 edges of the tree have both their sides."""
+    places = np.unique(np.round(z / ALIKE))
+    return 2 * (len(places) - 1) == len(z)

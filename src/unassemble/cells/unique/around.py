@@ -24,44 +24,25 @@ Cell = tuple[int, ...]
 
 @dataclass(frozen=True)
 class RightAngle:
-    """A right angle of a cell, between two edges whose far ends are not joined.
-
-    Attributes
-    ----------
-    apex : int
-    ends : (int, int)
-        The vertices before and after it.
-    cell, rest : int
-        The candidate that it belongs to, and the one that is left of it without the apex; -1 if nothing is.
-    """
+    """A right angle of a cell, between two edges whose far ends are not joined."""
 
     apex: int
-    ends: tuple[int, int]
+    ends: tuple[int, int]  # the vertices before and after it
+    # the candidate that it belongs to, and the one that is left of it without the apex; -1 if nothing is
     cell: int
     rest: int
 
 
 @dataclass(frozen=True, eq=False)
 class Around:
-    """Candidates about an answer.
+    """Candidates about an answer."""
 
-    Attributes
-    ----------
-    candidates : Candidates
-        Those of an embedding, the cells of the answer, and these without a vertex at a right angle.
-    labels : (cells,) bool
-        The answer.
-    z : (n,) complex128
-    right_angles : list of RightAngle
-    agree : float
-        Relative difference of equal numbers.
-    """
-
+    # those of an embedding, the cells of the answer, and these without a vertex at a right angle
     candidates: Candidates
-    labels: NDArray[np.bool_]
-    z: NDArray[np.complex128]
+    labels: NDArray[np.bool_]  # (cells,) the answer
+    z: NDArray[np.complex128]  # (n,)
     right_angles: list[RightAngle]
-    agree: float
+    agree: float  # relative difference of equal numbers
 
     @classmethod
     def of(cls, candidates: Candidates, cells: Polygons, z: NDArray[np.complex128], agree: float) -> Around:
