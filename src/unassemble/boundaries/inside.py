@@ -33,6 +33,8 @@ class InsideOptions:
     newton : FitOptions
         Steps of all vertices that start near: smooth displacements are stiff only in the fourth power of their length,
         so that any damping would hold them.
+    last : FitOptions
+        One step more where what is left is not rounding.
     held : float
         Whole entries to a vertex, at least, where the rim is taken off as a whole: three far inside, two determine.
     tries, nearly : int, float
@@ -58,6 +60,7 @@ class InsideOptions:
     newton: FitOptions = field(
         default_factory=lambda: FitOptions(steps=1, last_steps=8, damping=1e-15, exact=1e-12, near=0.05, shortest=1.0)
     )
+    last: FitOptions = field(default_factory=lambda: FitOptions(last_steps=1, trials=1, damping=1e-15))
     held: float = 2.3
     tries: int = 6
     nearly: float = 1e-3
@@ -140,6 +143,7 @@ def fit_inside(
             return None
         exact = core[0].misfit <= options.exact
         fit, rim = _grown(problem, *core, options) if exact else core
+        fit = problem.fit(fit.z, fit.scale, rim.whole, 0.0, options.last) if exact else fit
         z, whole = fit.z, rim.whole
         known, entries = np.zeros(len(z), dtype=bool), np.zeros_like(whole)
         if exact:
