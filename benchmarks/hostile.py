@@ -97,12 +97,17 @@ def gives_back(found, matrix: Any) -> bool:
 
 
 def agree(off: sp.csr_array, total: sp.csr_array, known: NDArray[np.bool_]) -> bool:
-    """Whether entries between rows that are claimed are the same, relative to their rows."""
+    """Whether entries between rows that are claimed are the same, relative to their rows.
+
+    Two rows with a common neighbour without a position may have a triangle there: nothing is claimed of their entry.
+    """
     largest = np.maximum(np.abs(off).max(axis=1).toarray().ravel(), 1e-300)
     difference = sp.coo_array(off - total)
     row, column = difference.coords
     wrong = np.abs(difference.data) > MISFIT * np.minimum(largest[row], largest[column])
-    return not (wrong & known[row] & known[column]).any()
+    beside = sp.csr_array(off != 0, dtype=np.int32)[:, ~known]
+    beside = sp.csr_array(beside @ beside.T)
+    return not (wrong & known[row] & known[column] & (beside[row, column] == 0)).any()
 
 
 def lengths_give_back(found: Surface, matrix: sp.csr_array) -> bool:
