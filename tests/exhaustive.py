@@ -14,8 +14,8 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from unassemble.planar.cotangent import edge_weights
-from unassemble.topology.pieces import planar_pieces
+from unassemble.planar import edge_weights
+from unassemble.topology import planar_pieces
 
 Cell = tuple[int, ...]
 LONGEST = 6

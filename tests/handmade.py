@@ -9,8 +9,7 @@ import numpy as np
 
 from meshes import edge_list, random_mesh
 from unassemble import Body, PlanarMesh, Recovery
-from unassemble.elements.kinds import KINDS
-from unassemble.elements.reference import reference_nodes
+from unassemble.elements import KINDS, reference_nodes
 from unassemble.topology import surfaces
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from handmade import lake, quadratic, solid, with_loose_row
-from unassemble.elements.kinds import KINDS
+from unassemble.elements import KINDS
 from unassemble.errors import FormatError, OutputError
 from unassemble.export import STATUS, UNIQUENESS, check_output, save, to_meshio
 from unassemble.formats import FORMATS, MeshFormat, lacks_worth

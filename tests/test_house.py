@@ -90,3 +90,12 @@ def test_few_numbers_were_chosen():
 def test_files_are_read_in_one_go():
     lines = Counter({str(path.relative_to(ROOT)): len(path.read_text("utf-8").splitlines()) for path in files()})
     assert {name: n for name, n in lines.items() if n > MOST_LINES} == {}
+
+
+def test_tests_go_through_doors():
+    """Top-level modules and packages: what a room is made of may change without a test that breaks."""
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("unassemble.") and not node.level:
+                inner = node.module.split(".")[1:]
+                assert len(inner) == 1 or (ROOT / Path(*inner)).is_dir(), f"{path.name}: {node.module}"

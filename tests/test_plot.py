@@ -13,10 +13,16 @@ from matplotlib.image import imread
 from handmade import lake, recovery_of, two_pieces, with_loose_row
 from meshes import random_mesh
 from unassemble.errors import InputError, OutputError
-from unassemble.plot import check_plot, plot_comparison, plot_recovery, style
-from unassemble.plot.comparison import align, largest_error
-from unassemble.plot.layout import laid_out
-from unassemble.plot.mesh import outer_loops
+from unassemble.plot import (
+    align,
+    check_plot,
+    laid_out,
+    largest_error,
+    outer_loops,
+    plot_comparison,
+    plot_recovery,
+    style,
+)
 
 
 def words(figure) -> str:

@@ -8,11 +8,8 @@ from scipy.spatial import Delaunay
 from meshes import delaunay, edge_list, random_mesh, specimen, triangle_set
 from unassemble import recover
 from unassemble.linalg import factorisation
-from unassemble.planar.krylov import ShiftedSearch
-from unassemble.planar.pencil import ConformalPencil
-from unassemble.topology import surfaces
-from unassemble.topology.cycles import three_cycles
-from unassemble.topology.separating import not_faces
+from unassemble.planar import ConformalPencil, ShiftedSearch
+from unassemble.topology import not_faces, surfaces, three_cycles
 from vanishing import used
 
 

@@ -6,7 +6,7 @@ import pytest
 from families import FAMILIES, with_many_holes
 from meshes import largest_error, random_mesh, specimen, triangle_set
 from unassemble import recover
-from unassemble.cells.propagate.patches import arcs_across, patches
+from unassemble.cells.propagate import arcs_across, patches
 
 
 def sides_of(triangles):

@@ -6,8 +6,8 @@ import pytest
 from families import FAMILIES
 from meshes import specimen
 from unassemble import recover
-from unassemble.cells.propagate.peeling import ContradictionError, lone_scales, peeled
-from unassemble.topology.cycles import three_cycles
+from unassemble.cells.propagate import ContradictionError, lone_scales, peeled
+from unassemble.topology import three_cycles
 from vanishing import forgotten
 
 

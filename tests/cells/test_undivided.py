@@ -6,8 +6,8 @@ import numpy as np
 
 from meshes import specimen
 from unassemble import recover
-from unassemble.cells.undivided import undivided
-from unassemble.scalar.joined import JoinedMesh
+from unassemble.cells import undivided
+from unassemble.scalar import JoinedMesh
 from unassemble.topology import surfaces
 from vanishing import forgotten, squares
 

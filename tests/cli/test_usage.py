@@ -10,8 +10,7 @@ import scipy.sparse as sp
 from click.testing import CliRunner
 
 from unassemble import InputError, recover
-from unassemble.cli import main
-from unassemble.cli.values import spelled_out
+from unassemble.cli import main, spelled_out
 
 BAD = [
     (["--scale", "0"], "finite nonzero number"),

@@ -12,8 +12,7 @@ import pytest
 import scipy.io
 import scipy.sparse as sp
 
-from unassemble.cli import main
-from unassemble.cli.spelling import as_typed, flags_of
+from unassemble.cli import as_typed, flags_of, main
 from unassemble.formats import FORMATS
 from unassemble.words import count_of
 

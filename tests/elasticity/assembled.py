@@ -11,13 +11,10 @@ import skfem
 from skfem.helpers import ddot, grad, sym_grad, trace
 
 from unassemble.clock import Clock
-from unassemble.elasticity.description import Request
-from unassemble.elasticity.nullspace.atlas import PATCH
-from unassemble.elasticity.recover import serve_body
+from unassemble.elasticity import Request, serve_body
+from unassemble.elasticity.nullspace import PATCH
 from unassemble.matrix import check_matrix
-from unassemble.nodes.nodal import nodal_matrix
-from unassemble.nodes.rounded import with_exact_sums
-from unassemble.nodes.unknowns import find_numbering
+from unassemble.nodes import find_numbering, nodal_matrix, with_exact_sums
 from unassemble.recovery import Body
 
 ELEMENTS = {

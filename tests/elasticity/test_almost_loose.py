@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from unassemble.nodes.shape import SOFT, shape
+from unassemble.nodes import SOFT, shape
 
 N, LOOSE = 200, 6
 

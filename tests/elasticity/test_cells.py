@@ -7,8 +7,7 @@ from assembled import ELEMENTS, box, eliminated, heterogeneous, on_plane, permut
 from scipy.spatial import Delaunay, cKDTree
 
 from unassemble import recover
-from unassemble.elements.kinds import KINDS
-from unassemble.elements.ordering import ordered_boxes
+from unassemble.elements import KINDS, ordered_boxes
 
 KIND = {
     "tri-p1": "triangle", "tri-p2": "triangle6", "quad-q1": "quad", "quad-s2": "quad8", "quad-q2": "quad9",

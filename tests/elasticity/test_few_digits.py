@@ -10,7 +10,7 @@ from assembled import box, eliminated, error, on_plane, permuted_nodes, stiffnes
 from supported import given, judged
 
 from unassemble import recover
-from unassemble.nodes.rounded import with_exact_sums
+from unassemble.nodes import with_exact_sums
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "structures"))
 from built import error as size_and_error

@@ -18,7 +18,7 @@ from supported import given, judged
 
 from unassemble import recover
 from unassemble.errors import GeometryError
-from unassemble.nodes.unknowns import given_numbering
+from unassemble.nodes import given_numbering
 
 COUNTS = {"tet-p1": (8, 7, 8), "tet-p2": (6, 6, 6), "hex-q1": (7, 7, 7), "hex-s2": (6, 6, 6), "hex-q2": (5, 6, 5)}
 # In boxes of equal hexahedra more than affine functions satisfy all scalar equations, r^(i + j + k) for one.

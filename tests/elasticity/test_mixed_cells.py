@@ -8,7 +8,7 @@ from mixed import mixed
 from supported import given, judged
 
 from unassemble import recover
-from unassemble.elements.surface import outer_facets, outer_nodes
+from unassemble.elements import outer_facets, outer_nodes
 
 COUNTS = (9, 8)
 

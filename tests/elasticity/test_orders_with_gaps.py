@@ -9,8 +9,7 @@ import scipy.sparse as sp
 from assembled import box, heterogeneous, permuted_nodes, recover_elasticity, stiffness
 from supported import assert_certified, given, judged
 
-from unassemble.nodes.grouping import by_first_row
-from unassemble.nodes.unknowns import find_numbering, given_numbering
+from unassemble.nodes import by_first_row, find_numbering, given_numbering
 
 
 def quadratic(kind: str, support: str, order: str, seed: int, perturb: float = 0.2):

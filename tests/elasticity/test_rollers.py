@@ -8,7 +8,7 @@ from supported import assert_certified, given, judged
 
 from unassemble.elasticity import positions
 from unassemble.errors import RecoveryError
-from unassemble.nodes.unknowns import find_numbering
+from unassemble.nodes import find_numbering
 
 COUNTS = {"tri-p1": (8, 9), "tri-p2": (6, 7), "quad-q1": (8, 9), "tet-p1": (4, 5, 5)}
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from unassemble.elasticity.nullspace.solution import Solution
-from unassemble.elasticity.straight.straight import Straight, in_place
+from unassemble.elasticity.nullspace import Solution
+from unassemble.elasticity.straight import Straight, in_place
 from unassemble.recovery import Evidence
 
 

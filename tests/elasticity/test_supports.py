@@ -19,7 +19,7 @@ from assembled import (
 from supported import with_zeros
 
 from unassemble.errors import RecoveryError
-from unassemble.nodes.unknowns import find_numbering, given_numbering
+from unassemble.nodes import find_numbering, given_numbering
 
 KINDS = {"tri-p1": (8, 9), "quad-q1": (8, 9), "tet-p1": (5, 6, 7), "hex-q1": (5, 6, 7)}
 

@@ -3,9 +3,8 @@
 import numpy as np
 from assembled import box, stiffness
 
-from unassemble.elasticity.materials.cells import recognise_cells
-from unassemble.nodes.nodal import nodal_matrix
-from unassemble.nodes.unknowns import given_numbering
+from unassemble.elasticity.materials import recognise_cells
+from unassemble.nodes import given_numbering, nodal_matrix
 
 
 def test_cells_with_nodes_that_have_no_coordinates_are_left_out():

@@ -6,12 +6,20 @@ import scipy.sparse as sp
 import skfem
 from skfem.helpers import ddot, dot, grad, sym_grad, trace
 
-from unassemble.elements.candidates import candidates
-from unassemble.elements.cliques import Graph
-from unassemble.elements.kinds import KINDS
-from unassemble.elements.matrices import assembled, elasticity, laplacian, mass
-from unassemble.elements.ordering import ordered
-from unassemble.elements.reference import reference_nodes, rules, shape_functions, shape_gradients
+from unassemble.elements import (
+    KINDS,
+    Graph,
+    assembled,
+    candidates,
+    elasticity,
+    laplacian,
+    mass,
+    ordered,
+    reference_nodes,
+    rules,
+    shape_functions,
+    shape_gradients,
+)
 
 SKFEM = {
     "triangle": (skfem.MeshTri, skfem.ElementTriP1),

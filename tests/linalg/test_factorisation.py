@@ -5,8 +5,7 @@ import pytest
 import scipy.sparse as sp
 
 from unassemble import InputError
-from unassemble.linalg import backend, factorisation, pardiso, threads, upper_from_edges
-from unassemble.linalg.upper import UpperTriangle
+from unassemble.linalg import UpperTriangle, backend, factorisation, pardiso, threads, upper_from_edges
 
 SOLVERS = [
     pytest.param("pardiso", marks=pytest.mark.skipif(not pardiso.available(), reason="MKL is not installed")),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from unassemble.matrix.digits import Digits
+from unassemble.matrix import Digits
 
 RNG = np.random.default_rng(0)
 GENERIC = RNG.choice([-1, 1], 200) * np.exp(RNG.uniform(-4, 4, 200))

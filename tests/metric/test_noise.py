@@ -6,9 +6,8 @@ import scipy.sparse as sp
 from surfaces import lattice, moebius, sheet, surface, torus
 
 from unassemble import recover
-from unassemble.linalg.responses import SamplingOptions
-from unassemble.metric.lengths import areas_cotangents
-from unassemble.metric.noise import length_deviations
+from unassemble.linalg import SamplingOptions
+from unassemble.metric import areas_cotangents, length_deviations
 
 SIGMA = 1e-4
 

@@ -7,8 +7,7 @@ from surfaces import moebius, sphere, torus
 
 from meshes import edge_list
 from unassemble.errors import GeometryError
-from unassemble.metric.lengths import angles, areas_cotangents, heron, longest_step
-from unassemble.metric.program import solve_metric
+from unassemble.metric import angles, areas_cotangents, heron, longest_step, solve_metric
 
 
 def with_lengths(points, triangles):

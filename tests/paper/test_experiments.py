@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from unassemble.planar.conformal import conformal_map
+from unassemble.planar import conformal_map
 from unassemble_paper import regenerate
 from unassemble_paper.cases import Case
 from unassemble_paper.page import filled

@@ -12,7 +12,7 @@ from unassemble import paper, recover
 from unassemble.cli import main
 from unassemble.errors import InputError
 from unassemble.paper import AngleOptions, NewtonOptions, distance
-from unassemble.planar.conformal import conformal_map
+from unassemble.planar import conformal_map
 from unassemble_paper.claim import Claim, claims_table
 
 

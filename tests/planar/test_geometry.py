@@ -6,13 +6,21 @@ import pytest
 from meshes import edge_list, largest_error, random_mesh, specimen
 from unassemble import GeometryError
 from unassemble.certify import certify
-from unassemble.linalg.responses import SamplingOptions
-from unassemble.planar.conformal import ConformalOptions, conformal_map, estimate_scale
-from unassemble.planar.cotangent import edge_weights, weight_gradient
-from unassemble.planar.deviations import coordinate_covariances
-from unassemble.planar.frame import canonical_frame, collinear, fit_similarity
-from unassemble.planar.normal import WeightJacobian
-from unassemble.planar.polish import PolishOptions, polish
+from unassemble.linalg import SamplingOptions
+from unassemble.planar import (
+    ConformalOptions,
+    PolishOptions,
+    WeightJacobian,
+    canonical_frame,
+    collinear,
+    conformal_map,
+    coordinate_covariances,
+    edge_weights,
+    estimate_scale,
+    fit_similarity,
+    polish,
+    weight_gradient,
+)
 from unassemble.topology import surfaces
 
 

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from unassemble.planar.hinges import join
-from unassemble.topology import Topology
-from unassemble.topology.keys import with_sides
-from unassemble.topology.pieces import planar_pieces
+from unassemble.planar import join
+from unassemble.topology import Topology, planar_pieces, with_sides
 
 
 @pytest.mark.parametrize("seed", range(5))

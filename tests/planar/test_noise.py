@@ -9,10 +9,8 @@ import scipy.sparse as sp
 from meshes import delaunay, diameter, largest_error, random_mesh, specimen
 from unassemble import GeometryError, SolverError, recover
 from unassemble.matrix import check_matrix
+from unassemble.planar import cautious_polish, conformal_map, count_flipped, polish
 from unassemble.planar import piece as pieces
-from unassemble.planar.cautious import cautious_polish, count_flipped
-from unassemble.planar.conformal import conformal_map
-from unassemble.planar.polish import polish
 from unassemble.topology import surfaces
 
 

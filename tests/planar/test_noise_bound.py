@@ -13,8 +13,7 @@ from bound import Bound, mean_square, mesh_of_at_least, noisy, weights_and_deriv
 from irregular import laplacian
 
 from unassemble.matrix import check_matrix
-from unassemble.planar.conformal import conformal_map
-from unassemble.planar.piece import PieceMesh, refined
+from unassemble.planar import PieceMesh, conformal_map, refined
 from unassemble.topology import surfaces
 
 WITHIN = 1.1

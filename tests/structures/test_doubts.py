@@ -9,7 +9,7 @@ from as_given import written
 from built import assembled, error, frame, grid, model_on, plane_frame, plate, rows_per_node, shell, sound, truss
 
 from unassemble import RecoveryError, recover
-from unassemble.structures.placed import pieces
+from unassemble.structures import pieces
 
 
 def rows_of(given, kept):

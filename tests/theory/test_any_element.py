@@ -5,11 +5,8 @@ import pytest
 import skfem
 from skfem.models.poisson import laplace
 
-from unassemble.conforming.assembly import Entries
-from unassemble.conforming.parts import parts_of
-from unassemble.conforming.roles import Cells
-from unassemble.elements.kinds import KINDS
-from unassemble.elements.reference import exact_rule, planar_rules
+from unassemble.conforming import Cells, Entries, parts_of
+from unassemble.elements import KINDS, exact_rule, planar_rules
 
 ELEMENTS = {
     "triangle": skfem.ElementTriP1,

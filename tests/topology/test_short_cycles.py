@@ -4,7 +4,7 @@ import networkx
 import numpy as np
 import pytest
 
-from unassemble.topology.cycles import chordless_four_cycles
+from unassemble.topology import chordless_four_cycles
 
 GRAPHS = {
     "grid": networkx.convert_node_labels_to_integers(networkx.grid_2d_graph(4, 5)),

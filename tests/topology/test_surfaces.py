@@ -11,10 +11,7 @@ from scipy.spatial import Delaunay
 
 from meshes import delaunay, edge_list, random_mesh, triangle_set
 from unassemble import NotPlanarError
-from unassemble.topology import require_planar, surfaces
-from unassemble.topology.boundary import loops
-from unassemble.topology.cycles import three_cycles
-from unassemble.topology.separating import _separating
+from unassemble.topology import loops, require_planar, separating, surfaces, three_cycles
 
 
 def shuffled(triangles, n, seed=0):
@@ -80,7 +77,7 @@ def test_vertex_of_degree_three_in_a_triangle():
 
 @pytest.mark.parametrize("nested", [1, 2, 5])
 @pytest.mark.parametrize("fill", ["vertices of degree three", "triangulated triangle"])
-def test_separating_triangles_at_any_depth(nested, fill):
+def testseparating_triangles_at_any_depth(nested, fill):
     points, triangles = random_mesh(60, seed=nested)
     cells, n = triangles.tolist(), len(points)
     for k in range(nested):
@@ -110,7 +107,7 @@ def test_cycles_with_something_on_both_sides_are_those_of_networkx(filled):
     n = len(points) + len(more)
     graph = networkx.Graph(edges.tolist())
     cycles, _ = three_cycles(n, edges)
-    found = _separating(n, edges, cycles)
+    found = separating(n, edges, cycles)
     assert found.any()
     sample = np.random.default_rng(0).permutation(len(cycles))[:40]
     for k in {*np.flatnonzero(found).tolist(), *sample.tolist()}:

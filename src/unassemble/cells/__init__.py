@@ -5,6 +5,7 @@ Where entries vanish the graph alone does not tell: see the page on theory in th
 
 from .completion import completed, guessed
 from .doubt import Attempt, Outcome, components_of, in_doubt
+from .undivided import undivided
 from .unique.alternatives import SEARCHED_ROWS, Alternative, alternatives
 
 __all__ = [
@@ -17,4 +18,5 @@ __all__ = [
     "components_of",
     "guessed",
     "in_doubt",
+    "undivided",
 ]

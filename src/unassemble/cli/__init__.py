@@ -6,9 +6,11 @@ import click
 
 from .._version import __version__
 from .commands import demo, inspect, modes, paper, recover
+from .spelling import as_typed, flags_of
 from .status import CommandLine
+from .values import spelled_out
 
-__all__ = ["main"]
+__all__ = ["as_typed", "flags_of", "main", "spelled_out"]
 
 
 # A backspace keeps click from running the lines together.

@@ -3,3 +3,16 @@
 The form M = L/2 - T annihilates the coordinates whatever the element is (theory: any conforming element); cells come
 from the sets of rows that are coupled to each other.
 """
+
+from .assembly import Entries
+from .parts import parts_of
+from .recover import recover_conforming, shown_cells
+from .roles import Cells
+
+__all__ = [
+    "Cells",
+    "Entries",
+    "parts_of",
+    "recover_conforming",
+    "shown_cells",
+]

@@ -3,3 +3,31 @@
 Nothing here knows what a matrix belongs to: scalar and vector-valued operators use the same kinds, shape functions,
 element matrices and candidates.
 """
+
+from .candidates import candidates
+from .cliques import Graph
+from .kinds import KINDS
+from .matrices import assembled, elasticity, laplacian, mass
+from .ordering import ordered, ordered_boxes
+from .reference import exact_rule, planar_rules, reference_nodes, rules, shape_functions, shape_gradients
+from .surface import outer_facets, outer_nodes
+
+__all__ = [
+    "KINDS",
+    "Graph",
+    "assembled",
+    "candidates",
+    "elasticity",
+    "exact_rule",
+    "laplacian",
+    "mass",
+    "ordered",
+    "ordered_boxes",
+    "outer_facets",
+    "outer_nodes",
+    "planar_rules",
+    "reference_nodes",
+    "rules",
+    "shape_functions",
+    "shape_gradients",
+]

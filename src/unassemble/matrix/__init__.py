@@ -1,7 +1,16 @@
 """From a file or a scipy matrix to a clean symmetric operator."""
 
 from .check import as_csr, check_matrix
+from .digits import Digits
 from .operator import OperatorMatrix
 from .read import is_file, load, read_matrix
 
-__all__ = ["OperatorMatrix", "as_csr", "check_matrix", "is_file", "load", "read_matrix"]
+__all__ = [
+    "Digits",
+    "OperatorMatrix",
+    "as_csr",
+    "check_matrix",
+    "is_file",
+    "load",
+    "read_matrix",
+]

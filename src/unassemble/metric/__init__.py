@@ -1,7 +1,23 @@
 """Edge lengths of curved surfaces: a convex program, and what the lengths say."""
 
 from .flat import could_be_planar, flattened, perhaps_planar, unless_planar
+from .lengths import angles, areas_cotangents, heron, longest_step
+from .noise import length_deviations
+from .program import solve_metric
 from .realise import realised
 from .recover import recover_surface
 
-__all__ = ["could_be_planar", "flattened", "perhaps_planar", "realised", "recover_surface", "unless_planar"]
+__all__ = [
+    "angles",
+    "areas_cotangents",
+    "could_be_planar",
+    "flattened",
+    "heron",
+    "length_deviations",
+    "longest_step",
+    "perhaps_planar",
+    "realised",
+    "recover_surface",
+    "solve_metric",
+    "unless_planar",
+]

@@ -1,1 +1,35 @@
 """Scalar matrices in the plane: conformal null vector, unknown scale, polish, error bars, gauge."""
+
+from .cautious import cautious_polish, count_flipped
+from .conformal import ConformalOptions, conformal_map, estimate_scale
+from .cotangent import edge_weights, weight_gradient
+from .deviations import coordinate_covariances
+from .frame import canonical_frame, collinear, fit_similarity
+from .hinges import join
+from .krylov import ShiftedSearch
+from .normal import WeightJacobian
+from .pencil import ConformalPencil
+from .piece import PieceMesh, refined
+from .polish import PolishOptions, polish
+
+__all__ = [
+    "ConformalOptions",
+    "ConformalPencil",
+    "PieceMesh",
+    "PolishOptions",
+    "ShiftedSearch",
+    "WeightJacobian",
+    "canonical_frame",
+    "cautious_polish",
+    "collinear",
+    "conformal_map",
+    "coordinate_covariances",
+    "count_flipped",
+    "edge_weights",
+    "estimate_scale",
+    "fit_similarity",
+    "join",
+    "polish",
+    "refined",
+    "weight_gradient",
+]

@@ -4,6 +4,7 @@ from .bars import truss_numbering
 from .beams import Beam, find_beam, serve_beam
 from .frames import serve_structure
 from .layouts import LAYOUTS, Layout, layout_named
+from .placed import pieces
 from .recognise import StructuralNumbering, find_structure, given_structure
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "find_structure",
     "given_structure",
     "layout_named",
+    "pieces",
     "serve_beam",
     "serve_structure",
     "truss_numbering",

@@ -1,8 +1,13 @@
 """From the sparsity graph to faces, orientation, boundary loops and pieces; no coordinates here."""
 
+from .boundary import loops
+from .cycles import chordless_four_cycles, three_cycles
+from .keys import with_sides
 from .numbering import Numbering, components, local_numbering
+from .pieces import planar_pieces
 from .polygons import Polygons
 from .recognise import located, require_planar, surfaces
+from .separating import not_faces, separating
 from .surface import Piece, Topology
 
 __all__ = [
@@ -10,9 +15,16 @@ __all__ = [
     "Piece",
     "Polygons",
     "Topology",
+    "chordless_four_cycles",
     "components",
     "local_numbering",
     "located",
+    "loops",
+    "not_faces",
+    "planar_pieces",
     "require_planar",
+    "separating",
     "surfaces",
+    "three_cycles",
+    "with_sides",
 ]

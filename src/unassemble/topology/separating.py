@@ -27,11 +27,11 @@ def not_faces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> 
         count = np.bincount(opposite[~false].ravel(), minlength=len(edges))
         doubtful = np.flatnonzero(crowded(count[opposite] > 2, axis=1) & ~false)
         for some in np.array_split(doubtful, 1 + len(doubtful) // LARGE):
-            false[some] = _separating(n, edges, triangles[some])
+            false[some] = separating(n, edges, triangles[some])
     return false
 
 
-def _separating(n: int, edges: NDArray, cycles: NDArray) -> NDArray[np.bool_]:
+def separating(n: int, edges: NDArray, cycles: NDArray) -> NDArray[np.bool_]:
     """(m,) whether at least two components of the graph without a cycle have neighbours at all of its vertices.
 
     Looked for in balls about all cycles at once, which grow until they tell: nearly always one of the components is

@@ -1,1 +1,7 @@
 """The material of elements: which candidates for cells, with which Lame coefficients, add up to the matrix."""
+
+from .cells import recognise_cells
+
+__all__ = [
+    "recognise_cells",
+]

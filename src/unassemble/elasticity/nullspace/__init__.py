@@ -1,1 +1,9 @@
 """From rows with known nodes and directions to positions: the null space of the identities."""
+
+from .atlas import PATCH
+from .solution import Solution
+
+__all__ = [
+    "PATCH",
+    "Solution",
+]
