@@ -121,3 +121,20 @@ def largest_error(found: NDArray, true: NDArray) -> float:
 def cell_sets(recovery) -> set[frozenset[int]]:
     """Cells as sets of rows."""
     return {frozenset(some) for cells in recovery.cells.values() for some in cells.tolist()}
+
+
+def same_but_for_diagonals(cells: set[frozenset[int]], others: set[frozenset[int]]) -> bool:
+    """Whether cells are the same but for pairs that share a side and are divided along another diagonal."""
+    mine, theirs = cells - others, others - cells
+    both = _pairs(mine) & _pairs(theirs)
+    covered = all(any(cell < pair for pair in both) for cell in mine | theirs)
+    return len(mine) == len(theirs) == 2 * len(both) and covered
+
+
+def _pairs(cells: set[frozenset[int]]) -> set[frozenset[int]]:
+    """Rows of two quadratic triangles that share a side."""
+    around: dict[int, list[frozenset[int]]] = {}
+    for cell in cells:
+        for row in cell:
+            around.setdefault(row, []).append(cell)
+    return {one | other for of in around.values() for one in of for other in of if len(one & other) == 3}

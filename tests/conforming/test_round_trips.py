@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from skfem import MeshQuad, MeshTri, MeshTri2
 
-from conforming.assembled import assembled, cell_sets, largest_error, quadrilaterals, with_hole
+from conforming.assembled import assembled, cell_sets, largest_error, quadrilaterals, same_but_for_diagonals, with_hole
 from meshes import SHARED, needs_shared, random_mesh
 from unassemble import ConformingMesh, recover
 
@@ -61,6 +61,36 @@ def test_vanishing_entries_need_not_be_stored(element):
 
 def test_cubic_right_triangles_show_without_their_zeros():
     check(assembled("P3", MeshTri().refined(3), zeros=False))
+
+
+def test_cocircular_quadratic_triangles_show_without_their_zeros():
+    """The weight between them vanishes; which diagonal it is the triangles tell, and right angles by the numbers."""
+    circle = np.exp(1j * np.array([0.1, 1.2, 2.9, 4.4]))
+    kite = np.array([-1, np.exp(-0.7j), 1, np.exp(0.7j)])
+    right = np.array([-1, np.exp(-0.7j), 1, np.exp(1.9j)])
+    for corners in (circle, kite, right):
+        apex = 3 * (corners + np.roll(corners, -1)) / 2  # a triangle on each side
+        points = np.concatenate([corners, apex])
+        cells = np.array([(0, 1, 2), (0, 2, 3), (0, 4, 1), (1, 5, 2), (2, 6, 3), (3, 7, 0)])
+        known = assembled("P2", MeshTri(np.stack([points.real, points.imag]), cells.T), zeros=False)
+        assert known.matrix.nnz < assembled("P2", MeshTri(np.stack([points.real, points.imag]), cells.T)).matrix.nnz - 8
+        check(known)
+
+
+@pytest.mark.parametrize("shape", [(3, 4), (12, 9)])
+def test_rectangles_of_quadratic_triangles_are_ambiguous_without_their_zeros(shape):
+    x, y = (np.linspace(0, 1, n) ** 1.2 for n in shape)
+    known = assembled("P2", MeshTri.init_tensor(x, y), c=-3.0, zeros=False)
+    found = recover(known.matrix)
+    assert (found.status, found.uniqueness) == ("ambiguous", "ambiguous")
+    assert found.backward_error < 1e-12
+    assert largest_error(found.points, known.points) < 1e-12
+    (other,) = found.alternatives
+    mine, theirs = ({frozenset(cell) for cell in cells} for cells in (other.cells, other.other_cells))
+    assert len(mine) == len(theirs) == 2
+    assert frozenset().union(*mine) == frozenset().union(*theirs)
+    assert mine <= cell_sets(found)
+    assert same_but_for_diagonals(cell_sets(found), known.cells)
 
 
 def test_cells_beside_a_flat_one_keep_the_order_of_their_nodes():

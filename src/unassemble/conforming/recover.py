@@ -60,15 +60,16 @@ def recover_conforming(
     failure: Exception = TopologyError("no sets of rows that are coupled to each other are cells of any known element")
     best: ConformingMesh | None = None
     small = stored.n <= SEARCHED_ROWS
-    remaining = iter(shown)
+    remaining, even = iter(shown), False
     while True:
-        if best is not None and best.certified and not small:
+        if best is not None and best.certified and not (small or even):
             break
         with clock("cells"):
             cells = next(remaining, None)
         if cells is None:
             break
         try:
+            even = cells.even
             found = _recovered(stored, cells, clock, task)
         except (TopologyError, GeometryError, SolverError) as error:
             failure = error
@@ -116,7 +117,7 @@ def shown_cells(stored: OperatorMatrix, *, mass: bool = False) -> Iterator[Cells
     for sets in node_sets(near):
         with suppress(TopologyError):
             for blocks, told in ordered_cells(near, sets, mass=mass):
-                yield Cells({kind: order[cells] for kind, cells in blocks.items()}, told, order)
+                yield Cells({kind: order[cells] for kind, cells in blocks.items()}, told, order, sets.even)
 
 
 def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -> ConformingMesh:

@@ -35,6 +35,7 @@ class Cells:
     blocks: dict[Kind, NDArray[np.int64]]
     told: bool  # whether the graph alone tells them, and no entries
     order: NDArray[np.int64]  # (n,) all rows, those near each other on the mesh near each other, too
+    even: bool = False  # whether those that come next are as likely
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 
 from ..budget import AT_ONCE, LARGE, SAMPLE
 from ..elements.cliques import Graph, simplices
+from ..elements.surface import among
 from ..matrix import OperatorMatrix
 from ..tolerances import ROUNDED
 from ..topology.keys import contains, distinct, pair_keys
+from .halves import halves
 
 _ABSENT = {4: 0, 6: 3, 8: 4, 9: 6, 10: 9}
 """Pairs that a cell of so many nodes may lack, because the entry vanishes and is not stored."""
@@ -30,6 +32,7 @@ class NodeSets:
     order: int  # polynomial degree along a side, which has order + 1 nodes
     sets: tuple[NDArray[np.int64], ...]  # tuple of (m, k) one for each number of nodes; rows increase within a cell
     told: bool = False  # whether no other sets would do as well
+    even: bool = False  # whether those that come next are as likely
 
 
 class Common:
@@ -193,9 +196,12 @@ def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
         if len(triangles) and _cover(common, [triangles, quads]):
             yield NodeSets(1, (triangles, quads), len(choices) == 1)
     if not _cover(common, [found]):
-        rest = common.quadratic_triangles(found)
+        likeliest, other = halves(matrix, common.nonzero)
+        rest = common.quadratic_triangles(once(np.concatenate([found, likeliest])))
         if _cover(common, [rest]):
-            yield NodeSets(2, (rest,))
+            yield NodeSets(2, (rest,), even=other is not None)
+            if other is not None:
+                yield NodeSets(2, (once(np.concatenate([rest[~among(rest, likeliest)], other])),))
 
 
 def _choices(common: Common, quads: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
