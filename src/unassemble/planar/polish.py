@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..tolerances import LAST_DIGITS, ROUNDED
 from ..topology import Piece
 from .cotangent import edge_weights
+from .iterative import IterativeNormalEquations
 from .normal import Jacobian, NormalEquations, WeightJacobian, distant_pair
 
 _log = logging.getLogger(__name__)
@@ -35,6 +36,7 @@ class PolishOptions:
     # the iteration also ends when a step changes the fitted weights by less than this times the noise that the misfit
     # shows: the mesh then moves by as small a part of its error bars
     settled: float = 1e-3
+    direct_limit: int = 1_500_000  # above so many vertices conjugate gradients take a tenth of the memory
 
 
 SHORT = PolishOptions(max_steps=8, max_factorisations=3)
@@ -115,17 +117,21 @@ def polish(
     problem = Problem(model, weights, spread, scale)
     fit = problem.at(z)
     equations: NormalEquations | None = None
-    system: GaussNewton | None = None
+    system: GaussNewton | IterativeNormalEquations | None = None
     factorisations, steps, length, converged = 0, 0, np.inf, False
     while steps < options.max_steps and not converged:
         jacobian = model.jacobian(fit.z, spread)
         fresh = system is None
         if system is None:
-            if equations is None:
-                equations = NormalEquations(jacobian, pins)
+            fitted = fit.weights if scale is None else None
+            if isinstance(drawn, Piece) and len(z) > options.direct_limit:
+                system = IterativeNormalEquations(drawn, WeightJacobian(drawn, fit.z, spread), fit.z, fitted)
             else:
-                equations.renew(jacobian)
-            system = GaussNewton(jacobian, equations, fit.weights if scale is None else None)
+                if equations is None:
+                    equations = NormalEquations(jacobian, pins)
+                else:
+                    equations.renew(jacobian)
+                system = GaussNewton(jacobian, equations, fitted)
             factorisations += 1
         move = system(jacobian, fit.misfit)
         previous, length = length, float(np.abs(move).max())
@@ -133,6 +139,8 @@ def polish(
         if slow and length > options.rounding and not fresh:
             if factorisations == options.max_factorisations:
                 break
+            if isinstance(system, IterativeNormalEquations):
+                system.release()
             system, length = None, np.inf
             continue
         better = downhill(problem, fit, move)
@@ -148,6 +156,8 @@ def polish(
         fit = better or fit
     if equations is not None:
         equations.release()
+    elif isinstance(system, IterativeNormalEquations):
+        system.release()
     return PolishedMesh(fit.z * extent, fit.scale, fit.norm, steps, factorisations, converged, length)
 
 

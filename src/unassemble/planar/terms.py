@@ -17,6 +17,7 @@ from ..errors import SolverError
 from ..topology import Piece
 from .cotangent import cotangent, edge_weights
 from .normal import NormalEquations, WeightJacobian, distant_pair
+from .polish import PolishOptions
 
 MASS, COEFFICIENT, ONE_SIGN = "mass", "coefficient", "one sign"
 
@@ -35,13 +36,13 @@ class Term:
 def lacking_term(
     piece: Piece, weights: NDArray, z: NDArray, scale: float, spread: NDArray | None, *, free_scale: bool
 ) -> Term | None:
-    """The term that explains most of a misfit; None where there are too few entries to spare.
+    """The term that explains most of a misfit; None where there are too few entries to spare, or too many vertices.
 
     `weights` (e,): -A_ij; `z` (n,): the fitted mesh; `scale`: c; `spread` (e,): standard deviations of the weights up
     to a factor; 1 by default; `free_scale`: whether c was fitted.
     """
     freedom = len(weights) - 2 * piece.n_vertices + 4 - free_scale
-    if freedom < 3:
+    if freedom < 3 or piece.n_vertices > PolishOptions().direct_limit:
         return None
     names, terms = _terms(piece, z)
     count = min(len(names), freedom // 3)  # of few entries the first ones only

@@ -1,0 +1,129 @@
+"""Normal equations by conjugate gradients, preconditioned by a conformal energy.
+
+The direct factor of J'J has about ten times the entries of the conformal one. Where that is too
+much memory, this serves: J'J measures how angles change, the conformal energy how far a displacement is from being
+conformal, triangle by triangle. With triangles weighted so that both agree on each of them the two are close
+to spectrally equivalent on irregular meshes (a displacement that is nearly conformal is nearly in both null
+spaces), and the energy is Hermitian with one complex unknown a vertex. On lattices they are not: the steps needed grow
+with the size.
+"""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..linalg import UpperTriangle, factorisation, upper_from_edges
+from ..tolerances import SINGULAR
+from ..topology import Piece
+from .cotangent import corner_gradients
+from .normal import Jacobian, WeightJacobian
+
+_log = logging.getLogger(__name__)
+
+
+class IterativeNormalEquations:
+    """Steps as of :class:`~unassemble.planar.polish.GaussNewton`, in linear memory.
+
+    Solutions have no component along similarities.
+
+    Parameters
+    ----------
+    piece : Piece
+    jacobian : WeightJacobian
+    z : (n,) complex128
+        The positions of the Jacobian, triangles counter-clockwise.
+    weights : (e,) float64, optional
+        Where the scale is fitted as well: the direction in which it moves the weights. The solution is then the best
+        displacement together with the best scale, for misfits that have no component along this direction.
+    tolerance : float
+        Reduction of the error's energy norm.
+    max_iterations : int
+    """
+
+    def __init__(
+        self,
+        piece: Piece,
+        jacobian: WeightJacobian,
+        z: NDArray,
+        weights: NDArray | None = None,
+        *,
+        tolerance: float = 1e-5,
+        max_iterations: int = 400,
+    ):
+        self._forward = jacobian.matrix.tocsr()
+        self._scaling = None if weights is None else weights / np.linalg.norm(weights)
+        self._gauge = np.linalg.qr(np.column_stack([np.ones(len(z)), z - z.mean()]))[0]
+        energy = _weighted_energy(piece, z, jacobian.spread)
+        self._factor = factorisation(energy)
+        self._factor.factorise(energy)
+        self._tolerance, self._max_iterations = tolerance, max_iterations
+
+    def __call__(self, jacobian: Jacobian, misfit: NDArray) -> NDArray:
+        """Displacement d (n,) complex; the best scale has left nothing of w in the misfit."""
+        return self.solve(jacobian.transpose(misfit))
+
+    def solve(self, rhs: NDArray) -> NDArray:
+        """J'J d = rhs for rhs (n,) complex without component along similarities."""
+        x = np.zeros_like(rhs)
+        residual = self._project(rhs)
+        direction = y = self._precondition(residual)
+        size = first = np.vdot(residual, y).real
+        iterations = 0
+        while size > self._tolerance**2 * first and iterations < self._max_iterations:
+            image = self._project(self._apply(direction))
+            step = size / np.vdot(direction, image).real
+            x = x + step * direction
+            residual = residual - step * image
+            y = self._precondition(residual)
+            previous, size = size, np.vdot(residual, y).real
+            direction = y + (size / previous) * direction
+            iterations += 1
+        _log.debug("normal equations: %d iterations, reduction %.1e", iterations, np.sqrt(size / first) if first else 0)
+        return x
+
+    def release(self) -> None:
+        """Give the memory of the factor back."""
+        self._factor.release()
+
+    def _apply(self, d: NDArray) -> NDArray:
+        change = self._forward @ d.view(np.float64)
+        if self._scaling is not None:
+            change -= self._scaling * (self._scaling @ change)
+        return (self._forward.T @ change).view(np.complex128)
+
+    def _precondition(self, residual: NDArray) -> NDArray:
+        return self._project(np.append(self._factor.solve(residual[:-1]), 0))
+
+    def _project(self, d: NDArray) -> NDArray:
+        return d - self._gauge @ (self._gauge.conj().T @ d)
+
+
+def _weighted_energy(piece: Piece, z: NDArray, spread: NDArray) -> UpperTriangle:
+    """Sum over triangles of a_t (L_t / 2 - T_t), without the last vertex's row and column.
+
+    L_t and T_t are the triangle's Laplacian and signed area; a_t makes the trace of its term that of its share of J'J
+    for complex-linear displacements.
+    """
+    at = z[piece.triangles]
+    u, w = at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at
+    at_u, at_w = corner_gradients(u, w)
+    product = np.conj(u) * w
+    cotangent = product.real / product.imag
+    trace = cotangent.sum(axis=1) / 2
+    gradients = np.abs(at_u) ** 2 + np.abs(at_w) ** 2 + np.abs(at_u + at_w) ** 2
+    weight = (gradients / spread[piece.opposite] ** 2).sum(axis=1) / 2 / trace
+    # Each corner contributes to the edge that faces it, run through from tail to head.
+    share = (weight[:, None] * cotangent / 4).ravel()
+    # The similarity itself, which is projected out, would make the energy singular.
+    area = weight * (1 - SINGULAR) / 4
+    left, right = piece.facing.T
+    real = share[left] + np.where(piece.inner, share[right], 0)
+    turn = area[left // 3] - np.where(piece.inner, area[right // 3], 0)
+    upwards = piece.stencil[0] < piece.stencil[1]
+    off_diagonal = -real + 1j * np.where(upwards, turn, -turn)
+    diagonal = np.bincount(piece.edges.ravel(), np.repeat(real, 2), piece.n_vertices)
+    kept = piece.edges[:, 1] < piece.n_vertices - 1
+    return upper_from_edges(piece.n_vertices - 1, piece.edges[kept], off_diagonal[kept], diagonal[:-1])
