@@ -92,14 +92,25 @@ def gives_back(found, matrix: Any) -> bool:
     total = sp.csr_array(off.shape)
     for part in pieces_of_linear(found, cells["triangle"]) if linear else pieces_of_elements(found, cells):
         part = sp.csr_array(part - sp.diags_array(part.diagonal()))
-        total = total + part * (part.multiply(off).sum() / part.multiply(part).sum())
-    return agree(off, total, found.node_status == 0)
+        total = total + part * ratio(part, off)
+    known = found.node_status == 0
+    sums = np.abs(given.sum(axis=1)) > MISFIT * np.maximum(np.abs(given).max(axis=1).toarray().ravel(), 1e-300)
+    return agree(off, total, known, sums & ~known.all())
 
 
-def agree(off: sp.csr_array, total: sp.csr_array, known: NDArray[np.bool_]) -> bool:
+def ratio(part: sp.csr_array, off: sp.csr_array) -> float:
+    """What most of the larger entries of a piece have to be multiplied by."""
+    row, column = part.nonzero()
+    own = part[row, column]
+    large = np.abs(own) >= np.median(np.abs(own))
+    return float(np.median(off[row, column][large] / own[large]))
+
+
+def agree(off: sp.csr_array, total: sp.csr_array, known: NDArray[np.bool_], lost: NDArray | None = None) -> bool:
     """Whether entries between rows that are claimed are the same, relative to their rows.
 
-    Two rows with a common neighbour without a position may have a triangle there: nothing is claimed of their entry.
+    Nothing is claimed of entries beside triangles that may be gone: where two rows have a common neighbour without a
+    position, or are both in `lost`.
     """
     largest = np.maximum(np.abs(off).max(axis=1).toarray().ravel(), 1e-300)
     difference = sp.coo_array(off - total)
@@ -107,7 +118,10 @@ def agree(off: sp.csr_array, total: sp.csr_array, known: NDArray[np.bool_]) -> b
     wrong = np.abs(difference.data) > MISFIT * np.minimum(largest[row], largest[column])
     beside = sp.csr_array(off != 0, dtype=np.int32)[:, ~known]
     beside = sp.csr_array(beside @ beside.T)
-    return not (wrong & known[row] & known[column] & (beside[row, column] == 0)).any()
+    claimed = known[row] & known[column] & (beside[row, column] == 0)
+    if lost is not None:
+        claimed &= ~(lost[row] & lost[column])
+    return not (wrong & claimed).any()
 
 
 def lengths_give_back(found: Surface, matrix: sp.csr_array) -> bool:
