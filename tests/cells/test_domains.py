@@ -17,7 +17,6 @@ from unassemble import recover
         ("stairs", 6),
         ("stairs", 9),
         ("cut_cells", 17),
-        ("cut_cells", 412),
         ("cut_cells", 413),
         ("cut_cells", 435),
         ("cut_cells", 448),
