@@ -31,7 +31,7 @@ class NodalMatrix:
     penalised : (n, d) bool
         Unknowns with a penalty on the diagonal.
     doubtful : (n,) bool, optional
-        Nodes whose rows, or directions, may be others; see :mod:`.doubts`.
+        Nodes whose rows, or directions, may be others; see :mod:`~unassemble.elasticity.doubts`.
     """
 
     indptr: NDArray[np.int32]
