@@ -68,7 +68,7 @@ SUSPICIOUS = 1e-12
 # Noise.
 
 CHANCE = 1e-6
-"""Probability at which agreement, or a few entries that explain a misfit, are no coincidence."""
+"""Probability at which agreement, or a term that explains a misfit, is no coincidence."""
 
 CONFIDENCE = 1e-3
 """Least p-value of a mesh certified in the presence of noise: one right mesh in a thousand is refused."""

@@ -263,7 +263,7 @@ def test_load_takes_files_and_matrices(tmp_path: Path, monkeypatch: pytest.Monke
         matrix = load(source)
         assert matrix.edges.tolist() == [[0, 1], [1, 2]]
         assert matrix.entries.tolist() == [-1.0, -0.5]
-    assert load(io.BytesIO(mat()), variable="A", drop_zeros=0.4, noise=1e-3).n == 3
+    assert load(io.BytesIO(mat()), variable="A", drop_zeros=0.4).n == 3
 
 
 def _door(content: bytes) -> None:

@@ -35,8 +35,8 @@ def in_doubt(
     matrix: OperatorMatrix,
     topology: Topology,
     attempt: Attempt,
-    scale: float | None = None,
-    noise: float | None = None,
+    scale: float | None,
+    noise: float | None,
 ) -> NDArray[np.bool_]:
     """(n,) rows of components with nonzero entries on no triangle, or entries that do not fit.
 

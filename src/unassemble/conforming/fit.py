@@ -65,7 +65,7 @@ def fitted(
     Raises GeometryError, SolverError.
     """
     z, c = corner_positions(part, weights, scale)
-    straight = _by_best_rule(part, weights, z, c, noise, straight=True)
+    straight = _by_best_rule(part, weights, z, c, noise)
     if part.degree == 1 or not refine or straight.size < max(CERTIFIED**0.5, _left_by(noise, c)):
         return _settled(straight, scale, noise) if refine else straight
     straight, curved = _polished(straight, weights, scale, noise), None
@@ -104,19 +104,11 @@ def _left_by(noise: NDArray | None, c: float) -> float:
     return 0.0 if noise is None else 2 * float(np.sqrt(np.mean(noise**2))) / abs(c)
 
 
-def _by_best_rule(
-    part: Part,
-    weights: NDArray,
-    z: NDArray,
-    c: float,
-    noise: NDArray | None,
-    *,
-    straight: bool,
-) -> Fitted:
-    """With the quadrature that fits best; of those that fit alike the first."""
+def _by_best_rule(part: Part, weights: NDArray, z: NDArray, c: float, noise: NDArray | None) -> Fitted:
+    """With straight sides and the quadrature that fits best; of those that fit alike the first."""
     trials = []
-    for rule in _rules(part, straight=straight):
-        trials.append(_with_rule(part, weights, z, c, noise, rule, straight=straight))
+    for rule in _rules(part, straight=True):
+        trials.append(_with_rule(part, weights, z, c, noise, rule, straight=True))
         if trials[-1].size <= AGREED:
             return trials[-1]
     least = min(trial.size for trial in trials)

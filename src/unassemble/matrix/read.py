@@ -167,9 +167,7 @@ def _as_bytes(content: str | bytes | None) -> bytes:
     return content.encode("utf-8", "replace") if isinstance(content, str) else content or b""
 
 
-def load(
-    source: Any, *, variable: str | None = None, drop_zeros: float | None = None, noise: float | None = None
-) -> OperatorMatrix:
+def load(source: Any, *, variable: str | None = None, drop_zeros: float | None = None) -> OperatorMatrix:
     """Read a matrix where `source` names a file, and check it.
 
     Parameters
@@ -177,7 +175,7 @@ def load(
     source : path, "-", open file, scipy sparse matrix or array, or array_like
     variable : str, optional
         See :func:`read_matrix`.
-    drop_zeros, noise : float, optional
+    drop_zeros : float, optional
         See :func:`check_matrix`.
 
     Raises
@@ -188,7 +186,7 @@ def load(
         If the matrix fails a check.
     """
     matrix = read_matrix(source, variable=variable) if is_file(source) else source
-    return check_matrix(matrix, drop_zeros=drop_zeros, noise=noise)
+    return check_matrix(matrix, drop_zeros=drop_zeros)
 
 
 def is_file(source: Any) -> bool:

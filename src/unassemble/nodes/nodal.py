@@ -31,7 +31,7 @@ class NodalMatrix:
     penalised : (n, d) bool
         Unknowns with a penalty on the diagonal.
     doubtful : (n,) bool, optional
-        Nodes whose rows, or directions, may be others; see :mod:`.doubts`.
+        Nodes whose rows, or directions, may be others; see :mod:`~unassemble.elasticity.doubts`.
     """
 
     indptr: NDArray[np.int32]
@@ -80,10 +80,9 @@ class NodalMatrix:
         """(n, n) ones where there are blocks."""
         return sp.csr_array((np.ones(len(self.indices)), self.indices, self.indptr), shape=(self.n, self.n))
 
-    def row_sums(self, entries: NDArray | None = None) -> NDArray:
+    def row_sums(self) -> NDArray:
         """(n, ...) sums over each node's blocks."""
-        entries = self.data if entries is None else entries
-        return np.add.reduceat(entries, self.indptr[:-1], axis=0)  # no node is empty
+        return np.add.reduceat(self.data, self.indptr[:-1], axis=0)  # no node is empty
 
 
 def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:

@@ -25,9 +25,7 @@ class Shape:
     Attributes
     ----------
     points : (n, d) float64
-        Centred, of norm one; NaN where loose.
-    loose : (n,) bool
-        Nodes that can move while the others stay.
+        Centred, of norm one; NaN where loose: of nodes that can move while the others stay.
     dimension : int
         Of the null space, translations counted, loose nodes left out; that of the translations where no field is exact.
     freedom : {"", "axes", "affine"}
@@ -39,7 +37,6 @@ class Shape:
     """
 
     points: NDArray[np.float64]
-    loose: NDArray[np.bool_]
     dimension: int
     freedom: str
     exact: bool
@@ -88,7 +85,7 @@ def shape(
     dimension = d + moving.shape[2] if exact else d
     points = np.full((n, d), np.nan)
     points[~loose], freedom = _choose(moving, exact=bool(exact))
-    return Shape(points, loose, dimension, freedom, bool(exact), count)
+    return Shape(points, dimension, freedom, bool(exact), count)
 
 
 def set_aside(null: NDArray, common: int) -> tuple[NDArray, NDArray[np.bool_]]:

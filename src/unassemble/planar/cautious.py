@@ -72,7 +72,7 @@ def cautious_polish(
         fit = better
     if held is not None:
         held.release()
-    return PolishedMesh(fit.z * extent, fit.scale, fit.norm, steps, steps, converged, length)
+    return PolishedMesh(fit.z * extent, fit.scale, fit.norm, steps, converged, length)
 
 
 def _stalled(history: list[tuple[float, float]], steps: int = 6) -> bool:

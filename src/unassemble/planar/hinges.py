@@ -14,9 +14,7 @@ from ..topology import Topology
 _DENSE = 100  # pieces; above, sparse linear algebra is faster, and none is turned over by itself
 
 
-def join(
-    topology: Topology, positions: list[NDArray], known: NDArray | None = None, closed: float = ALIKE
-) -> list[NDArray]:
+def join(topology: Topology, positions: list[NDArray], known: NDArray | None = None) -> list[NDArray]:
     """Move pieces by similarities close to translations so that shared vertices coincide.
 
     With turn t_p and shift s_p of piece p, t_p z_p + s_p = t_q z_q + s_q at every shared vertex; of all
@@ -31,8 +29,6 @@ def join(
     known : (number of pieces,) int, optional
         Known positions in each piece. Pieces with two or more stay where they are; of others joined to none
         of those the one with the most, or the first, does.
-    closed : float
-        Distance at shared vertices, relative to the largest piece, below which rings count as closed.
     """
     if not len(topology.hinges):
         return positions
@@ -42,13 +38,13 @@ def join(
     held = _held(group, known)
     if rings(topology) <= 0 and np.count_nonzero(held) == group.max() + 1:
         return _along_trees(topology, positions, held)
-    positions = _matching_images(topology, positions, held, closed)
+    positions = _matching_images(topology, positions, held, ALIKE)
     joined, _ = _joined(topology, positions, held)
     # Once more from there: turns and shifts of small pieces in a large mesh differ in size by many digits.
     return _joined(topology, joined, held)[0]
 
 
-def gap(topology: Topology, positions: list[NDArray], closed: float = ALIKE) -> float:
+def gap(topology: Topology, positions: list[NDArray], closed: float) -> float:
     """How far apart the pieces stay at shared vertices when they are joined, relative to the largest piece.
 
     Rings count as closed below `closed`, where no other images are tried.

@@ -50,7 +50,6 @@ class PolishedMesh:
     z: NDArray[np.complex128]  # (n,)
     scale: float
     residual: float  # root of the sum of squares of (c w - a) / s
-    steps: int
     factorisations: int
     converged: bool  # whether steps fell to rounding level
     # length of the last step that was computed, relative to the mesh's extent: about the error that remains
@@ -158,7 +157,7 @@ def polish(
         equations.release()
     elif isinstance(system, IterativeNormalEquations):
         system.release()
-    return PolishedMesh(fit.z * extent, fit.scale, fit.norm, steps, factorisations, converged, length)
+    return PolishedMesh(fit.z * extent, fit.scale, fit.norm, factorisations, converged, length)
 
 
 def errors_of_one_size(misfit: NDArray, spread: NDArray) -> bool:

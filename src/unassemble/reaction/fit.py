@@ -45,9 +45,7 @@ class MetricFit:
     """Result of :func:`fit_metric`."""
 
     metric: Metric  # in units of length in which s = 1
-    scale: float  # c
     residual: float  # root mean square of the equations' residuals: cosines, and relative areas
-    steps: int
 
 
 def _cosine(x: NDArray) -> NDArray[np.float64]:
@@ -111,7 +109,7 @@ def fit_metric(
     trust: NDArray,
     options: MetricOptions | None = None,
 ) -> MetricFit | None:
-    """The metric and the factor c with which a mesh has these entries; None where the iteration breaks down.
+    """The metric with which a mesh has these entries, c being any; None where the iteration breaks down.
 
     Parameters
     ----------
@@ -138,7 +136,7 @@ def fit_metric(
 def _descended(equations: Equations, metric: Metric, c: float, options: MetricOptions) -> MetricFit:
     residual = equations.residual(metric, c)
     root = float(np.sqrt(len(residual)))
-    damping, step, stopped, history = options.damping, 0, 0.0, [float(np.linalg.norm(residual))]
+    damping, history = options.damping, [float(np.linalg.norm(residual))]
     for step in range(1, options.steps + 1):
         before = float(np.linalg.norm(residual))
         derivative, by_c = equations.derivative(metric, c)
@@ -163,7 +161,7 @@ def _descended(equations: Equations, metric: Metric, c: float, options: MetricOp
         settled = not stopped and left > 0.5 * before and left < 1e-9 * root
         if left < options.tolerance * root or settled:
             break
-    return MetricFit(metric, c, float(np.linalg.norm(residual)) / root, step)
+    return MetricFit(metric, float(np.linalg.norm(residual)) / root)
 
 
 def _solved(derivative: sp.csr_array, by_c: NDArray, residual: NDArray, damping: float) -> tuple[NDArray, float]:

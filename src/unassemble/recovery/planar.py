@@ -38,7 +38,7 @@ class PlanarMesh(Recovery):
     missing_term : str
         ``"mass"``, ``"coefficient"`` or ``"one sign"``, a term that the model lacks, where that explains the misfit.
     suspects : (k, 2) int64
-        Entries that the mesh would fit the others far better without, the gravest first.
+        Entries that stand out from the misfit of their piece, at most one of each.
     areas : (m,) float64 or None
         Of a mass matrix, which tells no shape: s times the areas of the triangles; `points` are NaN.
     row_scaling : (n,) float64 or None

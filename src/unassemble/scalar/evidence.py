@@ -1,4 +1,4 @@
-"""What a misfit looks like: noise of some size, or a few wrong entries."""
+"""What a misfit looks like: noise of some size, a term that the model lacks, or a wrong entry."""
 
 from __future__ import annotations
 

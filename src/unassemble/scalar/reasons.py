@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from ..cells import Alternative
 from ..certify import Certificate
-from ..matrix import OperatorMatrix
 from ..planar.terms import COEFFICIENT, MASS, ONE_SIGN, Term
-from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE, NEARLY_ALL, SUMMED
+from ..tolerances import ALIKE, CERTIFIED, CONFIDENCE, LARGEST_NOISE, NEARLY_ALL
 from ..topology import Topology
 from ..words import Reason, count_of, words_of
 from .evidence import Evidence
@@ -38,7 +37,7 @@ def misfit(f: Findings, notes: Sequence[str]) -> Reason:
         parts = count_of(len(topology.failures), "part of the matrix has", "parts of the matrix have")
         return Reason.of(f"{parts} no mesh: {topology.failures[0]}", advice=_CHECK_MODEL)
     without = f.stored.incomplete_rows.any()
-    model = _KEEP_ROWS if without else _ONE_COEFFICIENT if _adds_up(f.stored) else _CHECK_MODEL
+    model = _KEEP_ROWS if without else _ONE_COEFFICIENT if f.stored.adds_up.all() else _CHECK_MODEL
     model = _LEAVE_SCALE if f.known_scale else model
     bare = topology.bare_edges[f.solved.matrix.entries[topology.bare_edges] != 0]
     if len(bare):
@@ -64,7 +63,7 @@ def misfit(f: Findings, notes: Sequence[str]) -> Reason:
             advice=_KEEP_ROWS,
         )
     remark = _like_noise(certificate, evidence, f.solved.scales)
-    if remark and _adds_up(f.stored):
+    if remark and f.stored.adds_up.all():
         return Reason.of(
             differs,
             "all rows add up to zero, which errors of single entries would not leave",
@@ -80,7 +79,7 @@ def lacking(f: Findings, term: Term) -> Reason:
     share = f"{term.share:.0%}" if term.share < 0.995 else "nearly all"
     begun = f"the misfit is no noise, since a term that the model lacks explains {share} of its square"
     varies = "a coefficient that varies in space, and a constant one is assumed"
-    if term.name == COEFFICIENT or _adds_up(f.stored):  # with a mass matrix, or one number added, rows do not
+    if term.name == COEFFICIENT or f.stored.adds_up.all():  # with a mass matrix, or one number added, rows do not
         which = f"it has the form of {varies}"
         if term.name != COEFFICIENT:
             which = f"all rows add up to zero, as with {varies}"
@@ -90,12 +89,6 @@ def lacking(f: Findings, term: Term) -> Reason:
         return Reason.of(begun, which, advice="assemble the stiffness matrix alone, or lump the mass matrix")
     assert term.name == ONE_SIGN
     return Reason.of(begun, "most entries are off in one direction", advice=_CHECK_MODEL)
-
-
-def _adds_up(matrix: OperatorMatrix) -> bool:
-    """Whether all rows add up to zero, up to rounding."""
-    sums = matrix.diagonal + np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n)
-    return bool((np.abs(sums) <= SUMMED * (np.abs(matrix.diagonal) + matrix.row_size)).all())
 
 
 def _differs(certificate: Certificate) -> str:
