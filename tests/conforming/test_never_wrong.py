@@ -23,7 +23,7 @@ def triangles(n=200, seed=0):
     return MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
 
 
-@pytest.mark.parametrize("relative", [1e-1, 1e-4, 1e-7, 1e-10])
+@pytest.mark.parametrize("relative", [1e-1, 1e-4, 1e-7])
 @pytest.mark.parametrize("element", ["P2", "Q1", "Q2"])
 def test_one_entry_changed(element, relative):
     known = assembled(element, triangles() if element == "P2" else quadrilaterals(8, 7))

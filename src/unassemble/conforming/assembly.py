@@ -57,14 +57,13 @@ class Entries:
     def roundings(self, z: NDArray) -> NDArray[np.float64]:
         """(e,) size of the rounding errors of assembled entries, in units of the machine precision.
 
-        That of terms conj(g_a) g_b before they cancel, at most the root of K_aa K_bb, and of the determinant, which
-        cancels where a cell is flat.
+        That of terms conj(g_a) g_b before they cancel, at most the root of K_aa K_bb.
         """
         z, sizes = self.nodes(z), []
         for block in self._blocks:
             a, b = np.triu_indices(block.cells.shape[1], 1)
             with np.errstate(all="ignore"):  # flat cells
-                roots = [np.sqrt(np.abs(block.squares(*at.metric)) * at.flatness) for _, at in block.parts(z)]
+                roots = [np.sqrt(np.abs(block.squares(*at.metric))) for _, at in block.parts(z)]
                 sizes.append((block, [size[:, a] * size[:, b] for size in roots]))
         return _total(len(self._part.edges), sizes)
 
@@ -94,11 +93,6 @@ class _Local:
         scaled = self.weights / self.determinant
         cross = self.s.real * self.t.real + self.s.imag * self.t.imag
         return scaled * _square(self.t), -scaled * cross, scaled * _square(self.s)
-
-    @property
-    def flatness(self) -> NDArray[np.float64]:
-        """(m, 1) by how much the rounding of s and t counts in the determinant, at the worst point."""
-        return np.asarray((np.abs(self.s) * np.abs(self.t) / np.abs(self.determinant)).max(axis=1, keepdims=True))
 
     def squares(self) -> tuple[NDArray, NDArray, NDArray]:
         """The same for w D g_a g_b, complex."""

@@ -10,12 +10,10 @@ import numpy as np
 from ..matrix import OperatorMatrix
 from ..scalar.solving import Task
 from ..scalar.verdict import Held
-from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE, SUSPICIOUS
+from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE
 from ..topology.keys import contains, pair_keys
 from ..words import count_of, sentences
 from .fit import Fitted
-
-_STANDS_OUT = 0.25  # of the sum of squared misfits; where all is rounding no entry has a twentieth
 
 
 @dataclass(frozen=True)
@@ -81,11 +79,6 @@ def _obstacle(fits: Sequence[Fitted], near: Held, task: Task) -> str:
             f"largest, where {CERTIFIED:g} is allowed)"
         )
         return sentences((differs, *notes))
-    for fit in fits if certificate.backward_error > SUSPICIOUS and task.options.refine else ():
-        squares = np.where(fit.weights != 0, (fit.misfit / fit.spread) ** 2, 0.0)  # what vanished is never to blame
-        if squares.max() > _STANDS_OUT * squares.sum():
-            i, j = fit.part.piece.vertices[fit.part.edges[int(squares.argmax())]]
-            return f"the entry of rows {i} and {j} stands out, next to others that fit to rounding level"
     return ""
 
 
