@@ -58,6 +58,11 @@ def tutte(piece: Piece, outline: int) -> NDArray[np.complex128]:
         z[~fixed] = np.ascontiguousarray(solver.solve(right)) @ np.array([1, 1j])
         solver.release()
     z = z[:n]
-    a, b, c = z[piece.triangles].T
-    area = (np.conj(b - a) * (c - a)).imag
+    area = areas(piece, z)
     return np.asarray((z if area.sum() > 0 else np.conj(z)) / np.sqrt(np.abs(area).mean()))
+
+
+def areas(piece: Piece, z: NDArray) -> NDArray[np.float64]:
+    """(m,) twice the areas of triangles."""
+    a, b, c = z[piece.triangles].T
+    return np.asarray((np.conj(b - a) * (c - a)).imag)

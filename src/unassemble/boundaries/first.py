@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import GeometryError, SolverError
 from ..planar.conformal import ConformalOptions, conformal_map, estimate_scale
 from ..topology import Piece
-from .embedding import tutte
+from .embedding import areas, tutte
 from .fit import Fit, FitOptions, WholeEntries
 from .local import fit_near
 from .patch import distance
@@ -135,12 +135,6 @@ def _conformal(problem: WholeEntries, weights: NDArray) -> NDArray[np.complex128
         return np.zeros(piece.n_vertices, dtype=np.complex128)
     area = float(areas(piece, z).mean())
     return np.asarray((z if area > 0 else np.conj(z)) / np.sqrt(abs(area)))
-
-
-def areas(piece: Piece, z: NDArray) -> NDArray[np.float64]:
-    """(m,) twice the areas of triangles."""
-    a, b, c = z[piece.triangles].T
-    return np.asarray((np.conj(b - a) * (c - a)).imag)
 
 
 def _upright(piece: Piece, z: NDArray) -> bool:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from ..planar.cotangent import weight_roundings
 from ..topology import Piece
-from .first import areas, first_fits
+from .embedding import areas
+from .first import first_fits
 from .fit import Fit, FitOptions, WholeEntries
 from .judge import determined
 from .local import fit_anew, fit_near
