@@ -113,10 +113,9 @@ def rows_alike(matrix: OperatorMatrix) -> bool:
 
     Next to no work, and no other matrix is a lattice that has lost rows.
     """
-    size, sums = np.zeros(matrix.n), matrix.diagonal.copy()
+    size, sums = np.zeros(matrix.n), matrix.row_sums
     for end in matrix.edges.T:
         size += np.bincount(end, np.abs(matrix.entries), matrix.n)
-        sums += np.bincount(end, matrix.entries, matrix.n)
     degree = np.bincount(matrix.edges.ravel(), minlength=matrix.n)
     inside = size[degree == degree.max()]
     alike = np.abs(inside - np.median(inside)) <= CERTIFIED * np.median(inside)

@@ -204,10 +204,9 @@ class _Judged:
         key = found.pairs @ [matrix.n, 1]
         misfit = found.misfits[np.searchsorted(key, pairs @ [matrix.n, 1])]
         flipped = (placed.status[mesh.triangles[found.flipped]] == 0).all(axis=1).any()
-        sums = matrix.diagonal.copy()
-        for ends, values in ((matrix.edges, matrix.entries), (found.pairs, found.differences)):
-            for end in ends.T:
-                sums += np.bincount(end, values, matrix.n)
+        sums = matrix.row_sums.copy()
+        for end in found.pairs.T:
+            sums += np.bincount(end, found.differences, matrix.n)
         gone = (np.abs(sums) > CERTIFIED * matrix.row_size) | (placed.status > 0)
         return cls(np.inf if flipped else float(misfit.max(initial=0.0)), len(pairs), min(spare), not gone.any())
 

@@ -102,9 +102,7 @@ class _Loops:
         outside[ends[:, 0]] = True
         if (incomplete & ~outside).any() or outside.sum() < len(ends) or len(piece.edges) < len(matrix.edges):
             return None
-        sums = matrix.diagonal.copy()
-        for end in matrix.edges.T:
-            sums += np.bincount(end, matrix.entries, matrix.n)
+        sums = matrix.row_sums
         key = np.searchsorted(matrix.edges @ [matrix.n, 1], np.sort(ends, axis=1) @ [matrix.n, 1])
         size = np.diff(piece.loop_offsets)
         place = np.arange(len(ends)) - np.repeat(piece.loop_offsets[:-1], size)

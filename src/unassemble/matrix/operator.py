@@ -39,13 +39,20 @@ class OperatorMatrix:
         return row_sizes(self.n, self.edges, np.abs(self.entries))
 
     @cached_property
-    def adds_up(self) -> NDArray[np.bool_]:
-        """(n,) rows that add up to zero, as those of a Laplacian do."""
-        size, sums = np.abs(self.diagonal), self.diagonal.copy()
+    def row_sums(self) -> NDArray[np.float64]:
+        """(n,) sums of rows, the diagonal included."""
+        sums = self.diagonal.copy()
         for end in self.edges.T:
             sums += np.bincount(end, self.entries, self.n)
+        return sums
+
+    @cached_property
+    def adds_up(self) -> NDArray[np.bool_]:
+        """(n,) rows that add up to zero, as those of a Laplacian do."""
+        size = np.abs(self.diagonal)
+        for end in self.edges.T:
             size += np.bincount(end, np.abs(self.entries), self.n)
-        return np.asarray(np.abs(sums) <= SUMMED * size)
+        return np.asarray(np.abs(self.row_sums) <= SUMMED * size)
 
     @property
     def unweighted(self) -> bool:

@@ -33,9 +33,7 @@ def with_vertices_back(matrix: OperatorMatrix) -> OperatorMatrix | None:
     if not len(rows):
         return None
     _, gone = np.unique(loop[rows], return_inverse=True)
-    sums = matrix.diagonal.copy()
-    for end in edges.T:
-        sums += np.bincount(end, matrix.entries, n)
+    sums = matrix.row_sums[rows]
     more = np.column_stack([rows, n + gone])
     total = n + int(gone.max()) + 1
     order = np.argsort(pair_keys(total, *np.vstack([edges, more]).T))
@@ -43,6 +41,6 @@ def with_vertices_back(matrix: OperatorMatrix) -> OperatorMatrix | None:
         matrix,
         n=total,
         edges=np.vstack([edges, more])[order],
-        entries=np.append(matrix.entries, -sums[rows])[order],
-        diagonal=np.append(matrix.diagonal, np.bincount(gone, sums[rows])),
+        entries=np.append(matrix.entries, -sums)[order],
+        diagonal=np.append(matrix.diagonal, np.bincount(gone, sums)),
     )
