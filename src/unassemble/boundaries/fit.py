@@ -5,7 +5,8 @@ Minimised is
     sum over whole entries of (a_e / c - w_e(z))^2 + mu^2 sum over triangles with others of their shape prior squared ,
 
 a_e = -A_ij. The prior holds what few entries hold, and fades: each mu starts where the one before has ended, the last
-is zero. Cotangents have poles where triangles are flat, and meshes beyond them are no meshes: steps end before any
+is zero. Where regions have factors of their own, w_e is c_r times half a cotangent for each of its triangles, c_r that
+of its region, and c the mean of both. Cotangents have poles where triangles are flat, and meshes beyond them are no meshes: steps end before any
 triangle turns over.
 
 References
@@ -18,6 +19,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -30,6 +32,8 @@ from ..topology import Piece
 from .shape import ShapePrior
 
 _log = logging.getLogger(__name__)
+
+Scale = Any  # float, or (k,) float64 where there are regions
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,8 @@ class Fit:
     Attributes
     ----------
     z : (n,) complex128
-    scale : float
+    scale : float or (k,) float64
+        c, or that of each region.
     misfit : float
         Root mean square of a / c - w over whole entries.
     prior : float
@@ -85,7 +90,7 @@ class Fit:
     """
 
     z: NDArray[np.complex128]
-    scale: float
+    scale: Scale
     misfit: float
     prior: float
     factorisations: int = 0
@@ -101,17 +106,20 @@ class WholeEntries:
         -A_ij of each edge, of any size where they are not whole.
     guessed : (e,) bool
         Weights that are about right where they are not whole: these count as the prior does.
-    scale : float, optional
+    scale : float or (k,) float64, optional
         c, where it is known.
     free : (n,) bool, optional
         Vertices that move; all others stay, and entries that only these have a part in are left out.
+    region : (m,) int64, optional
+        Of each triangle, where each region has a factor of its own.
     """
 
     def __init__(
-        self, piece: Piece, weights: NDArray, guessed: NDArray[np.bool_], scale: float | None = None,
-        free: NDArray[np.bool_] | None = None,
+        self, piece: Piece, weights: NDArray, guessed: NDArray[np.bool_], scale: Scale | None = None,
+        free: NDArray[np.bool_] | None = None, region: NDArray[np.int64] | None = None,
     ):  # fmt: skip
         self.piece, self.weights, self.guessed, self.known_scale = piece, weights, guessed, scale
+        self.region = region
         self.free = np.ones(piece.n_vertices, dtype=bool) if free is None else free
         self.asked = self.free[piece.stencil].any(axis=0)
         count = int(self.free.sum())
@@ -138,12 +146,35 @@ class WholeEntries:
         w, a = edge_weights(self.piece, z)[whole], self.weights[whole]
         return float(w @ a / (w @ w))
 
-    def misfits(self, z: NDArray, scale: float) -> NDArray[np.float64]:
+    def misfits(self, z: NDArray, scale: Scale) -> NDArray[np.float64]:
         """(e,) a / c - w."""
-        return np.asarray(self.weights / scale - edge_weights(self.piece, z))
+        if self.region is None:
+            return np.asarray(self.weights / scale - edge_weights(self.piece, z))
+        return np.asarray((self.weights - edge_weights(self.piece, z, scale[self.region])) / self._unit(scale))
+
+    def gradient(self, z: NDArray, scale: Scale) -> NDArray[np.complex128]:
+        """(4, e) as :func:`..planar.cotangent.weight_gradient` has it."""
+        if self.region is None:
+            return weight_gradient(self.piece, z)
+        return weight_gradient(self.piece, z, scale[self.region]) / self._unit(scale)
+
+    def slopes(self, z: NDArray, scale: Scale) -> NDArray[np.float64]:
+        """(e, k) what misfits change by with -log c, of each region."""
+        if self.region is None:
+            return np.asarray(self.weights / scale)[:, None]
+        parts = [
+            edge_weights(self.piece, z, np.where(self.region == k, scale[k], 0.0)) / self._unit(scale)
+            for k in range(len(scale))
+        ]
+        return np.column_stack(parts)
+
+    def _unit(self, scale: NDArray) -> NDArray[np.float64]:
+        """(e,) the mean of c on both sides."""
+        one, other = scale[self.region][self.piece.facing // 3].T
+        return np.asarray(np.where(self.piece.inner, (one + other) / 2, one))
 
     def fit(
-        self, z: NDArray, scale: float, whole: NDArray[np.bool_], mu: float, options: FitOptions | None = None
+        self, z: NDArray, scale: Scale, whole: NDArray[np.bool_], mu: float, options: FitOptions | None = None
     ) -> Fit:
         """Improve positions, in which no triangle is turned over.
 
@@ -196,7 +227,7 @@ class WholeEntries:
         return Fit(z, scale, rest, size, factorisations)
 
     def faded(
-        self, z: NDArray, scale: float, whole: NDArray[np.bool_], mus: Sequence[float],
+        self, z: NDArray, scale: Scale, whole: NDArray[np.bool_], mus: Sequence[float],
         options: FitOptions | None = None,
     ) -> Fit:  # fmt: skip
         """One fit after the other, with less and less prior; parameters as for :meth:`fit`."""
@@ -211,13 +242,13 @@ class WholeEntries:
         return np.where(whole, 1.0, min(FitOptions.guess * mu, FitOptions.most_guess) * (self.guessed & self.asked))
 
     def residuals(
-        self, z: NDArray, scale: float, whole: NDArray, prior: ShapePrior, mu: float
+        self, z: NDArray, scale: Scale, whole: NDArray, prior: ShapePrior, mu: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Misfits of entries (e,) and of the prior, weighted."""
         return self.trust(whole, mu) * self.misfits(z, scale), mu * prior.residual(z)
 
-    def step(self, system: System, damping: float | NDArray) -> tuple[NDArray, float] | None:
-        """Displacement and change of log c; None where the normal matrix cannot be factorised."""
+    def step(self, system: System, damping: float | NDArray) -> tuple[NDArray, NDArray] | None:
+        """Displacement and changes (k,) of log c, none where it is known; None where the normal matrix cannot be factorised."""
         matrix = system.damped(damping)
         try:
             self.analysed(matrix).factorise(matrix)
@@ -226,28 +257,30 @@ class WholeEntries:
             return None
         return self._solved(system)
 
-    def _solved(self, system: System) -> tuple[NDArray, float] | None:
+    def _solved(self, system: System) -> tuple[NDArray, NDArray] | None:
         """The same with the factor that is there."""
         assert self._factor is not None
-        gradient, response = self._factor.solve(np.column_stack([system.right, system.slope])).T
-        move = 0.0
-        if self.known_scale is None:
-            left = system.size - system.slope @ response
-            move = float((system.along - system.slope @ gradient) / max(left, 1e-12 * system.size))
-        step = np.ascontiguousarray(gradient - move * response).view(np.complex128)
+        solved = self._factor.solve(np.column_stack([system.right, system.slope]))
+        gradient, response = solved[:, 0], solved[:, 1:]
+        left = system.size - system.slope.T @ response
+        np.fill_diagonal(left, np.maximum(left.diagonal(), 1e-12 * system.size.diagonal()))
+        move = np.linalg.solve(left, system.along - system.slope.T @ gradient)
+        step = np.ascontiguousarray(gradient - response @ move).view(np.complex128)
         step = np.append(step, 0)[np.where(self.free, self.place, len(step))]
-        return (step, move) if np.isfinite(step).all() and np.isfinite(move) else None
+        return (step, move) if np.isfinite(step).all() and np.isfinite(move).all() else None
 
     def _along(
-        self, z: NDArray, scale: float, step: NDArray, move: float, whole: NDArray, prior: ShapePrior, mu: float,
+        self, z: NDArray, scale: Scale, step: NDArray, move: NDArray, whole: NDArray, prior: ShapePrior, mu: float,
         cost: float,
-    ) -> tuple[NDArray, float, NDArray, NDArray, float] | None:  # fmt: skip
+    ) -> tuple[NDArray, Scale, NDArray, NDArray, float] | None:  # fmt: skip
         """The longest part of a step, of a few, that turns no triangle over and lowers the cost."""
         fitted = self.piece.triangles[(whole[self.piece.opposite] | (mu > 0)).any(axis=1)]
         flip = float(first_flips(fitted, z, step).min(initial=np.inf))
-        share = min(1.0, 0.5 / max(abs(move), 1e-300), 0.9 * flip)
+        share = min(1.0, 0.5 / max(np.abs(move).max(initial=0.0), 1e-300), 0.9 * flip)
+        if self.known_scale is None and self.region is None:
+            move = float(move[0])
         for _ in range(5):
-            there, c = z + share * step, scale * float(np.exp(share * move))
+            there, c = z + share * step, scale if self.known_scale is not None else scale * np.exp(share * move)
             with np.errstate(all="ignore"):
                 misfit, shape = self.residuals(there, c, whole, prior, mu)
                 if misfit @ misfit + shape @ shape < cost:
@@ -257,29 +290,30 @@ class WholeEntries:
 
 
 class System:
-    """The linearised problem: normal matrix, right-hand side, and the column of log c beside them."""
+    """The linearised problem: normal matrix, right-hand side, and the columns of log c beside them."""
 
     def __init__(
-        self, problem: WholeEntries, z: NDArray, scale: float, whole: NDArray, prior: ShapePrior, mu: float,
+        self, problem: WholeEntries, z: NDArray, scale: Scale, whole: NDArray, prior: ShapePrior, mu: float,
         misfit: NDArray, shape: NDArray,
     ):  # fmt: skip
         piece, free = problem.piece, problem.free
         trust = problem.trust(whole, mu)
-        entries = trust * np.where(free[piece.stencil], weight_gradient(piece, z), 0)
+        entries = trust * np.where(free[piece.stencil], problem.gradient(z, scale), 0)
         gradient = mu * np.where(free[prior.corners], prior.gradient(z), 0)
         parts = [(entries, problem.place[piece.stencil]), (gradient, problem.place[prior.corners])]
         jacobian = jacobian_rows(problem.columns, parts)
         self._transposed = jacobian.T.tobsr()
         self._upper = UpperTriangle.of(self._transposed @ jacobian)
-        self._fitted = trust * problem.weights / scale  # what a / c changes by with -log c
-        self.slope = self._transposed @ np.concatenate([self._fitted, np.zeros(len(shape))])
-        self.size = float(self._fitted @ self._fitted)
+        known = problem.known_scale is not None
+        self._slopes = trust[:, None] * problem.slopes(z, scale)[:, : 0 if known else None]
+        self.slope = self._transposed @ np.pad(self._slopes, ((0, len(shape)), (0, 0)))
+        self.size = self._slopes.T @ self._slopes
         self.towards(misfit, shape)
 
     def towards(self, misfit: NDArray, shape: NDArray) -> System:
         """With other right-hand sides."""
         self.right = self._transposed @ np.concatenate([misfit, -shape])
-        self.along = float(self._fitted @ misfit)
+        self.along = self._slopes.T @ misfit
         return self
 
     def damped(self, damping: float | NDArray) -> UpperTriangle:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..topology import Piece
-from .fit import System, WholeEntries, first_flips
+from .fit import Scale, System, WholeEntries, first_flips
 from .patch import Patch, distance, spread
 from .shape import ShapePrior
 
@@ -39,7 +39,7 @@ class AnewOptions:
 def fit_near(
     problem: WholeEntries,
     z: NDArray[np.complex128],
-    scale: float,
+    scale: Scale,
     whole: NDArray[np.bool_],
     free: NDArray[np.bool_],
     schedule: tuple[tuple[float, int], ...],
@@ -62,7 +62,10 @@ def fit_near(
         For triangles that the prior has at random.
     """
     patch = Patch.about(problem.piece, free)
-    part = WholeEntries(patch.piece, problem.weights[patch.edges], problem.guessed[patch.edges], scale, patch.free)
+    region = None if problem.region is None else problem.region[patch.triangles]
+    part = WholeEntries(
+        patch.piece, problem.weights[patch.edges], problem.guessed[patch.edges], scale, patch.free, region
+    )
     moved = z.copy()
     try:
         for mu, steps in schedule:
@@ -107,7 +110,7 @@ def _fitted(
     part: WholeEntries, z: NDArray, whole: NDArray[np.bool_], mu: float, steps: int,
     rng: np.random.Generator | None, first: float = 1e-3,
 ) -> NDArray[np.complex128]:  # fmt: skip
-    piece, scale = part.piece, float(part.known_scale or 1.0)
+    piece, scale = part.piece, part.known_scale
     prior = ShapePrior.of(piece, ~whole).about(part.free)
     prior = prior if rng is None else prior.unlike(rng)
     whole = whole & part.asked

@@ -18,7 +18,7 @@ class Patch:
     ----------
     piece : Piece
         The triangles with a part in entries that moving vertices change; without boundary loops.
-    vertices, edges : (k,) int64, (e,) int64
+    vertices, edges, triangles : (k,) int64, (e,) int64, (m,) int64
         Of the whole piece.
     free : (k,) bool
         Vertices that move.
@@ -27,6 +27,7 @@ class Patch:
     piece: Piece
     vertices: NDArray[np.int64]
     edges: NDArray[np.int64]
+    triangles: NDArray[np.int64]
     free: NDArray[np.bool_]
 
     @classmethod
@@ -47,7 +48,7 @@ class Patch:
             vertices, edges, ends, triangles.reshape(-1, 3), opposite.reshape(-1, 3), facing,
             np.empty((0, 2), np.int64), np.zeros(1, np.int64),
         )  # fmt: skip
-        return cls(part, vertices, edges, free[vertices])
+        return cls(part, vertices, edges, chosen, free[vertices])
 
 
 def distance(piece: Piece, vertices: NDArray[np.bool_], most: int) -> NDArray[np.int64]:
