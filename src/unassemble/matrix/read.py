@@ -8,8 +8,9 @@ import os
 import re
 import sys
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import IO, Any, BinaryIO
 
@@ -17,20 +18,24 @@ import scipy.sparse as sp
 
 from ..errors import InputError, MatrixFileError, UnassembleError
 from ..formats import FORMATS
+from .binary import read_mat, read_mat73, read_npy, read_npz
 from .canonical import canonical, inconsistency
 from .check import check_matrix
-from .market import read_market
-from .mat import read_mat, read_mat4, read_mat73
-from .npz import read_npy, read_npz
 from .operator import OperatorMatrix
 from .signatures import HEAD, foreign, kind_of
-from .triplets import read_triplets
+from .text import read_market, read_triplets
 
-_FORMATS = {"market": "Matrix Market", "npz": ".npz", "npy": ".npy", "triplets": "lines of row, column and entry"}
-
-
-_READERS = {"market": read_market, "npz": read_npz, "npy": read_npy, "triplets": read_triplets}
-_MATLAB = {"mat": read_mat, "mat4": read_mat4, "hdf5": read_mat73}
+_READERS: dict[str, tuple[str, Callable[[BinaryIO, str], Any]]] = {
+    "market": ("Matrix Market", read_market),
+    "npz": (".npz", read_npz),
+    "npy": (".npy", read_npy),
+    "triplets": ("lines of row, column and entry", read_triplets),
+}
+_MATLAB: dict[str, Callable[[BinaryIO, str, str | None], Any]] = {
+    "mat": read_mat,
+    "mat4": partial(read_mat, dense=True),
+    "hdf5": read_mat73,
+}
 
 
 def read_matrix(source: str | os.PathLike[str] | IO[Any], *, variable: str | None = None) -> sp.csr_array:
@@ -86,9 +91,10 @@ def _read(stream: Any, name: str, variable: str | None) -> Any:
         raise MatrixFileError(f"{name} {foreign(_head(stream), suffix)}")
     if kind in _MATLAB:
         return _MATLAB[kind](stream, name, variable)
+    what, reader = _READERS[kind]
     if variable is not None:
-        raise InputError(f"{name} is {_FORMATS[kind]}, and only .mat files have variables: leave out `variable`")
-    return _READERS[kind](stream, name)
+        raise InputError(f"{name} is {what}, and only .mat files have variables: leave out `variable`")
+    return reader(stream, name)
 
 
 def _read_gzip(stream: BinaryIO, name: str, variable: str | None) -> Any:
@@ -115,7 +121,9 @@ def _head(stream: Any) -> bytes:
 def _opened(source: Any) -> Iterator[tuple[BinaryIO, str]]:
     """A binary stream that can be rewound, and its name for messages."""
     if isinstance(source, str) and source == "-":
-        yield _rewindable(_standard_input(), "standard input"), "standard input"
+        if sys.stdin is None or sys.stdin.closed:
+            raise MatrixFileError("standard input is closed: pipe a Matrix Market file into it")
+        yield _rewindable(getattr(sys.stdin, "buffer", sys.stdin), "standard input"), "standard input"
     elif hasattr(source, "read"):
         name = getattr(source, "name", None)
         name = name if isinstance(name, str) else "the file"  # a pipe has a number
@@ -144,12 +152,6 @@ def _open_path(path: Any) -> BinaryIO:
         raise MatrixFileError(f"{name!r} cannot be opened ({getattr(error, 'strerror', None) or error})") from error
 
 
-def _standard_input() -> Any:
-    if sys.stdin is None or sys.stdin.closed:
-        raise MatrixFileError("standard input is closed: pipe a Matrix Market file into it")
-    return getattr(sys.stdin, "buffer", sys.stdin)
-
-
 def _rewindable(stream: Any, name: str) -> BinaryIO:
     """The stream itself, or a copy in memory of a pipe, of text, or of a file that was read from before."""
     try:
@@ -170,20 +172,7 @@ def _as_bytes(content: str | bytes | None) -> bytes:
 def load(source: Any, *, variable: str | None = None, drop_zeros: float | None = None) -> OperatorMatrix:
     """Read a matrix where `source` names a file, and check it.
 
-    Parameters
-    ----------
-    source : path, "-", open file, scipy sparse matrix or array, or array_like
-    variable : str, optional
-        See :func:`read_matrix`.
-    drop_zeros : float, optional
-        See :func:`check_matrix`.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or an option is out of range.
-    MatrixError
-        If the matrix fails a check.
+    Options and errors are those of :func:`read_matrix` and :func:`check_matrix`.
     """
     matrix = read_matrix(source, variable=variable) if is_file(source) else source
     return check_matrix(matrix, drop_zeros=drop_zeros)
