@@ -119,12 +119,14 @@ def test_reserved_places_are_not_entries() -> None:
     [
         by_hand([0, 1, 9], [1, 0]),
         by_hand([0, 1], [1, 0]),
+        by_hand([0, 1, 2, 2], [1, 0]),
         by_hand([0, 1, -1], [1, 0]),
         by_hand([0, 2, 1], [1, 0]),
         by_hand([1, 1, 2], [1, 0]),
         by_hand([0, 1, 2], [1, 7]),
         by_hand([0, 1, 2], [1, -1]),
         by_hand([0, 1, 2], [1, 0], kind=9),
+        by_hand([0, 1, 2], [1, 0], kind=14),
         by_hand([0, 1, 2], [1, 0], shape=(-2, 2)),
     ],
 )
@@ -139,9 +141,9 @@ def structure(width: int, names: bytes, *fields: bytes) -> io.BytesIO:
     return io.BytesIO(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + element(14, parts))
 
 
-def test_empty_fields_are_passed_over(refused) -> None:
+def test_empty_fields_and_elements_of_other_types_are_passed_over(refused) -> None:
     content = structure(4, b"A\0\0\0B\0\0\0", element(14, b""), element(14, b"")).getvalue()
-    refused(MatrixFileError, "'S' of size 1 x 1", read_matrix, io.BytesIO(content))
+    refused(MatrixFileError, "'S' of size 1 x 1", read_matrix, io.BytesIO(content + element(9, bytes(8))))
     assert read_matrix(io.BytesIO(content + by_hand([0, 1, 2], [1, 0]).getvalue()[128:])).shape == (2, 2)
 
 

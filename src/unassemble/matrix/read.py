@@ -7,10 +7,8 @@ import io
 import os
 import re
 import sys
-import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import partial
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import IO, Any, BinaryIO
 
@@ -18,9 +16,10 @@ import scipy.sparse as sp
 
 from ..errors import InputError, MatrixFileError, UnassembleError
 from ..formats import FORMATS
-from .binary import read_mat, read_mat73, read_npy, read_npz
 from .canonical import canonical, inconsistency
 from .check import check_matrix
+from .mat import read_mat, read_mat4, read_mat73
+from .npz import read_npy, read_npz
 from .operator import OperatorMatrix
 from .signatures import HEAD, foreign, kind_of
 from .text import read_market, read_triplets
@@ -33,7 +32,7 @@ _READERS: dict[str, tuple[str, Callable[[BinaryIO, str], Any]]] = {
 }
 _MATLAB: dict[str, Callable[[BinaryIO, str, str | None], Any]] = {
     "mat": read_mat,
-    "mat4": partial(read_mat, dense=True),
+    "mat4": read_mat4,
     "hdf5": read_mat73,
 }
 
@@ -83,12 +82,15 @@ def read_matrix(source: str | os.PathLike[str] | IO[Any], *, variable: str | Non
 
 
 def _read(stream: Any, name: str, variable: str | None) -> Any:
-    kind = kind_of(_head(stream))
+    head = stream.read(HEAD)
+    stream.seek(0)
+    kind = kind_of(head)
     if kind == "gzip":
-        return _read_gzip(stream, name, variable)
+        with gzip.GzipFile(fileobj=stream, mode="rb") as unpacked:
+            return _read(unpacked, name, variable)
     suffix = next((one for one, held in FORMATS.items() if held.name and name.lower().endswith(one)), "")
     if kind is None or (kind == "hdf5" and suffix):
-        raise MatrixFileError(f"{name} {foreign(_head(stream), suffix)}")
+        raise MatrixFileError(f"{name} {foreign(head, suffix)}")
     if kind in _MATLAB:
         return _MATLAB[kind](stream, name, variable)
     what, reader = _READERS[kind]
@@ -97,41 +99,20 @@ def _read(stream: Any, name: str, variable: str | None) -> Any:
     return reader(stream, name)
 
 
-def _read_gzip(stream: BinaryIO, name: str, variable: str | None) -> Any:
-    try:
-        with gzip.GzipFile(fileobj=stream) as unpacked:
-            kind = kind_of(_head(unpacked))
-            if kind == "gzip":
-                raise MatrixFileError(f"{name} is compressed twice: unpack it once")
-            if kind in ("market", "triplets", None):  # read, or refused, as it is unpacked
-                return _read(unpacked, name, variable)
-            return _read(io.BytesIO(unpacked.read()), name, variable)
-    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-        raise MatrixFileError(f"{name} is a truncated or damaged gzip file: write or download it again") from error
-
-
-def _head(stream: Any) -> bytes:
-    """The first bytes of a stream that can be rewound."""
-    head: bytes = stream.read(HEAD)
-    stream.seek(0)
-    return head
-
-
 @contextmanager
 def _opened(source: Any) -> Iterator[tuple[BinaryIO, str]]:
     """A binary stream that can be rewound, and its name for messages."""
-    if isinstance(source, str) and source == "-":
-        if sys.stdin is None or sys.stdin.closed:
-            raise MatrixFileError("standard input is closed: pipe a Matrix Market file into it")
-        yield _rewindable(getattr(sys.stdin, "buffer", sys.stdin), "standard input"), "standard input"
-    elif hasattr(source, "read"):
-        name = getattr(source, "name", None)
-        name = name if isinstance(name, str) else "the file"  # a pipe has a number
-        yield _rewindable(source, name), name
-    else:
-        with _open_path(source) as stream:
-            name = os.fsdecode(source)
-            yield _rewindable(stream, name), name
+    with ExitStack() as stack:
+        if isinstance(source, str) and source == "-":
+            if sys.stdin is None or sys.stdin.closed:
+                raise MatrixFileError("standard input is closed: pipe a Matrix Market file into it")
+            stream, name = getattr(sys.stdin, "buffer", sys.stdin), "standard input"
+        elif hasattr(source, "read"):
+            name = getattr(source, "name", "the file")
+            stream, name = source, name if isinstance(name, str) else "the file"  # a pipe has a number
+        else:
+            stream, name = stack.enter_context(_open_path(source)), os.fsdecode(source)
+        yield _rewindable(stream, name), name
 
 
 def _open_path(path: Any) -> BinaryIO:
@@ -157,16 +138,15 @@ def _rewindable(stream: Any, name: str) -> BinaryIO:
     try:
         if not isinstance(stream, io.TextIOBase) and stream.seekable() and stream.tell() == 0:
             return stream
-        head = _as_bytes(stream.read(HEAD))
-        if kind_of(head) is None and len(head) == HEAD:  # refuse an endless device before reading on
-            raise MatrixFileError(f"{name} {foreign(head)}")
-        return io.BytesIO(head + _as_bytes(stream.read()))
+        head = stream.read(HEAD)
+        text = isinstance(head, str)
+        begun = head.encode("utf-8", "replace") if text else head or b""
+        if kind_of(begun) is None and len(begun) >= HEAD:  # refuse an endless device before reading on
+            raise MatrixFileError(f"{name} {foreign(begun)}")
+        rest = stream.read()
+        return io.BytesIO(begun + (rest.encode("utf-8", "replace") if text else rest or b""))
     except (OSError, ValueError) as error:
         raise MatrixFileError(f"{name} cannot be read ({getattr(error, 'strerror', None) or error})") from error
-
-
-def _as_bytes(content: str | bytes | None) -> bytes:
-    return content.encode("utf-8", "replace") if isinstance(content, str) else content or b""
 
 
 def load(source: Any, *, variable: str | None = None, drop_zeros: float | None = None) -> OperatorMatrix:
