@@ -112,7 +112,10 @@ def certify(
     terms : Terms, optional
     """
     key, value = _assemble(points, triangles, factor, tensor, terms)
-    return compared(len(points), edges, entries, key, value, _flipped(points, triangles), terms)
+    a, b, c = points[triangles].transpose(1, 2, 0)
+    (ux, uy), (wx, wy) = b - a, c - a
+    flipped = np.flatnonzero(~(ux * wy - uy * wx > 0))
+    return compared(len(points), edges, entries, key, value, flipped, terms)
 
 
 def compared(
@@ -156,12 +159,6 @@ def relative(difference: NDArray, reference: NDArray) -> NDArray[np.float64]:
     return np.where(np.isnan(ratio), np.inf, ratio)
 
 
-def _flipped(points: NDArray, triangles: NDArray) -> NDArray[np.int64]:
-    a, b, c = points[triangles].transpose(1, 2, 0)
-    (ux, uy), (wx, wy) = b - a, c - a
-    return np.flatnonzero(~(ux * wy - uy * wx > 0))
-
-
 def _assemble(
     points: NDArray,
     triangles: NDArray,
@@ -189,16 +186,15 @@ def _assemble(
             (xi, yi), (xj, yj) = sides[i], sides[j]
             product = kyy * (xi * xj) - kxy * (xi * yj + yi * xj) + kxx * (yi * yj)
             ends.append((np.minimum(corners[i], corners[j]), np.maximum(corners[i], corners[j])))
-            values.append(weight * product if terms is None else weight * product + _share(terms, i == j) * double)
+            value = weight * product
+            if terms is not None:
+                part = (6 if i == j else np.inf) if terms.lumped else (12 if i == j else 24)
+                value = value + terms.reaction / part * double
+            values.append(value)
     rows, columns = (np.concatenate(part) for part in zip(*ends, strict=True))
     summed = sp.coo_array((np.concatenate(values), (rows, columns)), shape=(n, n)).tocsr()
     summed.sort_indices()
     return np.repeat(np.arange(n), np.diff(summed.indptr)) * n + summed.indices, summed.data
-
-
-def _share(terms: Terms, own: bool) -> float:
-    """What a triangle adds to an entry of s M, over twice its area."""
-    return terms.reaction / (6 if own else np.inf) if terms.lumped else terms.reaction / (12 if own else 24)
 
 
 def without_spare_equations(
