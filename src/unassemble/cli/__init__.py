@@ -6,9 +6,8 @@ import click
 
 from .._version import __version__
 from .commands import demo, inspect, modes, paper, recover
-from .spelling import as_typed, flags_of
-from .status import CommandLine
-from .values import spelled_out
+from .options import spelled_out
+from .status import CommandLine, as_typed, flags_of
 
 __all__ = ["as_typed", "flags_of", "main", "spelled_out"]
 
@@ -35,8 +34,5 @@ def main() -> None:
     """All commands."""
 
 
-main.add_command(recover)
-main.add_command(inspect)
-main.add_command(modes)
-main.add_command(demo)
-main.add_command(paper)
+for command in (recover, inspect, modes, demo, paper):
+    main.add_command(command)

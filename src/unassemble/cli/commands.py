@@ -6,14 +6,13 @@ from typing import Any
 
 import click
 
-from .options import check_files, matrix_options, nodes_options, recovered, spelled_numbering, target
+from .options import Numbers, OptionalTolerance, check_files, matrix_options, recovered, recovery_options, target
 from .status import Exit, outcome, say
-from .values import Numbers, OptionalTolerance
 
 
 @click.command(cls=OptionalTolerance)
 @matrix_options
-@nodes_options
+@recovery_options
 @click.argument("out", metavar="[OUT]", required=False)
 @click.option("-o", "--output", metavar="OUT", help="The mesh: .npz, or any format of meshio.")
 @click.option(
@@ -53,10 +52,7 @@ from .values import Numbers, OptionalTolerance
 )
 @click.option("--triangulate", is_flag=True, help="Divide cells that the matrix leaves undivided.")
 @click.option("--standard-deviations", is_flag=True, help="Error bars of the coordinates.")
-@click.option("--report", metavar="FILE", help="Write a report: .json.")
 @click.option("--plot", metavar="FILE", help="Write a picture: .png, .svg or .pdf.")
-@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads of the linear algebra libraries.")
-@click.option("--quiet", is_flag=True, help="Print nothing but errors.")
 def recover(
     matrix: str, out: str | None, output: str | None, report: str | None, plot: str | None, quiet: bool, **options: Any
 ) -> int:
@@ -71,7 +67,6 @@ def recover(
     """
     unnamed = out is None and output is None
     out = target(matrix, out, output)
-    options["numbering"] = spelled_numbering(options["numbering"])
     options["refine"] = not options.pop("no_refine")
     from ..export import check_output, without_points
     from ..formats import lacks_worth
@@ -116,13 +111,10 @@ def inspect(matrix: str, variable: str | None, drop_zeros: float | None, as_json
 
 @click.command(cls=OptionalTolerance)
 @matrix_options
-@nodes_options
+@recovery_options
 @click.option("-o", "--output", "out", metavar="OUT", required=True, help="The modes: .npy, or dense Matrix Market.")
 @click.option("--petsc", metavar="FILE", help="Write the coordinates too, as a PETSc Vec in binary format.")
 @click.option("--amgcl", metavar="FILE", help="Write the coordinates too, as AMGCL reads them: Matrix Market.")
-@click.option("--report", metavar="FILE", help="Write a report: .json.")
-@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads of the linear algebra libraries.")
-@click.option("--quiet", is_flag=True, help="Print nothing but errors.")
 def modes(
     matrix: str, out: str, petsc: str | None, amgcl: str | None, report: str | None, quiet: bool, **options: Any
 ) -> int:
@@ -130,7 +122,6 @@ def modes(
 
     One row per row of MATRIX, in its order; translations, then rotations: 3 columns in the plane, 6 in space.
     """
-    options["numbering"] = spelled_numbering(options["numbering"])
     from ..files import check_target
     from ..modes import check_modes, save_amgcl_coordinates, save_modes, save_petsc_vec
     from ..progress import StageDisplay
