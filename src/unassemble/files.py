@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 from .errors import OutputError
 
 _DRAFT = ".unassemble-"
+PICTURES = (".png", ".svg", ".pdf")
 
 
 @contextmanager
@@ -70,6 +71,13 @@ def check_target(path: str | os.PathLike[str]) -> None:
             pass  # permissions are best judged by trying
     except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: a loop of links
         raise OutputError(f"cannot write {name!r}: {_reason(error)}") from error
+
+
+def check_plot(path: str | os.PathLike[str]) -> None:
+    """Raise OutputError, before long work, where a picture cannot be written, or its extension is another one."""
+    if Path(path).suffix.lower() not in PICTURES:
+        raise OutputError(f"a picture is a {' or '.join(PICTURES)} file, not {os.fspath(path)!r}")
+    check_target(path)
 
 
 def _reason(error: BaseException) -> str:

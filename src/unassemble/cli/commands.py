@@ -69,8 +69,8 @@ def recover(
     out = target(matrix, out, output)
     options["refine"] = not options.pop("no_refine")
     from ..export import check_output, without_points
+    from ..files import check_plot
     from ..formats import lacks_worth
-    from ..plot.canvas import check_plot
     from ..progress import StageDisplay
     from ..report import check_report, write_report
 

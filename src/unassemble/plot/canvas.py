@@ -1,62 +1,37 @@
-"""Figures without pyplot: size, header, footer, and writing them."""
+"""Figures without pyplot: size, where pieces are drawn, header, footer, and writing them."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
 from pathlib import PurePath
-from typing import TYPE_CHECKING
 
+import matplotlib
 import numpy as np
+import scipy.sparse as sp
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from scipy.sparse import csgraph
 
-from ..errors import OutputError
-from ..files import check_target, whole_file
+from ..files import check_plot, whole_file
+from ..recovery import PlanarMesh
 from . import style
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-# Without the date, the same mesh gives the same file.
-_METADATA: dict[str, dict[str, None]] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-
-
-def check_plot(path: str | os.PathLike[str]) -> None:
-    """Find out, before long work, whether a picture can be written.
-
-    Raises
-    ------
-    OutputError
-        If the extension is not ``.png``, ``.svg`` or ``.pdf``, or the file cannot be written.
-    """
-    if PurePath(path).suffix.lower() not in _METADATA:
-        raise OutputError(f"a picture is a {' or '.join(_METADATA)} file, not {os.fspath(path)!r}")
-    check_target(path)
 
 
 def write_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a figure, whole or not at all, in the format that the extension names."""
-    import matplotlib
-
+    """Write a figure, whole or not at all; without the date, so that the same mesh gives the same file."""
     check_plot(path)
     suffix = PurePath(path).suffix.lower()
+    metadata = dict.fromkeys({".svg": ["Date"], ".pdf": ["CreationDate"]}.get(suffix, []))
     with whole_file(path, suffix) as draft, matplotlib.rc_context({"svg.hashsalt": "unassemble"}):
-        figure.savefig(draft, format=suffix[1:], dpi=style.DPI, metadata=_METADATA[suffix])
+        figure.savefig(draft, format=suffix[1:], dpi=style.DPI, metadata=metadata)
 
 
 def panels(extents: Sequence[NDArray]) -> tuple[Figure, list[Axes]]:
-    """A figure with one box beside the other, all to one scale.
-
-    Parameters
-    ----------
-    extents : sequence of (2, 2) float64
-        Lower left and upper right corner of what each panel will show.
-    """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
+    """A figure with one box beside the other, all to one scale, for what each extent (2, 2) encloses."""
     sizes = np.array([high - low for low, high in extents])
     sizes = np.maximum(sizes, 1e-3 * max(float(sizes.max()), 1e-300))
     gap = style.PAGE.margin * 2 * (len(extents) - 1)
@@ -107,17 +82,55 @@ def footer(figure: Figure, handles: Sequence[Artist]) -> None:
     """A legend in one row at the bottom."""
     if handles:
         width, _ = figure.get_size_inches()
-        legend = figure.legend(
-            handles=list(handles),
-            loc="lower left",
-            bbox_to_anchor=(style.PAGE.margin / width, 0),
-            ncols=len(handles),
-            frameon=False,
-            fontsize=8.5,
-            borderaxespad=0.4,
-            borderpad=0,
-            handlelength=1.6,
-            columnspacing=1.8,
-        )
-        for text in legend.get_texts():
-            text.set_color(style.TEXT)
+        more = {"bbox_to_anchor": (style.PAGE.margin / width, 0), "ncols": len(handles), "labelcolor": style.TEXT}
+        gaps = {"borderaxespad": 0.4, "borderpad": 0, "handlelength": 1.6, "columnspacing": 1.8}
+        figure.legend(handles=handles, loc="lower left", frameon=False, fontsize=8.5, **more, **gaps)
+
+
+def laid_out(mesh: PlanarMesh) -> NDArray[np.float64]:
+    """(n, 2) points of a mesh for the eye; what hangs together, by edges or in hinges, stays together."""
+    triangles = mesh.divided()[0]
+    sides = (triangles[:, [0, 0]].ravel(), triangles[:, 1:].ravel())
+    graph = sp.coo_array((np.ones(len(sides[0]), np.int8), sides), shape=(mesh.n_points,) * 2)
+    label = csgraph.connected_components(graph, directed=False)[1]
+    used = np.unique(triangles)
+    part = np.full(mesh.n_points, -1)
+    part[used] = np.unique(label[used], return_inverse=True)[1]
+    return apart(mesh.points, part)
+
+
+def apart(points: NDArray[np.float64], part: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(n, 2) points, one part beside the other if the boxes around any two overlap, as by their own frames they may.
+
+    Parts are numbered by `part`, (n,), which is negative for points of none.
+    """
+    count = int(part.max(initial=-1)) + 1
+    if count < 2:
+        return points
+    used = (part >= 0) & np.isfinite(points).all(axis=1)
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(low, part[used], points[used])
+    np.maximum.at(high, part[used], points[used])
+    meet = np.all((low[:, None] < high) & (high[:, None] > low), axis=2)
+    if not np.triu(meet, 1).any():
+        return points
+    size = np.maximum(high - low, 0)
+    shift = (_shelves(size) - np.where(size > 0, low, 0))[part]
+    return points + np.where(part[:, None] >= 0, shift, 0)
+
+
+def _shelves(size: NDArray) -> NDArray:
+    """Lower left corners (k, 2) of boxes in rows, tallest first, top row first, about as wide as a page."""
+    gap = 0.06 * np.sqrt(size.prod(axis=1).max())
+    box = size + gap
+    order = np.argsort(-size[:, 1], kind="stable")
+    width = max(float(box[:, 0].max()), 1.5 * float(np.sqrt(box.prod(axis=1).sum())))
+    corner = np.zeros_like(size)
+    x = top = 0.0
+    shelf = float(box[order[0], 1])
+    for k in order:
+        if x > 0 and x + box[k, 0] > width:
+            x, top, shelf = 0.0, top - shelf, float(box[k, 1])
+        corner[k] = x, top - size[k, 1]
+        x += float(box[k, 0])
+    return corner
