@@ -46,12 +46,7 @@ _OR_HELD = ", or the stiffness matrix of a body of a few nodes that is held all 
 
 
 def refuse_masses(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) -> None:
-    """Raise an error that names a mass matrix which recovery does not read; as :func:`mass_matrix`.
-
-    Raises
-    ------
-    GeometryError
-    """
+    """Raise a GeometryError that names a mass matrix which recovery does not read; as :func:`mass_matrix`."""
     mass = mass_matrix(matrix, planar=planar, exact=exact)
     if mass is not None and mass.unread:
         raise GeometryError(mass.sentence())
@@ -68,7 +63,8 @@ def mass_matrix(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) ->
     sign, nothing = np.sign(matrix.diagonal[np.abs(matrix.diagonal).argmax()]), ROUNDED * np.abs(matrix.entries).max()
     if planar and len(matrix.edges) <= 3 * matrix.n and (sign * matrix.entries < -nothing).any():
         return None
-    if not exact and _is_lumped(matrix):
+    root = np.sqrt(np.abs(matrix.diagonal))[matrix.edges].prod(axis=1)
+    if not exact and (np.abs(matrix.entries) <= LAST_DIGITS * root).all():  # functions are orthogonal: Crouzeix-Raviart
         return Diagnosis("mass", "a lumped mass matrix", ("all but its diagonal is rounding",), UNREAD["mass"])
     masses = _Masses.of(matrix)
     if masses is None:
@@ -81,25 +77,16 @@ def mass_matrix(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) ->
         return Diagnosis("mass", f"a mass matrix of {name}", (sums, *masses.without), advice)
     crowded = masses.M.nnz > 7 * masses.M.shape[0] - 12  # twice 3 n - 6, and the diagonal
     bounds = masses.bounds if not exact and (crowded or not planar) else None
-    if bounds is None or _beside_stiffness(matrix):
+    # Rows may form straight triangles of second or third order, where more than their mass is there.
+    less = None if bounds is None else less_mass(matrix)
+    more = less is not None and bool(np.abs(less.matrix.entries).max() > ALIKE * np.abs(matrix.entries).max())
+    if bounds is None or more:
         return None
     shown = (
         f"scaled to identity blocks its least eigenvalue is {bounds[0]:.2g}, where those of stiffnesses near zero",
         f"its couplings add up in one vector, to a largest eigenvalue of {bounds[1]:.2g}, as under a translation",
     )
     return Diagnosis("mass", f"a consistent mass matrix{masses.unknowns}", (*shown, *masses.without), UNREAD["mass"])
-
-
-def _beside_stiffness(matrix: OperatorMatrix) -> bool:
-    """Whether rows form straight triangles of second or third order, and more than their mass is there."""
-    less = less_mass(matrix)
-    return less is not None and bool(np.abs(less.matrix.entries).max() > ALIKE * np.abs(matrix.entries).max())
-
-
-def _is_lumped(matrix: OperatorMatrix) -> bool:
-    """Whether nothing but rounding stands beside the diagonal, as where functions are orthogonal (Crouzeix-Raviart)."""
-    root = np.sqrt(np.abs(matrix.diagonal))
-    return bool((np.abs(matrix.entries) <= LAST_DIGITS * root[matrix.edges[:, 0]] * root[matrix.edges[:, 1]]).all())
 
 
 @dataclass(frozen=True, eq=False)

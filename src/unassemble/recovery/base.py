@@ -146,6 +146,7 @@ class Recovery:
     def element(self) -> str | None:
         """``P1`` to ``P3``, ``Q1``, ``Q2`` or ``S2`` (serendipity), or ``mixed``; None where it is not known."""
         kinds = {ELEMENT_NAMES[kind] for kind in self.cells if kind in ELEMENT_NAMES}
+        kinds |= {"P1"} if self.n_polygons else set()  # one stands for triangles
         return "mixed" if len(kinds) > 1 else next(iter(kinds), None)
 
     @property

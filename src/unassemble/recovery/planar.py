@@ -67,11 +67,6 @@ class PlanarMesh(Recovery):
     eliminated_points: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
 
     @property
-    def element(self) -> str:
-        """``P1``: a polygon stands for triangles."""
-        return "P1"
-
-    @property
     def n_polygons(self) -> int:
         """Number of cells that the matrix leaves undivided."""
         return len(self.polygons_offsets) - 1
@@ -122,8 +117,3 @@ class ConformingMesh(PlanarMesh):
     def cells(self) -> dict[str, NDArray[np.int64]]:
         """Cells of each kind that occurs, all their nodes, by meshio's names."""
         return with_mid_nodes(occurring(triangle=self.triangles, quad=self.quads), self.mid_nodes)
-
-    @property
-    def element(self) -> str:
-        """``P2``, ``P3``, ``Q1``, ``Q2``, ``S2`` (serendipity), or ``mixed``."""
-        return str(Recovery.element.fget(self))  # type: ignore[attr-defined]
