@@ -20,50 +20,26 @@ _DENSE = 400  # triangles of a piece whose equations are counted by their rank
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """What a matrix S (c L + s M) S has besides c L, and nothing else on its diagonal.
+    """What a matrix S (c L + s M) S has besides c L, and nothing else on its diagonal."""
 
-    Attributes
-    ----------
-    diagonal : (n,) float64
-        A_ii of the matrix.
-    reaction : float
-        s.
-    lumped : bool
-        Whether M is diagonal: a third of its area from each triangle to each of its corners.
-    scaling : (n,) float64 or None
-        S; the identity by default.
-    """
-
-    diagonal: NDArray[np.float64]
-    reaction: float = 0.0
-    lumped: bool = False
-    scaling: NDArray[np.float64] | None = None
+    diagonal: NDArray[np.float64]  # (n,) A_ii of the matrix
+    reaction: float = 0.0  # s
+    lumped: bool = False  # whether M is diagonal: a third of its area from each triangle to each of its corners
+    scaling: NDArray[np.float64] | None = None  # (n,) S; the identity by default
 
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """How well a mesh explains a matrix.
+    """How well a mesh explains a matrix."""
 
-    Attributes
-    ----------
-    backward_error : float
-        Largest difference between an off-diagonal entry and the re-assembled one, relative to the largest
-        off-diagonal entry of its row.
-    pairs : (k, 2) int64
-        Rows and columns of all entries of either, upper triangle; with further terms the diagonal as well.
-    misfits : (k,) float64
-        Their differences, relative in the same way.
-    differences : (k,) float64
-        Their differences, re-assembled minus given.
-    flipped : (f,) int64
-        Triangles that are flat or turned over: a mesh with any of them is not a planar one.
-    """
-
+    # largest difference between an off-diagonal entry and the re-assembled one, relative to the largest off-diagonal
+    # entry of its row
     backward_error: float
+    # (k, 2) rows and columns of all entries of either, upper triangle; with further terms the diagonal as well
     pairs: NDArray[np.int64]
-    misfits: NDArray[np.float64]
-    differences: NDArray[np.float64]
-    flipped: NDArray[np.int64]
+    misfits: NDArray[np.float64]  # (k,) their differences, relative in the same way
+    differences: NDArray[np.float64]  # (k,) re-assembled minus given
+    flipped: NDArray[np.int64]  # (f,) triangles that are flat or turned over: with any of them a mesh is not planar
 
     def worst(
         self, count: int = 10, *, noise: NDArray | None = None, first: NDArray | None = None
@@ -207,18 +183,7 @@ def without_spare_equations(
     an entry are zeros that were supposed, and what they say of each other is no evidence: as many equations are left
     out as vanishing sides depend on each other.
 
-    Parameters
-    ----------
-    edges : (e, 2) int64
-        Pairs i < j of stored entries.
-    points : (n, 2) float64
-    triangles : (m, 3) int64
-    known_scale : bool
-        Whether c is given.
-
-    Returns
-    -------
-    (k,) int64
+    `edges` (e, 2) are the pairs i < j of stored entries; `known_scale` tells whether c is given. Returns (k,) rows.
     """
     n = len(points)
     ends = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2) @ [n, 1]
@@ -285,23 +250,9 @@ def chi_square_verdict(misfit: NDArray, freedom: int, sigma: float, *, repeats: 
     the largest misfit is tested as well. No misfit varies more than the noise itself, so that the normal tail, times
     the number of entries, bounds its p-value. Errors of rounding are spread evenly: there both p-values are too large.
 
-    Parameters
-    ----------
-    misfit : (k,) float64
-        Re-assembled minus given entries, each over the standard deviation of its noise.
-    freedom : int
-        Entries less fitted unknowns.
-    sigma : float
-        The standard deviation of typical entries.
-    repeats : float
-        How many entries share an error: of the sum of squares, and of the degrees of freedom, only one part in so many
-        counts.
-
-    Returns
-    -------
-    dict
-        ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``; ``largest`` misfit in standard deviations and its
-        ``largest_p_value``.
+    `misfit` (k,): re-assembled minus given entries, each over the standard deviation of its noise. `freedom`: entries
+    less fitted unknowns. `sigma`: the standard deviation of typical entries. `repeats`: how many entries share an
+    error: of the sum of squares, and of the degrees of freedom, only one part in so many counts.
     """
     with np.errstate(over="ignore"):
         statistic = float(np.sum(misfit**2)) / repeats

@@ -13,21 +13,13 @@ from .tolerances import CERTIFIED
 
 @dataclass(frozen=True, eq=False)
 class MetricCertificate:
-    """How well edge lengths explain a matrix.
+    """How well edge lengths explain a matrix."""
 
-    Attributes
-    ----------
-    entries : Certificate
-        Of the off-diagonal entries; `flipped` are triangles whose sides do not meet.
-    diagonal : str
-        The diagonal matrix D of A = c L + D that comes nearest to the row sums: ``"zero"``, ``"constant"``, a multiple
-        of the identity, or ``"areas"``, a multiple of the lumped mass matrix of a single piece.
-    row_misfits : (n,) float64
-        Differences of the row sums from those of that D, relative to the largest off-diagonal entry of the row.
-    """
-
-    entries: Certificate
+    entries: Certificate  # of the off-diagonal entries; `flipped` are triangles whose sides do not meet
+    # the diagonal matrix D of A = c L + D that comes nearest to the row sums: "zero", "constant", a multiple of the
+    # identity, or "areas", a multiple of the lumped mass matrix of a single piece
     diagonal: str
+    # (n,) differences of the row sums from those of that D, relative to the largest off-diagonal entry of the row
     row_misfits: NDArray[np.float64]
 
 
