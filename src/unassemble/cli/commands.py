@@ -6,7 +6,17 @@ from typing import Any
 
 import click
 
-from .options import Numbers, OptionalTolerance, check_files, matrix_options, recovered, recovery_options, target
+from .options import (
+    OPERATORS,
+    Numbers,
+    OptionalTolerance,
+    check_files,
+    folder_options,
+    matrix_options,
+    recovered,
+    recovery_options,
+    target,
+)
 from .status import Exit, outcome, say
 
 
@@ -15,21 +25,11 @@ from .status import Exit, outcome, say
 @recovery_options
 @click.argument("out", metavar="[OUT]", required=False)
 @click.option("-o", "--output", metavar="OUT", help="The mesh: .npz, or any format of meshio.")
-@click.option(
-    "--operator",
-    type=click.Choice(["auto", "laplacian", "elasticity", "surface"]),
-    default="auto",
-    show_default=True,
-)
+@click.option("--operator", type=click.Choice(OPERATORS), default="auto", show_default=True)
 @click.option("--method", type=click.Choice(["conformal", "angles"]), help="The default picks the best.")
 @click.option("--no-refine", is_flag=True, help="Leave out the polish.")
 @click.option("--scale", type=float, metavar="C", help="The factor c is known.")
-@click.option(
-    "--noise",
-    type=float,
-    metavar="SIGMA",
-    help="Standard deviation of the entries; the certificate becomes a chi-square test.",
-)
+@click.option("--noise", type=float, metavar="SIGMA", help="Standard deviation of the entries, for a chi-square test.")
 @click.option(
     "--anchor",
     "anchors",
@@ -144,8 +144,7 @@ def modes(
 
 
 @click.command()
-@click.option("-o", "--output", "folder", metavar="DIR", default="demo-output", show_default=True)
-@click.option("--debug", is_flag=True, expose_value=False, help="Show tracebacks and details.")
+@folder_options("demo-output")
 def demo(folder: str) -> int:
     """Recover two matrices that this library did not assemble, and a lattice mast.
 
@@ -158,8 +157,7 @@ def demo(folder: str) -> int:
 
 
 @click.command()
-@click.option("-o", "--output", "folder", metavar="DIR", default="paper-output", show_default=True)
-@click.option("--debug", is_flag=True, expose_value=False, help="Show tracebacks and details.")
+@folder_options("paper-output")
 def paper(folder: str) -> int:
     """Regenerate Figures 2 to 12 of the 2002 paper.
 

@@ -80,6 +80,9 @@ def _with(*options: Callable[[_Command], _Command]) -> Callable[[_Command], _Com
     return lambda command: reduce(lambda inner, option: option(inner), reversed(options), command)
 
 
+_DEBUG = click.option("--debug", is_flag=True, expose_value=False, help="Show tracebacks and details.")
+OPERATORS = ["auto", "laplacian", "elasticity", "surface"]
+
 matrix_options = _with(
     click.argument("matrix", metavar="MATRIX"),
     click.option(
@@ -90,7 +93,7 @@ matrix_options = _with(
         "and of their transpose's.",
     ),
     click.option("--variable", metavar="NAME", help="Name of the variable in a .mat file."),
-    click.option("--debug", is_flag=True, expose_value=False, help="Show tracebacks and details."),
+    _DEBUG,
 )
 
 recovery_options = _with(
@@ -111,6 +114,11 @@ recovery_options = _with(
     click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads of the linear algebra libraries."),
     click.option("--quiet", is_flag=True, help="Print nothing but errors."),
 )
+
+
+def folder_options(default: str) -> Callable[[_Command], _Command]:
+    """The folder that results go to."""
+    return _with(click.option("-o", "--output", "folder", metavar="DIR", default=default, show_default=True), _DEBUG)
 
 
 def target(matrix: str, word: str | None, option: str | None, suffix: str = ".vtu") -> str:

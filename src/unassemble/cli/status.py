@@ -60,10 +60,6 @@ class Exit(IntEnum):
     INTERRUPTED = 130
 
 
-# From click 8.2 on, a command without arguments raises the help text.
-_HELP = getattr(click.exceptions, "NoArgsIsHelpError", ())
-
-
 class CommandLine(click.Group):
     """A group of commands that return their exit status."""
 
@@ -104,7 +100,7 @@ def verdict(error: BaseException) -> tuple[int, str]:
             return (error.code if isinstance(error.code, int) else Exit.BUG), ""
         case KeyboardInterrupt() | click.exceptions.Abort() if not isinstance(error.__cause__, EOFError):
             status, sentence = Exit.INTERRUPTED, "interrupted"
-        case click.exceptions.ClickException() if isinstance(error, _HELP):
+        case click.exceptions.NoArgsIsHelpError():
             return Exit.USAGE, error.format_message()
         case click.exceptions.ClickException():
             status, sentence = Exit.USAGE, error.format_message()
@@ -144,13 +140,7 @@ def outcome(recovery: Recovery, written: Sequence[str | None], *, quiet: bool, l
 
 
 def say(text: str) -> None:
-    """Print a result; a reader that has gone away is no failure of ours.
-
-    Raises
-    ------
-    OutputError
-        If standard output cannot take it, a full disk for one.
-    """
+    """Print a result; a reader that has gone away is no failure of ours, and a full disk an OutputError."""
     try:
         click.echo(text)
         if sys.stdout is not None:  # it may be closed

@@ -16,24 +16,15 @@ if TYPE_CHECKING:
 def lines_of(facts: Inspection) -> list[tuple[str, str]]:
     """Names and values, in the order in which they are shown."""
     above = count_of(facts.n_edges, "off-diagonal entry", "off-diagonal entries")
-    exact = (
-        ""
-        if not facts.asymmetry
-        else f" up to {'rounding' if facts.asymmetry <= ROUNDED else f'{facts.asymmetry:.1e}'}"
-    )
+    off = "rounding" if facts.asymmetry <= ROUNDED else f"{facts.asymmetry:.1e}"
     isolated = f", and {count_of(facts.n_isolated, 'isolated row')}" if facts.n_isolated else ""
-    gone = "zero up to rounding"
+    gone = f"{count_of(facts.n_vanished, 'of these is', 'of these are')} zero up to rounding"
     used, zero = facts.n_rows - facts.n_isolated, facts.n_zero_sums
     lines = [
         ("matrix", f"{count_of(facts.n_rows, 'row')}, {above} above the diagonal"),
-        ("symmetry", f"symmetric{exact}"),
+        ("symmetry", f"symmetric up to {off}" if facts.asymmetry else "symmetric"),
         ("graph", f"{count_of(facts.n_connected, 'connected piece')}{isolated}"),
-        (
-            "vanished",
-            f"{count_of(facts.n_vanished, 'of these is', 'of these are')} {gone}"
-            if facts.n_vanished
-            else "none of these",
-        ),
+        ("vanished", gone if facts.n_vanished else "none of these"),
         ("row sums", "zero" if zero == used else f"zero in {zero:,} of {used:,} rows only" if zero else "not zero"),
         ("surface", facts.surface) if facts.surface else ("planar", _planar(facts)),
     ]

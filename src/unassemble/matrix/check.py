@@ -22,21 +22,17 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
     Parameters
     ----------
     A : (n, n) scipy sparse matrix or array, or array_like
-        Explicit zeros are structure, those in the blocks of ``bsr`` included (``drop_zeros=0`` forgets them);
-        only zeros of the diagonal storage (``dia``), which cannot be told from padding, and of dense arrays
-        are absent entries. Duplicates are summed. A is not changed.
+        Explicit zeros are structure (``drop_zeros=0`` forgets them); see `canonical`.
     drop_zeros : float, optional
         Forget stored off-diagonal entries of at most this times the largest off-diagonal entry of their row
         and of their transpose's; at least 0 and below 1.
     noise : float, optional
-        Standard deviation of independent errors in the entries: both triangles may then differ by ten
-        times as much.
+        Standard deviation of independent errors in the entries: both triangles may then differ by ten times as much.
 
     Returns
     -------
     OperatorMatrix
-        The mean of both triangles, of complex matrices of their real part; what was changed on the way is in its
-        ``warnings``.
+        The mean of both triangles, of complex matrices of their real part; its ``warnings`` tell what was changed.
 
     Raises
     ------

@@ -37,13 +37,8 @@ class _Type(IntEnum):
 def read_mat(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
     """Read the sparse variable of a MATLAB file of versions 5 to 7; its index arrays are still to be checked.
 
-    Parameters
-    ----------
-    stream : binary file
-    name : str
-        What to call it in messages.
-    variable : str, optional
-        Which one, such as ``"A"`` or ``"Problem.A"``; needed where several are sparse and square.
+    `name` is what to call the file in messages, and `variable` which one to read, such as ``"A"`` or ``"Problem.A"``;
+    it is needed where several are sparse and square.
 
     Raises
     ------

@@ -43,18 +43,9 @@ def read_matrix(source: str | os.PathLike[str] | IO[Any], *, variable: str | Non
     Explicit zeros of the file are kept as structure; zeros of dense arrays and of scipy's diagonal storage, which
     cannot be told from padding, are not. Duplicates are summed. Pickles are never loaded.
 
-    Parameters
-    ----------
-    source : path, "-" or file
-        ``"-"`` is standard input. Matrix Market may be compressed by gzip, also on standard input.
-    variable : str, optional
-        Name of the variable in a ``.mat`` file, such as ``"A"`` or ``"Problem.A"``.
-
-    Returns
-    -------
-    csr_array
-        Of dtype float64, or complex128 or bool where the file says so, columns increasing within each row.
-        Neither square nor finite of necessity: see :func:`unassemble.matrix.check_matrix`.
+    `source` is a path, ``"-"`` for standard input, or an open file; text may be compressed by gzip. `variable` is the
+    name of one in a ``.mat`` file, such as ``"A"`` or ``"Problem.A"``. The result is of dtype float64, or complex128 or
+    bool where the file says so, and neither square nor finite of necessity: see :func:`unassemble.matrix.check_matrix`.
 
     Raises
     ------

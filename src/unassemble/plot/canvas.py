@@ -115,22 +115,7 @@ def apart(points: NDArray[np.float64], part: NDArray[np.int64]) -> NDArray[np.fl
     if not np.triu(meet, 1).any():
         return points
     size = np.maximum(high - low, 0)
-    shift = (_shelves(size) - np.where(size > 0, low, 0))[part]
+    row, column = np.divmod(np.arange(count), int(np.ceil(np.sqrt(count))))
+    corner = np.column_stack([column, -row]) * (1.06 * size.max(axis=0))
+    shift = (corner - np.where(size > 0, low, 0))[part]
     return points + np.where(part[:, None] >= 0, shift, 0)
-
-
-def _shelves(size: NDArray) -> NDArray:
-    """Lower left corners (k, 2) of boxes in rows, tallest first, top row first, about as wide as a page."""
-    gap = 0.06 * np.sqrt(size.prod(axis=1).max())
-    box = size + gap
-    order = np.argsort(-size[:, 1], kind="stable")
-    width = max(float(box[:, 0].max()), 1.5 * float(np.sqrt(box.prod(axis=1).sum())))
-    corner = np.zeros_like(size)
-    x = top = 0.0
-    shelf = float(box[order[0], 1])
-    for k in order:
-        if x > 0 and x + box[k, 0] > width:
-            x, top, shelf = 0.0, top - shelf, float(box[k, 1])
-        corner[k] = x, top - size[k, 1]
-        x += float(box[k, 0])
-    return corner

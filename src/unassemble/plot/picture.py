@@ -30,13 +30,8 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     the outer surface is drawn, shaded. Surfaces that have edge lengths only are drawn in coordinates that come near
     these; the header says how near.
 
-    Parameters
-    ----------
-    recovery : Recovery
-    path : path, optional
-        Write the picture there, whole or not at all: ``.png``, ``.svg`` or ``.pdf``.
-    ax : Axes, optional
-        Draw there, without heading and legend, and return the figure that it belongs to.
+    Where a `path` is given, the picture is written there, whole or not at all: ``.png``, ``.svg`` or ``.pdf``.
+    On an `ax` it is drawn without heading and legend, and the figure that this belongs to is returned.
 
     Raises
     ------
@@ -89,13 +84,7 @@ def _details(recovery: Recovery) -> str:
 def plot_comparison(true_points: ArrayLike, recovery: Recovery, path: str | os.PathLike[str] | None = None) -> Figure:
     """Draw the true mesh beside the recovered one, each piece moved by the best similarity or reflection.
 
-    Parameters
-    ----------
-    true_points : (n, 2) array_like
-        Row i belongs to matrix row i.
-    recovery : PlanarMesh
-    path : path, optional
-        Write the picture there, whole or not at all: ``.png``, ``.svg`` or ``.pdf``.
+    Row i of `true_points`, (n, 2) array_like, belongs to matrix row i; `path` is as in :func:`plot_recovery`.
 
     Raises
     ------
