@@ -40,21 +40,11 @@ def check_output(path: str | os.PathLike[str]) -> None:
 def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
     """Write a recovered mesh, whole or not at all; the extension names the format.
 
-    ``.npz`` holds ``points``, cells (``triangles``, ``quads``, ``tetrahedra``, ``hexahedra``, ``mid_nodes``, ``lines``,
-    ``polygons_offsets`` and ``polygons_data``), ``eliminated_points`` if any, of surfaces ``edges``, ``edge_lengths``
-    and ``curvature``, and no ``points`` unless there are coordinates, ``areas`` in place of ``points`` for a mass
-    matrix, ``row_scaling`` where rows were scaled, ``component``, ``hinges``, ``scale``, ``node_status``, of
-    vector-valued matrices ``node_of_row`` and ``direction_of_row``, and what the mesh is worth: ``status``,
-    ``uniqueness`` and ``backward_error``.
-    Other formats are those of meshio (:mod:`unassemble.formats`); of these ``.vtu`` holds polygons, the others get
-    them divided into triangles. Those that hold point data have what the mesh is worth as such, see
-    :func:`to_meshio`; the rest have no place for it, which :func:`unassemble.formats.lacks_worth` says.
-
-    Parameters
-    ----------
-    recovery : Recovery
-    path : path
-        An old file is replaced.
+    ``.npz`` holds coordinates or lengths, cells, pieces, factors, what rows belong to, and what the mesh is worth, by
+    the keys that the manual lists. Other formats are those of meshio (:mod:`unassemble.formats`); of these ``.vtu``
+    holds polygons, the others get them divided into triangles. Those that hold point data have what the mesh is worth
+    as such, see :func:`to_meshio`; the rest have no place for it, which :func:`unassemble.formats.lacks_worth` says. An
+    old file is replaced.
 
     Raises
     ------
@@ -84,13 +74,12 @@ def arrays(recovery: Recovery) -> dict[str, Any]:
     names = ["row_scaling", "areas", "edges", "edge_lengths", "curvature", "length_deviations", "component", "hinges"]
     names += ["scale", "node_status", "node_of_row", "direction_of_row"]
     content |= {name: found for name in names if (found := getattr(recovery, name, None)) is not None}
-    # Uniqueness is empty where the mesh does not fit.
-    worth = {name: getattr(recovery, name) or "" for name in ("status", "uniqueness")}
-    return (
-        content
-        | {name: np.array(value) for name, value in worth.items()}
-        | {"backward_error": np.array(recovery.backward_error)}
-    )
+    worth = {
+        "status": recovery.status,
+        "uniqueness": recovery.uniqueness or "",
+        "backward_error": recovery.backward_error,
+    }
+    return content | worth
 
 
 def without_points(recovery: Recovery) -> bool:
@@ -104,27 +93,14 @@ def to_meshio(recovery: Recovery) -> meshio.Mesh:
     """The mesh for meshio, in space (z = 0), since most formats know no other points.
 
     Point data, all scalar: ``row`` of the matrix, ``component``, ``boundary`` (1 on the outside of the mesh, else 0),
-    and where present ``node_status``, ``standard_deviation_x`` and ``standard_deviation_y``. The same at every point,
-    since meshio's writers have no place for what belongs to a mesh as a whole: ``status`` and ``uniqueness``, by their
-    place in `STATUS` and `UNIQUENESS`, ``backward_error``, and ``scale``, that of the point's piece. Of vector-valued
-    matrices there are ``row_x``, ``row_y``, ``row_z``, and of rotations ``row_rx``, ``row_ry``, ``row_rz``, instead of
-    ``row``, with -1 for unknowns that the matrix lacks. Nodes without cells are cells of kind ``vertex``, so that they
-    show. Undivided cells are blocks of kind ``polygon``, one for each number of vertices.
+    and where present ``node_status`` and ``standard_deviation_x`` and so on. Of vector-valued matrices there are
+    ``row_x``, ``row_y``, ``row_z``, and of rotations ``row_rx`` and so on, instead of ``row``, with -1 for unknowns
+    that the matrix lacks. The same at every point, since meshio's writers have no place for what belongs to a mesh as a
+    whole: ``status`` and ``uniqueness``, by their place in `STATUS` and `UNIQUENESS`, ``backward_error``, and
+    ``scale``, that of the point's piece. Nodes without cells are cells of kind ``vertex``, so that they show. Undivided
+    cells are blocks of kind ``polygon``, one for each number of vertices.
     """
-    return _mesh(recovery, 3, _point_data(recovery), polygons=True)
-
-
-def _mesh(recovery: Recovery, dimension: int, point_data: dict[str, NDArray], *, polygons: bool = False) -> meshio.Mesh:
-    import meshio
-
-    points = np.zeros((recovery.n_points, max(dimension, recovery.dim)))
-    points[:, : recovery.points.shape[1]] = recovery.points
-    blocks = list(_cells(recovery).items())
-    if polygons and isinstance(recovery, PlanarMesh) and recovery.n_polygons:
-        data, start, size = recovery.polygons_data, recovery.polygons_offsets[:-1], np.diff(recovery.polygons_offsets)
-        same = [("polygon", data[start[size == k, None] + np.arange(k)]) for k in np.unique(size)]
-        blocks = [*recovery.cells.items(), *same]
-    return meshio.Mesh(points, blocks, point_data=point_data)
+    return _mesh_for(recovery, MeshFormat("", polygons=True))
 
 
 def _cells(recovery: Recovery) -> dict[str, NDArray[np.int64]]:
@@ -198,12 +174,25 @@ def _check_content(recovery: Recovery, suffix: str, mesh_format: MeshFormat) -> 
 
 def _mesh_for(recovery: Recovery, mesh_format: MeshFormat) -> meshio.Mesh:
     """The mesh with exactly what the format can hold, so that meshio has nothing to drop."""
+    import meshio
+
     data: dict[str, NDArray] = {}
     if mesh_format.data == "all":
         data = _point_data(recovery)
     elif mesh_format.data == "boundary":
         data = {f"{mesh_format.name}:ref": _boundary_flag(recovery)}
-    mesh = _mesh(recovery, mesh_format.dimension, data, polygons=mesh_format.polygons)
+    points = np.zeros((recovery.n_points, max(mesh_format.dimension, recovery.dim)))
+    points[:, : recovery.points.shape[1]] = recovery.points
+    blocks = list(_cells(recovery).items())
+    if mesh_format.polygons and isinstance(recovery, PlanarMesh) and recovery.n_polygons:
+        corners, start, size = (
+            recovery.polygons_data,
+            recovery.polygons_offsets[:-1],
+            np.diff(recovery.polygons_offsets),
+        )
+        same = [("polygon", corners[start[size == k, None] + np.arange(k)]) for k in np.unique(size)]
+        blocks = [*recovery.cells.items(), *same]
+    mesh = meshio.Mesh(points, blocks, point_data=data)
     if not mesh_format.keeps_rows:  # points of no triangle have no place, and NaN would spoil bounding boxes
         mesh.points[np.isnan(mesh.points)] = 0
     if mesh_format.name == "nastran":

@@ -40,7 +40,6 @@ class MeshFormat:
     cannot: str = ""  # why the format can hold no mesh of ours
 
 
-_TWO_FILES = "it is two files that belong together"
 _NOT_COMPRESSED = "meshio writes it without compressing: write {} and compress that"
 
 # XML inside the one file: heavy data in a side file could not be renamed into place together with it.
@@ -55,7 +54,7 @@ _NETGEN = MeshFormat("netgen", cells=_ALL | _HALFWAY | _LINES, data="none")
 _SVG_OPTIONS = {"float_fmt": ".12g", "image_width": None}
 _SVG = MeshFormat("svg", dimension=2, cells=_FLAT, data="none", keeps_rows=False, options=_SVG_OPTIONS)
 _TECPLOT = MeshFormat("tecplot", dimension=2, cells=_CELLS)
-_TETGEN = MeshFormat("tetgen", cannot=_TWO_FILES)
+_TETGEN = MeshFormat("tetgen", cannot="it is two files that belong together")
 _UGRID = MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True)
 _UGRID_SINGLE = MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True, digits=7)
 
