@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .certify import Certificate, relative
+from .certify import Certificate, compared, relative
 from .tolerances import CERTIFIED
 
 
@@ -61,14 +61,12 @@ def certify_metric(
         sums = np.stack([b * b + (c - a) * (c + a), c * c + (a - b) * (a + b), a * a + (b - c) * (b + c)], axis=1)
         assembled = np.bincount(row.ravel(), (-factor[:, None] * sums / (8 * area[:, None])).ravel(), len(key))
     covered = np.bincount(row.ravel(), minlength=len(key)) > 0
-    difference = np.where(covered, assembled, 0.0) - entries
+    found = compared(n, edges, entries, key, np.where(covered, assembled, 0.0), np.flatnonzero(~inside))
     size = np.zeros(n)
     sums_of_rows = np.asarray(diagonal, np.float64)
     for end in edges.T:
         np.maximum.at(size, end, np.abs(entries))
         sums_of_rows = np.asarray(sums_of_rows + np.bincount(end, entries, n))
-    misfits = relative(difference, np.minimum(size[edges[:, 0]], size[edges[:, 1]]))
-    found = Certificate(float(misfits.max(initial=0.0)), edges, misfits, difference, np.flatnonzero(~inside))
     shapes = {"zero": np.zeros(n), "constant": np.ones(n)}
     if (factor == factor[0]).all():  # else each piece has a unit of area of its own
         shapes["areas"] = np.asarray(np.bincount(triangles.ravel(), np.repeat(area, 3), n))

@@ -99,13 +99,14 @@ def lake(size: float = 0.055) -> Specimen:
     )
 
 
-def mast(levels: int = 9) -> Specimen:
+def mast() -> Specimen:
     """A lattice mast, as those of classic test matrices: three rows for each node, in random order of the nodes.
 
     A bar along e, of stiffness k, adds k e e^T to the blocks of its ends and takes it off those between them. The feet
     are held, so that they and the bars that end there are not in the matrix. The mast is as wide below as two of its
     storeys are high.
     """
+    levels = 9  # storeys
     height, side = np.divmod(np.arange(4 * (levels + 1)), 4)
     turn = np.pi / 2 * (side + 0.5) + 0.02 * height
     width = np.sqrt(2) * (1 - 0.6 * height / levels)

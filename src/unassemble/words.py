@@ -16,12 +16,12 @@ def words_of(rows: Iterable[int]) -> str:
     return ", ".join(map(str, rows))
 
 
-def sentences(parts: Iterable[str], most: int = 2) -> str:
-    """The first few of some sentences, the important ones first: ``one thing. Another thing``.
+def sentences(parts: Iterable[str]) -> str:
+    """The first two of some sentences, the important ones first: ``one thing. Another thing``.
 
     Each comes without its full stop, and beginning small; empty ones are left out.
     """
-    chosen = [part for part in parts if part][:most]
+    chosen = [part for part in parts if part][:2]
     return ". ".join(part if k == 0 else part[:1].upper() + part[1:] for k, part in enumerate(chosen))
 
 

@@ -57,11 +57,9 @@ class Cells:
         return mostly(self.in_fours) and self.around <= 3  # products of matrices, and dense graphs, have 5 and more
 
 
-def cells_of(n: int, edges: NDArray[np.int64], most: int = 1500) -> Cells:
-    """Look at some pairs of a graph, all near to each other.
-
-    `edges` (e, 2): pairs i < j, at least one; `most`: pairs to look at, in a part of four times as many rows.
-    """
+def cells_of(n: int, edges: NDArray[np.int64]) -> Cells:
+    """Look at some pairs i < j of a graph, of which there is at least one, all near to each other."""
+    most = 1500  # pairs to look at, in a part of four times as many rows
     graph = sp.csr_array((np.ones(len(edges), np.int32), edges.T), shape=(n, n))
     graph = graph + graph.T
     rows = csgraph.breadth_first_order(graph, int(edges[0, 0]), directed=False, return_predecessors=False)[: 4 * most]
