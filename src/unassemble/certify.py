@@ -3,8 +3,6 @@
 Knows nothing of how the mesh was found, and imports no solver.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 Knows nothing of how the mesh was found, and imports no solver.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

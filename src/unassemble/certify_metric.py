@@ -1,7 +1,5 @@
 """Whether edge lengths explain a matrix: the certificate of curved surfaces, which shares nothing with the solver."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The main job on two matrices that this library did not assemble, and on a small structure."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module

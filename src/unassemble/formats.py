@@ -1,7 +1,5 @@
 """Mesh formats by extension: what each can hold, and how meshio is told to write it."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Which operator a matrix belongs to, where that is not said."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass

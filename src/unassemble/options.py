@@ -3,8 +3,6 @@
 Each is checked when it is made, before any work: what is refused here has no meaning for any matrix.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

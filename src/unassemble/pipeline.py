@@ -1,7 +1,5 @@
 """The door: options, file, checks, and which operator's recovery a matrix is for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The stage that long work is in, on a terminal."""
 
-from __future__ import annotations
-
 import sys
 import threading
 import time

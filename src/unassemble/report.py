@@ -1,7 +1,5 @@
 """What there is to say about a recovery, for programs: JSON."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """What there is to say about a recovery, for people: a few lines."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

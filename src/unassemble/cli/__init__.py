@@ -1,7 +1,5 @@
 """The command line. Only click is imported at start; the rest when a command needs it."""
 
-from __future__ import annotations
-
 import click
 
 from .._version import __version__

@@ -1,7 +1,5 @@
 """The commands: ``unassemble recover``, ``inspect``, ``modes``, ``demo`` and ``paper``."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import click

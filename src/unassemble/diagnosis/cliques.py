@@ -6,8 +6,6 @@ pairs, of six for quadratic triangles, and so on. Neighbouring cells share the n
 tetrahedra have no such pairs inside of a mesh; of the latter nearly every pair lies in a clique of four.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The kinds of scalar matrix that are told apart, and what to do with each."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

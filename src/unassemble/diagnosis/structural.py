@@ -1,7 +1,5 @@
 """What a matrix that is neither a mesh nor nodes of several unknowns seems to be: definite or not, tied, uneven."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..matrix import OperatorMatrix

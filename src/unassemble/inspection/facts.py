@@ -1,7 +1,5 @@
 """What an inspection counts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any

@@ -1,7 +1,5 @@
 """What a matrix is, and what can be recovered from it, without recovering it."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 

@@ -1,7 +1,5 @@
 """One form for every sparse matrix: compressed rows, sorted, duplicates summed, explicit zeros kept."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The checks at the door: any matrix in, a clean symmetric operator or one clear sentence out."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -6,8 +6,6 @@ MAT-File Format (the document of that name, level 5). A file is a row of data el
 length; a variable is an element that holds elements.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Sparse matrices of ``scipy.sparse.save_npz``, dense ones of ``numpy.save``; nothing is ever unpickled."""
 
-from __future__ import annotations
-
 from typing import Any, BinaryIO
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Files with a sparse matrix: open, see what they are, hand them to their reader."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import os

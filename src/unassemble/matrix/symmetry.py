@@ -1,7 +1,5 @@
 """Both triangles of a matrix become one weighted graph, or the pair that forbids it is named."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -5,8 +5,6 @@ ignores surplus columns, allocates what the header announces, and crashes on a z
 Format: R. Boisvert, R. Pozo, K. Remington, The Matrix Market exchange formats, NISTIR 5935 (1996).
 """
 
-from __future__ import annotations
-
 import io
 import re
 import warnings

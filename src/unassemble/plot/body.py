@@ -1,7 +1,5 @@
 """Bodies and structures as pictures: outer surfaces, shaded, planar cells, shells and members, or bare nodes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures without pyplot: size, where pieces are drawn, header, footer, and writing them."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from pathlib import PurePath

@@ -1,7 +1,5 @@
 """The mesh itself on an axes: fill, edges, boundary loops, marks."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

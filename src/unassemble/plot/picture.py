@@ -1,7 +1,5 @@
 """A recovered mesh as a picture, alone or beside the true one."""
 
-from __future__ import annotations
-
 import os
 
 import numpy as np
