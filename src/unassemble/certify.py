@@ -85,23 +85,44 @@ def certify(
         K; the identity by default.
     terms : Terms, optional
     """
-    key, value = _assemble(points, triangles, factor, tensor, terms)
-    a, b, c = points[triangles].transpose(1, 2, 0)
-    (ux, uy), (wx, wy) = b - a, c - a
+    kxx, kxy, kyy = tensor or (1.0, 0.0, 1.0)
+    corners = [np.ascontiguousarray(column) for column in triangles.T]
+    at = [points[corner] for corner in corners]
+    (ux, uy), (wx, wy) = (at[1] - at[0]).T, (at[2] - at[0]).T
     flipped = np.flatnonzero(~(ux * wy - uy * wx > 0))
-    return compared(len(points), edges, entries, key, value, flipped, terms)
+    # With side s_i facing corner i turned by a right angle, grad(phi_i) = s_i / (2 area), and the turned tensor is the
+    # adjugate of K: the entry is s_i' adj(K) s_j / (4 area), areas taken positive.
+    sides = [(b - a).T for a, b in (at[1:], at[2::-2], at[:2])]
+    ends, values = [], []
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a flat triangle certifies nothing
+        double = np.abs(sides[0][0] * sides[1][1] - sides[0][1] * sides[1][0])
+        weight = factor / (2 * double)
+        for i, j in ((0, 1), (1, 2), (2, 0), *(((0, 0), (1, 1), (2, 2)) if terms else ())):
+            (xi, yi), (xj, yj) = sides[i], sides[j]
+            product = kyy * (xi * xj) - kxy * (xi * yj + yi * xj) + kxx * (yi * yj)
+            ends.append((np.minimum(corners[i], corners[j]), np.maximum(corners[i], corners[j])))
+            value = weight * product
+            if terms is not None:  # int s phi_i phi_j is s area (1 + delta_ij) / 12
+                part = (6 if i == j else np.inf) if terms.lumped else (12 if i == j else 24)
+                value = value + terms.reaction / part * double
+            values.append(value)
+    rows, columns = (np.concatenate(part) for part in zip(*ends, strict=True))
+    return compared(len(points), edges, entries, (rows, columns), np.concatenate(values), flipped, terms)
 
 
 def compared(
     n: int,
     edges: NDArray,
     entries: NDArray,
-    key: NDArray,
-    value: NDArray,
+    places: tuple[NDArray, NDArray],
+    values: NDArray,
     flipped: NDArray,
     terms: Terms | None = None,
 ) -> Certificate:
-    """The entries of a mesh of n points, at increasing keys i n + j, against those of a matrix."""
+    """The entries of a mesh of n points, added up of values at rows i and columns j >= i, against those of a matrix."""
+    summed = sp.coo_array((values, places), shape=(n, n)).tocsr()
+    summed.sort_indices()
+    key, value = np.repeat(np.arange(n), np.diff(summed.indptr)) * n + summed.indices, summed.data
     if terms is not None and terms.scaling is not None:
         value = value * terms.scaling[key // n] * terms.scaling[key % n]
     given = edges[:, 0] * n + edges[:, 1]
@@ -131,44 +152,6 @@ def relative(difference: NDArray, reference: NDArray) -> NDArray[np.float64]:
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(difference == 0, 0.0, np.abs(difference) / reference)
     return np.where(np.isnan(ratio), np.inf, ratio)
-
-
-def _assemble(
-    points: NDArray,
-    triangles: NDArray,
-    factor: NDArray,
-    tensor: tuple[float, float, float] | None,
-    terms: Terms | None,
-) -> tuple[NDArray, NDArray]:
-    """Off-diagonal entries: int K grad(phi_i) . grad(phi_j) over triangles, areas taken positive.
-
-    With further terms those on the diagonal too, and int s phi_i phi_j: s area (1 + delta_ij) / 12.
-
-    With side s_i facing corner i turned by a right angle, grad(phi_i) = s_i / (2 area), and the
-    turned tensor is the adjugate of K: the entry is s_i' adj(K) s_j / (4 area).
-    """
-    n = len(points)
-    kxx, kxy, kyy = tensor or (1.0, 0.0, 1.0)
-    corners = [np.ascontiguousarray(column) for column in triangles.T]
-    at = [points[corner] for corner in corners]
-    sides = [(b - a).T for a, b in (at[1:], at[2::-2], at[:2])]
-    ends, values = [], []
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a flat triangle certifies nothing
-        double = np.abs(sides[0][0] * sides[1][1] - sides[0][1] * sides[1][0])
-        weight = factor / (2 * double)
-        for i, j in ((0, 1), (1, 2), (2, 0), *(((0, 0), (1, 1), (2, 2)) if terms else ())):
-            (xi, yi), (xj, yj) = sides[i], sides[j]
-            product = kyy * (xi * xj) - kxy * (xi * yj + yi * xj) + kxx * (yi * yj)
-            ends.append((np.minimum(corners[i], corners[j]), np.maximum(corners[i], corners[j])))
-            value = weight * product
-            if terms is not None:
-                part = (6 if i == j else np.inf) if terms.lumped else (12 if i == j else 24)
-                value = value + terms.reaction / part * double
-            values.append(value)
-    rows, columns = (np.concatenate(part) for part in zip(*ends, strict=True))
-    summed = sp.coo_array((np.concatenate(values), (rows, columns)), shape=(n, n)).tocsr()
-    summed.sort_indices()
-    return np.repeat(np.arange(n), np.diff(summed.indptr)) * n + summed.indices, summed.data
 
 
 def without_spare_equations(

@@ -59,7 +59,9 @@ def certify_metric(
         sums = np.stack([b * b + (c - a) * (c + a), c * c + (a - b) * (a + b), a * a + (b - c) * (b + c)], axis=1)
         assembled = np.bincount(row.ravel(), (-factor[:, None] * sums / (8 * area[:, None])).ravel(), len(key))
     covered = np.bincount(row.ravel(), minlength=len(key)) > 0
-    found = compared(n, edges, entries, key, np.where(covered, assembled, 0.0), np.flatnonzero(~inside))
+    found = compared(
+        n, edges, entries, (edges[:, 0], edges[:, 1]), np.where(covered, assembled, 0.0), np.flatnonzero(~inside)
+    )
     size = np.zeros(n)
     sums_of_rows = np.asarray(diagonal, np.float64)
     for end in edges.T:
