@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from ..elements.surface import outer_facets, planar_outlines
 from ..recovery import Body, ConformingMesh, Recovery, Structure, Surface
 from . import style
 from .canvas import apart, panel
-from .mesh import extent, line_handle
+from .mesh import draw_lines, extent, line_handle
 
 # Looking down on the body from the front and the right; z points up.
 _ACROSS = np.array([0.80, 0.60, 0.0])
@@ -45,10 +45,10 @@ def plot_body(recovery: Recovery, ax: Axes | None = None) -> tuple[Figure, list[
         handles.append(line_handle(colour, label))
     if isinstance(recovery, Structure) and len(recovery.lines):
         order = np.argsort(depth[recovery.lines].mean(axis=1), kind="stable")
-        _draw_lines(ax, flat[recovery.lines[order]], float(np.clip(60 / np.sqrt(len(order)), 0.3, 1.6)))
+        draw_lines(ax, flat[recovery.lines[order]], style.OUTER, float(np.clip(60 / np.sqrt(len(order)), 0.3, 1.6)))
         handles.append(line_handle(style.OUTER, "members"))
     elif len(recovery.boundary):
-        _draw_lines(ax, flat[recovery.boundary], 1.2)
+        draw_lines(ax, flat[recovery.boundary], style.OUTER, 1.2)
     return figure, handles
 
 
@@ -95,9 +95,3 @@ def _draw_faces(ax: Axes, recovery: Recovery, faces: list[NDArray], flat: NDArra
     width = float(np.clip(40 / np.sqrt(max(len(order), 1)), 0.1, 0.6))
     drawn: dict[str, Any] = {"facecolors": colours, "edgecolors": edge, "linewidths": width, "rasterized": large}
     ax.add_collection(PolyCollection([polygons[k] for k in order], **drawn), autolim=False)
-
-
-def _draw_lines(ax: Axes, ends: NDArray, width: float) -> None:
-    """Straight lines (m, 2, 2)."""
-    lines = LineCollection(list(ends), colors=style.OUTER, linewidths=width, rasterized=len(ends) > style.MOST_VECTOR)
-    ax.add_collection(lines, autolim=False)

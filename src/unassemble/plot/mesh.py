@@ -1,6 +1,8 @@
 """The mesh itself on an axes: fill, edges, boundary loops, marks."""
 
+from collections.abc import Iterable
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -30,23 +32,21 @@ def draw_mesh(ax: Axes, mesh: PlanarMesh, points: NDArray, outer: NDArray) -> li
     rings = [points[mesh.boundary[a:b, 0]] for a, b in pairwise(mesh.boundary_offsets)]
     _fill(ax, rings)
     width = _line_width(ax, start, stop)
-    lines = LineCollection(
-        np.stack([start, stop], axis=1),  # type: ignore[arg-type]
-        colors=style.EDGE,
-        linewidths=width,
-        capstyle="round",
-        rasterized=len(start) > style.MOST_VECTOR,
-    )
-    ax.add_collection(lines, autolim=False)
+    draw_lines(ax, np.stack([start, stop], axis=1), style.EDGE, width, capstyle="round")
     for is_outer, colour in ((False, style.HOLE), (True, style.OUTER)):
         chosen = [np.vstack([ring, ring[:1]]) for ring, flag in zip(rings, outer, strict=True) if flag == is_outer]
-        ax.add_collection(
-            LineCollection(chosen, colors=colour, linewidths=np.clip(3 * width, 0.9, 1.4), joinstyle="round"),
-            autolim=False,
-        )
+        draw_lines(ax, chosen, colour, float(np.clip(3 * width, 0.9, 1.4)), joinstyle="round")
     n_holes = int(np.count_nonzero(~outer))
     holes = [line_handle(style.HOLE, count_of(n_holes, "hole"))] if n_holes else []
     return [line_handle(style.OUTER, "outer boundary"), *holes]
+
+
+def draw_lines(ax: Axes, lines: Iterable[NDArray], colour: str, width: float, **more: Any) -> None:
+    """Lines through points (k, 2) each."""
+    lines = list(lines)
+    many = len(lines) > style.MOST_VECTOR
+    drawn = LineCollection(lines, colors=colour, linewidths=width, rasterized=many, **more)
+    ax.add_collection(drawn, autolim=False)
 
 
 def draw_hinges(ax: Axes, points: NDArray) -> list[Line2D]:
@@ -64,8 +64,7 @@ def draw_worst(ax: Axes, points: NDArray, pairs: NDArray) -> list[Line2D]:
     ends = ends[np.isfinite(ends).all(axis=(1, 2))] if len(pairs) else np.empty((0, 2, 2))
     if not len(ends):
         return []
-    lines = LineCollection(list(ends), colors=style.WORST, linewidths=1.8, capstyle="round", zorder=6)
-    ax.add_collection(lines, autolim=False)
+    draw_lines(ax, ends, style.WORST, 1.8, capstyle="round", zorder=6)
     middle = ends.mean(axis=1)
     near = np.linalg.norm(middle[:, None] - middle, axis=2) < 0.03 * np.ptp(ax.get_xlim())
     middle = middle[~np.tril(near, -1).any(axis=1)]  # neighbours share a ring
