@@ -22,7 +22,6 @@ import argparse
 import sys
 import time
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +35,7 @@ from conditions import convected, eliminated, identity_rows, largest_error_of, m
 from meshes import random_mesh  # noqa: E402
 from unassemble import RecoveryError, recover  # noqa: E402
 from unassemble.boundaries import with_boundary_edges, with_diagonals  # noqa: E402
+from unassemble.boundaries.fit import WholeEntries  # noqa: E402
 from unassemble.boundaries.judge import determined  # noqa: E402
 from unassemble.boundaries.rim import Rim  # noqa: E402
 from unassemble.linalg import UpperTriangle, factorisation  # noqa: E402
@@ -124,7 +124,9 @@ def bound(matrix: sp.csr_array, points: np.ndarray) -> tuple[float, float, str]:
             fits = np.abs(-given.entries[piece.edge_rows] - edge_weights(piece, z)) < 1e-9
         if not (rim.whole & fits).any():
             continue
-        known += int(determined(piece, z, rim.whole & fits, partial(factorisation, definite=True))[0].sum())
+        problem = WholeEntries(piece, -given.entries[piece.edge_rows], np.zeros(len(fits), dtype=bool))
+        known += int(determined(problem, z, 1.0, rim.whole & fits)[0].sum())
+        problem.release()
     share = known / given.n
     return share, 0.0, f"{given.n:6d} rows   {share:5.0%}"
 

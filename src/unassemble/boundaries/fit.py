@@ -5,9 +5,9 @@ Minimised is
     sum over whole entries of (a_e / c - w_e(z))^2 + mu^2 sum over triangles with others of their shape prior squared ,
 
 a_e = -A_ij. The prior holds what few entries hold, and fades: each mu starts where the one before has ended, the last
-is zero. Where regions have factors of their own, w_e is c_r times half a cotangent for each of its triangles, c_r that
-of its region, and c the mean of both. Cotangents have poles where triangles are flat, and meshes beyond them are no meshes: steps end before any
-triangle turns over.
+is zero. Cotangents have poles where triangles are flat, and meshes beyond them are no meshes: steps end before any
+triangle turns over. Where regions have factors of their own, both sides of a_e = c w_e(z) have them: misfits are those
+of a_e, and of half a cotangent times its region's factor from each triangle, in units of the mean of these factors.
 
 References
 ----------
@@ -119,7 +119,7 @@ class WholeEntries:
         free: NDArray[np.bool_] | None = None, region: NDArray[np.int64] | None = None,
     ):  # fmt: skip
         self.piece, self.weights, self.guessed, self.known_scale = piece, weights, guessed, scale
-        self.region = region
+        self.region: Any = region  # an array wherever it is used
         self.free = np.ones(piece.n_vertices, dtype=bool) if free is None else free
         self.asked = self.free[piece.stencil].any(axis=0)
         count = int(self.free.sum())
@@ -150,26 +150,32 @@ class WholeEntries:
         """(e,) a / c - w."""
         if self.region is None:
             return np.asarray(self.weights / scale - edge_weights(self.piece, z))
-        return np.asarray((self.weights - edge_weights(self.piece, z, scale[self.region])) / self._unit(scale))
+        return np.asarray((self.weights - edge_weights(self.piece, z, scale[self.region])) / self.unit(scale))
 
     def gradient(self, z: NDArray, scale: Scale) -> NDArray[np.complex128]:
         """(4, e) as :func:`..planar.cotangent.weight_gradient` has it."""
         if self.region is None:
             return weight_gradient(self.piece, z)
-        return weight_gradient(self.piece, z, scale[self.region]) / self._unit(scale)
+        return weight_gradient(self.piece, z, scale[self.region]) / self.unit(scale)
 
     def slopes(self, z: NDArray, scale: Scale) -> NDArray[np.float64]:
         """(e, k) what misfits change by with -log c, of each region."""
         if self.region is None:
             return np.asarray(self.weights / scale)[:, None]
         parts = [
-            edge_weights(self.piece, z, np.where(self.region == k, scale[k], 0.0)) / self._unit(scale)
+            edge_weights(self.piece, z, np.where(self.region == k, scale[k], 0.0)) / self.unit(scale)
             for k in range(len(scale))
         ]
         return np.column_stack(parts)
 
-    def _unit(self, scale: NDArray) -> NDArray[np.float64]:
-        """(e,) the mean of c on both sides."""
+    def _scaled(self, scale: Scale, move: NDArray) -> Scale:
+        """Factors whose logarithms have changed; where c is known it stays."""
+        if self.known_scale is not None:
+            return scale
+        return scale * np.exp(move) if self.region is not None else scale * float(np.exp(move[0]))
+
+    def unit(self, scale: NDArray) -> NDArray[np.float64]:
+        """(e,) the mean of c on both sides of each edge."""
         one, other = scale[self.region][self.piece.facing // 3].T
         return np.asarray(np.where(self.piece.inner, (one + other) / 2, one))
 
@@ -248,7 +254,7 @@ class WholeEntries:
         return self.trust(whole, mu) * self.misfits(z, scale), mu * prior.residual(z)
 
     def step(self, system: System, damping: float | NDArray) -> tuple[NDArray, NDArray] | None:
-        """Displacement and changes (k,) of log c, none where it is known; None where the normal matrix cannot be factorised."""
+        """Displacement, and changes (k,) of log c if it is free; None where the normal matrix cannot be factorised."""
         matrix = system.damped(damping)
         try:
             self.analysed(matrix).factorise(matrix)
@@ -277,10 +283,8 @@ class WholeEntries:
         fitted = self.piece.triangles[(whole[self.piece.opposite] | (mu > 0)).any(axis=1)]
         flip = float(first_flips(fitted, z, step).min(initial=np.inf))
         share = min(1.0, 0.5 / max(np.abs(move).max(initial=0.0), 1e-300), 0.9 * flip)
-        if self.known_scale is None and self.region is None:
-            move = float(move[0])
         for _ in range(5):
-            there, c = z + share * step, scale if self.known_scale is not None else scale * np.exp(share * move)
+            there, c = z + share * step, self._scaled(scale, share * move)
             with np.errstate(all="ignore"):
                 misfit, shape = self.residuals(there, c, whole, prior, mu)
                 if misfit @ misfit + shape @ shape < cost:
@@ -302,17 +306,17 @@ class System:
         gradient = mu * np.where(free[prior.corners], prior.gradient(z), 0)
         parts = [(entries, problem.place[piece.stencil]), (gradient, problem.place[prior.corners])]
         jacobian = jacobian_rows(problem.columns, parts)
-        self._transposed = jacobian.T.tobsr()
-        self._upper = UpperTriangle.of(self._transposed @ jacobian)
+        self.jacobian_transposed = jacobian.T.tobsr()
+        self._upper = UpperTriangle.of(self.jacobian_transposed @ jacobian)
         known = problem.known_scale is not None
         self._slopes = trust[:, None] * problem.slopes(z, scale)[:, : 0 if known else None]
-        self.slope = self._transposed @ np.pad(self._slopes, ((0, len(shape)), (0, 0)))
+        self.slope = self.jacobian_transposed @ np.pad(self._slopes, ((0, len(shape)), (0, 0)))
         self.size = self._slopes.T @ self._slopes
         self.towards(misfit, shape)
 
     def towards(self, misfit: NDArray, shape: NDArray) -> System:
         """With other right-hand sides."""
-        self.right = self._transposed @ np.concatenate([misfit, -shape])
+        self.right = self.jacobian_transposed @ np.concatenate([misfit, -shape])
         self.along = self._slopes.T @ misfit
         return self
 

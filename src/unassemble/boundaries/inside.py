@@ -148,7 +148,7 @@ def fit_inside(
         z, whole = fit.z, rim.whole
         known, entries = np.zeros(len(z), dtype=bool), np.zeros_like(whole)
         if exact:
-            known, entries = determined(piece, z, whole, problem.analysed, known_scale=scale is not None)
+            known, entries = determined(problem, z, fit.scale, whole)
     finally:
         problem.release()
     if entries.sum() <= 2 * known.sum() - (4 if scale is not None else 3):  # nothing that checks them as a whole

@@ -26,9 +26,8 @@ from scipy.sparse import csgraph
 
 from ..errors import SolverError
 from ..linalg import Factorisation, UpperTriangle
-from ..planar.cotangent import edge_weights, weight_gradient
 from ..topology import Piece
-from .fit import jacobian_rows
+from .fit import Scale, WholeEntries, jacobian_rows
 
 
 @dataclass(frozen=True)
@@ -62,34 +61,30 @@ class JudgeOptions:
 
 
 def determined(
-    piece: Piece, z: NDArray, whole: NDArray[np.bool_], analyse: Callable[[UpperTriangle], Factorisation], *,
-    known_scale: bool = False,
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:  # fmt: skip
+    problem: WholeEntries, z: NDArray, scale: Scale, whole: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Vertices, up to a similarity of all of them, and the entries that determine and check them.
 
     Parameters
     ----------
-    piece : Piece
+    problem : WholeEntries
     z : (n,) complex128
         Positions at which whole entries fit.
+    scale : float or (k,) float64
     whole : (e,) bool
-    analyse : callable
-        Makes a factorisation from the pattern of the normal matrix of all entries.
-    known_scale : bool
-        Whether c is given.
 
     Returns
     -------
     vertices : (n,) bool
     entries : (e,) bool
     """
-    n = piece.n_vertices
+    piece, n = problem.piece, problem.piece.n_vertices
     length = np.abs(z[piece.edges[:, 1]] - z[piece.edges[:, 0]])
     size = np.bincount(piece.edges.ravel(), np.repeat(length, 2), n) / np.bincount(piece.edges.ravel(), minlength=n)
-    gradient = weight_gradient(piece, z) * size[piece.stencil]
-    weights = edge_weights(piece, z) * (not known_scale)
+    gradient = problem.gradient(z, scale) * size[piece.stencil]
+    slopes = problem.slopes(z, scale)[:, : 0 if problem.known_scale is not None else None]
     try:
-        checked, free = _Linearised.of(piece, gradient, weights, whole).judged(analyse)
+        checked, free = _Linearised.of(piece, gradient, slopes, whole).judged(problem.analysed)
     except SolverError:
         checked, free = np.zeros_like(whole), np.zeros((n, 0), dtype=np.complex128)
     if not checked.any():
@@ -102,13 +97,14 @@ def determined(
 
 @dataclass(frozen=True, eq=False)
 class _Linearised:
-    """J of some entries, in lengths of edges, and the column of log c.
+    """J of some entries, in lengths of edges, and the columns of log c.
 
     Attributes
     ----------
     jacobian : (e, 2 n) sparse
         Zero for other entries.
-    slope : (e,) float64
+    slope : (e, k) float64
+        An orthonormal basis of them.
     entries : (e,) bool
     held : (n,) bool
         Vertices that some of the entries depend on.
@@ -120,20 +116,20 @@ class _Linearised:
     held: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, piece: Piece, gradient: NDArray, weights: NDArray, entries: NDArray[np.bool_]) -> _Linearised:
-        """For gradients (4, e) over the stencils of edges."""
+    def of(cls, piece: Piece, gradient: NDArray, slopes: NDArray, entries: NDArray[np.bool_]) -> _Linearised:
+        """For gradients (4, e) over the stencils of edges, and what entries change by with log c, (e, k)."""
         held = np.zeros(piece.n_vertices, dtype=bool)
         held[piece.stencil[:, entries]] = True
         jacobian = jacobian_rows(len(held), [(np.where(entries, gradient, 0), piece.stencil)])
-        return cls(jacobian, np.where(entries, weights, 0.0), entries, held)
+        return cls(jacobian, np.linalg.qr(np.where(entries[:, None], slopes, 0.0))[0], entries, held)
 
     def judged(
         self, analyse: Callable[[UpperTriangle], Factorisation]
     ) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
         """(e,) entries that others say something about, and (n, k) displacements that leave these as they are.
 
-        The inverse is that of J'J, made definite by a small shift; with c free its column is projected out, which is a
-        matter of rank one.
+        The inverse is that of J'J, made definite by a small shift; with c free its columns are projected out,
+        which is a matter of low rank.
         """
         transposed = self.jacobian.T.tobsr()
         product = UpperTriangle.of(transposed @ self.jacobian)
@@ -144,12 +140,12 @@ class _Linearised:
         solver = analyse(matrix)
         solver.factorise(matrix)
         pull = transposed @ self.slope
-        response = solver.solve(pull)
-        left = float(self.slope @ self.slope - pull @ response)
+        response = solver.solve(pull) if pull.size else pull
+        left = self.slope.T @ self.slope - pull.T @ response
 
         def preimage(y: NDArray) -> NDArray:
             x = solver.solve(np.ascontiguousarray(transposed @ self._without_slope(y)))
-            return x + np.outer(response, pull @ x) / left if left > 0 else x
+            return np.asarray(x + response @ np.linalg.lstsq(left, pull.T @ x, rcond=None)[0])
 
         rng = np.random.default_rng(1)
         y = rng.standard_normal((len(self.slope), JudgeOptions.probes)) * self.entries[:, None]
@@ -164,9 +160,8 @@ class _Linearised:
         return checked, np.ascontiguousarray((x / np.linalg.norm(x, axis=0)).T).view(np.complex128).T
 
     def _without_slope(self, image: NDArray) -> NDArray[np.float64]:
-        """Columns (e, k) less their component along the column of log c."""
-        size = float(self.slope @ self.slope)
-        return np.asarray(image - np.outer(self.slope, self.slope @ image) / size if size else image)
+        """Columns (e, 2) less their components along the columns of log c."""
+        return np.asarray(image - self.slope @ (self.slope.T @ image))
 
 
 def _moving_alike(piece: Piece, z: NDArray, free: NDArray, size: NDArray, held: NDArray[np.bool_]) -> NDArray[np.bool_]:

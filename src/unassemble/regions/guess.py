@@ -8,6 +8,7 @@ bring that down to a few per cent and keep jumps where they are.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -91,12 +92,12 @@ def _valleys(values: NDArray, options: GuessOptions) -> NDArray[np.float64]:
     density = gaussian_filter1d(np.histogram(values, np.append(grid, grid[-1] + step) - step / 2)[0] * 1.0, 4)
     peaks = np.flatnonzero((density[1:-1] > density[:-2]) & (density[1:-1] >= density[2:])) + 1
     while len(peaks) > 1:
-        low = [density[i : j + 1].min() / min(density[i], density[j]) for i, j in zip(peaks, peaks[1:], strict=False)]
+        low = [density[i : j + 1].min() / min(density[i], density[j]) for i, j in pairwise(peaks)]
         k = int(np.argmax(low))
         if low[k] < options.valley:
             break
         peaks = np.delete(peaks, k + (density[peaks[k]] > density[peaks[k + 1]]))
-    return np.array([grid[i + int(density[i : j + 1].argmin())] for i, j in zip(peaks, peaks[1:], strict=False)])
+    return np.array([grid[i + int(density[i : j + 1].argmin())] for i, j in pairwise(peaks)])
 
 
 def _connected(piece: Piece, region: NDArray) -> NDArray[np.int64]:

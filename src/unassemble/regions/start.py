@@ -98,7 +98,7 @@ def _fitted(drawn: NDArray, weights: NDArray, region: NDArray, scale: NDArray) -
 
 
 def _unfolded(piece: Piece, z: NDArray, options: StartOptions) -> NDArray[np.complex128] | None:
-    """The same where vertices about triangles that are turned over are means of their neighbours; None if that fails."""
+    """The same, vertices about triangles that are turned over being means of their neighbours; None if that fails."""
     n = piece.n_vertices
     graph = sp.coo_array((np.ones(len(piece.edges)), piece.edges.T), shape=(n, n)).tocsr()
     graph = graph + graph.T
