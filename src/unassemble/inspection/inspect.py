@@ -11,7 +11,7 @@ from ..diagnosis import PLANAR, Diagnosis, diagnosed, further_terms, indefinite,
 from ..errors import NotPlanarError, RecoveryError
 from ..matrix import OperatorMatrix, load
 from ..operators import VectorReading, second_reading, vector_valued
-from ..quiet import quiet_libraries
+from ..progress import quiet_libraries
 from ..tolerances import MOST
 from ..topology import Topology, components, located, require_planar, surfaces
 from ..words import count_of
