@@ -101,12 +101,8 @@ FORMATS: Mapping[str, MeshFormat] = {
 def format_of(path: str | os.PathLike[str]) -> tuple[str, MeshFormat]:
     """Extension and format that a file name asks for; upper and lower case are alike.
 
-    Raises
-    ------
-    OutputError
-        If the extension is unknown, or its writer not installed.
-    FormatError
-        If the format has no place for any mesh of ours.
+    Raises OutputError if the extension is unknown, or its writer not installed; FormatError if the format has no place
+    for any mesh of ours.
     """
     name = PurePath(path).name.lower()
     fitting = [suffix for suffix in FORMATS if name.endswith(suffix) and name != suffix]

@@ -37,12 +37,7 @@ def read_npz(stream: BinaryIO, name: str) -> Any:
 
     `name` is what to call the file in messages.
 
-    Raises
-    ------
-    MatrixFileError
-        If it holds no sparse matrix, or Python objects.
-    ValueError
-        If arrays do not belong together.
+    Raises MatrixFileError if it holds no sparse matrix, or Python objects; ValueError if arrays do not belong together.
     """
     with np.load(stream, allow_pickle=False) as archive:
         held = archive.files
@@ -60,10 +55,7 @@ def read_npz(stream: BinaryIO, name: str) -> Any:
 def read_npy(stream: BinaryIO, name: str) -> sp.coo_array:
     """Read a dense array of ``numpy.save``; its zeros are absent entries.
 
-    Raises
-    ------
-    MatrixFileError
-        If it holds Python objects, or no matrix of numbers.
+    Raises MatrixFileError if it holds Python objects, or no matrix of numbers.
     """
     dense = _without_objects(np.load, stream, name)  # which does not unpickle unless told
     if dense.ndim != 2 or dense.dtype.kind not in "biufc":
@@ -87,12 +79,8 @@ def read_mat(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
     `name` is what to call the file in messages, and `variable` which one to read, such as ``"A"`` or ``"Problem.A"``;
     it is needed where several are sparse and square.
 
-    Raises
-    ------
-    MatrixFileError
-        If there is no sparse variable, or the choice is open.
-    ValueError, zlib.error, struct.error
-        If the file is truncated or damaged.
+    Raises MatrixFileError if there is no sparse variable, or the choice is open; ValueError, zlib.error, struct.error
+    if the file is truncated or damaged.
     """
     content = stream.read()
     order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
