@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,10 @@ from ..clock import Clock
 from ..elements.kinds import KINDS
 from ..elements.surface import boundary_loops
 from ..matrix import OperatorMatrix
-from ..nodes.anchoring import Anchors, anchored, digits_lost, near_enough
+from ..nodes.anchoring import Anchors, Request, anchored, near_enough
 from ..nodes.nodal import NodalMatrix, determined
 from ..nodes.numbering import Numbering
 from ..nodes.redrawn import known_to
-from ..nodes.rounded import Rounding
 from ..recovery import Body
 from ..tolerances import ALIKE, LAST_DIGITS
 from ..words import Reason
@@ -30,27 +29,6 @@ from .nullspace.redundancy import checked
 from .nullspace.solution import Solution
 from .remarks import about_assumptions, about_cells, about_directions, about_nodes
 from .verdict import NOTHING_CHECKED, NOTHING_SHOWN, RESTS_ON_PLANES, hidden, of_few_digits, verdict
-
-
-@dataclass(frozen=True)
-class Request:
-    """What is asked for, and what is known beside the matrix.
-
-    Attributes
-    ----------
-    anchors : sequence of (row, x, y) or (row, x, y, z), optional
-    cells : bool
-        Look for elements too, not only where nothing else confirms positions.
-    choice : str
-        Why the matrix was taken for one of elasticity.
-    rounding : Rounding, optional
-        Of the entries, where they have few digits.
-    """
-
-    anchors: Sequence[Any] | None = None
-    cells: bool = True
-    choice: str = ""
-    rounding: Rounding | None = None
 
 
 def described(
@@ -110,7 +88,7 @@ def described(
     if status == "certified" and _flat(placed, component):
         status, reason = "uncertified", Reason("the points lie in one line or plane, and no solid body does")
     points, factor, notes = anchored(placed, component, len(solution.evidence), known)
-    status, reason = near_enough(status, reason, digits_lost(points, placed, component, factor))
+    status, reason = near_enough(status, reason, points, placed, component, factor, 1.0)  # mean edges have length one
     lame, scale = _in_units(shown, component, factor, nodal.dim)
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: with a mesh its point reflection fits the matrix as well")

@@ -10,11 +10,11 @@ from ..clock import Clock
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
-from ..nodes.anchoring import checked_anchors
+from ..nodes.anchoring import Request
 from ..nodes.nodal import NodalMatrix, nodal_matrix, uncoupled
 from ..nodes.numbering import Numbering
 from ..recovery import Body
-from .description import Request, described
+from .description import described
 from .doubts import with_doubts
 from .nullspace.certificate import residuals
 from .positions import solve
@@ -43,7 +43,7 @@ def serve_body(
             "the directions are not coupled, as those of a vector Laplacian: these are scalar matrices side by side, "
             "which `operator='laplacian'` recovers"
         )
-    known = checked_anchors(request.anchors, numbering.node_of_row, numbering.block_size)  # before the long work
+    known = request.held(numbering.node_of_row, numbering.block_size)  # before the long work
     with clock("null space"), blas_threads(1):
         nodal = with_doubts(without_springs(nodal), numbering)
         try:

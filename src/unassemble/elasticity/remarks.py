@@ -33,19 +33,10 @@ def about_nodes(
     hanging: NDArray[np.bool_],
     lone: NDArray[np.bool_],
 ) -> list[str]:
-    """Why nodes have no coordinates.
+    """Why nodes have no coordinates: `loose`.
 
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    loose : (n,) bool
-        Nodes without coordinates.
-    withheld : (n,) bool
-        Those that no cell confirms.
-    hanging : (n,) bool
-        Those whose coordinates rest on an assumption that nothing confirms.
-    lone : (n,) bool
-        Those whose coordinates rest on identities that no others would contradict.
+    No cell confirms those `withheld`; others rest on an assumption that nothing confirms, `hanging`, or on identities
+    that no others would contradict, `lone`.
     """
     sprung = (nodal.size == 0) & (nodal.row_of >= 0).any(axis=1)
     told = []

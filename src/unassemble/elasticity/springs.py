@@ -43,14 +43,7 @@ def drawn_together(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray
     """(n,) nodes in the place of one that they are coupled to, without whole rows that couple to nodes elsewhere.
 
     A web of springs that touches a body in one node is drawn there, whatever its nodes have in common. Bodies in
-    contact have nodes upon each other that have rows of elements.
-
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    valid : (n, d, d) or (n, d, d, d) bool
-    points : (n, d) float64
-        Mean edge length 1; NaN where not determined.
+    contact have nodes upon each other that have rows of elements. Mean edges of the points have length one.
     """
     i, j, present = nodal.node, nodal.indices, nodal.row_of >= 0
     live = (i != j) & (nodal.data != 0).any(axis=(1, 2))

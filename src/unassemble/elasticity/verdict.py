@@ -105,17 +105,7 @@ _FREEDOMS = {
 def verdict(
     nodal: NodalMatrix, solution: Solution, error: float, found: Cells, numbering: Numbering
 ) -> tuple[str, Reason]:
-    """Status and reason.
-
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    solution : Solution
-    error : float
-        Largest residual of a valid identity.
-    found : Cells
-    numbering : Numbering
-    """
+    """Status and reason, by the largest residual of a valid identity and the cells that were found."""
     objection = _to_positions(nodal, solution, numbering)
     if objection.text:
         return "uncertified", objection

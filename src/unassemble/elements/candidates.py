@@ -38,9 +38,8 @@ def candidates(graph: Graph, points: NDArray[np.float64]) -> Iterator[tuple[Bloc
     Parameters
     ----------
     graph : Graph
-        Coupled nodes.
+        Coupled nodes; nodes without coordinates are coupled to none.
     points : (n, d) float64
-        NaN where not determined; such nodes are coupled to none.
     """
     d, known = points.shape[1], int(np.isfinite(points).all(axis=1).sum())
     known_kinds = (kind for kind in KINDS.values() if kind.dim == d and kind.degree < 3 and not kind.linear_simplex)

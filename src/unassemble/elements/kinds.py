@@ -14,25 +14,13 @@ _SIDES = ((0, 3, 4, 7), (1, 2, 5, 6), (0, 1, 4, 5), (2, 3, 6, 7), (0, 1, 2, 3), 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of cell.
+    """A kind of cell."""
 
-    Attributes
-    ----------
-    name : str
-        meshio's.
-    base : {"triangle", "quad", "tetra", "hexahedron"}
-        The linear cell on the same corners.
-    dim : {2, 3}
-    corners : int
-    between : tuple of tuples of int
-        For each further node, in meshio's order, the corners that it lies in the middle of where sides are straight;
-        a corner counts as often as it is named.
-    """
-
-    name: str
-    base: str
+    name: str  # meshio's
+    base: str  # the linear cell on the same corners
     dim: int
     corners: int
+    # further nodes in meshio's order: the corners, counted as often as named, that each is the middle of
     between: tuple[tuple[int, ...], ...] = ()
 
     @property

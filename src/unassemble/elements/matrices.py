@@ -20,14 +20,7 @@ def mapped_gradients(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(m, q, k, d) gradients of the shape functions in space, and (m, q) weights times |det J|.
 
-    Parameters
-    ----------
-    points : (n, d) float64
-    cells : (m, k) int64
-        In meshio's order. In cells that are flat gradients are those of the reference element, and the weights zero.
-    kind : Kind
-    rule : (q, d) and (q,) float64
-        Quadrature in the reference element; see :func:`.reference.rules`.
+    In cells that are flat gradients are those of the reference element, and the weights zero.
     """
     at, weights = rule
     local = shape_gradients(kind, at)

@@ -16,14 +16,7 @@ def unpierced(cells: NDArray[np.int64], points: NDArray[np.float64], graph: Grap
     """(m,) whether no edge of the graph leaves a corner into the inside of the simplex, or into a facet.
 
     Where three tetrahedra surround an edge, the corners of two of the larger ones that they make up are cliques as
-    well; the edge runs through both.
-
-    Parameters
-    ----------
-    cells : (m, d + 1) int64
-        Not flat.
-    points : (n, d) float64
-    graph : Graph
+    well; the edge runs through both. The simplices are not flat.
     """
     whole = np.ones(len(cells), dtype=bool)
     if not len(cells):

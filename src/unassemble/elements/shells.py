@@ -22,19 +22,9 @@ def graph_of(n: int, *cells: NDArray[np.int64]) -> Graph:
 
 
 def shell_cells(graph: Graph, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Cliques that are cells: quadrilaterals, and triangles with a side that is none of theirs, nor a diagonal.
+    """Cliques that are cells: (m, 4) quadrilaterals, after (m, 3) triangles with a side that is none of theirs.
 
-    Parameters
-    ----------
-    graph : Graph
-    points : (n, d) float64
-        Of all nodes that the graph couples.
-
-    Returns
-    -------
-    triangles : (m, 3) int64
-    quads : (m, 4) int64
-        Corners in order around the cell; in the plane counter-clockwise.
+    Nor is that a diagonal. Corners stand in order around the cell; in the plane counter-clockwise.
     """
     quads = _around(points, shared_cliques(graph, 4))
     triangles = simplices(graph, 2)

@@ -139,14 +139,9 @@ def _bounding_twice(facets: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def boundary_loops(blocks: Blocks) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Directed boundary edges of planar cells loop by loop, and where each loop begins.
+    """(b, 2) directed boundary edges of planar cells loop by loop, and (loops + 1,) where each loop begins.
 
     Where loops touch in a vertex they are taken apart, or joined, as the order of the cells has it.
-
-    Returns
-    -------
-    boundary : (b, 2) int64
-    offsets : (loops + 1,) int64
     """
     (edges,) = outer_facets(blocks)
     if not len(edges):

@@ -52,7 +52,7 @@ def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]
     """Of a vector-valued matrix."""
     from ..nodes.nodal import nodal_matrix, uncoupled
     from ..structures import StructuralNumbering
-    from ..structures.bars import bars_of
+    from ..structures.trusses import bars_of
 
     found = vector.numbering
     shown = {"name": vector.name, "evidence": (vector.why,)}

@@ -84,13 +84,6 @@ def proven_directions(
     directions add up to zero whatever is missing. In such sums a row of that direction cannot be missed, and one of
     another direction would not be borne. Where planes with one direction taken out meet, no sum of two directions
     vanishes; that of the third does not tell which of the two a row is.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric.
-    direction, group : (N,) int64
-    d : int
     """
     own = np.eye(d, dtype=bool)[direction]
     size = row_sizes(matrix)
@@ -118,15 +111,7 @@ def unaccounted(
 ) -> NDArray[np.bool_]:
     """(n, d) directions that nodes lack although all rows coupled to them annihilate constants of that direction.
 
-    A penalty on the diagonal is no trace.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-    node, direction : (N,) int64
-    d : int
-    live : (N,) bool, optional
-        Rows that count, all where not given; those of the identity do not.
+    A penalty on the diagonal is no trace. Rows that count may be given as `live`, (N,); those of the identity do not.
     """
     order, n = len(node), int(node.max()) + 1
     live = np.ones(order, dtype=bool) if live is None else live

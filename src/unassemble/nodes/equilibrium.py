@@ -27,15 +27,8 @@ def spread_directions(
 ) -> NDArray[np.int64]:
     """(N,) directions of all rows, with which most of the whole rows annihilate translations.
 
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric, every row coupled to another one.
-    group : (N,) int64
-        Rows that couple to the same unknowns; those of d whole rows are nodes.
-    d : int
-    known : (N,) int64
-        Directions to start from, -1 where they are not known.
+    Rows of one `group`, (N,), couple to the same unknowns; those of d whole rows are nodes. Directions are spread from
+    those `known`, (N,), of which others are -1. Every row is coupled to another one.
     """
     direction = np.zeros(len(group), np.int64)
     inner = matrix.copy()

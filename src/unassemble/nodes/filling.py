@@ -19,13 +19,7 @@ from .likeness import likest_pairs, pattern_of, reach
 
 
 def filled(matrix: sp.csr_array) -> sp.csr_array:
-    """The matrix with zeros where rows that are likest each other have entries, and so on with these.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric.
-    """
+    """The matrix with zeros where rows that are likest each other have entries, and so on with these."""
     while True:
         pattern = pattern_of(matrix)
         near = sp.coo_array(sp.triu(pattern @ pattern, 1))
@@ -41,13 +35,6 @@ def filled_by_direction(matrix: sp.csr_array, direction: NDArray[np.int64], d: i
 
     Rows of one direction that couple to the same rows of it belong to nodes with the same neighbours. Those of
     different directions are compared, which leaves no doubt where entries vanish in the same way for whole directions.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric.
-    direction : (N,) int64
-    d : int
     """
     n = matrix.shape[0]
     label = np.arange(n)

@@ -29,17 +29,7 @@ def with_least_sums(
     """Choose the directions that no sum proves such that all sums together are least, until none changes.
 
     They start from those given, and from those with which translations are in equilibrium where the others are proven.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric, every row coupled to another one.
-    group : (N,) int64
-        Rows that couple to the same unknowns.
-    direction : (N,) int64
-    d : int
-    budget : Budget
-        Where it does not suffice, directions stay as they are.
+    Rows of one `group` couple to the same unknowns. Where the budget does not suffice, directions stay as they are.
     """
     told, size = without_penalties(matrix), row_sizes(matrix)
     scaled = sp.csr_array(sp.diags_array(1 / np.where(size > 0, size, np.inf)) @ told)

@@ -36,16 +36,10 @@ def reach(matrix: sp.csr_array) -> sp.csr_array:
 def likest_pairs(
     reached: sp.csr_array, r: NDArray[np.int64], s: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Those of the pairs of rows (r, s) whose cosine is the largest of both rows, or equal to it.
+    """Those of the pairs of rows (r, s) whose cosine is the largest of both rows, or equal to it; see :func:`reach`.
 
     Cosines of long sparse rows are costly, and most pairs are far from alike. A few random combinations of the columns
     keep angles, about, and leave a few pairs of each row (Johnson and Lindenstrauss, 1984).
-
-    Parameters
-    ----------
-    reached : (N, N) sparse
-        See :func:`reach`.
-    r, s : (k,) int64
     """
     order = reached.shape[0]
     sketch = reached @ np.random.default_rng(0).standard_normal((order, _NUMBERS), dtype=np.float32)

@@ -15,32 +15,19 @@ from .numbering import Numbering
 
 @dataclass(frozen=True, eq=False)
 class NodalMatrix:
-    """Square blocks of order d, one per pair of coupled nodes, in CSR form.
+    """Square blocks of order d, one per pair of coupled nodes, in CSR form: columns increase, each node is its own.
 
-    Attributes
-    ----------
-    indptr, indices : int32
-        Graph of the nodes, columns increasing, every node coupled to itself.
-    data : (nnz, d, d) float64
-        ``data[k, c, b]`` is A^{cb}_ij; unknowns that the matrix lacks have zeros. A diagonal entry with a penalty is
-        replaced by what makes its row annihilate constants, which is what assembly put there if the row is whole.
-    row_of : (n, d) int64
-        Matrix row of each unknown, -1 where there is none.
-    size : (n,) float64
-        Mean absolute sum of a node's off-diagonal blocks, the unit in which its equations are measured.
-    penalised : (n, d) bool
-        Unknowns with a penalty on the diagonal.
-    doubtful : (n,) bool, optional
-        Nodes whose rows, or directions, may be others; see :mod:`~unassemble.elasticity.doubts`.
+    A diagonal entry with a penalty is replaced by what makes its row annihilate constants, which is what assembly put
+    there if the row is whole.
     """
 
     indptr: NDArray[np.int32]
     indices: NDArray[np.int32]
-    data: NDArray[np.float64]
-    row_of: NDArray[np.int64]
-    size: NDArray[np.float64]
-    penalised: NDArray[np.bool_]
-    doubtful: NDArray[np.bool_] | None = None
+    data: NDArray[np.float64]  # (nnz, d, d), ``data[k, c, b]`` is A^{cb}_ij; zero where the matrix lacks unknowns
+    row_of: NDArray[np.int64]  # (n, d) of the matrix, -1 where there is none
+    size: NDArray[np.float64]  # (n,) mean absolute sum of a node's off-diagonal blocks, the unit of its equations
+    penalised: NDArray[np.bool_]  # (n, d) unknowns with a penalty on the diagonal
+    doubtful: NDArray[np.bool_] | None = None  # (n,) nodes whose rows, or directions, may be others
 
     @classmethod
     def of(cls, indptr: NDArray, indices: NDArray, data: NDArray, row_of: NDArray[np.int64]) -> NodalMatrix:
@@ -111,7 +98,7 @@ def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
 
 
 def valid_pairs(nodal: NodalMatrix) -> NDArray[np.bool_]:
-    """Which rows of which blocks hold every coefficient that assembly gave them.
+    """(n, d, d) rows of blocks that hold every coefficient that assembly gave them, by components of row and columns.
 
     Row i of A^{cb} annihilates constants, unless a coupled unknown of component b was taken away or the
     diagonal was changed. The converse fails on regular meshes, where what is missing can add up to zero (two
@@ -119,11 +106,6 @@ def valid_pairs(nodal: NodalMatrix) -> NDArray[np.bool_]:
     the same unknowns, and a neighbour that is known to lack the direction spoils it. So does what they miss of another
     direction, if no neighbour is known to lack that: a whole node was taken away, whose entries add up to zero in
     meshes that are the same all along an axis. A penalty on the diagonal explains itself and spoils its own row only.
-
-    Returns
-    -------
-    (n, d, d) bool
-        Component c of the row, component b of the columns.
     """
     present: NDArray[np.bool_] = nodal.row_of >= 0
     zero, penalty = annihilating(nodal), nodal.penalised[:, None, :] & np.eye(nodal.dim, dtype=bool)
@@ -148,15 +130,9 @@ def eliminated(nodal: NodalMatrix) -> NDArray[np.bool_]:
 
 
 def surrounded(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(n,) nodes whose neighbours are all there, though some may lack a direction.
+    """(n,) nodes whose neighbours are all there, though some may lack a direction; by :func:`valid_pairs`.
 
     The rows show it in those directions that none of them lacks; there has to be one.
-
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    valid : (n, d, d) bool
-        See :func:`valid_pairs`.
     """
     present = nodal.row_of >= 0
     lacking = nodal.graph @ eliminated(nodal).astype(float) > 0

@@ -16,42 +16,19 @@ from .orders import ORDERS, Reading
 
 @dataclass(frozen=True, eq=False)
 class Numbering:
-    """Nodes and directions of the rows of a vector-valued matrix.
-
-    Attributes
-    ----------
-    block_size : int
-        Unknowns per node, 2 or 3.
-    node_of_row : (N,) int64
-        Nodes are numbered by their first row.
-    direction_of_row : (N,) int64
-    identity_row : (N,) bool
-        Rows that couple to nothing: unknowns replaced by the identity.
-    kind : {"interleaved", "by component", "pattern", "given"}
-    share : float
-        Share of the pairs (row, direction) whose entries add up to zero, among rows that couple.
-    common : float
-        How far the rows of a node couple to the same nodes: 1 if all do.
-    odd : int
-        Nodes that lack a direction without a trace, no row near them missing it: their rows belong together, and it
-        did not show. In an order without gaps, those whose rows cannot be one node's.
-    open_row : (N,) bool, optional
-        Where the unknowns stand in order: rows that may belong to one node with others of them, which neither pattern
-        nor order decides.
-    unnamed : (N,) bool, optional
-        Rows whose direction nothing proves.
-    """
+    """Nodes and directions of the N rows of a vector-valued matrix."""
 
     block_size: int
-    node_of_row: NDArray[np.int64]
+    node_of_row: NDArray[np.int64]  # numbered by their first row
     direction_of_row: NDArray[np.int64]
-    identity_row: NDArray[np.bool_]
-    kind: str
-    share: float
-    common: float
+    identity_row: NDArray[np.bool_]  # those that couple to nothing: unknowns replaced by the identity
+    kind: str  # "interleaved", "by component", "pattern" or "given"
+    share: float  # of the pairs (row, direction) whose entries add up to zero, among rows that couple
+    common: float  # how far the rows of a node couple to the same nodes: 1 if all do
+    # nodes that lack a direction without a trace; in an order without gaps, those whose rows cannot be one node's
     odd: int = 0
-    open_row: NDArray[np.bool_] | None = None
-    unnamed: NDArray[np.bool_] | None = None
+    open_row: NDArray[np.bool_] | None = None  # in order: rows that may be one node's with others, by pattern and order
+    unnamed: NDArray[np.bool_] | None = None  # rows whose direction nothing proves
 
     @property
     def incomplete(self) -> bool:

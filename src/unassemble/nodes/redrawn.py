@@ -27,18 +27,10 @@ from .rounded import Rounding
 
 @dataclass(frozen=True)
 class Known:
-    """How well positions are known.
+    """How well positions are known."""
 
-    Attributes
-    ----------
-    error : float
-        Largest one of a node, relative to the diameter of its piece; infinite where a node may get lost.
-    explained : bool
-        Whether rounding explains the misfits, so that the error is all that there is.
-    """
-
-    error: float
-    explained: bool = True
+    error: float  # largest of a node, relative to the diameter of its piece; infinite where one may get lost
+    explained: bool = True  # whether rounding explains the misfits, so that the error is all that there is
 
 
 def known_to(
@@ -52,19 +44,8 @@ def known_to(
 ) -> Known:
     """Find positions anew, with other rounding.
 
-    Parameters
-    ----------
-    points : (n, d) float64
-        NaN where not determined.
-    component : (n,) int64
-        Piece of each node, -1 where not determined.
-    misfits : (m,) float64
-        Of what certifies these points.
-    rounding : Rounding
-    place : callable
-        Such points, and their misfits, from a matrix that may have been rounded to the given one.
-    sized : bool
-        Whether the matrix tells size and sign.
+    From a matrix that may have been rounded to the given one `place` finds such points (n, d), and the `misfits` (m,) of
+    what certifies them; `sized` says whether the matrix tells size and sign.
     """
     pieces = [np.flatnonzero(component == one) for one in range(component.max(initial=-1) + 1)]
     moved, changes = np.zeros(len(points)), np.zeros((REDRAWN, len(misfits)))

@@ -25,33 +25,15 @@ _LAYOUTS = {3: (3, 2, 1), 2: (2,), 6: (3,), 4: (2,)}  # unknowns of a node, and 
 
 @dataclass(frozen=True, eq=False)
 class Rounding:
-    """What the entries of a matrix were rounded to.
+    """What the entries of a matrix were rounded to."""
 
-    Attributes
-    ----------
-    name : str
-        Digits, decimals or single precision; see :class:`~unassemble.matrix.digits.Digits`.
-    level : float
-        How far entries may be off, relative to their size, as half of the rows have it.
-    exact : (N, N) sparse
-        The matrix, with exact sums.
-    unit : (N, N) sparse
-        Of the last place of each entry, with the entry's sign.
-    number : (nnz,) int64
-        Entries that are the same number, but for the sign: these were rounded alike.
-    direction : (N,) int64
-        Of each row; -1 where not known.
-    zero : (N, b) bool
-        Rows and directions that add up to zero, but for rounding.
-    """
-
-    name: str
-    level: float
-    exact: sp.csr_array
-    unit: sp.csr_array
-    number: NDArray[np.int64]
-    direction: NDArray[np.int64]
-    zero: NDArray[np.bool_]
+    name: str  # digits, decimals or single precision
+    level: float  # how far entries may be off, relative to their size, as half of the rows have it
+    exact: sp.csr_array  # the matrix, with exact sums
+    unit: sp.csr_array  # of the last place of each entry, with the entry's sign
+    number: NDArray[np.int64]  # (nnz,) entries that are the same number, but for the sign: these were rounded alike
+    direction: NDArray[np.int64]  # of each row; -1 where not known
+    zero: NDArray[np.bool_]  # (N, b) rows and directions that add up to zero, but for rounding
 
     @property
     def spread(self) -> float:

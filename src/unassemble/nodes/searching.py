@@ -29,16 +29,9 @@ _WORK = 2e10  # for directions: half a minute or so
 
 
 def searched(matrix: sp.csr_array, sizes: tuple[int, ...], *, as_stored: bool = False) -> list[Numbering]:
-    """Numberings that were found, up to the first that leaves no doubt.
+    """Numberings with so many unknowns per node that were found, up to the first that leaves no doubt.
 
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric.
-    sizes : tuple of int
-        Block sizes to try.
-    as_stored : bool
-        Whether to believe only what entries as they are stored show, in one of the usual orders.
+    `as_stored` believes only what entries as they are stored show, in one of the usual orders.
     """
     live, inner = live_part(matrix)
     found: list[Numbering] = []

@@ -20,27 +20,14 @@ _FEW = 0.25  # share of nodes that may be loose although rows of their own are v
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Coordinates of one piece.
+    """Coordinates of one piece."""
 
-    Attributes
-    ----------
-    points : (n, d) float64
-        Centred, of norm one; NaN where loose: of nodes that can move while the others stay.
-    dimension : int
-        Of the null space, translations counted, loose nodes left out; that of the translations where no field is exact.
-    freedom : {"", "axes", "affine"}
-        What remains beyond translation and scale.
-    exact : bool
-        Whether the field is a null field, not only the best one.
-    null : int
-        Fields that count as null fields, those of loose nodes among them.
-    """
-
+    # (n, d) centred, of norm one; NaN where loose: of nodes that can move while the others stay
     points: NDArray[np.float64]
-    dimension: int
-    freedom: str
-    exact: bool
-    null: int
+    dimension: int  # of the null space without loose nodes; that of the translations where no field is exact
+    freedom: str  # beyond translation and scale: "", "axes" or "affine"
+    exact: bool  # whether the field is a null field, not only the best one
+    null: int  # fields that count as null fields, those of loose nodes among them
 
 
 def shape(
@@ -155,14 +142,7 @@ def _flat(points: NDArray) -> bool:
 
 
 def in_gauge(points: NDArray, graph: sp.csr_array) -> NDArray[np.float64]:
-    """Centroid at the origin, mean edge length 1, and of the two point reflections that with positive third moments.
-
-    Parameters
-    ----------
-    points : (n, d) float64
-        NaN rows are left out.
-    graph : (n, n) sparse
-    """
+    """Centroid at the origin, mean edge length 1, and of the two point reflections that with positive third moments."""
     pairs = sp.triu(graph, 1).tocoo()
     length = np.linalg.norm(points[pairs.row] - points[pairs.col], axis=1)
     mean = np.nanmean(length) if np.isfinite(length).any() else 1.0

@@ -94,12 +94,6 @@ def nodes_of_pattern(matrix: sp.csr_array) -> tuple[int, int] | None:
 def regular_numbering(matrix: sp.csr_array, kind: str, block_size: int | None = None) -> Numbering:
     """The numbering of unknowns in an order that the caller knows.
 
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-    kind : {"interleaved", "by component"}
-    block_size : int, optional
-
     Raises
     ------
     InputError

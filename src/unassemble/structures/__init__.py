@@ -1,11 +1,11 @@
 """Frames, shells and plates, whose nodes have rotations beside displacements; and trusses, which consist of bars."""
 
-from .bars import truss_numbering
 from .beams import Beam, find_beam, serve_beam
 from .frames import serve_structure
 from .layouts import LAYOUTS, Layout, layout_named
 from .placed import pieces
 from .recognise import StructuralNumbering, find_structure, given_structure
+from .trusses import truss_numbering
 
 __all__ = [
     "LAYOUTS",

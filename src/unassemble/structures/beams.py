@@ -11,9 +11,7 @@ supports spoil are not needed. Stretching and torsion are chains of springs besi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,12 +19,13 @@ from numpy.typing import NDArray
 
 from ..clock import Clock
 from ..matrix import OperatorMatrix
-from ..nodes.anchoring import anchored, checked_anchors
+from ..nodes.anchoring import Request
 from ..recovery import Evidence, Structure
 from ..tolerances import ALIKE, CERTIFIED
-from ..words import count_of
+from ..words import Reason, count_of
+from .answer import answer, covered
 from .layouts import PLANE
-from .placed import covered
+from .placed import Placed
 from .recognise import StructuralNumbering
 from .straight import entries_at
 
@@ -35,28 +34,10 @@ MOST = 5  # entries of a bending row off the diagonal: four of the neighbours, o
 
 @dataclass(frozen=True, eq=False)
 class Beam(StructuralNumbering):
-    """Rows of a straight beam: directions 1 (deflection) and 2 (rotation); 0 for one chain of springs, -1 for several.
+    """Rows of a straight beam: directions 1 (deflection), 2 (rotation), 0 (one chain of springs) or -1 (several)."""
 
-    Attributes
-    ----------
-    members : (m, 2) int64
-        Nodes.
-    steps : (m,) float64
-        x of the second node less that of the first.
-    """
-
-    members: NDArray[np.int64]
-    steps: NDArray[np.float64]
-
-
-class _Blocks(NamedTuple):
-    """(m,) rows w_i, t_i, w_j, t_j of members, and x_j - x_i."""
-
-    w: NDArray[np.int64]
-    t: NDArray[np.int64]
-    other_w: NDArray[np.int64]
-    other_t: NDArray[np.int64]
-    step: NDArray[np.float64]
+    members: NDArray[np.int64]  # (m, 2) nodes  # (m, 2) nodes
+    steps: NDArray[np.float64]  # (m,) x of the second node less that of the first
 
 
 def find_beam(matrix: sp.csr_array) -> Beam | None:
@@ -68,17 +49,15 @@ def find_beam(matrix: sp.csr_array) -> Beam | None:
         Symmetric.
     """
     order = matrix.shape[0]
-    off = matrix - sp.diags_array(matrix.diagonal())
+    off = sp.csr_array(matrix - sp.diags_array(matrix.diagonal()))
     off.eliminate_zeros()
     if order < 4 or np.diff(off.indptr).max(initial=0) > MOST or (matrix.diagonal() <= 0).any():
         return None
-    blocks = _members(sp.csr_array(off))
-    deflections = np.unique(np.concatenate([blocks.w, blocks.other_w]))
-    partner = np.full(order, -1)
-    for w, t in ((blocks.w, blocks.t), (blocks.other_w, blocks.other_t)):
-        partner[w] = t
-        if (partner[w] != t).any():
-            return None  # one deflection with two rotations
+    w, t, steps = _members(off)
+    deflections, partner = np.unique(w), np.full(order, -1)
+    partner[w] = t
+    if (partner[w] != t).any():
+        return None  # one deflection with two rotations
     rotations = partner[deflections]
     node = np.full(order, -1)
     node[deflections] = node[rotations] = np.arange(len(deflections))
@@ -86,8 +65,7 @@ def find_beam(matrix: sp.csr_array) -> Beam | None:
     direction[rotations], direction[deflections] = 2, 1
     if not len(deflections) or len(np.unique(rotations)) < len(rotations) or np.isin(rotations, deflections).any():
         return None
-    members, steps = np.column_stack([node[blocks.w], node[blocks.other_w]]), blocks.step
-    members, steps = _with_ends(sp.csr_array(off), node, direction, members, steps)
+    members, steps = _with_ends(off, node, direction, node[w], steps)
     n = int(node.max()) + 1
     if len(members) != n - 1 or _components(n, members)[0] != 1:
         return None
@@ -97,9 +75,8 @@ def find_beam(matrix: sp.csr_array) -> Beam | None:
         return None
     line = np.argsort(_along(n, members, steps))
     chains = [np.flatnonzero(label == one) for one in range(count) if one != bending[0]]
-    for chain in chains:
-        if not _beside(sp.csr_array(off), chain, line, node):
-            return None
+    if not all(_beside(off, chain, line, node) for chain in chains):
+        return None
     if len(chains) == 1:
         direction[chains[0]] = 0
     renamed = np.unique(node, return_index=True)[1].argsort().argsort()  # by the first row of each
@@ -107,8 +84,8 @@ def find_beam(matrix: sp.csr_array) -> Beam | None:
     return Beam(PLANE, renamed[node], direction, "pattern", share, members=renamed[members], steps=steps)
 
 
-def _members(off: sp.csr_array) -> _Blocks:
-    """Members whose blocks are whole, each once."""
+def _members(off: sp.csr_array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Deflections (m, 2) and rotations (m, 2) of members whose blocks are whole, each once, and x_j - x_i (m,)."""
     order, width = off.shape[0], MOST
     count = np.diff(off.indptr)
     row = np.repeat(np.arange(order), count)
@@ -127,7 +104,8 @@ def _members(off: sp.csr_array) -> _Blocks:
     good &= np.abs(left + right) <= ALIKE * np.abs(right)
     good &= np.abs(1.5 * corner * -least[:, None] - right**2) <= ALIKE * right**2
     k, which = np.nonzero(good)
-    return _Blocks(w[k], lower[k, which], other_w[k], upper[k, which], -2 * right[k, which] / least[k])
+    ends = np.column_stack([w[k], other_w[k]]), np.column_stack([lower[k, which], upper[k, which]])
+    return *ends, -2 * right[k, which] / least[k]
 
 
 def _with_ends(
@@ -189,51 +167,51 @@ def _beside(off: sp.csr_array, chain: NDArray[np.int64], line: NDArray[np.int64]
     return True
 
 
-def serve_beam(
-    matrix: OperatorMatrix, beam: Beam, clock: Clock, *, anchors: Sequence[Any] | None, choice: str
-) -> Structure:
+def serve_beam(matrix: OperatorMatrix, beam: Beam, clock: Clock, request: Request) -> Structure:
     """Positions along a straight beam, in true units of length, and its members.
 
     The axis is x and deflections are along y; the direction of the axis, which the sign of rotations tells where it is
     known, is free.
+
+    Raises
+    ------
+    InputError
+        For anchors that do not fit.
     """
-    n = beam.n_nodes
-    known = checked_anchors(anchors, beam.node_of_row, beam.layout.dim)
+    n, bending = beam.n_nodes, beam.direction_of_row > 0
+    held = request.held(beam.node_of_row, beam.layout.dim)
     with clock("solve"):
         x = _along(n, beam.members, beam.steps)
         points = np.column_stack([x - x.mean(), np.zeros(n)])
     with clock("certify"):
         misfit, told = _held_against(matrix.csr(), beam, points[:, 0])
+    found = Placed(
+        points, np.zeros(n, np.int64), (Evidence(1, misfit, float("inf"), int(told.sum())),), told, np.zeros_like(told)
+    )
     certified = misfit <= CERTIFIED
-    chains = int(np.count_nonzero(beam.direction_of_row <= 0))
-    reason = "bending members along a line give back the blocks of all neighbours, and the sums of rows between them: "
+    said = f"the bending rows differ from those of members along a line by {misfit:.1e} of the row's largest entry"
+    if certified:
+        whole = "bending members along a line give back the blocks of all neighbours, and the sums of rows between them"
+        said = f"{whole}: {covered(told, bending)}"
     notes = ["a beam by itself lies along x, in a direction that is free"]
-    if chains:
-        notes.append(f"{count_of(chains, 'row')} of stretching or torsion know no length: they are taken for those of "
-                     "the nodes next to which they are numbered")  # fmt: skip
-    bending = beam.direction_of_row > 0
-    component = np.zeros(n, np.int64)
-    points, _, more = anchored(points, component, 1, known, sized=True)
-    return Structure(
-        points=points,
+    if not bending.all():
+        chains = count_of(int((~bending).sum()), "row")
+        notes.append(f"{chains} of stretching or torsion know no length: they are taken for those of the nodes next to "
+                     "which they are numbered")  # fmt: skip
+    return answer(
+        matrix,
+        beam,
+        clock,
+        request,
+        held,
+        found,
+        ("certified" if certified else "uncertified", Reason(said)),
+        edges=beam.members,
+        uniqueness="proved",
+        notes=notes,
         lines=np.sort(beam.members, axis=1),
-        component=component,
-        scale=np.full(1, np.nan),
-        node_status=np.zeros(n, np.int8),
-        evidence=(Evidence(1, misfit, float("inf"), int(told.sum())),),
-        status="certified" if certified else "uncertified",
-        uniqueness="proved" if certified else None,
-        reason=reason + covered(told, bending)
-        if certified
-        else (f"the bending rows differ from those of members along a line by {misfit:.1e} of the row's largest entry"),
         operator="plane frame",
         backward_error=misfit,
-        timings=clock.timings,
-        warnings=(*matrix.warnings, *notes, *more),
-        node_of_row=beam.node_of_row,
-        direction_of_row=beam.direction_of_row,
-        numbering=beam.kind,
-        choice=choice,
     )
 
 

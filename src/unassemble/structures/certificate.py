@@ -25,26 +25,9 @@ def forces(
     """Forces that rigid rotations of the nodes bring about, with their signs, relative to what makes them up.
 
     That is bounded, without signs, by nodes that move by their distance from the centroid and turn by one: about
-    single axes both may be nothing but rounding.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        As it was given.
-    layout : Layout
-    node_of_row, direction_of_row : (N,) int64
-        Rows whose direction is -1 do not move.
-    points : (n, d) float64
-        NaN where not determined; rows that touch such nodes do not count.
-    counted : (N, rotations) bool
-        Rows and rotations away from supports.
-
-    Returns
-    -------
-    force : (k,) float64
-        Of all rows and rotations that count.
-    used : (N,) bool
-        Rows with one that counts.
+    single axes both may be nothing but rounding. The matrix is as it was given; rows whose direction is -1 do not
+    move; rows that touch nodes without coordinates do not count, and of the others those and the rotations that are
+    `counted`, (N, rotations). Returns the forces (k,) of all that count, and rows (N,) with one that does.
     """
     moves = len(layout.displacements)
     known, moving = determined(points), direction_of_row >= 0
@@ -60,14 +43,9 @@ def forces(
 def members_misfits(
     members: Straight, layout: Layout, points: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """How far the blocks of straight members are from those of members between the points.
+    """How far blocks of straight members are from those of members between the points, (k,), and ends of these, (k, 2).
 
-    Returns
-    -------
-    ends : (k, 2) int64
-        Of members both of whose nodes have coordinates.
-    misfit : (k,) float64
-        Relative to the size of each part of the block.
+    Relative to the size of each part of the block; of members both of whose nodes have coordinates.
     """
     some = determined(points)[members.ends].all(axis=1)
     ends, given = members.ends[some], members.blocks[some]

@@ -31,12 +31,6 @@ def contradicted(given: Equations, nodes: Nodes) -> tuple[NDArray[np.bool_], NDA
     By least squares, with weights that fall with the deviations of the round before, these of not less than a bound
     that falls from round to round. Off is what misses by more than half of the digits; with it go all equations of its
     node, and those of several rows, or of members, in which the node occurs.
-
-    Parameters
-    ----------
-    given : Equations
-    nodes : Nodes
-        In whose order `given` counts rows.
     """
     A, b = given.operator, nodes.layout.block_size
     lengths = float(np.abs(given.right).max(initial=0.0))

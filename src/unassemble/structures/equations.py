@@ -24,28 +24,15 @@ from .straight import Straight
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """Equations for coordinates, each relative to the size of its coefficients.
+    """Equations for coordinates, each relative to the size of its coefficients."""
 
-    Attributes
-    ----------
-    operator : (m, n dim) sparse
-    right : (m,) float64
-    size : (m,) float64
-        What the equation was divided by.
-    lever : (m,) float64
-        Sum of the terms of the right-hand side, without signs.
-    row : (m,) int64
-        Row ``i b + k`` of direction k of node i; -1 for differences of two rows, and for what members tell.
-    rotation : (m,) int64
-        Which of the layout's rotations it is; -1 for what members tell.
-    """
-
-    operator: sp.csr_array
+    operator: sp.csr_array  # (m, n dim)
     right: NDArray[np.float64]
-    size: NDArray[np.float64]
-    lever: NDArray[np.float64]
+    size: NDArray[np.float64]  # what the equation was divided by
+    lever: NDArray[np.float64]  # sum of the terms of the right-hand side, without signs
+    # ``i b + k`` of direction k of node i; -1 for differences of two rows, and for what members tell
     row: NDArray[np.int64]
-    rotation: NDArray[np.int64]
+    rotation: NDArray[np.int64]  # which of the layout's rotations it is; -1 for what members tell
 
     def __getitem__(self, which: NDArray) -> Equations:
         """Some of the equations, by their indices or a mask."""
@@ -53,19 +40,11 @@ class Equations:
 
 
 def equations(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool, allowed: float = CANCELLED) -> Equations:
-    """Collect the valid equations.
+    """Collect the equations that are `valid`, (n, b, rotations); see :meth:`.nodes.Nodes.whole`.
 
-    Parameters
-    ----------
-    nodes : Nodes
-    valid : (n, b, rotations) bool
-        See :meth:`.nodes.Nodes.whole`.
-    springs : bool
-        Allow for springs between the rotations of a node and the ground, as programs add them where a flat shell has
-        no stiffness against drilling. They add an unknown symmetric matrix to the three moments' rows; what is left
-        are the differences of its two triangles.
-    allowed : float
-        What rounding leaves of coefficients that cancel, relative to them.
+    It can allow for `springs` between the rotations of a node and the ground, as programs add them where a flat shell
+    has no stiffness against drilling. They add an unknown symmetric matrix to the three moments' rows; what is left are
+    the differences of its two triangles. Coefficients that cancel up to what is `allowed`, relative to them, are none.
     """
     b, moves = nodes.layout.block_size, len(nodes.layout.displacements)
     every = [_rotation(nodes, k) for k in range(valid.shape[2])]

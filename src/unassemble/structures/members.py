@@ -23,21 +23,9 @@ MOST_PER_NODE = 4  # triangles of surfaces, of which two are a quadrilateral: by
 def members_and_cells(nodes: Nodes, points: NDArray[np.float64], allowed: float) -> dict[str, NDArray[np.int64]]:
     """Straight members between two nodes, and triangles and quadrilaterals between more.
 
-    Cells are cliques of pairs that are no members; a pair of which none is part of a cell is a member too.
-
-    Parameters
-    ----------
-    nodes : Nodes
-    points : (n, d) float64
-        NaN where not determined.
-    allowed : float
-        What is left of forces that balance, relative to them.
-
-    Returns
-    -------
-    dict
-        ``lines`` (m, 2), ``triangles`` (m, 3) and ``quads`` (m, 4): corners in order around the cell; in the plane
-        counter-clockwise.
+    Cells are cliques of pairs that are no members; a pair of which none is part of a cell is a member too. What is
+    `allowed` may be left of forces that balance. Returns ``lines`` (m, 2), ``triangles`` (m, 3) and ``quads`` (m, 4):
+    corners in order around the cell; in the plane counter-clockwise.
     """
     pairs = np.column_stack(sp.triu(nodes.graph, 1).nonzero()).astype(np.int64)
     pairs = pairs[determined(points)[pairs].all(axis=1)]
@@ -60,17 +48,8 @@ def mispaired(
     directions or in none. In space each coordinate acts on two directions, which contradict each other where their rows
     are not one node's; the coordinates of a plate act on one direction. Those of a plane frame have a direction each,
     so that all depends on the pairing: its nodes have to be joined by members, and no two of them to have the same
-    neighbours. What was condensed joins the nodes next to it otherwise; these need a member to another node.
-
-    Parameters
-    ----------
-    nodes : Nodes
-    points : (n, dim) float64
-        NaN where not determined.
-    inner : (n,) bool
-        Nodes whose forces are not touched by supports, or by what was condensed.
-    allowed : float
-        What is left of forces that balance, relative to them.
+    neighbours. What was condensed joins the nodes next to it otherwise; these need a member to another node. `inner`
+    (n,) are nodes whose forces are touched neither by supports nor by what was condensed.
     """
     n, b = nodes.n, nodes.layout.block_size
     coo, size = nodes.matrix.tocoo(), np.minimum(np.abs(nodes.matrix.diagonal()), row_sizes(nodes.matrix))

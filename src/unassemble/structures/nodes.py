@@ -16,20 +16,11 @@ from .layouts import Layout
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """Unknowns of a matrix by node and direction.
-
-    Attributes
-    ----------
-    layout : Layout
-    matrix : (n b, n b) sparse
-        Row ``i b + k`` belongs to direction k of node i; empty where the matrix has no such unknown.
-    row_of : (n, b) int64
-        Row of the given matrix, -1 where there is none, or only that of an identity.
-    """
+    """Unknowns of a matrix by node and direction."""
 
     layout: Layout
-    matrix: sp.csr_array
-    row_of: NDArray[np.int64]
+    matrix: sp.csr_array  # row ``i b + k`` is direction k of node i; empty where there is no such unknown
+    row_of: NDArray[np.int64]  # (n, b) of the given matrix; -1 where there is none, or only that of an identity
 
     @property
     def n(self) -> int:
@@ -100,15 +91,7 @@ class Nodes:
 
 
 def nodes_of(matrix: sp.csr_array, layout: Layout, node: NDArray[np.int64], direction: NDArray[np.int64]) -> Nodes:
-    """Order a matrix by nodes; entries that are rounding and rows of the identity are left out.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-    layout : Layout
-    node, direction : (N,) int64
-        Rows whose direction is -1 are left out, as if they had been eliminated.
-    """
+    """Order a matrix by nodes; entries that are rounding, rows of the identity and of direction -1 are left out."""
     b = layout.block_size
     coo = matrix.tocoo()
     diagonal = np.abs(matrix.diagonal())

@@ -29,23 +29,13 @@ _KNOWN = (*SOLIDS.values(), *LAYOUTS)
 
 @dataclass(frozen=True, eq=False)
 class StructuralNumbering:
-    """Nodes and directions of the rows of a structure's matrix.
-
-    Attributes
-    ----------
-    layout : Layout
-    node_of_row, direction_of_row : (N,) int64
-        A direction of -1 is not known.
-    kind : {"interleaved", "by component", "given"}
-    share : float
-        Share of the rows that annihilate all translations.
-    """
+    """Nodes and directions of the rows of a structure's matrix."""
 
     layout: Layout
     node_of_row: NDArray[np.int64]
-    direction_of_row: NDArray[np.int64]
-    kind: str
-    share: float
+    direction_of_row: NDArray[np.int64]  # -1 where it is not known
+    kind: str  # "interleaved", "by component" or "given"
+    share: float  # of the rows, that annihilate all translations
 
     @property
     def n_nodes(self) -> int:
@@ -188,19 +178,9 @@ def directions_with_gaps(matrix: sp.csr_array) -> Iterator[tuple[NDArray[np.int6
 
 
 def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Nodes of rows that stand node by node, where some nodes lack unknowns.
+    """Nodes and directions (N,) of rows that stand node by node, where some nodes lack some of b unknowns.
 
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-    b : int
-        Unknowns of a whole node.
-
-    Returns
-    -------
-    node : (N,) int64
-    direction : (N,) int64
-        -1 for rows of nodes that lack unknowns: which ones, is not told.
+    Directions are -1 for rows of nodes that lack unknowns: which ones, is not told.
     """
     shown = [shown_by_members(matrix, layout) for layout in LAYOUTS if layout.block_size == b]
     node = shortest_runs(matrix, b, np.any(shown, axis=0))

@@ -25,26 +25,11 @@ def unnoticed(
     points: NDArray[np.float64],
     edges: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
-    """Equations that a disturbance would change without being noticed.
+    """(m,) equations of a piece that a disturbance would change without being noticed.
 
     Disturbances are any of a single equation; springs between two coupled nodes; springs that are the same between
     all coupled nodes, or between the rotations of all nodes and the ground, as regular lattices could take them for a
-    change of size.
-
-    Parameters
-    ----------
-    given : Equations
-        Of a piece; `row` counts its own nodes.
-    probes : (m, k) float64
-        Residuals of random right-hand sides.
-    layout : Layout
-    points : (n, dim) float64
-    edges : (e, 2) int64
-        Coupled nodes.
-
-    Returns
-    -------
-    (m,) bool
+    change of size. `row` counts the piece's own nodes, `probes` (m, k) are residuals of random right-hand sides.
     """
     blind = _small(probes)
     b, moves, turns = layout.block_size, len(layout.displacements), len(layout.turning)

@@ -15,18 +15,11 @@ from ..nodes.likeness import pattern_of
 
 
 def shortest_runs(matrix: sp.csr_array, most: int, begins: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(N,) nodes of neighbouring rows, each of at most so many.
+    """(N,) nodes of neighbouring rows, each of at most so many; a node of so many `begins` with some rows, (N,).
 
     What the first cut takes for one node is one unknown to couple to for the next, as long as fewer nodes come of it:
-    rows of nodes some of whose directions are not coupled, as in flat shells along an axis, meet the same nodes.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Every row has an entry on the diagonal.
-    most : int
-    begins : (N,) bool
-        Rows with which a node of so many is known to begin.
+    rows of nodes some of whose directions are not coupled, as in flat shells along an axis, meet the same nodes. Every
+    row has an entry on the diagonal.
     """
     order = matrix.shape[0]
     pattern = sp.csr_array(pattern_of(matrix))

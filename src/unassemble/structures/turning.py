@@ -10,15 +10,14 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from ..nodes.shape import in_gauge, set_aside, shape
+from ..nodes.shape import set_aside
 from ..recovery import Evidence
 from ..tolerances import CANCELLED, CERTIFIED, SINGULAR
 from .contradictions import contradicted
 from .equations import Equations, equations, joined, told_by
 from .layouts import Layout
 from .nodes import Nodes
-from .placed import Piece, Placed, Positions, placed, without_free
-from .positions import least_squares
+from .placed import Piece, Placed, least_squares, placed, up_to_size, without_free
 from .redundancy import unnoticed
 from .straight import Straight
 
@@ -28,13 +27,7 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
 
     Where these contradict each other as well, from all but the rows of few nodes, if the others agree without them.
     What `members` tell by themselves comes on top. Equations contradict each other if residuals exceed what is
-    `allowed`.
-
-    Returns
-    -------
-    Placed
-    (n, b, rotations) bool
-        Rows and rotations that these rest on, whose forces have to vanish.
+    `allowed`. With (n, b, rotations) rows and rotations that positions rest on, whose forces have to vanish.
 
     Raises
     ------
@@ -63,8 +56,7 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
             given, spoiled = given[~some[0]], some[1]
             counted[spoiled] = False
         try:
-            solve = partial(_positions if layout.rotations else _shape, given, layout)
-            found = placed(given.operator, layout.dim, edges, solve, allowed)
+            found = placed(given.operator, layout.dim, edges, partial(_solved, given, layout), allowed)
             found = replace(found, spoiled=spoiled)
         except GeometryError as error:
             failure = failure or error
@@ -86,56 +78,33 @@ def _doubts(found: Placed, allowed: float) -> tuple[bool, bool, bool, int, float
     return found.residual > allowed, free, bool(found.unnoticed.any()), lost, found.residual
 
 
-def _positions(given: Equations, layout: Layout, piece: Piece) -> Positions:
-    """Coordinates of one piece.
+def _solved(given: Equations, layout: Layout, piece: Piece) -> tuple[NDArray[np.float64], Evidence, NDArray[np.bool_]]:
+    """Coordinates of one piece, evidence, and what would go unnoticed.
 
     Raises
     ------
     GeometryError
-        If there are fewer equations than unknowns leave room for, or far more is free than translations.
+        If there are fewer equations than unknowns leave room for, or far more is free than there should be.
     """
     d, b, n, m = layout.dim, layout.block_size, len(piece.nodes), len(piece.rows)
+    part = given[piece.rows]
+    place = np.searchsorted(piece.nodes, part.row // b)
+    known = piece.nodes[np.minimum(place, n - 1)] == part.row // b  # a row may not depend on its node
+    own = (part.row >= 0) & known
+    local = replace(part, operator=piece.operator, row=np.where(own, place * b + part.row % b, -1))
+    if not layout.rotations:
+        points, evidence, probes = up_to_size(piece, d)
+        return points, evidence, unnoticed(local, probes, layout, np.nan_to_num(points), piece.edges)
     if n < 2 or m < (n - 1) * d:
         raise GeometryError(f"{m} equations are too few for {n} nodes: too much lies next to supports")
-    part = given[piece.rows]
-    x, residuals, fields, values = least_squares(piece.operator, part.right, d)
+    x, residuals, fields, values, gap = least_squares(piece.operator, part.right, d)
     x = x.reshape(n, d)
     span = np.linalg.norm(x[piece.edges[:, 0]] - x[piece.edges[:, 1]], axis=1).max(initial=0)
     if span <= CANCELLED * part.lever.max(initial=0):
         raise GeometryError("rotations and displacements do not depend on each other: the nodes would lie in one point")
-    null, gap = fields[..., values <= SINGULAR], values[values > SINGULAR]
-    loose = np.zeros(n, dtype=bool)
+    null, loose = fields[..., values <= SINGULAR], np.zeros(n, dtype=bool)
     if null.shape[2] > d:
         null, loose = set_aside(null, d)
-    blind = unnoticed(_local(part, piece, b), residuals[:, 1:], layout, x, piece.edges) & (part.rotation >= 0)
-    residual = float(np.abs(residuals[:, 0]).max()) / span
-    evidence = Evidence(null.shape[2], residual, float(gap[0]) if len(gap) else float("inf"), m)
-    return Positions(np.where(loose[:, None], np.nan, x - x[~loose].mean(axis=0)), evidence, blind)
-
-
-def _shape(given: Equations, layout: Layout, piece: Piece) -> Positions:
-    """Coordinates of one piece whose nodes have displacements only, up to its size.
-
-    Raises
-    ------
-    GeometryError
-        If more is free than translations and size.
-    """
-    d, m = layout.dim, len(piece.rows)
-    order = len(piece.nodes)
-    _, residuals, fields, values = least_squares(piece.operator, np.zeros(m), d)
-    one = shape(fields, values, np.zeros(order, dtype=bool))
-    links = sp.csr_array((np.ones(len(piece.edges)), piece.edges.T), shape=(order, order))
-    points, gap = in_gauge(one.points, sp.csr_array(links + links.T)), values[values > SINGULAR]
-    local = _local(given[piece.rows], piece, layout.block_size)
-    blind = unnoticed(local, residuals[:, 1:], layout, np.nan_to_num(points), piece.edges)
-    evidence = Evidence(one.dimension, float(values[d]), float(gap[0]) if len(gap) else float("inf"), m)
-    return Positions(points, evidence, blind)
-
-
-def _local(part: Equations, piece: Piece, b: int) -> Equations:
-    """Equations of a piece, rows counted by its own nodes."""
-    place = np.searchsorted(piece.nodes, part.row // b)
-    known = piece.nodes[np.minimum(place, len(piece.nodes) - 1)] == part.row // b  # a row may not depend on its node
-    own = (part.row >= 0) & known
-    return replace(part, operator=piece.operator, row=np.where(own, place * b + part.row % b, -1))
+    blind = unnoticed(local, residuals[:, 1:], layout, x, piece.edges) & (part.rotation >= 0)
+    evidence = Evidence(null.shape[2], float(np.abs(residuals[:, 0]).max()) / span, gap, m)
+    return np.where(loose[:, None], np.nan, x - x[~loose].mean(axis=0)), evidence, blind

@@ -24,26 +24,15 @@ from .fits import Fit, fits
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Elements of a mesh.
+    """Elements of a mesh."""
 
-    Attributes
-    ----------
-    blocks : mapping of str to (m, k) int64
-        By kind, meshio's names: nodes in meshio's order, positively oriented. Empty where no element was recognised.
-    lame : (n_cells, 2) float64
-        lambda and mu of each cell, up to one common factor (the unknown size of the body), in the order of the blocks;
-        empty where they are not known.
-    backward_error : float
-        Largest difference between an entry and the re-assembled one, relative to the largest off-diagonal entry of
-        its row; NaN where the cells were read off the graph only.
-    shown : (n, d) bool, optional
-        Unknowns of nodes whose row has an entry that re-assembles and is not zero.
-    """
-
+    # (m, k) by kind, meshio's names and order, positively oriented; empty where none was recognised
     blocks: Mapping[str, NDArray[np.int64]]
+    # (n_cells, 2) lambda and mu, up to the unknown size of the body; empty where they are not known
     lame: NDArray[np.float64]
+    # largest difference between an entry and the re-assembled one, relative to the largest of its row
     backward_error: float
-    shown: NDArray[np.bool_] | None = None
+    shown: NDArray[np.bool_] | None = None  # (n, d) unknowns whose row has an entry that re-assembles and is not zero
 
     @property
     def recognised(self) -> bool:

@@ -26,34 +26,19 @@ _LARGEST = 50_000_000  # numbers in a least-squares problem
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Lame coefficients and how well they fit.
-
-    Attributes
-    ----------
-    blocks : tuple of Block
-    lame : (m, 2) float64
-        lambda and mu of the cells of all blocks, one after the other; zero for candidates that carry no material.
-    misfit : float
-        Largest difference between an entry and the re-assembled one, relative to its row.
-    """
+    """Lame coefficients and how well they fit."""
 
     blocks: tuple[Block, ...]
+    # (m, 2) of the cells of all blocks, one after the other; zero for candidates that carry no material
     lame: NDArray[np.float64]
-    misfit: float
+    misfit: float  # largest difference between an entry and the re-assembled one, relative to its row
 
 
 def fits(points: NDArray[np.float64], blocks: Sequence[Block], entries: Entries, ratio: float | None) -> Iterator[Fit]:
     """Lame coefficients of the candidates, in the ways that suit their kinds, the simplest first.
 
-    Parameters
-    ----------
-    points : (n, d) float64
-    blocks : sequence of Block
-        Linear simplices, cells with entries of their own, or the one beside the other.
-    entries : Entries
-        Those that these cells explain.
-    ratio : float, optional
-        lambda / mu, where it is one number.
+    They are linear simplices, cells with entries of their own, or the one beside the other, and explain the entries;
+    lambda / mu is the `ratio` where it is one number.
     """
     simple = [Model(points, one.cells, one.kind, next(rules(one.kind))) for one in blocks if one.kind.linear_simplex]
     beside = [Pairs.of(one.cells, entries) for one in simple]

@@ -66,18 +66,9 @@ def null_fields(
     patch: int | None = None,
     terms: NDArray[np.float64] | None = None,
 ) -> NullFields:
-    """Least singular fields of all valid identities of a body.
+    """Least singular fields of all valid identities of the nodes of a body, (m,); see :func:`.identities.identities`.
 
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    valid : (n, d, d) bool
-    body : (m,) int64
-        Nodes of the body, whose identities to use.
-    patch : int, optional
-        Most rows in one chart.
-    terms : (d, d, d, t) float64, optional
-        Unknown boundary terms; see :func:`.identities.identities`.
+    A chart has no more rows than `patch`.
     """
     parts = _patches(nodal, body, patch or PATCH[nodal.dim])
     made = [chart(nodal, valid, rows, whole=len(parts) == 1, terms=terms) for rows in parts]

@@ -17,19 +17,9 @@ from ...nodes.nodal import NodalMatrix, determined
 
 
 def residuals(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Misfits of valid identities among determined nodes.
+    """(k,) misfits of valid identities among determined nodes; identities that touch other ones are skipped.
 
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    valid : (n, d, d) bool
-    points : (n, d) float64
-        NaN where not determined; identities that touch such a node are skipped.
-
-    Returns
-    -------
-    (k,) float64
-        Relative to the size of a row, times the mean distance between coupled nodes.
+    Relative to the size of a row, times the mean distance between coupled nodes.
     """
     d = nodal.dim
     known = determined(points)

@@ -53,18 +53,10 @@ def chart(
     whole: bool,
     terms: NDArray[np.float64] | None = None,
 ) -> Chart:
-    """Compute the least singular fields of the identities of some rows.
+    """Compute the least singular fields of the identities of some rows; see :func:`.identities.identities`.
 
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    valid : (n, d, d) bool
-    rows : (m,) int64
-    whole : bool
-        Whether these are all rows of the body. Otherwise fields are added until the rest is stiff, so that the
-        charts together hold every field of the body that fits.
-    terms : (d, d, d, t) float64, optional
-        Unknown boundary terms; see :func:`.identities.identities`.
+    If these are not the `whole` body's, fields are added until the rest is stiff, so that the charts together hold
+    every field of the body that fits.
     """
     local = identities(nodal, valid, rows, terms)
     own = len(local.rows)
@@ -146,14 +138,7 @@ def _refine(local: Identities, solver: Factorisation, fields: NDArray, values: N
 
 
 def patches(graph: sp.csr_array, size: int) -> list[NDArray[np.int64]]:
-    """Cut a graph into connected-looking halves, again and again, by breadth-first distance from one end.
-
-    Parameters
-    ----------
-    graph : (n, n) sparse
-    size : int
-        Most nodes of a patch.
-    """
+    """Cut a graph into halves of so many nodes at most, again and again, by breadth-first distance from one end."""
     done: list[NDArray[np.int64]] = []
     open_: list[NDArray[np.int64]] = [np.arange(graph.shape[0])]
     while open_:

@@ -62,29 +62,16 @@ def boundary_basis(valid: NDArray[np.bool_], terms: NDArray[np.float64]) -> NDAr
 class Identities:
     """The valid identities of some nodes, as an operator on the coordinates of the nodes they touch.
 
-    Attributes
-    ----------
-    rows : (m,) int64
-        Nodes whose rows are used.
-    columns : (n,) int64
-        Nodes that these rows touch, increasing.
-    indptr, indices : int32
-        Row k couples to ``columns[indices[indptr[k]:indptr[k + 1]]]``.
-    data : (nnz, d, d) float64
-        Blocks relative to the size of their row, zero where not valid.
-    valid : (m, d, d, d) bool
-        Places (c, b, a) that count.
-    terms : (d, d, d, t) float64
-        What unknown boundary terms may put into the places c, b, a; see :func:`boundary_terms` and :func:`no_terms`.
+    Row k couples to ``columns[indices[indptr[k]:indptr[k + 1]]]``.
     """
 
-    rows: NDArray[np.int64]
-    columns: NDArray[np.int64]
+    rows: NDArray[np.int64]  # (m,) nodes whose rows are used
+    columns: NDArray[np.int64]  # (n,) nodes that these rows touch, increasing
     indptr: NDArray[np.int32]
     indices: NDArray[np.int32]
-    data: NDArray[np.float64]
-    valid: NDArray[np.bool_]
-    terms: NDArray[np.float64]
+    data: NDArray[np.float64]  # (nnz, d, d) blocks relative to the size of their row, zero where not valid
+    valid: NDArray[np.bool_]  # (m, d, d, d) places (c, b, a) that count
+    terms: NDArray[np.float64]  # (d, d, d, t) what unknown boundary terms may put into these
 
     @property
     def dim(self) -> int:
@@ -213,18 +200,10 @@ def _telling(valid: NDArray[np.bool_], terms: NDArray[np.float64]) -> NDArray[np
 def identities(
     nodal: NodalMatrix, valid: NDArray[np.bool_], rows: NDArray[np.int64], terms: NDArray[np.float64] | None = None
 ) -> Identities:
-    """Collect the valid identities of some nodes.
+    """Collect the valid identities of some rows (m,), without those that say nothing once p and q are eliminated.
 
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    valid : (n, d, d) or (n, d, d, d) bool
-        See :func:`~unassemble.elasticity.nodal.valid_pairs` and
-        :func:`~unassemble.elasticity.nullspace.planes.with_planes`.
-    rows : (m,) int64
-        Nodes whose rows to use; those that say nothing once p and q are eliminated are dropped.
-    terms : (d, d, d, t) float64, optional
-        Unknown boundary terms: the fewer there are, the more equations are left. Any p and q, where not given.
+    What is `valid`, (n, d, d) or (n, d, d, d), see :func:`.nodal.valid_pairs` and :func:`.planes.with_planes`. The fewer
+    boundary `terms` (d, d, d, t) are unknown, the more equations are left; any p and q are, where they are not given.
     """
     terms = boundary_terms(nodal.dim) if terms is None else terms
     valid = valid if valid.ndim == 4 else np.repeat(valid[..., None], nodal.dim, axis=3)

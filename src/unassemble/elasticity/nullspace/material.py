@@ -20,13 +20,6 @@ def lame_ratio(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.
 
     p = int lambda grad phi_i and q = int mu grad phi_i are in the ratio lambda : mu at every node. They vanish at nodes
     around which the material is homogeneous, so that nodes on free surfaces and material interfaces count.
-
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    valid : (n, d, d) bool
-    points : (n, d) float64
-        NaN where not determined.
     """
     known = determined(points)
     local = identities(nodal, valid, np.arange(nodal.n))

@@ -22,19 +22,9 @@ from ...nodes.nodal import NodalMatrix, eliminated, surrounded
 def with_planes(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NodalMatrix, NDArray[np.bool_]] | None:
     """Complete the rows next to rollers; None where there are none.
 
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    valid : (n, d, d) bool
-        See :func:`.nodal.valid_pairs`.
-
-    Returns
-    -------
-    nodal : NodalMatrix
-        With the missing sums put to neighbours that lack the direction, and in places (b, b) of nodes that lack
-        b the differences of x_b to neighbours that do.
-    valid : (n, d, d, d) bool
-        By component c of the row, b of the columns, and a of the coordinate.
+    The missing sums are put to neighbours that lack the direction, and in places (b, b) of nodes that lack b the
+    differences of x_b to neighbours that do. What is valid then, (n, d, d, d), goes by component c of the row, b of the
+    columns, and a of the coordinate.
     """
     d = nodal.dim
     present = nodal.row_of >= 0

@@ -12,38 +12,18 @@ from ...recovery import Evidence
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Positions of all pieces, and how surely they are known.
+    """Positions of all pieces, and how surely they are known."""
 
-    Attributes
-    ----------
-    valid : (n, d, d) bool
-        Row and column directions whose equations were used.
-    component : (n,) int64
-        Piece of each node, -1 where not determined.
-    points : (n, d) float64
-    evidence : tuple of Evidence
-    freedoms : tuple of str
-        What remains free beyond translation and scale, per piece; mostly empty.
-    exact : bool
-        Whether all pieces have exact null fields.
-    warnings : tuple of str
-    planes : bool
-        Whether nodes that lack a direction were taken to lie in planes across it.
-    straight : tuple of float
-        lambda / mu of the pieces whose axes the identities leave free and elements told; see :mod:`.straight`.
-    hanging : (n,) bool, optional
-        Nodes that only equations determine that rest on an assumption, of planes.
-    """
-
-    valid: NDArray[np.bool_]
-    component: NDArray[np.int64]
-    points: NDArray[np.float64]
+    valid: NDArray[np.bool_]  # (n, d, d) row and column directions whose equations were used
+    component: NDArray[np.int64]  # (n,) piece of each node, -1 where not determined
+    points: NDArray[np.float64]  # (n, d)
     evidence: tuple[Evidence, ...]
-    freedoms: tuple[str, ...]
-    exact: bool
+    freedoms: tuple[str, ...]  # what remains free beyond translation and scale, per piece; mostly empty
+    exact: bool  # whether all pieces have exact null fields
     warnings: tuple[str, ...]
-    planes: bool = False
-    straight: tuple[float, ...] = ()
+    planes: bool = False  # whether nodes that lack a direction were taken to lie in planes across it
+    straight: tuple[float, ...] = ()  # lambda / mu of the pieces whose axes the identities leave free and elements told
+    # (n,) nodes that only equations determine that rest on an assumption, of planes
     hanging: NDArray[np.bool_] | None = None
 
     @property

@@ -37,13 +37,8 @@ from ..materials.entries import Entries, Model, Pairs
 def frame(nodal: NodalMatrix, picture: NDArray[np.float64]) -> tuple[NDArray[np.float64], float] | None:
     """The map M in x = M y for which one isotropic material explains the entries, and its lambda / mu.
 
-    M is found up to the size of the body and a point reflection; None where no element explains the entries.
-
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    picture : (n, d) float64
-        Of one piece, about as large in all directions; NaN elsewhere.
+    M is found up to the size of the body and a point reflection; None where no element explains the entries. The
+    picture y, (n, d), is that of one piece, about as large in all directions; NaN elsewhere.
     """
     graph, entries = coupled(nodal, picture), Entries.of(nodal, determined(picture))
     for blocks in candidates(graph, picture) if len(entries.key) else ():

@@ -49,12 +49,7 @@ class Straight:
 def straightened(nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.bool_]) -> Solution | None:
     """The solution with as many of its bent pieces straight as elements explain; unchanged where there are none.
 
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    found : Solution or None
-        None where the identities determine nothing.
-    valid : (n, d, d) bool
+    It is None where the identities determine nothing.
     """
     inside = valid & (valid.all(axis=(1, 2)) & _bent(nodal, found))[:, None, None]
     straight = list(_straight(nodal, inside)) if inside.any() else []
