@@ -48,7 +48,7 @@ class Layout:
         return max(axis < self.dim for axis in self.rotations) / len(self.rotations)
 
     def turned(self, axis: int) -> list[tuple[int, int, int]]:
-        """Unit rotation about an axis: (direction, coordinate, sign) of displacements, each sign times the coordinate."""
+        """Unit rotation about an axis: (direction, coordinate, sign) of displacements, sign times the coordinate."""
         after, last = (axis + 1) % 3, (axis + 2) % 3
         terms = ((after, last, -1), (last, after, 1))
         return [

@@ -202,8 +202,8 @@ def identities(
 ) -> Identities:
     """Collect the valid identities of some rows (m,), without those that say nothing once p and q are eliminated.
 
-    What is `valid`, (n, d, d) or (n, d, d, d), see :func:`.nodal.valid_pairs` and :func:`.planes.with_planes`. The fewer
-    boundary `terms` (d, d, d, t) are unknown, the more equations are left; any p and q are, where they are not given.
+    What is `valid`, (n, d, d) or (n, d, d, d), see :func:`.nodal.valid_pairs` and :func:`.planes.with_planes`. The
+    fewer boundary `terms` (d, d, d, t) are unknown, the more equations are left; any p and q, where they are not given.
     """
     terms = boundary_terms(nodal.dim) if terms is None else terms
     valid = valid if valid.ndim == 4 else np.repeat(valid[..., None], nodal.dim, axis=3)
