@@ -24,9 +24,9 @@ from ..words import Reason
 from .doubts import guessed_directions, unborne, unconfirmed
 from .materials.cells import Cells, no_cells, recognise_cells
 from .nullspace.certificate import residuals
-from .nullspace.material import lame_ratio, poisson_ratio
+from .nullspace.identities import lame_ratio, poisson_ratio
+from .nullspace.placing import Solution
 from .nullspace.redundancy import checked
-from .nullspace.solution import Solution
 from .remarks import about_assumptions, about_cells, about_directions, about_nodes
 from .verdict import NOTHING_CHECKED, NOTHING_SHOWN, RESTS_ON_PLANES, hidden, of_few_digits, verdict
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..nodes.nodal import NodalMatrix, determined
 from ..nodes.numbering import Numbering
 from .materials.cells import Cells
-from .nullspace.solution import Solution
+from .nullspace.placing import Solution
 
 
 def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:

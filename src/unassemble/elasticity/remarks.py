@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..nodes.nodal import NodalMatrix
 from ..words import count_of
 from .materials.cells import Cells
-from .nullspace.solution import Solution
+from .nullspace.placing import Solution
 
 
 def about_cells(found: Cells) -> list[str]:

@@ -16,7 +16,7 @@ from ..nodes.shape import SOFT
 from ..tolerances import CERTIFIED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, sentences
 from .materials.cells import Cells
-from .nullspace.solution import Solution
+from .nullspace.placing import Solution
 
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
 NOTHING_SHOWN = Reason(

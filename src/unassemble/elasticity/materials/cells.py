@@ -19,7 +19,7 @@ from ...elements.surface import tiles
 from ...nodes.nodal import NodalMatrix, determined, surrounded, valid_pairs
 from ...tolerances import ALIKE, CERTIFIED
 from .entries import Entries, Pairs
-from .fits import Fit, fits
+from .fits import fits
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,21 +113,15 @@ def _recognised(points: NDArray[np.float64], graph: Graph, entries: Entries, rat
         seen = [replace(one, cells=one.cells[Pairs.of(one.cells, told).seen]) for one in blocks]
         if not all(len(one.cells) for one in seen):
             continue
-        found = next((cells for fit in fits(points, seen, told, ratio) if (cells := _accepted(fit))), None)
+        found = next((cells for fit in fits(points, seen, told, ratio) if (cells := _accepted(*fit))), None)
         if found is not None:
             best, most = replace(found, shown=told.shown()), len(told.key)
-        elif not best.recognised:
-            best = _by_graph(seen)
+        elif not best.recognised and not any(one.kind.linear_simplex for one in seen) and tiles(_linear(seen)):
+            # without certificate; that cliques lie side by side is no evidence of linear simplices
+            best = replace(no_cells(), blocks={one.kind.name: one.cells for one in seen})
         if most == len(entries.key):
             break
     return best
-
-
-def _by_graph(blocks: Sequence[Block]) -> Cells:
-    """Cells without certificate, if they lie side by side; cliques of linear simplices are no evidence."""
-    if any(one.kind.linear_simplex for one in blocks) or not tiles(_linear(blocks)):
-        return no_cells()
-    return Cells({one.kind.name: one.cells for one in blocks}, np.empty((0, 2)), float("nan"))
 
 
 def _linear(blocks: Sequence[Block]) -> dict[str, NDArray[np.int64]]:
@@ -135,18 +129,17 @@ def _linear(blocks: Sequence[Block]) -> dict[str, NDArray[np.int64]]:
     return {one.kind.base: one.cells[:, : one.kind.corners] for one in blocks}
 
 
-def _accepted(fit: Fit) -> Cells | None:
+def _accepted(blocks: Sequence[Block], lame: NDArray[np.float64], misfit: float) -> Cells | None:
     """Cells that carry material, if they fit, have shear moduli of one sign and do not overlap; made-up ones do.
 
     A quadratic triangle, for one, is a combination of small linear ones and a large one with a negative modulus.
     """
-    lame = fit.lame
-    if not fit.misfit <= CERTIFIED or not lame.any():
+    if not misfit <= CERTIFIED or not lame.any():
         return None
     carries = np.abs(lame).max(axis=1) > ALIKE * np.abs(lame).max()
-    parts = np.split(carries, np.cumsum([len(one.cells) for one in fit.blocks])[:-1])
-    blocks = [replace(one, cells=one.cells[part]) for one, part in zip(fit.blocks, parts, strict=True) if part.any()]
+    parts = np.split(carries, np.cumsum([len(one.cells) for one in blocks])[:-1])
+    blocks = [replace(one, cells=one.cells[part]) for one, part in zip(blocks, parts, strict=True) if part.any()]
     mu = lame[carries, 1]
     if not ((mu > 0).all() or (mu < 0).all()) or not tiles(_linear(blocks)):
         return None
-    return Cells({one.kind.name: one.cells for one in blocks}, lame[carries], fit.misfit)
+    return Cells({one.kind.name: one.cells for one in blocks}, lame[carries], misfit)

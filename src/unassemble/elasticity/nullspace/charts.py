@@ -1,10 +1,8 @@
 """Charts: the positions that the identities of a few neighbouring nodes allow.
 
-The identities behave like a differential operator of fourth order, so that one factorisation of the
-whole body is dear in space and ill-conditioned, while an iteration needs many steps. But they are local, and so is
-their
-answer: the rows of some two thousand neighbouring nodes determine the positions of all nodes they touch, up to few
-freedoms.
+The identities behave like a differential operator of fourth order, so that one factorisation of the whole body is dear
+in space and ill-conditioned, while an iteration needs many steps. But they are local, and so is their answer: the rows
+of some two thousand neighbouring nodes determine the positions of all nodes they touch, up to few freedoms.
 """
 
 from __future__ import annotations
@@ -25,34 +23,24 @@ from .identities import Identities, identities
 
 
 @dataclass(frozen=True, eq=False)
-class Chart:
-    """Fields on some nodes that fit the identities of some rows best.
+class Fields:
+    """Fields on some nodes that fit the identities of some rows best."""
 
-    Attributes
-    ----------
-    nodes : (n,) int64
-    fields : (n, d, k) float64
-        Orthonormal.
-    values : (k,) float64
-        Singular values: the norm of each field's residual, increasing.
-    rows : int
-        Number of rows used.
-    """
-
-    nodes: NDArray[np.int64]
-    fields: NDArray[np.float64]
-    values: NDArray[np.float64]
-    rows: int
+    nodes: NDArray[np.int64]  # that some valid identity touches
+    fields: NDArray[np.float64]  # (n, d, k) orthonormal
+    values: NDArray[np.float64]  # singular values, increasing: norms of residuals; of several charts some upper bounds
+    rows: int  # nodes whose identities were used
+    charts: int = 1
 
 
 def chart(
     nodal: NodalMatrix,
     valid: NDArray[np.bool_],
     rows: NDArray[np.int64],
+    terms: NDArray[np.float64] | None,
     *,
     whole: bool,
-    terms: NDArray[np.float64] | None = None,
-) -> Chart:
+) -> Fields:
     """Compute the least singular fields of the identities of some rows; see :func:`.identities.identities`.
 
     If these are not the `whole` body's, fields are added until the rest is stiff, so that the charts together hold
@@ -64,7 +52,7 @@ def chart(
         local = _supported(local, nodal, valid, terms)
     n, d = len(local.columns), local.dim
     if not n:
-        return Chart(local.columns, np.empty((0, d, 0)), np.empty(0), 0)
+        return Fields(local.columns, np.empty((0, d, 0)), np.empty(0), 0)
     count = min(4 * d, n * d)
     with nearly_singular(UpperTriangle.of(local.normal_matrix())) as solver:
         while True:
@@ -75,8 +63,8 @@ def chart(
         if not whole:
             keep = values < LITTLE
             fields, values = fields[..., keep], values[keep]
-        fields, values = _refine(local, solver, fields, values)
-    return Chart(local.columns, fields, values, own)
+        fields, values = _refined(local, solver, fields, values)
+    return Fields(local.columns, fields, values, own)
 
 
 def _supported(
@@ -100,8 +88,7 @@ def _supported(
 def _short(local: Identities) -> NDArray[np.bool_]:
     """(m,) rows with fewer equations than their share of what the nodes take that they touch."""
     touching = np.bincount(local.indices, minlength=len(local.columns))
-    taken = np.add.reduceat(local.dim / touching[local.indices], local.indptr[:-1]) if len(local.rows) else np.empty(0)
-    return np.asarray(taken > local.equations)
+    return np.asarray(np.add.reduceat(local.dim / touching[local.indices], local.indptr[:-1]) > local.equations)
 
 
 def _least_fields(local: Identities, solver: Factorisation, count: int) -> tuple[NDArray, NDArray]:
@@ -115,48 +102,37 @@ def _least_fields(local: Identities, solver: Factorisation, count: int) -> tuple
     return (x @ v).reshape(n, d, -1), np.sqrt(np.maximum(squares, 0))
 
 
-def _ritz(local: Identities, x: NDArray) -> tuple[NDArray, NDArray]:
-    """Rotate orthonormal fields to singular ones. Working with residuals, not with their squares, keeps all digits."""
-    n, d, k = x.shape
-    triangle = np.linalg.qr(local.residual(x).reshape(-1, k), mode="r")
-    _, values, v = svd(triangle)
-    values = np.concatenate([values, np.zeros(k - len(values))])
-    return (x.reshape(n * d, k) @ v[::-1].T).reshape(n, d, k), values[::-1]
+def _refined(local: Identities, solver: Factorisation, fields: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
+    """One step of inverse iteration in correction form: its error is that of the residual, not of the factor.
 
-
-def _refine(local: Identities, solver: Factorisation, fields: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
-    """One step of inverse iteration in correction form: its error is that of the residual, not of the factor."""
+    Fields are rotated to singular ones by residuals, not by their squares, which keeps all digits.
+    """
     n, d, k = fields.shape
     null = values < ALIKE
     if null.any():
         gradient = local.gradient(local.residual(fields[..., null]))
-        step = solver.solve(gradient.reshape(n * d, -1)).reshape(n, d, -1)
         fields = fields.copy()
-        fields[..., null] -= step
+        fields[..., null] -= solver.solve(gradient.reshape(n * d, -1)).reshape(n, d, -1)
         fields = np.linalg.qr(fields.reshape(n * d, k))[0].reshape(n, d, k)
-    return _ritz(local, fields)
+    _, values, v = svd(np.linalg.qr(local.residual(fields).reshape(-1, k), mode="r"))
+    values = np.concatenate([values, np.zeros(k - len(values))])
+    return (fields.reshape(n * d, k) @ v[::-1].T).reshape(n, d, k), values[::-1]
 
 
 def patches(graph: sp.csr_array, size: int) -> list[NDArray[np.int64]]:
     """Cut a graph into halves of so many nodes at most, again and again, by breadth-first distance from one end."""
     done: list[NDArray[np.int64]] = []
     open_: list[NDArray[np.int64]] = [np.arange(graph.shape[0])]
+    breadth_first = sp.csgraph.breadth_first_order
     while open_:
         nodes = open_.pop()
         if len(nodes) <= size:
             done.append(nodes)
             continue
         sub = graph[nodes][:, nodes]
-        order = _from_one_end(sub)
+        order = breadth_first(sub, 0, directed=False, return_predecessors=False)
+        order = breadth_first(sub, order[-1], directed=False, return_predecessors=False)
+        order = np.concatenate([order, np.setdiff1d(np.arange(len(nodes)), order)])  # further components follow
         half = len(order) // 2
         open_ += [nodes[np.sort(order[half:])], nodes[np.sort(order[:half])]]
     return done
-
-
-def _from_one_end(graph: sp.csr_array) -> NDArray[np.int64]:
-    """All nodes by distance from a node far out; further components follow."""
-    breadth_first = sp.csgraph.breadth_first_order
-    order = breadth_first(graph, 0, directed=False, return_predecessors=False)
-    order = breadth_first(graph, order[-1], directed=False, return_predecessors=False)
-    rest = np.setdiff1d(np.arange(graph.shape[0]), order)
-    return np.concatenate([order, rest]).astype(np.int64)

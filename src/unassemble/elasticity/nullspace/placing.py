@@ -2,22 +2,61 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...errors import GeometryError
 from ...nodes.nodal import NodalMatrix, determined, linked
-from ...nodes.shape import Shape, in_gauge, shape
+from ...nodes.shape import in_gauge, shape
 from ...recovery import Evidence
 from ...tolerances import SINGULAR
 from ..springs import drawn_together
-from .atlas import NullFields, null_fields
-from .solution import Solution
+from .atlas import null_fields
 
 # Nodes of a body whose best fit, where none is exact, one factorisation finds. Charts are no help there: each fits in
 # its own way, and where two of them meet the joined field has a kink that costs far more than the misfit itself.
 _WHOLE = {2: 250_000, 3: 30_000}
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Positions of all pieces, and how surely they are known."""
+
+    valid: NDArray[np.bool_]  # (n, d, d) row and column directions whose equations were used
+    component: NDArray[np.int64]  # (n,) piece of each node, -1 where not determined
+    points: NDArray[np.float64]  # (n, d)
+    evidence: tuple[Evidence, ...]
+    freedoms: tuple[str, ...]  # what remains free beyond translation and scale, per piece; mostly empty
+    exact: bool  # whether all pieces have exact null fields
+    warnings: tuple[str, ...]
+    planes: bool = False  # whether nodes that lack a direction were taken to lie in planes across it
+    straight: tuple[float, ...] = ()  # lambda / mu of the pieces whose axes the identities leave free and elements told
+    # (n,) nodes that only equations determine that rest on an assumption, of planes
+    hanging: NDArray[np.bool_] | None = None
+
+    @property
+    def unique(self) -> bool:
+        """Whether what is determined is so up to translation and scale of its piece."""
+        return self.exact and not any(self.freedoms)
+
+    @property
+    def whole(self) -> bool:
+        """Whether every node is determined, up to translation and scale of its piece, and none hangs."""
+        return self.unique and bool(np.isfinite(self.firm_points).all())
+
+    @property
+    def firm_points(self) -> NDArray[np.float64]:
+        """(n, d) the points, NaN where they hang on an assumption that nothing controls."""
+        return self.points if self.hanging is None else np.where(self.hanging[:, None], np.nan, self.points)
+
+    @property
+    def rank(self) -> tuple[bool, bool, int, int]:
+        """For comparison of solutions: exact, unique, and how many coordinates are determined, firmly and at all."""
+        firm, points = np.isfinite(self.firm_points).sum(), np.isfinite(self.points).sum()
+        return self.exact, not any(self.freedoms), int(firm), int(points)
 
 
 def placed(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> Solution:
@@ -33,10 +72,14 @@ def placed(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> Solution:
     points = np.full((nodal.n, nodal.dim), np.nan)
     evidence, freedoms, exact, warnings = [], [], [], []
     failure: GeometryError | None = None
+    told = np.asarray(valid.reshape(nodal.n, -1).any(axis=1))
     for piece in range(n_pieces):
         body = np.flatnonzero(component == piece)
         found = null_fields(nodal, valid, body)
-        if found.charts > 1 and not _settled(found):
+        d, values = nodal.dim, found.values
+        # More than translations satisfies the identities exactly, and not all fields that were looked for.
+        settled = len(values) > d and values[d] <= SINGULAR < values[-1]
+        if found.charts > 1 and not settled:
             if len(body) <= _WHOLE[nodal.dim]:
                 found = null_fields(nodal, valid, body, patch=len(body))
             else:
@@ -44,7 +87,6 @@ def placed(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> Solution:
                     f"piece {piece} with node {body[0]} is too large for the best fit by one factorisation. The "
                     "points are those of smaller parts, joined, whose distances may be far from right"
                 )
-        told = np.asarray(valid.reshape(nodal.n, -1).any(axis=1))
         try:
             one = shape(found.fields, found.values, told[found.nodes])
         except GeometryError as error:
@@ -55,7 +97,9 @@ def placed(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> Solution:
             continue
         points[found.nodes] = one.points
         points[body] = in_gauge(points[body], graph[body][:, body])
-        evidence.append(_evidence(found, one))
+        null = max(one.null, d + 1)
+        gap = float(found.values[null]) if null < len(found.values) else float("inf")
+        evidence.append(Evidence(one.dimension, float(found.values[d]), gap, found.rows))
         freedoms.append(one.freedom)
         exact.append(one.exact)
     points[drawn_together(nodal, valid, points)] = np.nan
@@ -63,12 +107,6 @@ def placed(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> Solution:
         raise failure or GeometryError("no row annihilates constants: no node has a valid equation")
     component = np.where(determined(points), component, -1)
     return Solution(valid, component, points, tuple(evidence), tuple(freedoms), all(exact), tuple(warnings))
-
-
-def _settled(found: NullFields) -> bool:
-    """Whether more than translations satisfies the identities exactly, and not all fields that were looked for."""
-    d = found.fields.shape[1]
-    return len(found.values) > d and bool(found.values[d] <= SINGULAR < found.values[-1])
 
 
 def pieces_of(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
@@ -85,10 +123,3 @@ def pieces_of(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.
     order = np.full(len(told), -1)
     order[kept] = np.arange(len(kept))
     return order[label].astype(np.int64), len(kept)
-
-
-def _evidence(found: NullFields, one: Shape) -> Evidence:
-    d = found.fields.shape[1]
-    null = max(one.null, d + 1)
-    gap = float(found.values[null]) if null < len(found.values) else float("inf")
-    return Evidence(one.dimension, float(found.values[d]), gap, found.rows)

@@ -17,8 +17,7 @@ from ...nodes.nodal import NodalMatrix, determined
 from ...tolerances import SMALL
 from .atlas import PATCH
 from .identities import identities
-from .placing import placed
-from .solution import Solution
+from .placing import Solution, placed
 
 
 def checked(nodal: NodalMatrix, solution: Solution) -> NDArray[np.bool_]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -22,9 +21,7 @@ from ...nodes.shape import in_gauge, set_aside
 from ...recovery import Evidence
 from ...tolerances import ALIKE, SINGULAR
 from ..nullspace.atlas import null_fields
-from ..nullspace.identities import no_terms
-from ..nullspace.placing import pieces_of
-from ..nullspace.solution import Solution
+from ..nullspace.placing import Solution, pieces_of
 from .frame import frame
 
 
@@ -69,15 +66,16 @@ def _straight(nodal: NodalMatrix, inside: NDArray[np.bool_]) -> Iterator[Straigh
     graph = nodal.graph
     for piece in range(n_pieces):
         body = np.flatnonzero(component == piece)
-        null = null_fields(nodal, inside, body, terms=no_terms(nodal.dim))
+        null = null_fields(nodal, inside, body, terms=np.empty((nodal.dim,) * 3 + (0,)))
         exact = null.values <= SINGULAR
         if not len(exact) or exact[-1] or exact.sum() <= nodal.dim:
             continue
         shown = _picture(null.fields[..., exact])
         if shown is None:
             continue
+        held, picture, fields = shown
         points = np.full((nodal.n, nodal.dim), np.nan)
-        points[null.nodes[shown.held]] = shown.points
+        points[null.nodes[held]] = picture
         told = frame(nodal, points)
         if told is None:
             continue
@@ -85,19 +83,14 @@ def _straight(nodal: NodalMatrix, inside: NDArray[np.bool_]) -> Iterator[Straigh
         here = determined(points)
         points[here] = in_gauge(points[here] @ matrix.T, graph[here][:, here])
         residual, gap = map(float, null.values[[nodal.dim, exact.sum()]])
-        yield Straight(points, ratio, Evidence(shown.fields, residual, gap, null.rows))
+        yield Straight(points, ratio, Evidence(fields, residual, gap, null.rows))
 
 
-class _Picture(NamedTuple):
-    """Which nodes are held, (N,), an affine picture of these, (N', d), and how many of the fields they share."""
+def _picture(null: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.float64], int] | None:
+    """An affine picture among fields (N, d, k) without boundary terms; None where there is more than that.
 
-    held: NDArray[np.bool_]
-    points: NDArray[np.float64]
-    fields: int
-
-
-def _picture(null: NDArray[np.float64]) -> _Picture | None:
-    """An affine picture among fields (N, d, k) without boundary terms; None where there is more than that."""
+    Which nodes are held, (N,), the picture of these, (N', d), and how many of the fields they share.
+    """
     d, functions = null.shape[1], _functions(null)
     held = np.ones(len(null), dtype=bool)
     if functions.shape[1] > d:  # those of nodes that can move by themselves are among them
@@ -107,7 +100,7 @@ def _picture(null: NDArray[np.float64]) -> _Picture | None:
     if functions.shape[1] != d:
         return None
     fields = int((scipy.linalg.svdvals(null[held].reshape(-1, null.shape[2])) > ALIKE).sum())
-    return _Picture(held, functions, fields)
+    return held, functions, fields
 
 
 def _functions(null: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -119,27 +112,17 @@ def _functions(null: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def in_place(found: Solution | None, valid: NDArray[np.bool_], straight: list[Straight]) -> Solution:
     """Straight pieces, one at least, in place of the bent ones that they are part of."""
+    base = found or Solution(valid, np.empty(0, np.int64), np.empty(0), (), (), exact=True, warnings=())
+    better = {one.piece_in(base) for one in straight} if found else set()
+    parts = [
+        (base.component == k, base.points, *of_piece)
+        for k, of_piece in enumerate(zip(base.evidence, base.freedoms, strict=True))
+        if k not in better
+    ]
+    parts += [(one.nodes, one.points, one.evidence, "") for one in straight]
     component, points = np.full(len(valid), -1), np.full(straight[0].points.shape, np.nan)
-    evidence: list[Evidence] = []
-    freedoms: list[str] = []
-    if found is not None:
-        better = {one.piece_in(found) for one in straight}
-        for piece in range(len(found.freedoms)):
-            if piece not in better:
-                here = found.component == piece
-                component[here], points[here] = len(freedoms), found.points[here]
-                evidence.append(found.evidence[piece])
-                freedoms.append(found.freedoms[piece])
-    for one in straight:
-        component[one.nodes], points[one.nodes] = len(freedoms), one.points[one.nodes]
-        evidence.append(one.evidence)
-        freedoms.append("")
-    base = Solution(valid, component, points, (), (), exact=True, warnings=()) if found is None else found
-    return replace(
-        base,
-        component=component,
-        points=points,
-        evidence=tuple(evidence),
-        freedoms=tuple(freedoms),
-        straight=tuple(one.ratio for one in straight),
-    )
+    for k, (here, x, _, _) in enumerate(parts):
+        component[here], points[here] = k, x[here]
+    _, _, evidence, freedoms = zip(*parts, strict=True)
+    ratios = tuple(one.ratio for one in straight)
+    return replace(base, component=component, points=points, evidence=evidence, freedoms=freedoms, straight=ratios)
