@@ -7,7 +7,7 @@ element matrices and candidates.
 from .candidates import candidates
 from .cliques import Graph
 from .kinds import KINDS
-from .matrices import assembled, elasticity, laplacian, mass
+from .matrices import assembled, elasticity, mass
 from .ordering import ordered, ordered_boxes
 from .reference import exact_rule, planar_rules, reference_nodes, rules, shape_functions, shape_gradients
 from .surface import outer_facets, outer_nodes
@@ -19,7 +19,6 @@ __all__ = [
     "candidates",
     "elasticity",
     "exact_rule",
-    "laplacian",
     "mass",
     "ordered",
     "ordered_boxes",

@@ -101,16 +101,17 @@ def planar_rules(kind: Kind) -> dict[str, Rule]:
 
 
 def exact_rule(kind: Kind, more: int = 0) -> Rule:
-    """A rule that integrates products of gradients exactly on affine cells, in the plane: Gauss's, on triangles folded.
+    """A rule that integrates products of gradients exactly on affine cells: Gauss's, on simplices folded.
 
-    The map (s, t) -> (s, (1 - s) t) takes the box to the triangle; its determinant costs one degree. Products of
-    functions take one point `more` in each direction.
+    The map (s, t, u) -> (s, (1 - s) t, (1 - s) (1 - t) u) takes the box to the simplex; its determinant costs a degree
+    in the plane. Products of functions take one point `more` in each direction.
     """
-    at, weights = _gauss(2, kind.degree + 1 + more)
-    if not kind.simplex:
-        return at, weights
-    s, t = at.T
-    return np.column_stack([s, (1 - s) * t]), weights * (1 - s)
+    at, weights = _gauss(kind.dim, kind.degree + 1 + more)
+    if kind.simplex:
+        left = np.cumprod(1 - at[:, :-1], axis=1)
+        at[:, 1:] *= left
+        weights = weights * left.prod(axis=1)
+    return at, weights
 
 
 def _gauss(d: int, order: int) -> Rule:
