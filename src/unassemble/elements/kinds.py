@@ -65,13 +65,3 @@ KINDS = {
         Kind("hexahedron27", "hexahedron", 3, 8, (*_HEXAHEDRON, *_SIDES, tuple(range(8)))),
     )
 }
-
-
-def kind_of(base: str, nodes: int) -> Kind:
-    """The kind on the corners of `base` that has so many nodes."""
-    return next(kind for kind in KINDS.values() if kind.base == base and kind.nodes == nodes)
-
-
-def sides(base: str) -> tuple[tuple[int, ...], ...]:
-    """Pairs of corners that are the edges of a linear cell."""
-    return {"triangle": _TRIANGLE, "quad": _QUAD, "tetra": _TETRA, "hexahedron": _HEXAHEDRON}[base]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .cliques import Graph, shared_cliques, simplices
@@ -16,9 +15,7 @@ _FLAT = 0.3  # of its width: how thick a quadrilateral may be
 def graph_of(n: int, *cells: NDArray[np.int64]) -> Graph:
     """The graph of n nodes in which those of each cell, (m, k), are coupled to each other."""
     pairs = [some[:, pair] for some in cells for pair in combinations(range(some.shape[1]), 2)]
-    i, j = np.concatenate(pairs).T
-    ends = np.concatenate([i, j]), np.concatenate([j, i])
-    return Graph(sp.csr_array((np.ones(2 * len(i), np.int8), ends), shape=(n, n)))
+    return Graph.of(n, *np.concatenate(pairs).T)
 
 
 def shell_cells(graph: Graph, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

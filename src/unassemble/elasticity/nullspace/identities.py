@@ -156,7 +156,7 @@ def identities(
     """
     terms = boundary_terms(nodal.dim) if terms is None else terms
     valid = valid if valid.ndim == 4 else np.repeat(valid[..., None], nodal.dim, axis=3)
-    code = valid[rows].reshape(len(rows), -1) @ (1 << np.arange(nodal.dim**3))
+    code = valid[rows].reshape(-1, nodal.dim**3) @ (1 << np.arange(nodal.dim**3))
     alike = [(code == value, boundary_basis(valid[rows[np.argmax(code == value)]], terms)) for value in np.unique(code)]
     equations = valid[rows].sum(axis=(1, 2, 3))
     for same, basis in alike:
@@ -187,6 +187,8 @@ def lame_ratio(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.
     """
     known, d = determined(points), nodal.dim
     local = identities(nodal, valid, np.arange(nodal.n))
+    if not len(local.rows):
+        return None
     value = local.apply(np.where(known[:, None], points, 0.0)[local.columns, :, None])
     both = np.full((len(local.rows), 2 * d), np.nan)  # p and q, in units of the size of the row
     for rows, basis in local.kinds:
