@@ -27,7 +27,7 @@ from .nullspace.certificate import residuals
 from .nullspace.identities import lame_ratio, poisson_ratio
 from .nullspace.placing import Solution
 from .nullspace.redundancy import checked
-from .remarks import about_assumptions, about_cells, about_directions, about_nodes
+from .remarks import about_assumptions, about_cells, about_nodes
 from .verdict import NOTHING_CHECKED, NOTHING_SHOWN, RESTS_ON_PLANES, hidden, of_few_digits, verdict
 
 
@@ -112,8 +112,7 @@ def described(
             *solution.warnings,
             *(about_cells(shown) if cells else ()),
             *about_nodes(nodal, loose, withheld, hanging, lone),
-            *about_assumptions(solution),
-            *about_directions(int(guessed.sum())),
+            *about_assumptions(solution, int(guessed.sum())),
             *notes,
         ),
         node_of_row=numbering.node_of_row,

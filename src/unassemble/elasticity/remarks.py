@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,19 +13,18 @@ from .materials.cells import Cells
 from .nullspace.placing import Solution
 
 
-def about_cells(found: Cells) -> list[str]:
+def about_cells(found: Cells) -> Iterator[str]:
     """What there is to say of the elements."""
     if not found.recognised:
-        return [
-            "no elements were recognised: looked for are triangles and quadrilaterals, tetrahedra and hexahedra, "
-            "of one kind throughout, or linear triangles beside quadrilaterals"
-        ]
-    if not found.certified:
-        return [
+        yield (
+            "no elements were recognised: looked for are triangles and quadrilaterals, tetrahedra and hexahedra, of "
+            "one kind throughout, or linear triangles beside quadrilaterals"
+        )
+    elif not found.certified:
+        yield (
             "the elements were read off the graph and are not certified: no material was found with which they "
             "re-assemble to the matrix"
-        ]
-    return []
+        )
 
 
 def about_nodes(
@@ -32,65 +33,57 @@ def about_nodes(
     withheld: NDArray[np.bool_],
     hanging: NDArray[np.bool_],
     lone: NDArray[np.bool_],
-) -> list[str]:
+) -> Iterator[str]:
     """Why nodes have no coordinates: `loose`.
 
     No cell confirms those `withheld`; others rest on an assumption that nothing confirms, `hanging`, or on identities
     that no others would contradict, `lone`.
     """
-    sprung = (nodal.size == 0) & (nodal.row_of >= 0).any(axis=1)
-    told = []
-    if (loose & sprung).any():
-        told.append(
-            f"{count_of(int((loose & sprung).sum()), 'node hangs', 'nodes hang')} on springs, or on nothing, and have "
-            "no position: no linear field knows a spring"
+    sprung = loose & (nodal.size == 0) & (nodal.row_of >= 0).any(axis=1)
+    if sprung.any():
+        yield (
+            f"{_nodes(sprung, 'hangs', 'hang')} on springs, or on nothing, and have no position: no linear field knows "
+            "a spring"
         )
     if withheld.any():
-        told.append(
-            f"{count_of(int(withheld.sum()), 'node has', 'nodes have')} rows that no element shows to be theirs. "
-            "Since it was inferred which rows make up a node, no coordinates are given there"
+        yield (
+            f"{_nodes(withheld, 'has', 'have')} rows that no element shows to be theirs. Since it was inferred which "
+            "rows make up a node, no coordinates are given there"
         )
-    resting = int((hanging & ~withheld).sum())
-    if resting:
-        told.append(
-            f"{count_of(resting, 'node is', 'nodes are')} determined only if nodes that lack a direction lie in planes "
-            "across it, which neither another equation nor an element confirms. No coordinates are given there"
+    if (hanging & ~withheld).any():
+        yield (
+            f"{_nodes(hanging & ~withheld)} determined only if nodes that lack a direction lie in planes across it, "
+            "which neither another equation nor an element confirms. No coordinates are given there"
         )
     if lone.any():
-        told.append(
-            f"{count_of(int(lone.sum()), 'node is', 'nodes are')} determined by identities that no others check, nor "
-            "an element. No coordinates are given there"
+        yield (
+            f"{_nodes(lone)} determined by identities that no others check, nor an element. No coordinates are given "
+            "there"
         )
-    rest = int((loose & ~withheld & ~hanging & ~lone & ~sprung).sum())
-    if rest:
-        told.append(
-            f"{count_of(rest, 'node is', 'nodes are')} not determined: rows coupled to {'it' if rest == 1 else 'them'} "
-            "lack entries, as next to eliminated unknowns, or belong to other axes, as at inclined supports, and no "
-            "equation that holds for every element and material is left of these"
+    rest = loose & ~withheld & ~hanging & ~lone & ~sprung
+    if rest.any():
+        yield (
+            f"{_nodes(rest)} not determined: rows coupled to {'it' if rest.sum() == 1 else 'them'} lack entries, as "
+            "next to eliminated unknowns, or belong to other axes, as at inclined supports, and no equation that holds "
+            "for every element and material is left of these"
         )
-    return told
 
 
-def about_assumptions(solution: Solution) -> list[str]:
-    """What was assumed, beside the identities, to determine positions."""
-    told = []
+def _nodes(some: NDArray[np.bool_], is_: str = "is", are: str = "are") -> str:
+    return count_of(int(some.sum()), f"node {is_}", f"nodes {are}")
+
+
+def about_assumptions(solution: Solution, guessed: int) -> Iterator[str]:
+    """What was assumed, beside the identities, to determine positions, and directions of rows that were guessed."""
     if solution.planes:
-        told.append(
-            "nodes that lack a direction were taken to lie in planes across it, which fits, to determine others"
-        )
+        yield "nodes that lack a direction were taken to lie in planes across it, which fits, to determine others"
     if solution.straight:
-        told.append(
+        yield (
             "the body is homogeneous and held all around, where the identities leave an affine map free that the "
             "elements determined"
         )
-    return told
-
-
-def about_directions(guessed: int) -> list[str]:
-    """What there is to say of rows whose direction is the likeliest and no more."""
-    if not guessed:
-        return []
-    return [
-        f"which directions {count_of(guessed, 'row', 'rows')} of nodes without coordinates belong to is not proven: "
-        "`direction_of_row` is -1 there, and rigid-body modes are zero"
-    ]
+    if guessed:
+        yield (
+            f"which directions {count_of(guessed, 'row', 'rows')} of nodes without coordinates belong to is not "
+            "proven: `direction_of_row` is -1 there, and rigid-body modes are zero"
+        )

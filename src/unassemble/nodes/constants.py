@@ -13,9 +13,7 @@ PENALTY = 1e3  # a diagonal entry this many times the rest of its row is a penal
 
 def uncoupled_rows(matrix: sp.csr_array) -> NDArray[np.bool_]:
     """(N,) rows without an entry off the diagonal, as those of the identity."""
-    off = matrix.copy()
-    off.setdiag(0)
-    return np.asarray(abs(off).sum(axis=1)).ravel() == 0
+    return row_sizes(matrix) == 0
 
 
 def row_sizes(matrix: sp.csr_array) -> NDArray[np.float64]:
@@ -38,11 +36,10 @@ def without_penalties(matrix: sp.csr_array) -> sp.csr_array:
     own, penalised = matrix.diagonal(), with_penalty(matrix, row_sizes(matrix))
     if not penalised.any():
         return matrix
-    given = matrix.tocoo()
-    entries = np.where((given.row == given.col) & penalised[given.row], 0.0, given.data)
-    left = np.bincount(given.row, np.where(given.row == given.col, 0.0, entries), len(own))
-    entries[given.row == given.col] = np.where(penalised, -left, own)[given.row[given.row == given.col]]
-    return sp.csr_array((entries, (given.row, given.col)), shape=matrix.shape)
+    whole = matrix.copy()
+    whole.setdiag(0)
+    whole.setdiag(np.where(penalised, -np.asarray(whole.sum(axis=1)).ravel(), own))
+    return whole
 
 
 def adding_up(matrix: sp.csr_array, size: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -29,24 +29,6 @@ class NodalMatrix:
     penalised: NDArray[np.bool_]  # (n, d) unknowns with a penalty on the diagonal
     doubtful: NDArray[np.bool_] | None = None  # (n,) nodes whose rows, or directions, may be others
 
-    @classmethod
-    def of(cls, indptr: NDArray, indices: NDArray, data: NDArray, row_of: NDArray[np.int64]) -> NodalMatrix:
-        """From blocks in BSR form, every node coupled to itself."""
-        n, d = row_of.shape
-        indptr = indptr.astype(np.int32)
-        indices, data = indices[: indptr[-1]].astype(np.int32), data[: indptr[-1]].copy()
-        own = np.repeat(np.arange(n), np.diff(indptr)) == indices
-        off = np.abs(data).sum(axis=(1, 2)) / d**2
-        off[own] = 0
-        size = np.add.reduceat(off, indptr[:-1])
-        diagonal = np.diagonal(data, axis1=1, axis2=2)[own]
-        penalised = (np.abs(diagonal) > PENALTY * size[:, None]) & (size > 0)[:, None]
-        node, direction = np.nonzero(penalised)
-        place = np.flatnonzero(own)[node]
-        data[place, direction, direction] = 0  # before the rest is added up: it would be lost beside the penalty
-        data[place, direction, direction] = -np.add.reduceat(data, indptr[:-1])[node, direction, direction]
-        return cls(indptr, indices, data, row_of, size, penalised)
-
     @property
     def n(self) -> int:
         """Number of nodes."""
@@ -84,17 +66,23 @@ def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
     row_of[place[live]] = np.flatnonzero(live)
     coo = matrix.tocoo()
     keep = live[coo.row] & live[coo.col]
-    diagonal = np.arange(n) * d
-    entries = sp.coo_array(
-        (
-            np.concatenate([coo.data[keep], np.zeros(n)]),
-            (np.concatenate([place[coo.row[keep]], diagonal]), np.concatenate([place[coo.col[keep]], diagonal])),
-        ),
-        shape=(n * d, n * d),
-    )
+    diagonal = np.arange(n) * d  # so that every node is coupled to itself
+    ends = np.concatenate([place[coo.row[keep]], diagonal]), np.concatenate([place[coo.col[keep]], diagonal])
+    entries = sp.coo_array((np.concatenate([coo.data[keep], np.zeros(n)]), ends), shape=(n * d, n * d))
     blocks = entries.tocsr().tobsr(blocksize=(d, d))
     blocks.sort_indices()
-    return NodalMatrix.of(blocks.indptr, blocks.indices, blocks.data, row_of.reshape(n, d))
+    indptr = blocks.indptr.astype(np.int32)
+    indices, data = blocks.indices[: indptr[-1]].astype(np.int32), blocks.data[: indptr[-1]].copy()
+    own = np.repeat(np.arange(n), np.diff(indptr)) == indices
+    off = np.abs(data).sum(axis=(1, 2)) / d**2
+    off[own] = 0
+    size = np.add.reduceat(off, indptr[:-1])
+    penalised = (np.abs(np.diagonal(data, axis1=1, axis2=2)[own]) > PENALTY * size[:, None]) & (size > 0)[:, None]
+    node, direction = np.nonzero(penalised)
+    at = np.flatnonzero(own)[node]
+    data[at, direction, direction] = 0  # before the rest is added up: it would be lost beside the penalty
+    data[at, direction, direction] = -np.add.reduceat(data, indptr[:-1])[node, direction, direction]
+    return NodalMatrix(indptr, indices, data, row_of.reshape(n, d), size, penalised)
 
 
 def valid_pairs(nodal: NodalMatrix) -> NDArray[np.bool_]:

@@ -54,8 +54,10 @@ def known_to(
             other, left = place(rounding.redrawn(seed))
             if not determined(other)[component >= 0].all() or len(left) != len(misfits):
                 return Known(float("inf"))
-            for piece in pieces:
-                moved[piece] += _moved(points[piece], other[piece], sized=sized)
+            for piece in pieces:  # in the same place, relative to the diameter
+                x, y = (one[piece] - one[piece].mean(axis=0) for one in (points, other))
+                factor = 1.0 if sized else (x * y).sum() / (y * y).sum()
+                moved[piece] += np.square(x - factor * y).sum(axis=1) / np.square(np.ptp(x, axis=0)).sum()
             mirrored = not sized and np.nansum(points * other) < 0
             changes[seed] = (-left if mirrored else left) - misfits
     except GeometryError:
@@ -78,10 +80,3 @@ def _explained(misfits: NDArray[np.float64], changes: NDArray[np.float64]) -> bo
     freedom = max(1.0, size**2 / alike)
     bound = scipy.stats.f.isf(CONFIDENCE, freedom, draws * freedom)
     return bool(misfits @ misfits <= size * max(NOISY**2, bound))
-
-
-def _moved(x: NDArray[np.float64], y: NDArray[np.float64], *, sized: bool) -> NDArray[np.float64]:
-    """(n,) squared distances of points from others, in the same place, relative to their diameter."""
-    x, y = x - x.mean(axis=0), y - y.mean(axis=0)
-    factor = 1.0 if sized else (x * y).sum() / (y * y).sum()
-    return np.asarray(np.square(x - factor * y).sum(axis=1) / np.square(np.ptp(x, axis=0)).sum())

@@ -57,8 +57,9 @@ def directions_in_order(
     if direction is not None:
         yield direction
     group = same_pattern(inner)
-    if _shows_runs(group, d) and inner.diagonal().all():
-        direction = spread_directions(inner, group, d, _of_runs(group, d))
+    known = _of_runs(group, d)
+    if np.mean(known >= 0) > 0.5 and inner.diagonal().all():
+        direction = spread_directions(inner, group, d, known)
         yield with_least_sums(inner, group, direction, d, Budget(_WORK))
 
 
@@ -70,20 +71,9 @@ def live_part(matrix: sp.csr_array) -> tuple[NDArray[np.int64], sp.csr_array]:
     return live, inner
 
 
-def _runs(group: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(N,) runs of neighbouring rows of one group."""
-    return np.concatenate([[0], np.cumsum(np.diff(group) != 0)])
-
-
-def _shows_runs(group: NDArray[np.int64], d: int) -> bool:
-    """Whether most rows stand in runs of d rows of one group, as those of nodes do."""
-    run = _runs(group)
-    return bool(2 * np.count_nonzero(np.bincount(run)[run] == d) > len(run))
-
-
 def _of_runs(group: NDArray[np.int64], d: int) -> NDArray[np.int64]:
-    """(N,) directions of rows in runs of d rows of one group, -1 for all others."""
-    run = _runs(group)
+    """(N,) directions of rows in runs of d neighbouring rows of one group, as those of nodes are; -1 for all others."""
+    run = np.concatenate([[0], np.cumsum(np.diff(group) != 0)])
     return np.where(np.bincount(run)[run] == d, np.arange(len(run)) - np.searchsorted(run, run), -1)
 
 
@@ -106,7 +96,8 @@ def _readings(inner: sp.csr_array, sizes: tuple[int, ...], as_stored: bool) -> I
         whole = filled(inner) if put_back else inner
         group = same_pattern(whole)
         for d in sizes:
-            if kind == "interleaved" and not (put_back or (large and not as_stored) or _shows_runs(group, d)):
+            shown = put_back or (large and not as_stored) or np.mean(_of_runs(group, d) >= 0) > 0.5
+            if kind == "interleaved" and not shown:
                 continue
             reading = _by_equilibrium(inner, whole, d, kind)
             if reading is not None:
@@ -161,7 +152,8 @@ def _by_equilibrium(inner: sp.csr_array, whole: sp.csr_array, d: int, kind: str)
     if kind == "interleaved":
         node, open_row = nodes_in_runs(inner, group, direction, d), None
     else:
-        node, open_row = _of_patterns(group, direction, d)
+        open_row = np.asarray((by_direction(group, direction, d) > 1).any(axis=1))[group]  # several of some direction
+        node = by_first_row(np.where(open_row, len(group) + np.arange(len(group)), group))
         if _even(inner, group, direction, d) <= MOST:
             return None
     return Reading(node, direction, open_row, ~proven_directions(whole, direction, group, d))
@@ -185,14 +177,6 @@ def _even(matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.
     count = by_direction(group, direction, d)
     whole = (np.bincount(group, ~adds_up) == 0)[group]
     return float((count == count[:, :1]).all(axis=1)[group[whole]].mean()) if whole.any() else 0.0
-
-
-def _of_patterns(
-    group: NDArray[np.int64], direction: NDArray[np.int64], d: int
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Nodes of rows of one pattern, and rows that are left by themselves since their pattern has several of some."""
-    several = np.asarray((by_direction(group, direction, d) > 1).any(axis=1))[group]
-    return by_first_row(np.where(several, len(group) + np.arange(len(group)), group)), several
 
 
 def _of_all_rows(reading: Reading, live: NDArray[np.int64], order: int) -> Reading:

@@ -68,7 +68,9 @@ def shape(
             null, loose, count = shared, apart, some
             break
     kept = null[~loose]
-    moving = _without_translations(kept)
+    u, s, _ = svd((kept - kept.mean(axis=0)).reshape(-1, kept.shape[2]), full_matrices=False)
+    others = kept.shape[2] - d  # in slender bodies rounding leaves more of the translations
+    moving = u[:, :others][:, s[:others] > ALIKE].reshape(len(kept), d, -1)
     dimension = d + moving.shape[2] if exact else d
     points = np.full((n, d), np.nan)
     points[~loose], freedom = _choose(moving, exact=bool(exact))
@@ -92,24 +94,11 @@ def set_aside(null: NDArray, common: int) -> tuple[NDArray, NDArray[np.bool_]]:
             loose = np.abs(own).max(axis=(1, 2)) > CANCELLED
             if np.count_nonzero(~loose) * null.shape[1] < common:  # too few are left to carry what they share
                 break
-            return _orthonormal(np.einsum("nak,lk->nal", null, v[:common]), ~loose), loose
+            fields = np.einsum("nak,lk->nal", null, v[:common])
+            shared = np.zeros_like(fields)  # orthonormal over the others
+            shared[~loose] = np.linalg.qr(fields[~loose].reshape(-1, common))[0].reshape(-1, *fields.shape[1:])
+            return shared, loose
     return null, np.zeros(n, dtype=bool)
-
-
-def _orthonormal(fields: NDArray, kept: NDArray[np.bool_]) -> NDArray:
-    """Fields orthonormal over the kept nodes, zero at the others."""
-    q = np.linalg.qr(fields[kept].reshape(-1, fields.shape[2]))[0]
-    full = np.zeros_like(fields)
-    full[kept] = q.reshape(-1, *fields.shape[1:])
-    return full
-
-
-def _without_translations(fields: NDArray) -> NDArray:
-    """Orthonormal basis of the centred fields, d fewer: in slender bodies rounding leaves more of the translations."""
-    n, d, k = fields.shape
-    centred = (fields - fields.mean(axis=0)).reshape(n * d, k)
-    u, s, _ = svd(centred, full_matrices=False)
-    return u[:, : k - d][:, s[: k - d] > ALIKE].reshape(n, d, -1)
 
 
 def _choose(moving: NDArray, *, exact: bool) -> tuple[NDArray, str]:

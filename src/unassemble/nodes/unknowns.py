@@ -151,15 +151,11 @@ def _with_gaps(matrix: sp.csr_array, regular: Numbering, sizes: tuple[int, ...])
     if regular.kind == "by component" and not impossible and same_cuts(matrix, regular):
         return regular
     for one in searched(matrix, sizes, as_stored=True):
-        if one.common == 1 and not one.odd and (impossible or _contradicts(one, regular)):
+        unlike = (one.direction_of_row != regular.direction_of_row) & ~regular.identity_row  # which has any
+        contradicts = (unlike if one.unnamed is None else unlike & ~one.unnamed).any()  # by sums that prove
+        if one.common == 1 and not one.odd and (impossible or contradicts):
             return one
     return replace(regular, odd=impossible)
-
-
-def _contradicts(one: Numbering, other: Numbering) -> bool:
-    """Whether a direction that sums prove is another one there; rows of the identity have any."""
-    unlike = (one.direction_of_row != other.direction_of_row) & ~other.identity_row
-    return bool((unlike if one.unnamed is None else unlike & ~one.unnamed).any())
 
 
 def _regular(matrix: sp.csr_array, d: int, kind: str, *, checked: bool = True) -> Numbering | None:

@@ -11,24 +11,28 @@ from numpy.typing import NDArray
 
 from ..nodes.nodal import determined
 from .layouts import Layout
+from .nodes import Nodes
+from .recognise import StructuralNumbering
 from .straight import Straight
 
 
 def forces(
     matrix: sp.csr_array,
-    layout: Layout,
-    node_of_row: NDArray[np.int64],
-    direction_of_row: NDArray[np.int64],
+    numbering: StructuralNumbering,
+    nodes: Nodes,
     points: NDArray[np.float64],
-    counted: NDArray[np.bool_],
+    valid: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Forces that rigid rotations of the nodes bring about, with their signs, relative to what makes them up.
+    """Forces (k,) that rigid rotations of the nodes bring about, with their signs, relative to what makes them up.
 
     That is bounded, without signs, by nodes that move by their distance from the centroid and turn by one: about
-    single axes both may be nothing but rounding. The matrix is as it was given; rows whose direction is -1 do not
-    move; rows that touch nodes without coordinates do not count, and of the others those and the rotations that are
-    `counted`, (N, rotations). Returns the forces (k,) of all that count, and rows (N,) with one that does.
+    single axes both may be nothing but rounding. Rows of the given matrix whose direction is -1 do not move; those that
+    touch nodes without coordinates do not count, of the others those and the rotations that are `valid`, by node. With
+    rows (N,) one of whose forces counts.
     """
+    layout, node_of_row, direction_of_row = numbering.layout, numbering.node_of_row, numbering.direction_of_row
+    counted = np.zeros((len(node_of_row), len(layout.turning)), dtype=bool)
+    counted[nodes.row_of[nodes.present]] = valid[nodes.present]
     moves = len(layout.displacements)
     known, moving = determined(points), direction_of_row >= 0
     motions = layout.rigid_motions(np.where(known[:, None], points, 0.0))[:, :, moves:]

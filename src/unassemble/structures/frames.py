@@ -49,9 +49,9 @@ def serve_structure(
     whole, rounding = with_exact_sums(matrix.csr(), known=(numbering.direction_of_row, layout.block_size))
     spread = rounding.spread if rounding else 0.0
     with clock("solve"):
-        nodes, members, found, valid = solved = _placed(whole, numbering, rounding)
+        nodes, members, found, valid = _placed(whole, numbering, rounding)
     with clock("certify"):
-        force, used = _forces(whole, numbering, *solved)
+        force, used = forces(whole, numbering, nodes, found.points, valid)
         ends, misfit = members_misfits(members, layout, found.points)
         used = (used | np.isin(node, ends)) & ~np.isin(node, found.spoiled)
         error = float(np.concatenate([abs(force), misfit]).max()) if used.any() else float("inf")
@@ -121,26 +121,11 @@ def _known(
         return Known(float(error * np.sqrt(loosest.rows) / loosest.gap))
 
     def place(other: sp.csr_array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        solved = _placed(other, numbering, rounding, members.ends)
-        return solved[2].points, _forces(other, numbering, *solved)[0]
+        nodes, _, again, valid = _placed(other, numbering, rounding, members.ends)
+        return again.points, forces(other, numbering, nodes, again.points, valid)[0]
 
     sized = bool(numbering.layout.rotations)
     return known_to(found.points, found.component, force, rounding, place, sized=sized)
-
-
-def _forces(
-    matrix: sp.csr_array,
-    numbering: StructuralNumbering,
-    nodes: Nodes,
-    _members: Straight,
-    found: Placed,
-    valid: NDArray[np.bool_],
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Forces of what :func:`_placed` found in a matrix; see :func:`.certificate.forces`."""
-    layout, node = numbering.layout, numbering.node_of_row
-    counted = np.zeros((len(node), len(layout.turning)), dtype=bool)
-    counted[nodes.row_of[nodes.present]] = valid[nodes.present]
-    return forces(matrix, layout, node, numbering.direction_of_row, found.points, counted)
 
 
 def _placed(
