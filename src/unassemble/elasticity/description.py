@@ -21,13 +21,12 @@ from ..nodes.redrawn import known_to
 from ..recovery import Body
 from ..tolerances import ALIKE, LAST_DIGITS
 from ..words import Reason
-from .doubts import guessed_directions, unborne, unconfirmed
+from .doubts import about_assumptions, about_cells, about_nodes, guessed_directions, unborne, unconfirmed
 from .materials.cells import Cells, no_cells, recognise_cells
 from .nullspace.certificate import residuals
 from .nullspace.identities import lame_ratio, poisson_ratio
 from .nullspace.placing import Solution
 from .nullspace.redundancy import checked
-from .remarks import about_assumptions, about_cells, about_nodes
 from .verdict import NOTHING_CHECKED, NOTHING_SHOWN, RESTS_ON_PLANES, hidden, of_few_digits, verdict
 
 
