@@ -42,8 +42,7 @@ def described(
 ) -> Body:
     """The body, with its certificate, material and cells, and the sentences that go with them.
 
-    `placed_again` finds points (n, d), and misfits (k,), from another matrix that may have been rounded to the given
-    one.
+    `placed_again` finds points and misfits from another matrix that may have been rounded to the given one.
     """
     cells, rounding = request.cells, request.rounding
     with clock("certify"):

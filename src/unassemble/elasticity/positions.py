@@ -27,13 +27,7 @@ _LARGE = 2000
 
 
 def solve(nodal: NodalMatrix) -> Solution:
-    """Place all nodes.
-
-    Raises
-    ------
-    GeometryError
-        If no piece has positions.
-    """
+    """Place all nodes; GeometryError if no piece has positions."""
     valid = valid_pairs(nodal)
     found: Solution | None = None
     failure: GeometryError | None = None

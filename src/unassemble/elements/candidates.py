@@ -34,11 +34,8 @@ class Block:
 def candidates(graph: Graph, points: NDArray[np.float64]) -> Iterator[tuple[Block, ...]]:
     """What could be the cells, those kinds first that have most nodes: of one kind, or triangles beside quadrilaterals.
 
-    Parameters
-    ----------
-    graph : Graph
-        Coupled nodes; nodes without coordinates are coupled to none.
-    points : (n, d) float64
+    The graph couples nodes with coordinates; no more is asked of the points (n, d) than that they are an affine
+    picture.
     """
     d, known = points.shape[1], int(np.isfinite(points).all(axis=1).sum())
     known_kinds = (kind for kind in KINDS.values() if kind.dim == d and kind.degree < 3 and not kind.linear_simplex)

@@ -104,8 +104,8 @@ def shared_cliques(graph: Graph, k: int) -> NDArray[np.int64]:
 def straight_simplices(graph: Graph, points: NDArray[np.float64]) -> NDArray[np.int64]:
     """(m, 6 or 10) corners and middles of simplices whose sides have a node in the middle; nodes increasing.
 
-    For quadratic triangles of one material: there the entries between a corner and the middle of the side facing
-    it vanish, so that the six nodes are no clique; but all middles are coupled.
+    In quadratic triangles of one material the entries between a corner and the middle of the side facing it vanish, so
+    that the six nodes are no clique; but all middles are coupled.
     """
     d = points.shape[1]
     known = np.flatnonzero(np.isfinite(points).all(axis=1))

@@ -18,9 +18,9 @@ from .reference import Rule, shape_functions, shape_gradients
 def mapped_gradients(
     points: NDArray[np.float64], cells: NDArray[np.int64], kind: Kind, rule: Rule
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(m, q, k, d) gradients of the shape functions in space, and (m, q) weights times |det J|.
+    """(m, q, k, d) gradients of shape functions in space, and (m, q) weights times |det J|.
 
-    In cells that are flat gradients are those of the reference element, and the weights zero.
+    Of flat cells the gradients are those in the reference element, and the weights zero.
     """
     at, weights = rule
     local = shape_gradients(kind, at)
@@ -65,15 +65,7 @@ def elasticity(
 
 
 def assembled(blocks: NDArray[np.float64], cells: NDArray[np.int64], n: int) -> sp.csr_array:
-    """The matrix of n nodes that element matrices add up to.
-
-    Parameters
-    ----------
-    blocks : (m, k, k) or (m, k, k, d, d) float64
-        Scalar; or blocks of d unknowns per node, which the matrix then has node by node.
-    cells : (m, k) int64
-    n : int
-    """
+    """The matrix of n nodes that element matrices (m, k, k) add up to; node by node, if of blocks: (m, k, k, d, d)."""
     d = blocks.shape[-1] if blocks.ndim == 5 else 1
     unknowns = (cells[:, :, None] * d + np.arange(d)).reshape(len(cells), -1)
     size = unknowns.shape[1]

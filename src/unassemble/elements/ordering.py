@@ -59,10 +59,7 @@ def _no_middles(sets: NDArray, points: NDArray, corners: int) -> NDArray[np.bool
 def _arranged(
     sets: NDArray, corners: NDArray[np.bool_], points: NDArray, kind: Kind
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Cells on given corners, and the largest distance of a further node from the middle of its corners.
-
-    Relative to the size of the cell; cells that are flat begin with -1.
-    """
+    """Cells on given corners, -1 first if flat, and how far a node is from the middle of its corners, over the size."""
     m = len(sets)
     frame = sets[corners].reshape(m, kind.corners)
     frame = _oriented(frame, points) if kind.simplex else ordered_boxes(frame, points)

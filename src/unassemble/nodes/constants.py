@@ -108,7 +108,7 @@ def unaccounted(
 ) -> NDArray[np.bool_]:
     """(n, d) directions that nodes lack although all rows coupled to them annihilate constants of that direction.
 
-    A penalty on the diagonal is no trace. Rows that count may be given as `live`, (N,); those of the identity do not.
+    Of rows that are `live`, (N,), if these are given: those of the identity do not count. A penalty is no trace.
     """
     order, n = len(node), int(node.max()) + 1
     live = np.ones(order, dtype=bool) if live is None else live

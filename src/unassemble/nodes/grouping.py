@@ -10,10 +10,7 @@ from numpy.typing import NDArray
 
 
 def same_pattern(matrix: sp.csr_array, identity: NDArray[np.bool_] | None = None) -> NDArray[np.int64]:
-    """(N,) group of each row, numbered by first row: rows whose stored entries stand in the same columns.
-
-    Rows of the `identity`, (N,), are groups by themselves.
-    """
+    """(N,) group of each row, by first row: those of the same columns; rows of the `identity` are groups alone."""
     key = np.random.default_rng(0).integers(1, 2**62, matrix.shape[1], dtype=np.uint64)
     pattern = sp.csr_array((np.ones(matrix.nnz, np.uint64), matrix.indices, matrix.indptr), shape=matrix.shape)
     code = pattern @ key  # sums wrap around, which does no harm

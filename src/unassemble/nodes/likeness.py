@@ -22,10 +22,7 @@ def pattern_of(matrix: sp.csr_array) -> sp.csr_array:
 
 
 def reach(matrix: sp.csr_array) -> sp.csr_array:
-    """(N, N) where the rows lead to over three steps of the graph, rows of norm one.
-
-    Each step divides by the number of rows coupled to, half before and half after it.
-    """
+    """(N, N) where rows lead to over three steps, each over the number of rows coupled to by halves; of norm one."""
     weight = sp.diags_array(1 / np.sqrt(np.maximum(np.diff(matrix.indptr), 1)).astype(np.float32))
     step = sp.csr_array(weight @ pattern_of(matrix) @ weight)
     reached = sp.csr_array(step @ step @ step)

@@ -55,10 +55,7 @@ class NodalMatrix:
 
 
 def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
-    """Gather the unknowns of each node into blocks.
-
-    Unknowns whose row and column are those of the identity are left out, as if they had been eliminated.
-    """
+    """Gather the unknowns of each node into blocks; those of rows of the identity are left out, as if eliminated."""
     n, d = numbering.n_nodes, numbering.block_size
     place = numbering.node_of_row * d + numbering.direction_of_row
     row_of = np.full(n * d, -1, dtype=np.int64)

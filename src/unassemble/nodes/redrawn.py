@@ -44,8 +44,8 @@ def known_to(
 ) -> Known:
     """Find positions anew, with other rounding.
 
-    From a matrix that may have been rounded to the given one `place` finds such points, and the `misfits` (m,) of what
-    certifies them; `sized` says whether the matrix tells size and sign.
+    `place` finds points and their misfits (m,) from a matrix that may have been rounded to the given one; `sized` says
+    whether the matrix tells size and sign.
     """
     pieces = [np.flatnonzero(component == one) for one in range(component.max(initial=-1) + 1)]
     moved, changes = np.zeros(len(points)), np.zeros((REDRAWN, len(misfits)))

@@ -168,10 +168,7 @@ def _annihilated(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> 
 
 
 def _even(matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], d: int) -> float:
-    """Share of rows whose pattern has as many rows in each direction, where all of them add up to zero.
-
-    Two directions of three taken for one annihilate translations as well.
-    """
+    """Share of whole rows whose pattern has as many in each direction: two of three taken for one annihilate, too."""
     size = row_sizes(matrix)
     adds_up = adding_up(matrix, size) | with_penalty(matrix, size)
     count = by_direction(group, direction, d)

@@ -40,7 +40,7 @@ def answer(
 ) -> Structure:
     """What was found, by status and reason of the `verdict`; what is `free` is said where anchors leave a size so.
 
-    `edges` (e, 2) are coupled nodes, in whose distances errors are measured; `fields` are further ones of a Structure.
+    Errors are measured in distances of coupled nodes, `edges` (e, 2); `fields` are further ones of a Structure.
     """
     points, factor, more = anchored(found.points, found.component, len(found.evidence), held, sized=sized)
     length = np.linalg.norm(found.points[edges[:, 0]] - found.points[edges[:, 1]], axis=1)

@@ -47,10 +47,7 @@ def forces(
 def members_misfits(
     members: Straight, layout: Layout, points: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """How far blocks of straight members are from those of members between the points, (k,), and ends of these, (k, 2).
-
-    Relative to the size of each part of the block; of members both of whose nodes have coordinates.
-    """
+    """Ends (k, 2) of straight members, and how far each block is from that of one between the points, part by part."""
     some = determined(points)[members.ends].all(axis=1)
     ends, given = members.ends[some], members.blocks[some]
     if not len(ends):

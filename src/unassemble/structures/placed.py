@@ -25,16 +25,12 @@ _PROBES = 3
 
 
 class Piece(NamedTuple):
-    """Equations that share no node with others.
+    """Equations that share no node with others."""
 
-    `nodes` (k,) increase; `rows` (m,) are those of the equations of all pieces, `operator` (m, k d) theirs; `edges`
-    (e, 2) are coupled nodes, by their place in `nodes`.
-    """
-
-    nodes: NDArray[np.int64]
-    rows: NDArray[np.int64]
-    operator: sp.csr_array
-    edges: NDArray[np.int64]
+    nodes: NDArray[np.int64]  # (k,), increasing
+    rows: NDArray[np.int64]  # (m,) of the equations of all pieces
+    operator: sp.csr_array  # (m, k d)
+    edges: NDArray[np.int64]  # (e, 2) coupled nodes, by their place in `nodes`
 
 
 # Points (k, d) of a piece, NaN where loose, its evidence, and equations (m,) that a disturbance would change without
@@ -70,13 +66,7 @@ class Placed:
 
 
 def without_free(found: Placed, most: int) -> Placed:
-    """Positions of the pieces whose null space has no larger dimension; of others they mean nothing.
-
-    Raises
-    ------
-    GeometryError
-        If no piece is left.
-    """
+    """Positions of pieces whose null space has no larger dimension, as others mean nothing; GeometryError if of none."""
     free = np.array([one.null_dimension > most for one in found.evidence])
     if not free.any():
         return found
@@ -103,12 +93,7 @@ def placed(
     """Positions from equations that others would contradict; where too few are left, or all contradict, from all.
 
     Equations (m, n d) that would be disturbed without being noticed are left out, and what only they determine with
-    them; they contradict each other if residuals exceed what is `allowed`.
-
-    Raises
-    ------
-    GeometryError
-        If no node is determined.
+    them; they contradict each other if residuals exceed what is `allowed`. GeometryError if no node is determined.
     """
 
     def from_those(used: NDArray[np.bool_]) -> Placed:
@@ -186,10 +171,7 @@ def _groups(label: NDArray, count: int) -> list[NDArray[np.int64]]:
 def up_to_size(piece: Piece, d: int) -> tuple[NDArray[np.float64], Evidence, NDArray[np.float64]]:
     """Points of a piece whose equations leave the size free, evidence, and residuals (m, k) of random right-hand sides.
 
-    Raises
-    ------
-    GeometryError
-        If more is free than translations and size.
+    GeometryError if more is free than translations and size.
     """
     n, m = len(piece.nodes), len(piece.rows)
     _, residuals, fields, values, gap = least_squares(piece.operator, np.zeros(m), d)
@@ -203,23 +185,9 @@ def least_squares(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]:
     """Solve equations for n nodes with d coordinates each, and see what they leave free and which of them are spare.
 
-    Returns
-    -------
-    solution : (n d,) float64
-        Without what is free.
-    residuals : (m, k) float64
-        Of the right-hand side, first, and of random ones.
-    fields : (n, d, k) float64
-        Orthonormal: all null fields, and some more.
-    values : (k,) float64
-        Their singular values, increasing.
-    gap : float
-        The least of these that is none of a null field.
-
-    Raises
-    ------
-    GeometryError
-        If far more is free than translations and enlargements.
+    The solution (n d,), without what is free; residuals (m, k) of the right-hand side and of random ones; orthonormal
+    fields (n, d, k), all null fields and some more, and their singular values, increasing; and the least of these that
+    is none of a null field. GeometryError if far more is free than translations and enlargements.
     """
     random = np.random.default_rng(0).standard_normal((len(right), _PROBES))
     sides = np.column_stack([right, random])

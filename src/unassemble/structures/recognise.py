@@ -177,10 +177,7 @@ def directions_with_gaps(matrix: sp.csr_array) -> Iterator[tuple[NDArray[np.int6
 
 
 def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Nodes and directions (N,) of rows that stand node by node, where some nodes lack some of b unknowns.
-
-    Directions are -1 for rows of nodes that lack unknowns: which ones, is not told.
-    """
+    """Nodes and directions (N,) of rows that stand node by node; -1 for those of nodes that lack some of b unknowns."""
     shown = [shown_by_members(matrix, layout) for layout in LAYOUTS if layout.block_size == b]
     node = _shortest_runs(matrix, b, np.any(shown, axis=0))
     within = np.arange(len(node)) - np.searchsorted(node, node)

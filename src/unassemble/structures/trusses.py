@@ -33,22 +33,16 @@ from .placed import Piece, Placed, placed, up_to_size, without_free
 
 
 class Bars(NamedTuple):
-    """Bars of a truss: nodes (m, 2), the lesser first, and unit vectors (m, d) along them, of arbitrary sign.
+    """Bars of a truss."""
 
-    With (m,) masks: False where both ends lack unknowns, so that only a part of the direction shows; where one does.
-    """
-
-    ends: NDArray[np.int64]
-    directions: NDArray[np.float64]
-    known: NDArray[np.bool_]
-    whole: NDArray[np.bool_]
+    ends: NDArray[np.int64]  # (m, 2) nodes, the lesser first
+    directions: NDArray[np.float64]  # (m, d) unit vectors, sign arbitrary
+    known: NDArray[np.bool_]  # False where both ends lack unknowns, so that only a part of the direction shows
+    whole: NDArray[np.bool_]  # False where one end lacks unknowns
 
 
 def bars_of(nodal: NodalMatrix, allowed: float = CANCELLED) -> Bars | None:
-    """The bars, if every pair of coupled nodes is one, and they span space; None for other matrices.
-
-    What may be left of a block beside a bar is `allowed`, relative to its size.
-    """
+    """The bars, if all pairs of coupled nodes are, but for what is `allowed`, and they span space; None if not so."""
     upper = (nodal.node < nodal.indices) & (np.abs(nodal.data).max(axis=(1, 2)) > 0)
     blocks = nodal.data[upper]
     if not len(blocks):

@@ -40,11 +40,7 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     Where these contradict each other as well, from all but the rows of few nodes, if the others agree without them.
     What `members` tell by themselves comes on top. Equations contradict each other if residuals exceed what is
     `allowed`. With (n, b, rotations) rows and rotations that positions rest on, whose forces have to vanish.
-
-    Raises
-    ------
-    GeometryError
-        If no node is determined, or more is free than translations.
+    GeometryError if no node is determined, or more is free than translations.
     """
     attempts: list[tuple[Placed, NDArray[np.bool_]]] = []
     failure: GeometryError | None = None
@@ -91,13 +87,7 @@ def _doubts(found: Placed, allowed: float) -> tuple[bool, bool, bool, int, float
 
 
 def _solved(given: Equations, layout: Layout, piece: Piece) -> tuple[NDArray[np.float64], Evidence, NDArray[np.bool_]]:
-    """Coordinates of one piece, evidence, and what would go unnoticed.
-
-    Raises
-    ------
-    GeometryError
-        If there are fewer equations than unknowns leave room for, or far more is free than there should be.
-    """
+    """Coordinates of one piece, evidence, and what would go unnoticed; GeometryError if they are hardly determined."""
     d, b, n, m = layout.dim, layout.block_size, len(piece.nodes), len(piece.rows)
     part = given[piece.rows]
     place = np.searchsorted(piece.nodes, part.row // b)

@@ -153,9 +153,9 @@ class Model:
     def contributions(
         self, pairs: Pairs, entries: Entries, some: NDArray | slice = slice(None)
     ) -> Iterator[tuple[slice, NDArray[np.float64]]]:
-        """What unit Lame coefficients of some cells add to the entries of their pairs; zero where unknowns lack.
+        """What unit Lame coefficients, (1, 0) and (0, 1), of some cells add to the entries of their pairs, by batches.
 
-        By batches of these cells: (2, b, pairs, d, d) for (lambda, mu) = (1, 0) and (0, 1).
+        The cells of a batch, and (2, b, pairs, d, d); zero where unknowns lack.
         """
         own, cells = pairs.at(some), self.cells[some]
         k, d, partial = self.kind.nodes, self.kind.dim, not entries.told.all()

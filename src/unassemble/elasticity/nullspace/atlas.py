@@ -35,10 +35,7 @@ def null_fields(
     patch: int | None = None,
     terms: NDArray[np.float64] | None = None,
 ) -> Fields:
-    """Least singular fields of all valid identities of the nodes of a body, (m,); see :func:`.identities.identities`.
-
-    A chart has no more rows than `patch`.
-    """
+    """Least singular fields of all valid identities of a body's nodes, (m,), by charts of no more rows than `patch`."""
     size, graph = patch or PATCH[nodal.dim], nodal.graph
     parts = [body[part] for part in patches(graph[body][:, body], size)] if len(body) > 1.5 * size else [body]
     made = [chart(nodal, valid, rows, terms, whole=len(parts) == 1) for rows in parts]

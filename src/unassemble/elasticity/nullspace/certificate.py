@@ -17,9 +17,9 @@ from ...nodes.nodal import NodalMatrix, determined
 
 
 def residuals(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(k,) misfits of valid identities among determined nodes; identities that touch other ones are skipped.
+    """(k,) misfits of valid identities, relative to the size of a row times the mean distance of coupled nodes.
 
-    Relative to the size of a row, times the mean distance between coupled nodes.
+    Those that touch nodes without coordinates are skipped.
     """
     d = nodal.dim
     known = determined(points)

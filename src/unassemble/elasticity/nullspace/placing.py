@@ -60,13 +60,7 @@ class Solution:
 
 
 def placed(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> Solution:
-    """Positions piece by piece, from valid identities, (n, d, d) or (n, d, d, d).
-
-    Raises
-    ------
-    GeometryError
-        If no piece has positions.
-    """
+    """Positions piece by piece, from valid identities, (n, d, d) or (n, d, d, d); GeometryError if no piece has any."""
     component, n_pieces = pieces_of(nodal, valid)
     graph = nodal.graph
     points = np.full((nodal.n, nodal.dim), np.nan)

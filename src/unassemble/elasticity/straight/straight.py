@@ -44,10 +44,7 @@ class Straight:
 
 
 def straightened(nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.bool_]) -> Solution | None:
-    """The solution with as many of its bent pieces straight as elements explain; unchanged where there are none.
-
-    It is None where the identities determine nothing.
-    """
+    """The solution, None where identities determine nothing, with bent pieces straight where elements explain them."""
     inside = valid & (valid.all(axis=(1, 2)) & _bent(nodal, found))[:, None, None]
     straight = list(_straight(nodal, inside)) if inside.any() else []
     return in_place(found, valid, straight) if straight else found
