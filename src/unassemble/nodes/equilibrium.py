@@ -58,7 +58,7 @@ class _Body:
         self._shifted = sp.csr_array(off + sp.diags_array((1 + SMALL) * own))
         self._pattern = sp.csr_array((np.ones(off.nnz, np.int32), off.indices, off.indptr), shape=off.shape)
         adds_up = adding_up(self._whole, self._size)
-        self.telling: NDArray[np.bool_] = np.asarray(adds_up & ~penalised)
+        self._telling: NDArray[np.bool_] = np.asarray(adds_up & ~penalised)
         order = np.argsort(group, kind="stable")
         nodes = order[np.bincount(group)[group[order]] == d].reshape(-1, d)
         self._nodes = nodes[adds_up[nodes].all(axis=1)]
@@ -70,14 +70,14 @@ class _Body:
     def directions(self, given: NDArray[np.int64]) -> NDArray[np.int64]:
         """(n,) directions with which most rows annihilate translations, and of several those of least sums."""
         best, most, least = np.zeros(len(self._size), np.int64), -1, np.inf
-        hope = int(self.telling.sum())
+        hope = int(self._telling.sum())
         for start in self._starts(given):
             known, before = start, -1
             while True:
                 direction = self._extended(known)
-                good = self._good(direction)
-                count = int(good.sum())
-                total = self._total(direction)
+                sums = np.abs(self._whole @ np.eye(self._d)[direction]) / self._size[:, None]
+                good = self._telling & (sums <= CANCELLED).all(axis=1)
+                count, total = int(good.sum()), float(sums.sum())
                 if (count, -total) > (most, -least):
                     best, most, least = direction, count, total
                 if count <= before or count == hope or not count:
@@ -133,15 +133,6 @@ class _Body:
             two = np.partition(fit, -2, axis=1)[:, -2:]
             margin[members] = (two[:, 1] - two[:, 0])[:, None]
         return best, margin
-
-    def _total(self, direction: NDArray[np.int64]) -> float:
-        """Absolute sums over each direction, in all rows, of their sizes."""
-        return float((np.abs(self._whole @ np.eye(self._d)[direction]) / self._size[:, None]).sum())
-
-    def _good(self, direction: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """(n,) rows whose entries add up to zero in each direction."""
-        sums = self._whole @ np.eye(self._d)[direction]
-        return np.asarray(self.telling & (np.abs(sums) <= CANCELLED * self._size[:, None]).all(axis=1))
 
     def _vouched(self, good: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(n,) rows of the largest domain tied together by good ones, which vouch for what they couple to."""

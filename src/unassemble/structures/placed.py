@@ -66,7 +66,7 @@ class Placed:
 
 
 def without_free(found: Placed, most: int) -> Placed:
-    """Positions of pieces whose null space has no larger dimension, as others mean nothing; GeometryError if of none."""
+    """Positions of pieces whose null space has no larger dimension: others mean nothing. GeometryError for none."""
     free = np.array([one.null_dimension > most for one in found.evidence])
     if not free.any():
         return found
