@@ -15,32 +15,6 @@ from .kinds import Kind
 from .reference import Rule, shape_functions, shape_gradients
 
 
-def mapped_gradients(
-    points: NDArray[np.float64], cells: NDArray[np.int64], kind: Kind, rule: Rule
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(m, q, k, d) gradients of shape functions in space, and (m, q) weights times |det J|.
-
-    Of flat cells the gradients are those in the reference element, and the weights zero.
-    """
-    at, weights = rule
-    local = shape_gradients(kind, at)
-    jacobian = np.einsum("mke,qkr->mqer", points[cells], local, optimize=True)
-    size = np.abs(np.linalg.det(jacobian))
-    jacobian[size <= LAST_DIGITS * np.linalg.norm(jacobian, axis=(2, 3)) ** kind.dim] = np.eye(kind.dim)
-    return np.einsum("qkr,mqre->mqke", local, np.linalg.inv(jacobian), optimize=True), size * weights
-
-
-def gradient_products(
-    points: NDArray[np.float64], cells: NDArray[np.int64], kind: Kind, rule: Rule
-) -> NDArray[np.float64]:
-    """(m, k, k, d, d) integrals of d_c phi_i d_b phi_j, by i, j, c, b; parameters as in :func:`mapped_gradients`."""
-    m, k, d = len(cells), kind.nodes, kind.dim
-    g, volume = mapped_gradients(points, cells, kind, rule)
-    g = g.reshape(m, len(volume.T), k * d)
-    outer = (g * volume[..., None]).transpose(0, 2, 1) @ g  # one product of matrices per cell: fast
-    return outer.reshape(m, k, d, k, d).transpose(0, 1, 3, 2, 4)
-
-
 def mass(points: NDArray[np.float64], cells: NDArray[np.int64], kind: Kind, rule: Rule) -> NDArray[np.float64]:
     """(m, k, k) integrals of phi_i phi_j."""
     at, weights = rule
@@ -59,7 +33,15 @@ def elasticity(
     The strain energy lambda tr(e)^2 / 2 + mu e : e gives int lambda d_c phi_i d_b phi_j + mu d_b phi_i d_c phi_j +
     delta_cb mu grad phi_i . grad phi_j.
     """
-    first = gradient_products(points, cells, kind, rule)
+    m, k, d = len(cells), kind.nodes, kind.dim
+    at, weights = rule
+    local = shape_gradients(kind, at)
+    jacobian = np.einsum("mke,qkr->mqer", points[cells], local, optimize=True)
+    size = np.abs(np.linalg.det(jacobian))
+    jacobian[size <= LAST_DIGITS * np.linalg.norm(jacobian, axis=(2, 3)) ** d] = np.eye(d)  # flat, and of no weight
+    g = np.einsum("qkr,mqre->mqke", local, np.linalg.inv(jacobian), optimize=True).reshape(m, len(weights), k * d)
+    outer = (g * (size * weights)[..., None]).transpose(0, 2, 1) @ g  # one product of matrices per cell: fast
+    first = outer.reshape(m, k, d, k, d).transpose(0, 1, 3, 2, 4)
     trace = np.trace(first, axis1=3, axis2=4)
     return first, first.transpose(0, 1, 2, 4, 3) + trace[..., None, None] * np.eye(kind.dim)
 

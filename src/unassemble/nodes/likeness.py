@@ -52,16 +52,11 @@ def likest_pairs(
     error = np.sqrt(2 / _NUMBERS)  # of 1 - cosine, relative
     contenders = np.flatnonzero(apart <= (1 + SIGMAS * error) * close)
     r, s = r[contenders], s[contenders]
-    value, best = _cosines(reached, r, s), np.zeros(order)
+    step = max(AT_ONCE * order // max(reached.nnz, 1), 1)
+    parts = [reached[r[k : k + step]].multiply(reached[s[k : k + step]]) for k in range(0, len(r), step)]
+    sums = [np.asarray(part.sum(axis=1), dtype=np.float64).ravel() for part in parts]
+    value, best = np.concatenate([np.empty(0), *sums]), np.zeros(order)
     for rows in (r, s):
         np.maximum.at(best, rows, value)
     chosen = (value >= best[r] - ALIKE) & (value >= best[s] - ALIKE)
     return r[chosen], s[chosen]
-
-
-def _cosines(reached: sp.csr_array, r: NDArray[np.int64], s: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(k,) cosines between the reaches of rows r and s."""
-    step = max(AT_ONCE * reached.shape[0] // max(reached.nnz, 1), 1)
-    parts = [reached[r[k : k + step]].multiply(reached[s[k : k + step]]) for k in range(0, len(r), step)]
-    sums = [np.asarray(part.sum(axis=1), dtype=np.float64).ravel() for part in parts]
-    return np.concatenate([np.empty(0), *sums])

@@ -36,11 +36,6 @@ class Numbering:
         return len(self.node_of_row) != self.block_size * self.n_nodes
 
     @property
-    def has_whole_node(self) -> bool:
-        """Whether some node has a row for every direction."""
-        return int(np.bincount(self.node_of_row).max()) == self.block_size
-
-    @property
     def inferred(self) -> bool:
         """Whether it was inferred which rows belong to one node: some are missing, or couple to different unknowns."""
         return self.kind != "given" and (self.incomplete or self.common < 1)
@@ -58,7 +53,7 @@ class Numbering:
     @property
     def quality(self) -> float:
         """Rows add up to zero, those of a node couple to the same nodes, and most nodes have all their directions."""
-        if not self.has_whole_node:
+        if int(np.bincount(self.node_of_row).max()) < self.block_size:  # no node has a row for every direction
             return 0.0
         filled = len(self.node_of_row) / (self.n_nodes * self.block_size)
         return self.share * self.common * filled * (1 - self.odd / self.n_nodes)

@@ -42,11 +42,6 @@ class Layout:
         """Coordinates of a node: those that the matrix does not tell are zero."""
         return self.dim if self.dim > 1 else 3
 
-    @property
-    def twisting(self) -> float:
-        """Share of the rotations that a straight line of members annihilates: that about its own axis."""
-        return max(axis < self.dim for axis in self.rotations) / len(self.rotations)
-
     def turned(self, axis: int) -> list[tuple[int, int, int]]:
         """Unit rotation about an axis: (direction, coordinate, sign) of displacements, sign times the coordinate."""
         after, last = (axis + 1) % 3, (axis + 2) % 3

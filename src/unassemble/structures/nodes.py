@@ -72,7 +72,9 @@ class Nodes:
         size = np.column_stack([abs(part).sum(axis=1) for part in columns])
         zero = (np.abs(sums) <= CANCELLED * size).reshape(self.n, b, b)
         lacking = self.graph @ (~self.present).astype(np.int32) > 0
-        sound: NDArray[np.bool_] = self.present & ~self._penalised()
+        diagonal = np.abs(self.matrix.diagonal()).reshape(self.n, b)
+        penalised = diagonal > PENALTY * (size.reshape(self.n, b, b).sum(axis=2) - diagonal)
+        sound: NDArray[np.bool_] = self.present & ~penalised
         still = np.asarray(zero[:, :moves, :moves].all(axis=(1, 2)) & sound[:, :moves].all(axis=1))
         sound[:, :moves] &= zero[:, range(moves), range(moves)]
         sound[:, moves:] &= still[:, None]
@@ -82,12 +84,6 @@ class Nodes:
             needed = [*across, moves + k] if layout.rotations else across
             valid[:, :, k] = zero[:, :, across].all(axis=2) & sound & ~lacking[:, needed].any(axis=1)[:, None]
         return valid
-
-    def _penalised(self) -> NDArray[np.bool_]:
-        """(n, b) unknowns with a penalty on the diagonal."""
-        diagonal = np.abs(self.matrix.diagonal())
-        rest = np.asarray(abs(self.matrix).sum(axis=1)).ravel() - diagonal
-        return np.asarray((diagonal > PENALTY * rest).reshape(self.n, -1))
 
 
 def nodes_of(matrix: sp.csr_array, layout: Layout, node: NDArray[np.int64], direction: NDArray[np.int64]) -> Nodes:

@@ -166,7 +166,10 @@ def _share(matrix: sp.csr_array, layout: Layout, direction: NDArray) -> float:
     tells = coupled[:, :moves].any(axis=1)
     kinds = [kind & tells for kind in (turning, ~turning) if kind.any()]
     share = float(min(good[kind].mean() if kind.any() else 0.0 for kind in kinds))
-    return 0.0 if layout.rotations and own[turning].mean() > (LITTLE + layout.twisting) * share else share
+    if not layout.rotations:
+        return share
+    twisting = max(axis < layout.dim for axis in layout.rotations) / len(layout.rotations)  # a line, about its own axis
+    return 0.0 if own[turning].mean() > (LITTLE + twisting) * share else share
 
 
 def directions_with_gaps(matrix: sp.csr_array) -> Iterator[tuple[NDArray[np.int64], int]]:

@@ -38,23 +38,15 @@ class Straight:
         """(n,) which nodes belong to it."""
         return determined(self.points)
 
-    def piece_in(self, found: Solution) -> int:
-        """The bent piece that this one is part of, -1 if none; nodes that are loose there are part of none."""
-        return int(found.component[self.nodes].max())
-
 
 def straightened(nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.bool_]) -> Solution | None:
     """The solution, None where identities determine nothing, with bent pieces straight where elements explain them."""
-    inside = valid & (valid.all(axis=(1, 2)) & _bent(nodal, found))[:, None, None]
+    whole = valid.all(axis=(1, 2))
+    if found is not None:  # pieces of which more than translation and scale is free
+        whole &= np.isin(found.component, [piece for piece, freedom in enumerate(found.freedoms) if freedom])
+    inside = valid & whole.reshape(-1, 1, 1)
     straight = list(_straight(nodal, inside)) if inside.any() else []
     return in_place(found, valid, straight) if straight else found
-
-
-def _bent(nodal: NodalMatrix, found: Solution | None) -> NDArray[np.bool_]:
-    """(n,) nodes of pieces of which more than translation and scale is free."""
-    if found is None:
-        return np.ones(nodal.n, dtype=bool)
-    return np.isin(found.component, [piece for piece, freedom in enumerate(found.freedoms) if freedom])
 
 
 def _straight(nodal: NodalMatrix, inside: NDArray[np.bool_]) -> Iterator[Straight]:
@@ -110,7 +102,7 @@ def _functions(null: NDArray[np.float64]) -> NDArray[np.float64]:
 def in_place(found: Solution | None, valid: NDArray[np.bool_], straight: list[Straight]) -> Solution:
     """Straight pieces, one at least, in place of the bent ones that they are part of."""
     base = found or Solution(valid, np.empty(0, np.int64), np.empty(0), (), (), exact=True, warnings=())
-    better = {one.piece_in(base) for one in straight} if found else set()
+    better = {int(base.component[one.nodes].max()) for one in straight} if found else set()
     parts = [
         (base.component == k, base.points, *of_piece)
         for k, of_piece in enumerate(zip(base.evidence, base.freedoms, strict=True))
