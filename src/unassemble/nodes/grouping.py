@@ -9,6 +9,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 
+def pattern_of(matrix: sp.csr_array) -> sp.csr_array:
+    """(N, N) ones where entries are stored, in single precision."""
+    return sp.csr_array((np.ones(matrix.nnz, np.float32), matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
 def same_pattern(matrix: sp.csr_array, identity: NDArray[np.bool_] | None = None) -> NDArray[np.int64]:
     """(N,) group of each row, by first row: those of the same columns; rows of the `identity` are groups alone."""
     key = np.random.default_rng(0).integers(1, 2**62, matrix.shape[1], dtype=np.uint64)

@@ -19,9 +19,8 @@ from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST, NEARLY_ALL
 from .constants import adding_up, proven_directions, row_sizes, unaccounted, uncoupled_rows, with_penalty
 from .equilibrium import spread_directions
 from .filling import filled, filled_by_direction
-from .grouping import by_direction, by_first_row, same_pattern
+from .grouping import by_direction, by_first_row, pattern_of, same_pattern
 from .least_sums import with_least_sums
-from .likeness import pattern_of
 from .numbering import Numbering, measured
 from .orders import Reading, directions_by_component, nodes_by_component, nodes_in_runs
 

@@ -34,7 +34,7 @@ class Piece(NamedTuple):
 
 
 # Points (k, d) of a piece, NaN where loose, its evidence, and equations (m,) that a disturbance would change without
-# being noticed; see :mod:`.redundancy`.
+# being noticed; see :mod:`.turning`.
 Solve = Callable[[Piece], tuple[NDArray[np.float64], Evidence, NDArray[np.bool_]]]
 
 

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from ..budget import SAMPLE
 from ..errors import InputError
-from ..nodes.grouping import by_first_row
-from ..nodes.likeness import pattern_of
+from ..nodes.grouping import by_first_row, pattern_of
 from ..nodes.orders import ORDERS, regular
 from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST
 from .layouts import LAYOUTS, SOLIDS, SPACE, Layout

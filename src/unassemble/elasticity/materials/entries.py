@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from ...budget import AT_ONCE
 from ...elements.cliques import Graph
 from ...elements.kinds import Kind
-from ...elements.matrices import elasticity
-from ...elements.reference import Rule
+from ...elements.reference import Rule, elasticity
 from ...nodes.nodal import NodalMatrix, valid_pairs
 from ...tolerances import CERTIFIED
 
