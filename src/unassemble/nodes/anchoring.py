@@ -20,31 +20,17 @@ Anchors = tuple[NDArray[np.int64], NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked for, and what is known beside the matrix.
+    """What is asked for, and what is known beside the matrix."""
 
-    Attributes
-    ----------
-    anchors : sequence of (row, x, y) or (row, x, y, z), optional
-    cells : bool
-        Look for elements too, not only where nothing else confirms positions.
-    choice : str
-        Why the matrix was taken for what it is.
-    rounding : Rounding, optional
-        Of the entries, where they have few digits.
-    """
-
-    anchors: Sequence[Any] | None = None
-    cells: bool = True
-    choice: str = ""
-    rounding: Rounding | None = None
+    anchors: Sequence[Any] | None = None  # (row, x, y) or (row, x, y, z)
+    cells: bool = True  # look for elements too, not only where nothing else confirms positions
+    choice: str = ""  # why the matrix was taken for what it is
+    rounding: Rounding | None = None  # of the entries, where they have few digits
 
     def held(self, node_of_row: NDArray[np.int64], d: int) -> Anchors:
         """Nodes (k,) and known positions (k, d) of the anchors.
 
-        Raises
-        ------
-        InputError
-            For rows that do not exist or belong to one node, and positions of another dimension.
+        InputError for rows that do not exist or belong to one node, and positions of another dimension.
         """
         anchors = list(self.anchors or ())
         try:

@@ -92,14 +92,10 @@ def nodes_of_pattern(matrix: sp.csr_array) -> tuple[int, int] | None:
 
 
 def regular_numbering(matrix: sp.csr_array, kind: str, block_size: int | None = None) -> Numbering:
-    """The numbering of unknowns in an order that the caller knows.
+    """The numbering of unknowns in an order that the caller knows, "interleaved" or "by component".
 
-    Raises
-    ------
-    InputError
-        If the order of the matrix is no multiple of the block size.
-    RecoveryError
-        If the rows of this numbering do not annihilate translations.
+    InputError if the order of the matrix is no multiple of the block size; RecoveryError if the rows of this numbering
+    do not annihilate translations.
     """
     order = matrix.shape[0]
     sizes = [d for d in _sizes(block_size) if order % d == 0]

@@ -41,13 +41,7 @@ class Beam(StructuralNumbering):
 
 
 def find_beam(matrix: sp.csr_array) -> Beam | None:
-    """Recognise the rows of one straight beam, in any order; None for all other matrices.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric.
-    """
+    """Recognise the rows of one straight beam, in any order; None for all other matrices, (N, N) sparse and symmetric."""
     order = matrix.shape[0]
     off = sp.csr_array(matrix - sp.diags_array(matrix.diagonal()))
     off.eliminate_zeros()
@@ -168,15 +162,10 @@ def _beside(off: sp.csr_array, chain: NDArray[np.int64], line: NDArray[np.int64]
 
 
 def serve_beam(matrix: OperatorMatrix, beam: Beam, clock: Clock, request: Request) -> Structure:
-    """Positions along a straight beam, in true units of length, and its members.
+    """Positions along a straight beam, in true units of length, and its members; errors as of :func:`serve_structure`.
 
     The axis is x and deflections are along y; the direction of the axis, which the sign of rotations tells where it is
     known, is free.
-
-    Raises
-    ------
-    InputError
-        For anchors that do not fit.
     """
     n, bending = beam.n_nodes, beam.direction_of_row > 0
     held = request.held(beam.node_of_row, beam.layout.dim)

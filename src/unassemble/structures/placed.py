@@ -127,19 +127,10 @@ def placed(
 def pieces(
     operator: sp.csr_array, d: int, edges: NDArray[np.int64], rows: NDArray[np.int64] | None = None
 ) -> Iterator[Piece]:
-    """Connected pieces, in the order of their first nodes; nodes in no equation are in none.
+    """Connected pieces, in the order of their first nodes, of equations (m, n d); nodes in no equation are in none.
 
-    The work is that of one pass over the equations, however many pieces there are.
-
-    Parameters
-    ----------
-    operator : (m, n d) sparse
-    d : int
-        Coordinates of a node.
-    edges : (e, 2) int64
-        Coupled nodes; those of different pieces are left out.
-    rows : (k,) int64, optional
-        The equations to use; all by default.
+    The work is that of one pass over the equations, however many pieces there are. Coupled nodes, `edges` (e, 2), of
+    different pieces are left out; `rows` (k,) are the equations to use, all by default.
     """
     rows = np.arange(operator.shape[0]) if rows is None else rows
     operator = sp.csr_array(operator[rows])

@@ -97,15 +97,7 @@ def truss_numbering(
 def serve_truss(
     matrix: OperatorMatrix, nodal: NodalMatrix, numbering: Numbering, bars: Bars, clock: Clock, request: Request
 ) -> Structure:
-    """Recover a truss, up to the size of each piece.
-
-    Raises
-    ------
-    InputError
-        For anchors that do not fit.
-    RecoveryError
-        If no piece is determined.
-    """
+    """Recover a truss, up to the size of each piece; errors as of :func:`.frames.serve_structure`."""
     rounding = request.rounding
     held = request.held(numbering.node_of_row, nodal.dim)
     with clock("solve"):
