@@ -39,29 +39,29 @@ def recover_vector(
         If no piece is determined.
     """
     numbering, rounding = reading.numbering, reading.rounding
-    request = Request(anchors, cells, reading.why, rounding)
+    request = Request(matrix, clock, anchors, cells, reading.why, rounding)
     if isinstance(numbering, Beam):
-        return serve_beam(matrix, numbering, clock, request)
+        return serve_beam(numbering, request)
     if isinstance(numbering, StructuralNumbering):
-        return serve_structure(matrix, numbering, clock, request)
+        return serve_structure(numbering, request)
     with clock("numbering"):
         whole = rounding.exact if rounding else matrix.csr()
         nodal = nodal_matrix(whole, numbering)
     bars = bars_of(nodal, rounding.spread if rounding else CANCELLED)
     if bars is not None:
-        return serve_truss(matrix, nodal, numbering, bars, clock, request)
+        return serve_truss(nodal, numbering, bars, request)
     del whole  # of a large body, memory that the long work can use
     try:
-        body = serve_body(matrix, nodal, numbering, clock, request)
+        body = serve_body(nodal, numbering, request)
     except RecoveryError:
-        other = _by_rotations(matrix, numbering, clock, request)
+        other = _by_rotations(numbering, request)
         if other is None:
             raise
         return other
-    return body if body.certified else _by_rotations(matrix, numbering, clock, request) or body
+    return body if body.certified else _by_rotations(numbering, request) or body
 
 
-def _by_rotations(matrix: OperatorMatrix, numbering: Numbering, clock: Clock, request: Request) -> Recovery | None:
+def _by_rotations(numbering: Numbering, request: Request) -> Recovery | None:
     """Nodes in space by rigid rotations alone, of any material and element; None where these certify nothing."""
     if numbering.block_size != PINNED.dim:
         return None
@@ -70,7 +70,7 @@ def _by_rotations(matrix: OperatorMatrix, numbering: Numbering, clock: Clock, re
         direction = np.where(numbering.unnamed, -1, direction)
     same = StructuralNumbering(PINNED, numbering.node_of_row, direction, numbering.kind, numbering.share)
     try:
-        found = serve_structure(matrix, same, clock, request)
+        found = serve_structure(same, request)
     except RecoveryError:
         return None
     return found if found.certified else None

@@ -10,12 +10,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..clock import Clock
 from ..elements.kinds import KINDS
 from ..elements.surface import boundary_loops
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
-from ..matrix import OperatorMatrix
 from ..nodes.anchoring import Anchors, Request, anchored, near_enough
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix, uncoupled
 from ..nodes.numbering import Numbering
@@ -43,13 +41,7 @@ from .verdict import (
 )
 
 
-def serve_body(
-    matrix: OperatorMatrix,
-    nodal: NodalMatrix,
-    numbering: Numbering,
-    clock: Clock,
-    request: Request,
-) -> Body:
+def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Body:
     """Recover a solid body whose numbering is known.
 
     Raises
@@ -65,7 +57,7 @@ def serve_body(
             "which `operator='laplacian'` recovers"
         )
     known = request.held(numbering.node_of_row, numbering.block_size)  # before the long work
-    with clock("null space"), blas_threads(1):
+    with request.clock("null space"), blas_threads(1):
         nodal = with_doubts(without_springs(nodal), numbering)
         try:
             solution = solve(nodal)
@@ -83,15 +75,13 @@ def serve_body(
             again = solve(other)
         return again.points, residuals(other, again.valid, again.points)
 
-    return _described(matrix, nodal, numbering, solution, clock, request, known, placed_again)
+    return _described(nodal, numbering, solution, request, known, placed_again)
 
 
 def _described(
-    matrix: OperatorMatrix,
     nodal: NodalMatrix,
     numbering: Numbering,
     solution: Solution,
-    clock: Clock,
     request: Request,
     known: Anchors,
     placed_again: Callable[[sp.csr_array], tuple[NDArray[np.float64], NDArray[np.float64]]],
@@ -101,26 +91,26 @@ def _described(
     `placed_again` finds points and misfits from another matrix that may have been rounded to the given one.
     """
     cells, rounding = request.cells, request.rounding
-    with clock("certify"):
+    with request.clock("certify"):
         misfits = residuals(nodal, solution.valid, solution.points)
         error = float(np.abs(misfits).max()) if len(misfits) else float("nan")
         near = not error >= max(ALIKE, rounding.spread if rounding else 0.0)  # NaN where only elements can tell
         ratio = _lame_ratio(nodal, solution) if near else None
     found = no_cells()
     if (cells or solution.straight or solution.hanging is not None) and near:
-        with clock("cells"):
+        with request.clock("cells"):
             found = recognise_cells(nodal, solution.points, ratio)
     status, reason = verdict(nodal, solution, error, found, numbering)
     alone = status == "certified" and not found.certified
     lone = determined(solution.points) & ~checked(nodal, solution) if alone else np.zeros(nodal.n, dtype=bool)
     if lone.any() and not cells:  # only elements can confirm them
         more = replace(request, cells=True)
-        return _described(matrix, nodal, numbering, solution, clock, more, known, placed_again)
+        return _described(nodal, numbering, solution, more, known, placed_again)
     if alone and not (determined(solution.points) & ~lone).any():
         status, reason, lone = "uncertified", NOTHING_CHECKED, np.zeros_like(lone)
     bar = None
     if rounding and near and not any(solution.freedoms):
-        with clock("certify"):
+        with request.clock("certify"):
             bar = known_to(solution.points, solution.component, misfits, rounding, placed_again, sized=False)
         status, reason = of_few_digits(nodal, solution, error, numbering, rounding, bar)
     elif rounding:
@@ -160,9 +150,9 @@ def _described(
         operator="elasticity",
         backward_error=found.backward_error if found.certified else error,
         position_error=bar.error if bar and bar.explained else None,
-        timings=clock.timings,
+        timings=request.clock.timings,
         warnings=(
-            *matrix.warnings,
+            *request.matrix.warnings,
             *solution.warnings,
             *(about_cells(shown) if cells else ()),
             *about_nodes(nodal, loose, withheld, hanging, lone),

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clock import Clock
 from ..errors import InputError
+from ..matrix import OperatorMatrix
 from ..tolerances import ALIKE, SUMMED
 from ..words import Reason
 from .rounded import Rounding
@@ -22,6 +24,8 @@ Anchors = tuple[NDArray[np.int64], NDArray[np.float64]]
 class Request:
     """What is asked for, and what is known beside the matrix."""
 
+    matrix: OperatorMatrix
+    clock: Clock
     anchors: Sequence[Any] | None = None  # (row, x, y) or (row, x, y, z)
     cells: bool = True  # look for elements too, not only where nothing else confirms positions
     choice: str = ""  # why the matrix was taken for what it is

@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..clock import Clock
-from ..matrix import OperatorMatrix
 from ..nodes.anchoring import Anchors, Request, anchored, near_enough
 from ..nodes.numbering import Numbering
 from ..recovery import Structure
@@ -23,9 +21,7 @@ def covered(rows: NDArray[np.bool_], columns: NDArray[np.bool_]) -> str:
 
 
 def answer(
-    matrix: OperatorMatrix,
     numbering: Numbering | StructuralNumbering,
-    clock: Clock,
     request: Request,
     held: Anchors,
     found: Placed,
@@ -56,8 +52,8 @@ def answer(
         uniqueness=uniqueness if status == "certified" else None,
         reason=reason.text,
         advice=reason.advice,
-        timings=clock.timings,
-        warnings=(*matrix.warnings, *found.notes, *notes, *([free] if np.isnan(factor).any() else []), *more),
+        timings=request.clock.timings,
+        warnings=(*request.matrix.warnings, *found.notes, *notes, *([free] if np.isnan(factor).any() else []), *more),
         node_of_row=numbering.node_of_row,
         direction_of_row=numbering.direction_of_row,
         numbering=numbering.kind,

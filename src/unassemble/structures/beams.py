@@ -17,8 +17,6 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..clock import Clock
-from ..matrix import OperatorMatrix
 from ..nodes.anchoring import Request
 from ..recovery import Evidence, Structure
 from ..tolerances import ALIKE, CERTIFIED
@@ -41,7 +39,7 @@ class Beam(StructuralNumbering):
 
 
 def find_beam(matrix: sp.csr_array) -> Beam | None:
-    """Recognise the rows of one straight beam, in any order; None for all other matrices, (N, N) sparse and symmetric."""
+    """Recognise the rows of one straight beam, in any order, of a symmetric matrix (N, N); None if they are not so."""
     order = matrix.shape[0]
     off = sp.csr_array(matrix - sp.diags_array(matrix.diagonal()))
     off.eliminate_zeros()
@@ -161,7 +159,7 @@ def _beside(off: sp.csr_array, chain: NDArray[np.int64], line: NDArray[np.int64]
     return True
 
 
-def serve_beam(matrix: OperatorMatrix, beam: Beam, clock: Clock, request: Request) -> Structure:
+def serve_beam(beam: Beam, request: Request) -> Structure:
     """Positions along a straight beam, in true units of length, and its members; errors as of :func:`serve_structure`.
 
     The axis is x and deflections are along y; the direction of the axis, which the sign of rotations tells where it is
@@ -169,11 +167,11 @@ def serve_beam(matrix: OperatorMatrix, beam: Beam, clock: Clock, request: Reques
     """
     n, bending = beam.n_nodes, beam.direction_of_row > 0
     held = request.held(beam.node_of_row, beam.layout.dim)
-    with clock("solve"):
+    with request.clock("solve"):
         x = _along(n, beam.members, beam.steps)
         points = np.column_stack([x - x.mean(), np.zeros(n)])
-    with clock("certify"):
-        misfit, told = _held_against(matrix.csr(), beam, points[:, 0])
+    with request.clock("certify"):
+        misfit, told = _held_against(request.matrix.csr(), beam, points[:, 0])
     found = Placed(
         points, np.zeros(n, np.int64), (Evidence(1, misfit, float("inf"), int(told.sum())),), told, np.zeros_like(told)
     )
@@ -188,9 +186,7 @@ def serve_beam(matrix: OperatorMatrix, beam: Beam, clock: Clock, request: Reques
         notes.append(f"{chains} of stretching or torsion know no length: they are taken for those of the nodes next to "
                      "which they are numbered")  # fmt: skip
     return answer(
-        matrix,
         beam,
-        clock,
         request,
         held,
         found,

@@ -9,9 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..clock import Clock
 from ..linalg import blas_threads
-from ..matrix import OperatorMatrix
 from ..nodes.anchoring import Request
 from ..nodes.redrawn import Known, known_to
 from ..nodes.rounded import Rounding, with_exact_sums
@@ -28,9 +26,7 @@ from .straight import Straight, straight_members
 from .turning import said_of, turning_positions
 
 
-def serve_structure(
-    matrix: OperatorMatrix, numbering: StructuralNumbering, clock: Clock, request: Request
-) -> Structure:
+def serve_structure(numbering: StructuralNumbering, request: Request) -> Structure:
     """Recover the coordinates of a structure whose nodes and directions are known, in true units of length.
 
     Anchors move pieces; size and axes are the matrix's own. Rounding is looked for anew, as directions are known now.
@@ -45,11 +41,11 @@ def serve_structure(
     layout, node = numbering.layout, numbering.node_of_row
     sized, moves = bool(layout.rotations), len(layout.displacements)
     held = request.held(node, layout.space)
-    whole, rounding = with_exact_sums(matrix.csr(), known=(numbering.direction_of_row, layout.block_size))
+    whole, rounding = with_exact_sums(request.matrix.csr(), known=(numbering.direction_of_row, layout.block_size))
     spread = rounding.spread if rounding else 0.0
-    with clock("solve"):
+    with request.clock("solve"):
         nodes, members, found, valid = _placed(whole, numbering, rounding)
-    with clock("certify"):
+    with request.clock("certify"):
         force, used = forces(whole, numbering, nodes, found.points, valid)
         ends, misfit = members_misfits(members, layout, found.points)
         used = (used | np.isin(node, ends)) & ~np.isin(node, found.spoiled)
@@ -74,7 +70,7 @@ def serve_structure(
     found = replace(found, points=np.pad(found.points, ((0, 0), (0, layout.space - layout.dim))))
     fields: dict[str, Any] = {}
     if request.cells and error < max(ALIKE, spread):
-        with clock("members"):
+        with request.clock("members"):
             fields = members_and_cells(nodes, found.points, max(CANCELLED, spread))
         notes.append("members and cells were read off the graph: what is certified is the coordinates")
     if sized and not valid[:, moves:].any():
@@ -88,9 +84,7 @@ def serve_structure(
         notes.append(f"{(found.component < 0).sum()} of {count_of(nodes.n, 'node')} cannot be determined: at supports, "
                      "or tied to these only")  # fmt: skip
     return answer(
-        matrix,
         numbering,
-        clock,
         request,
         held,
         found,

@@ -15,9 +15,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..budget import SAMPLE
-from ..clock import Clock
 from ..errors import GeometryError
-from ..matrix import OperatorMatrix
 from ..nodes.anchoring import Request
 from ..nodes.constants import uncoupled_rows
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix
@@ -94,15 +92,13 @@ def truss_numbering(
     return None
 
 
-def serve_truss(
-    matrix: OperatorMatrix, nodal: NodalMatrix, numbering: Numbering, bars: Bars, clock: Clock, request: Request
-) -> Structure:
+def serve_truss(nodal: NodalMatrix, numbering: Numbering, bars: Bars, request: Request) -> Structure:
     """Recover a truss, up to the size of each piece; errors as of :func:`.frames.serve_structure`."""
     rounding = request.rounding
     held = request.held(numbering.node_of_row, nodal.dim)
-    with clock("solve"):
+    with request.clock("solve"):
         found = _place_joints(bars, nodal.n, rounding.spread if rounding else CERTIFIED)
-    with clock("certify"):
+    with request.clock("certify"):
         misfits = _misfits(nodal, found.points)
         error = float(np.abs(misfits).max(initial=0.0))
         known = _known(misfits, found, numbering, rounding)
@@ -117,9 +113,7 @@ def serve_truss(
                      "leave them room")  # fmt: skip
     lines = bars.ends[~loose[bars.ends].any(axis=1)]
     return answer(
-        matrix,
         numbering,
-        clock,
         request,
         held,
         found,
