@@ -14,7 +14,7 @@ from ..elements.kinds import KINDS
 from ..elements.surface import boundary_loops
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
-from ..nodes.anchoring import Anchors, Request, anchored, near_enough
+from ..nodes.anchoring import Request, anchored, near_enough
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix, uncoupled
 from ..nodes.numbering import Numbering
 from ..nodes.redrawn import known_to
@@ -56,7 +56,7 @@ def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Bo
             "the directions are not coupled, as those of a vector Laplacian: these are scalar matrices side by side, "
             "which `operator='laplacian'` recovers"
         )
-    known = request.held(numbering.node_of_row, numbering.block_size)  # before the long work
+    request.held(numbering.node_of_row, numbering.block_size)  # anchors that do not fit, before the long work
     with request.clock("null space"), blas_threads(1):
         nodal = with_doubts(without_springs(nodal), numbering)
         try:
@@ -75,7 +75,7 @@ def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Bo
             again = solve(other)
         return again.points, residuals(other, again.valid, again.points)
 
-    return _described(nodal, numbering, solution, request, known, placed_again)
+    return _described(nodal, numbering, solution, request, placed_again)
 
 
 def _described(
@@ -83,7 +83,6 @@ def _described(
     numbering: Numbering,
     solution: Solution,
     request: Request,
-    known: Anchors,
     placed_again: Callable[[sp.csr_array], tuple[NDArray[np.float64], NDArray[np.float64]]],
 ) -> Body:
     """The body, with its certificate, material and cells, and the sentences that go with them.
@@ -105,7 +104,7 @@ def _described(
     lone = determined(solution.points) & ~checked(nodal, solution) if alone else np.zeros(nodal.n, dtype=bool)
     if lone.any() and not cells:  # only elements can confirm them
         more = replace(request, cells=True)
-        return _described(nodal, numbering, solution, more, known, placed_again)
+        return _described(nodal, numbering, solution, more, placed_again)
     if alone and not (determined(solution.points) & ~lone).any():
         status, reason, lone = "uncertified", NOTHING_CHECKED, np.zeros_like(lone)
     bar = None
@@ -131,7 +130,8 @@ def _described(
         status, reason = "uncertified", NOTHING_SHOWN
     if status == "certified" and _flat(placed, component):
         status, reason = "uncertified", Reason("the points lie in one line or plane, and no solid body does")
-    points, factor, notes = anchored(placed, component, len(solution.evidence), known)
+    held = request.held(numbering.node_of_row, nodal.dim)
+    points, factor, notes = anchored(placed, component, len(solution.evidence), held)
     status, reason = near_enough(status, reason, points, placed, component, factor, 1.0)  # mean edges have length one
     lame, scale = _in_units(shown, component, factor, nodal.dim)
     if np.isnan(factor).any():

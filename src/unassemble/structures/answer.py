@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..nodes.anchoring import Anchors, Request, anchored, near_enough
+from ..nodes.anchoring import Request, anchored, near_enough
 from ..nodes.numbering import Numbering
 from ..recovery import Structure
 from ..words import Reason
@@ -23,7 +23,6 @@ def covered(rows: NDArray[np.bool_], columns: NDArray[np.bool_]) -> str:
 def answer(
     numbering: Numbering | StructuralNumbering,
     request: Request,
-    held: Anchors,
     found: Placed,
     verdict: tuple[str, Reason],
     *,
@@ -38,6 +37,7 @@ def answer(
 
     Errors are measured in distances of coupled nodes, `edges` (e, 2); `fields` are further ones of a Structure.
     """
+    held = request.held(numbering.node_of_row, found.points.shape[1])
     points, factor, more = anchored(found.points, found.component, len(found.evidence), held, sized=sized)
     length = np.linalg.norm(found.points[edges[:, 0]] - found.points[edges[:, 1]], axis=1)
     edge = float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0

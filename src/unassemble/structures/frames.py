@@ -40,7 +40,7 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
     """
     layout, node = numbering.layout, numbering.node_of_row
     sized, moves = bool(layout.rotations), len(layout.displacements)
-    held = request.held(node, layout.space)
+    request.held(node, layout.space)  # anchors that do not fit, before the long work
     whole, rounding = with_exact_sums(request.matrix.csr(), known=(numbering.direction_of_row, layout.block_size))
     spread = rounding.spread if rounding else 0.0
     with request.clock("solve"):
@@ -86,7 +86,6 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
     return answer(
         numbering,
         request,
-        held,
         found,
         (status, reason),
         edges=np.column_stack(sp.triu(nodes.graph, 1).nonzero()),

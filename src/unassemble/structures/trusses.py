@@ -95,7 +95,7 @@ def truss_numbering(
 def serve_truss(nodal: NodalMatrix, numbering: Numbering, bars: Bars, request: Request) -> Structure:
     """Recover a truss, up to the size of each piece; errors as of :func:`.frames.serve_structure`."""
     rounding = request.rounding
-    held = request.held(numbering.node_of_row, nodal.dim)
+    request.held(numbering.node_of_row, nodal.dim)  # anchors that do not fit, before the long work
     with request.clock("solve"):
         found = _place_joints(bars, nodal.n, rounding.spread if rounding else CERTIFIED)
     with request.clock("certify"):
@@ -115,7 +115,6 @@ def serve_truss(nodal: NodalMatrix, numbering: Numbering, bars: Bars, request: R
     return answer(
         numbering,
         request,
-        held,
         found,
         (status, reason),
         edges=lines,
