@@ -81,11 +81,11 @@ class Numbering:
         return self.sound and shows and not self.odd
 
 
-def measured(matrix: sp.csr_array, reading: Reading, d: int, kind: str) -> Numbering:
-    """A numbering that was searched for, and what speaks for it."""
+def measured(matrix: sp.csr_array, reading: Reading, d: int, kind: str, *, searched: bool = True) -> Numbering:
+    """A numbering and what speaks for it; of one that was `searched` for more is asked."""
     node, direction = reading.node, reading.direction
     identity = uncoupled_rows(matrix)
-    share = annihilated_share(matrix, identity, direction, d, searched=True)
+    share = annihilated_share(matrix, identity, direction, d, searched=searched)
     common = coupled_in_common(matrix, node)
-    odd = int(unaccounted(matrix, node, direction, d, ~identity).any(axis=1).sum())
+    odd = int(unaccounted(matrix, node, direction, d, ~identity).any(axis=1).sum()) if searched else 0
     return Numbering(d, node, direction, identity, kind, share, common, odd, reading.open_row, reading.unnamed)

@@ -16,11 +16,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError, RecoveryError
-from ..tolerances import NEARLY_ALL
-from .constants import annihilated_share, uncoupled_rows
+from ..tolerances import MOST, NEARLY_ALL
+from .constants import uncoupled_rows
 from .grouping import by_first_row, coupled_in_common, made_up, same_pattern
-from .numbering import Numbering
-from .orders import ORDERS, regular
+from .numbering import Numbering, measured
+from .orders import ORDERS, Reading, regular
 from .searching import same_cuts, searched
 
 MORE_THAN_STIFFNESS = (
@@ -156,15 +156,10 @@ def _with_gaps(matrix: sp.csr_array, regular: Numbering, sizes: tuple[int, ...])
 
 def _regular(matrix: sp.csr_array, d: int, kind: str, *, checked: bool = True) -> Numbering | None:
     """One of the two numberings that need no search, if order and pattern allow it."""
-    order = matrix.shape[0]
-    if order % d:
+    if matrix.shape[0] % d:
         return None
-    node, direction = regular(order, d, kind)
-    common = coupled_in_common(matrix, node)
-    if checked and common < 0.6:
-        return None
-    identity = uncoupled_rows(matrix)
-    return Numbering(d, node, direction, identity, kind, annihilated_share(matrix, identity, direction, d), common)
+    one = measured(matrix, Reading(*regular(matrix.shape[0], d, kind)), d, kind, searched=False)
+    return None if checked and one.common < MOST else one
 
 
 def given_numbering(matrix: sp.csr_array, node_of_row: NDArray, direction_of_row: NDArray) -> Numbering:
@@ -185,7 +180,4 @@ def given_numbering(matrix: sp.csr_array, node_of_row: NDArray, direction_of_row
     node = by_first_row(node)
     if len(np.unique(node * d + direction)) < order:
         raise InputError("two rows have the same node and direction")
-    identity = uncoupled_rows(matrix)
-    share = annihilated_share(matrix, identity, direction, d, searched=True)
-    common = coupled_in_common(matrix, node)
-    return Numbering(d, node, direction, identity, "given", share, common)
+    return measured(matrix, Reading(node, direction), d, "given")
