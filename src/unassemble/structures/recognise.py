@@ -45,6 +45,11 @@ class StructuralNumbering:
         """Unknowns per node."""
         return self.layout.block_size
 
+    @property
+    def told(self) -> float:
+        """Share of all rows whose direction is known and that annihilate translations."""
+        return float(self.share * np.mean(self.direction_of_row >= 0))
+
 
 def find_structure(
     matrix: sp.csr_array, kind: str | None = None, block_size: int | None = None
@@ -69,7 +74,7 @@ def find_structure(
     best = _best(matrix, usual, block_size)
     if (best is None or best.share < MOST) and kind != "by component" and matrix.diagonal().all():
         other = _best(matrix, {(b, "interleaved"): _with_gaps(matrix, b) for b in (3, 6)}, block_size)
-        best = max((one for one in (best, other) if one is not None), key=_rows_told, default=None)
+        best = max((one for one in (best, other) if one is not None), key=lambda one: one.told, default=None)
         if best is other and best is not None and best.layout.rotations:
             best = _continued(matrix, best)
     return _beside(matrix, best) if best is not None and best.layout.rotations else None
@@ -91,24 +96,17 @@ def _beside(matrix: sp.csr_array, one: StructuralNumbering) -> StructuralNumberi
 
 def _best(
     matrix: sp.csr_array,
-    numberings: Mapping[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.int64]] | None],
+    numberings: Mapping[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.int64]]],
     block_size: int | None,
 ) -> StructuralNumbering | None:
     """The layout and the numbering, by its block size and name, with most rows that annihilate translations."""
-    best, most = None, HARDLY_ANY
-    for layout in _KNOWN:
-        for (b, name), numbering in numberings.items():
-            if numbering is None or layout.block_size != b or block_size not in (None, b):
-                continue
-            one = StructuralNumbering(layout, *numbering, name, _share(matrix, layout, numbering[1]))
-            if _rows_told(one) > most:
-                best, most = one, _rows_told(one)
-    return best
-
-
-def _rows_told(one: StructuralNumbering) -> float:
-    """Share of all rows whose direction is known and that annihilate translations."""
-    return float(one.share * np.mean(one.direction_of_row >= 0))
+    found = [
+        StructuralNumbering(layout, *numbering, name, _share(matrix, layout, numbering[1]))
+        for layout in _KNOWN
+        for (b, name), numbering in numberings.items()
+        if layout.block_size == b and block_size in (None, b)
+    ]
+    return max((one for one in found if one.told > HARDLY_ANY), key=lambda one: one.told, default=None)
 
 
 def given_structure(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> StructuralNumbering | None:
