@@ -22,7 +22,7 @@ from ..recovery import Body
 from ..tolerances import ALIKE, LAST_DIGITS
 from ..words import Reason
 from .doubts import about_assumptions, about_cells, about_nodes, guessed_directions, unborne, unconfirmed, with_doubts
-from .materials.cells import Cells, no_cells, recognise_cells
+from .materials.cells import Cells, recognise_cells
 from .nullspace.certificate import residuals
 from .nullspace.identities import lame_ratio, poisson_ratio
 from .nullspace.placing import Solution, checked
@@ -95,7 +95,7 @@ def _described(
         error = float(np.abs(misfits).max()) if len(misfits) else float("nan")
         near = not error >= max(ALIKE, rounding.spread if rounding else 0.0)  # NaN where only elements can tell
         ratio = _lame_ratio(nodal, solution) if near else None
-    found = no_cells()
+    found = Cells()
     if (cells or solution.straight or solution.hanging is not None) and near:
         with request.clock("cells"):
             found = recognise_cells(nodal, solution.points, ratio)

@@ -7,7 +7,7 @@ of each; the residual of the fit is the certificate. Material may differ from ce
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -27,11 +27,11 @@ class Cells:
     """Elements of a mesh."""
 
     # (m, k) by kind, meshio's names and order, positively oriented; empty where none was recognised
-    blocks: Mapping[str, NDArray[np.int64]]
+    blocks: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
     # (n_cells, 2) lambda and mu, up to the unknown size of the body; empty where they are not known
-    lame: NDArray[np.float64]
+    lame: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     # largest difference between an entry and the re-assembled one, relative to the largest of its row
-    backward_error: float
+    backward_error: float = float("nan")
     shown: NDArray[np.bool_] | None = None  # (n, d) unknowns whose row has an entry that re-assembles and is not zero
 
     @property
@@ -60,11 +60,6 @@ class Cells:
         return replace(self, blocks=blocks, lame=lame)
 
 
-def no_cells() -> Cells:
-    """Nothing recognised."""
-    return Cells({}, np.empty((0, 2)), float("nan"))
-
-
 def coupled(nodal: NodalMatrix, points: NDArray[np.float64]) -> Graph:
     """Pairs of determined nodes with an entry that is not zero, or that lack some, which may not have been zero."""
     known, lacking = determined(points), np.asarray((nodal.row_of < 0).any(axis=1))
@@ -89,7 +84,7 @@ def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: floa
     """
     graph, known = coupled(nodal, points), determined(points)
     likely = Entries.of(nodal, known, surrounded(nodal, valid_pairs(nodal)))
-    found = no_cells()
+    found = Cells()
     # The power of two next to the largest entry: squares of what is measured in it neither overflow nor vanish.
     unit = float(2.0 ** np.frexp(nodal.size.max(initial=0.0))[1])
     for entries in [likely, Entries.of(nodal, known)] if (likely.complete != likely.sure).any() else [likely]:
@@ -105,7 +100,7 @@ def _recognised(points: NDArray[np.float64], graph: Graph, entries: Entries, rat
 
     Cells that hide next to supports are excused, and those of another kind must not pass for such.
     """
-    best, most = no_cells(), 0
+    best, most = Cells(), 0
     for blocks in candidates(graph, points) if len(entries.key) else ():
         told = entries.explained_by([Pairs.of(one.cells, entries) for one in blocks], graph)
         if told is None or len(told.key) <= most:
@@ -118,7 +113,7 @@ def _recognised(points: NDArray[np.float64], graph: Graph, entries: Entries, rat
             best, most = replace(found, shown=told.shown()), len(told.key)
         elif not best.recognised and not any(one.kind.linear_simplex for one in seen) and tiles(_linear(seen)):
             # without certificate; that cliques lie side by side is no evidence of linear simplices
-            best = replace(no_cells(), blocks={one.kind.name: one.cells for one in seen})
+            best = Cells({one.kind.name: one.cells for one in seen})
         if most == len(entries.key):
             break
     return best
