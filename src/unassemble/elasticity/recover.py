@@ -17,7 +17,7 @@ from ..linalg import blas_threads
 from ..nodes.anchoring import Request, anchored, near_enough
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix, uncoupled
 from ..nodes.numbering import Numbering
-from ..nodes.redrawn import known_to
+from ..nodes.rounded import known_to
 from ..recovery import Body
 from ..tolerances import ALIKE, LAST_DIGITS
 from ..words import Reason
@@ -25,9 +25,8 @@ from .doubts import about_assumptions, about_cells, about_nodes, guessed_directi
 from .materials.cells import Cells, recognise_cells
 from .nullspace.certificate import residuals
 from .nullspace.identities import lame_ratio, poisson_ratio
-from .nullspace.placing import Solution, checked
+from .nullspace.placing import Solution, checked, without_springs
 from .positions import solve
-from .springs import without_springs
 from .verdict import (
     NOTHING_CHECKED,
     NOTHING_SHOWN,

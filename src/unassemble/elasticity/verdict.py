@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from ..nodes.nodal import NodalMatrix, without_trace
 from ..nodes.numbering import Numbering
-from ..nodes.redrawn import Known
-from ..nodes.rounded import Rounding
+from ..nodes.rounded import Known, Rounding
 from ..nodes.shape import SOFT
 from ..tolerances import CERTIFIED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, sentences

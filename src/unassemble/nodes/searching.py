@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from ..budget import LARGE, Budget
 from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST, NEARLY_ALL
 from .constants import adding_up, proven_directions, row_sizes, unaccounted, uncoupled_rows, with_penalty
-from .equilibrium import spread_directions
+from .directions import spread_directions, with_least_sums
 from .filling import filled, filled_by_direction
 from .grouping import by_direction, by_first_row, pattern_of, same_pattern
-from .least_sums import with_least_sums
 from .numbering import Numbering, measured
 from .orders import Reading, directions_by_component, nodes_by_component, nodes_in_runs
 

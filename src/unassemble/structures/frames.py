@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from ..linalg import blas_threads
 from ..nodes.anchoring import Request
-from ..nodes.redrawn import Known, known_to
-from ..nodes.rounded import Rounding, with_exact_sums
+from ..nodes.rounded import Known, Rounding, known_to, with_exact_sums
 from ..recovery import Structure
 from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SUMMED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of

@@ -21,8 +21,7 @@ from ..nodes.constants import uncoupled_rows
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix
 from ..nodes.numbering import Numbering
 from ..nodes.orders import ORDERS, regular
-from ..nodes.redrawn import Known, known_to
-from ..nodes.rounded import Rounding
+from ..nodes.rounded import Known, Rounding, known_to
 from ..recovery import Evidence, Structure
 from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SMALL
 from ..words import Reason, count_of
