@@ -59,8 +59,7 @@ def annihilated_share(
     live = ~identity
     if not live.any():
         return 0.0
-    ones = np.zeros((len(direction), d))
-    ones[np.flatnonzero(live), direction[live]] = 1
+    ones = np.eye(d)[direction] * live[:, None]
     size = row_sizes(matrix)[live]
     zero = np.abs(matrix @ ones)[live] <= CANCELLED * size[:, None]
     own = zero[np.arange(len(size)), direction[live]]
@@ -110,15 +109,14 @@ def unaccounted(
 
     Of rows that are `live`, (N,), if these are given: those of the identity do not count. A penalty is no trace.
     """
-    order, n = len(node), int(node.max()) + 1
+    order = len(node)
     live = np.ones(order, dtype=bool) if live is None else live
-    labels = np.zeros((order, d))
-    labels[np.flatnonzero(live), direction[live]] = 1
+    labels = np.eye(d)[direction] * live[:, None]
     size = np.asarray(abs(matrix).sum(axis=1)).ravel()
     missing = (np.abs(matrix @ labels) > CANCELLED * size[:, None]) & live[:, None]
     missing[np.arange(order), direction] &= ~with_penalty(matrix, row_sizes(matrix))
-    pattern = sp.csr_array((np.ones(matrix.nnz, np.int8), matrix.indices, matrix.indptr), shape=matrix.shape)
-    onto = sp.csr_array((np.ones(order, np.int32), (node, np.arange(order))), shape=(n, order))
-    missed = onto @ (pattern.astype(np.int32) @ missing.astype(np.int32))
+    pattern = sp.csr_array((np.ones(matrix.nnz, np.int32), matrix.indices, matrix.indptr), shape=matrix.shape)
+    onto = sp.csr_array((np.ones(order, np.int32), (node, np.arange(order))))
+    missed = onto @ (pattern @ missing.astype(np.int32))
     present = (onto @ labels) > 0
     return np.asarray(~present & (missed == 0) & present.any(axis=1)[:, None])

@@ -53,16 +53,9 @@ def equations(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool, allowed:
     for k, m in combinations(range(len(every)), 2) if springs else ():
         both = np.flatnonzero(valid[:, moves + m, k] & valid[:, moves + k, m]) * b + moves
         one, other = every[k][both + m], every[m][both + k]
-        parts.append(
-            Equations(
-                sp.csr_array(one.operator - other.operator),
-                one.right - other.right,
-                one.size + other.size,
-                one.lever + other.lever,
-                np.full(len(both), -1),
-                one.rotation,
-            )
-        )
+        operator, right = sp.csr_array(one.operator - other.operator), one.right - other.right
+        size, lever, row = one.size + other.size, one.lever + other.lever, np.full(len(both), -1)
+        parts.append(Equations(operator, right, size, lever, row, one.rotation))
     return _relative(joined(*parts), allowed)
 
 
