@@ -34,7 +34,7 @@ MOST = 5  # entries of a bending row off the diagonal: four of the neighbours, o
 class Beam(StructuralNumbering):
     """Rows of a straight beam: directions 1 (deflection), 2 (rotation), 0 (one chain of springs) or -1 (several)."""
 
-    members: NDArray[np.int64]  # (m, 2) nodes  # (m, 2) nodes
+    members: NDArray[np.int64]  # (m, 2) nodes
     steps: NDArray[np.float64]  # (m,) x of the second node less that of the first
 
 
@@ -59,13 +59,14 @@ def find_beam(matrix: sp.csr_array) -> Beam | None:
         return None
     members, steps = _with_ends(off, node, direction, node[w], steps)
     n = int(node.max()) + 1
-    if len(members) != n - 1 or _components(n, members)[0] != 1:
+    x = _along(n, members, steps)
+    if len(members) != n - 1 or np.isnan(x).any():
         return None
-    count, label = _components(order, np.column_stack(off.nonzero()))
+    count, label = sp.csgraph.connected_components(off, directed=False)
     bending = np.unique(label[node >= 0])
     if len(bending) > 1 or (node[label == bending[0]] < 0).any():
         return None
-    line = np.argsort(_along(n, members, steps))
+    line = np.argsort(x)
     chains = [np.flatnonzero(label == one) for one in range(count) if one != bending[0]]
     if not all(_beside(off, chain, line, node) for chain in chains):
         return None
@@ -122,32 +123,23 @@ def _with_ends(
 
 
 def _along(n: int, members: NDArray[np.int64], steps: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) positions along the beam, the first node's zero."""
+    """(n,) positions along the beam, the first node's zero; NaN where nothing ties them to it."""
     tree = sp.csr_array((steps, members.T), shape=(n, n))
     both = sp.csr_array(tree - tree.T)
     order, before = sp.csgraph.breadth_first_order(abs(both), 0, directed=False)
-    x = np.zeros(n)
+    x = np.full(n, np.nan)
+    x[0] = 0
     for k in order[1:]:
         x[k] = x[before[k]] + both[before[k], k]
     return x
-
-
-def _components(n: int, pairs: NDArray) -> tuple[int, NDArray[np.int64]]:
-    graph = sp.csr_array((np.ones(len(pairs)), pairs.T), shape=(n, n))
-    count, label = sp.csgraph.connected_components(graph, directed=False)
-    return int(count), label.astype(np.int64)
 
 
 def _beside(off: sp.csr_array, chain: NDArray[np.int64], line: NDArray[np.int64], node: NDArray[np.int64]) -> bool:
     """Give the rows of a chain of springs the nodes next to which they are numbered; False if it is no such chain."""
     part = sp.csr_array(off[chain][:, chain])
     degree = np.diff(part.indptr)
-    if (
-        len(chain) > len(line)
-        or degree.max(initial=0) > 2
-        or degree.sum() != 2 * len(chain) - 2
-        or (part.data > 0).any()
-    ):
+    in_line = degree.max(initial=0) <= 2 and degree.sum() == 2 * len(chain) - 2
+    if len(chain) > len(line) or not in_line or (part.data > 0).any():
         return False
     path = chain[sp.csgraph.breadth_first_order(part, int(np.argmin(degree)), directed=False)[0]]
     rows = np.arange(len(node))
@@ -172,9 +164,8 @@ def serve_beam(beam: Beam, request: Request) -> Structure:
         points = np.column_stack([x - x.mean(), np.zeros(n)])
     with request.clock("certify"):
         misfit, told = _held_against(request.matrix.csr(), beam, points[:, 0])
-    found = Placed(
-        points, np.zeros(n, np.int64), (Evidence(1, misfit, float("inf"), int(told.sum())),), told, np.zeros_like(told)
-    )
+    evidence = Evidence(1, misfit, float("inf"), int(told.sum()))
+    found = Placed(points, np.zeros(n, np.int64), (evidence,), told, np.zeros_like(told))
     certified = misfit <= CERTIFIED
     said = f"the bending rows differ from those of members along a line by {misfit:.1e} of the row's largest entry"
     if certified:
@@ -215,16 +206,12 @@ def _held_against(matrix: sp.csr_array, beam: Beam, x: NDArray[np.float64]) -> t
     stiffness = np.zeros(len(length))
     stiffness[both] = -entries_at(matrix, row_of[i[both], 0], row_of[j[both], 0]) / 12
     stiffness[~both] = entries_at(matrix, row_of[i[~both], 1], row_of[j[~both], 1]) / (2 * length[~both] ** 2)
-    one, left = np.ones_like(length), length
-    block = np.stack([12 * one, 6 * left, -12 * one, 6 * left,
-                      6 * left, 4 * left**2, -6 * left, 2 * left**2,
-                      -12 * one, -6 * left, 12 * one, -6 * left,
-                      6 * left, 2 * left**2, -6 * left, 4 * left**2], axis=1).reshape(-1, 4, 4)  # fmt: skip
+    scale = np.stack([np.ones_like(length), length], axis=1)[:, [0, 1, 0, 1]]
+    hermite = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
+    block = stiffness[:, None, None] * hermite * scale[:, :, None] * scale[:, None, :]
     rows = np.concatenate([row_of[i], row_of[j]], axis=1)
-    live = (rows[:, :, None] >= 0) & (rows[:, None, :] >= 0)
-    k, a, b = np.nonzero(live)
-    values = block[k, a, b] * stiffness[k]
-    again = sp.csr_array((values, (rows[k, a], rows[k, b])), shape=(order, order))
+    k, a, b = np.nonzero((rows[:, :, None] >= 0) & (rows[:, None, :] >= 0))
+    again = sp.csr_array((block[k, a, b], (rows[k, a], rows[k, b])), shape=(order, order))
     left_over = sp.coo_array(matrix - again)
     inner = np.bincount(beam.members.ravel(), minlength=n) == 2
     node = beam.node_of_row
