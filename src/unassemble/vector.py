@@ -22,12 +22,7 @@ from .tolerances import CANCELLED
 
 
 def recover_vector(
-    matrix: OperatorMatrix,
-    reading: VectorReading,
-    clock: Clock,
-    *,
-    anchors: Sequence[Any] | None,
-    cells: bool,
+    matrix: OperatorMatrix, reading: VectorReading, clock: Clock, *, anchors: Sequence[Any] | None, cells: bool
 ) -> Recovery:
     """Recover a vector-valued matrix whose numbering is known; see :class:`.nodes.anchoring.Request`.
 

@@ -160,9 +160,7 @@ def _tetrahedron_rules() -> Iterator[Rule]:
     centre = (0.25, 0.25, 0.25, 0.25)
     a = (1 + np.sqrt(5 / 14)) / 4
     yield _symmetric(
-        (-148 / 1875, centre),
-        (343 / 7500, (1 / 14, 1 / 14, 1 / 14, 11 / 14)),
-        (56 / 375, (a, a, 0.5 - a, 0.5 - a)),
+        (-148 / 1875, centre), (343 / 7500, (1 / 14, 1 / 14, 1 / 14, 11 / 14)), (56 / 375, (a, a, 0.5 - a, 0.5 - a))
     )
     a = (5 - np.sqrt(5)) / 20
     yield _symmetric((1 / 4, (a, a, a, 1 - 3 * a)))

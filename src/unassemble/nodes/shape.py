@@ -30,11 +30,7 @@ class Shape:
     null: int  # fields that count as null fields, those of loose nodes among them
 
 
-def shape(
-    fields: NDArray[np.float64],
-    values: NDArray[np.float64],
-    told: NDArray[np.bool_],
-) -> Shape:
+def shape(fields: NDArray[np.float64], values: NDArray[np.float64], told: NDArray[np.bool_]) -> Shape:
     """Find the coordinates among the least singular fields.
 
     Parameters

@@ -158,11 +158,7 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def _unnoticed(
-    given: Equations,
-    probes: NDArray[np.float64],
-    layout: Layout,
-    points: NDArray[np.float64],
-    edges: NDArray[np.int64],
+    given: Equations, probes: NDArray[np.float64], layout: Layout, points: NDArray[np.float64], edges: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
     """(m,) equations of a piece that a disturbance would change without being noticed.
 
