@@ -39,7 +39,7 @@ def solve(nodal: NodalMatrix) -> Solution:
             found = placed(nodal, valid)
         except GeometryError as error:
             failure = error
-        if not (found is not None and found.whole):
+        if found is None or not (found.unique and np.isfinite(found.firm_points).all()):
             found = _with_planes(nodal, found, valid)
     if not (found is not None and found.unique):
         found = straightened(nodal, found, valid)

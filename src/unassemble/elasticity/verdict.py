@@ -109,7 +109,7 @@ def verdict(
     if objection.text:
         return "uncertified", objection
     if found.certified and found.backward_error <= CERTIFIED:
-        count = count_of(found.n_cells, "element")
+        count = count_of(sum(map(len, found.blocks.values())), "element")
         return "certified", Reason(f"the matrix re-assembled on the {count} is the given one")
     nearly = _softest(solution)
     objection = _to_identities(nodal, solution, numbering)

@@ -33,11 +33,6 @@ class Layout:
         return self.rotations or tuple(axis for axis in range(3) if self.turned(axis))
 
     @property
-    def free(self) -> int:
-        """Fields of coordinates that no matrix determines: translations and, without rotations, the size."""
-        return self.dim + (not self.rotations)
-
-    @property
     def space(self) -> int:
         """Coordinates of a node: those that the matrix does not tell are zero."""
         return self.dim if self.dim > 1 else 3

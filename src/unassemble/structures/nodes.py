@@ -35,14 +35,10 @@ class Nodes:
     @cached_property
     def graph(self) -> sp.csr_array:
         """(n, n) pattern of coupled nodes, with the diagonal."""
-        return self._pattern(self.layout.block_size)
+        return self.pattern(self.layout.block_size)
 
-    @cached_property
-    def moving(self) -> sp.csr_array:
-        """(n, n) pattern of nodes whose displacements are coupled, with the diagonal."""
-        return self._pattern(len(self.layout.displacements))
-
-    def _pattern(self, directions: int) -> sp.csr_array:
+    def pattern(self, directions: int) -> sp.csr_array:
+        """(n, n) pattern of nodes coupled in the first of their directions, with the diagonal."""
         coo, b, own = self.matrix.tocoo(), self.layout.block_size, np.arange(self.n)
         some = (coo.row % b < directions) & (coo.col % b < directions)
         place = np.concatenate([coo.row[some] // b, own]), np.concatenate([coo.col[some] // b, own])

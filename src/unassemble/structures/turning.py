@@ -44,7 +44,7 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     attempts: list[tuple[Placed, NDArray[np.bool_]]] = []
     failure: GeometryError | None = None
     layout, valid = nodes.layout, nodes.whole()
-    edges = np.column_stack(sp.triu(nodes.moving, 1).nonzero())
+    edges = np.column_stack(sp.triu(nodes.pattern(len(layout.displacements)), 1).nonzero())
     ways = [(False, False), (False, True), (True, False)] if layout.rotations else [(False, False)]
     if layout.rotations and layout.dim == 3:  # where nothing drills, forces alone are too few to leave any out
         ways.append((True, True))
@@ -76,7 +76,8 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     if not attempts and failure:
         raise failure
     found, counted = min(attempts, key=lambda one: _doubts(one[0], allowed))
-    return without_free(found, layout.free), counted
+    most = layout.dim + (not layout.rotations)  # no matrix tells translations, nor the size without rotations
+    return without_free(found, most), counted
 
 
 def _doubts(found: Placed, allowed: float) -> tuple[bool, bool, bool, int, float]:

@@ -44,11 +44,6 @@ class Cells:
         """Whether the cells re-assemble to the given matrix."""
         return self.recognised and bool(np.isfinite(self.backward_error))
 
-    @property
-    def n_cells(self) -> int:
-        """Number of cells."""
-        return sum(map(len, self.blocks.values()))
-
     def among(self, nodes: NDArray[np.bool_]) -> Cells:
         """The cells all of whose nodes are among some, (n,) bool."""
         kept = [nodes[cells].all(axis=1) for cells in self.blocks.values()]
@@ -88,7 +83,9 @@ def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: floa
     # The power of two next to the largest entry: squares of what is measured in it neither overflow nor vanish.
     unit = float(2.0 ** np.frexp(nodal.size.max(initial=0.0))[1])
     for entries in [likely, Entries.of(nodal, known)] if (likely.complete != likely.sure).any() else [likely]:
-        other = _recognised(points, graph, entries.over(unit), ratio)
+        other = _recognised(
+            points, graph, replace(entries, value=entries.value / unit, size=entries.size / unit), ratio
+        )
         if other.certified:
             return replace(other, lame=other.lame * unit)
         found = found if found.recognised else other

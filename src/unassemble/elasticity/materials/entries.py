@@ -62,10 +62,6 @@ class Entries:
         """Some of them."""
         return replace(self, key=self.key[place], value=self.value[place], told=self.told[place], size=self.size[place])
 
-    def over(self, unit: float) -> Entries:
-        """The same in another unit."""
-        return replace(self, value=self.value / unit, size=self.size / unit)
-
     def shown(self) -> NDArray[np.bool_]:
         """(n, d) unknowns whose rows have one of these entries that is not zero."""
         seen = np.zeros((self.n, self.value.shape[1]), dtype=bool)
@@ -143,11 +139,6 @@ class Model:
     cells: NDArray[np.int64]
     kind: Kind
     rule: Rule
-
-    @property
-    def coefficients(self) -> int:
-        """Nonzero numbers of the matrix that takes all coefficients to the entries."""
-        return len(self.cells) * self.kind.nodes * (self.kind.nodes - 1) * self.kind.dim**2
 
     def contributions(
         self, pairs: Pairs, entries: Entries, some: NDArray | slice = slice(None)

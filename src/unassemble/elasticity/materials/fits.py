@@ -53,7 +53,8 @@ def fits(points: NDArray[np.float64], blocks: Sequence[Block], entries: Entries,
         if ratio is not None:
             mu, rest = one_material(model, entries, ratio)
             yield blocks, np.vstack([mu[:, None] * [ratio, 1], *lame]), rest.largest
-        if model.coefficients <= _LARGEST:
+        pairs = model.kind.nodes * (model.kind.nodes - 1)
+        if len(model.cells) * pairs * model.kind.dim**2 <= _LARGEST:
             coefficients, rest = _least_squares(model, entries)
             yield blocks, np.vstack([coefficients, *lame]), rest.largest
 

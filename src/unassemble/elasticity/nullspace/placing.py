@@ -45,11 +45,6 @@ class Solution:
         return self.exact and not any(self.freedoms)
 
     @property
-    def whole(self) -> bool:
-        """Whether every node is determined, up to translation and scale of its piece, and none hangs."""
-        return self.unique and bool(np.isfinite(self.firm_points).all())
-
-    @property
     def firm_points(self) -> NDArray[np.float64]:
         """(n, d) the points, NaN where they hang on an assumption that nothing controls."""
         return self.points if self.hanging is None else np.where(self.hanging[:, None], np.nan, self.points)
