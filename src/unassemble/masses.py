@@ -54,9 +54,11 @@ def weighed(
         raise InputError(f"the matrix and its mass matrix differ in size: they are {sizes}")
     if not (np.isrealobj(M.data) and (M.diagonal() > 0).all()):
         raise GeometryError("`mass` is no mass matrix: not all of its diagonal entries are positive numbers")
+    one, other = A.tocoo(), M.tocoo()
+    place = np.concatenate([one.row, other.row]), np.concatenate([one.col, other.col])
     found: Recovery | None
-    try:
-        found = recover(_with_zeros(A, M))
+    try:  # with zeros for sides of triangles that face right angles, which have an entry in M only
+        found = recover(sp.csr_array((np.concatenate([one.data, 0 * other.data]), place), shape=A.shape))
     except RecoveryError:
         found = None
     if found is None or not found.certified:
@@ -95,13 +97,6 @@ def weighed(
         root = "sqrt(rho)" if found.dim == 2 else "the cube root of rho"
         notes += (f"the mesh has the size of density 1: if that is rho, lengths are those given here over {root}",)
     return replace(found, density=density, warnings=notes, reason=sentences([found.reason.split(". ")[0], said]))
-
-
-def _with_zeros(A: sp.csr_array, M: sp.csr_array) -> sp.csr_array:
-    """A with an explicit zero in each place of M where it has no entry: sides of triangles that face right angles."""
-    one, other = A.tocoo(), M.tocoo()
-    place = np.concatenate([one.row, other.row]), np.concatenate([one.col, other.col])
-    return sp.csr_array(sp.coo_array((np.concatenate([one.data, 0 * other.data]), place), shape=A.shape))
 
 
 def _whole(A: sp.csr_array, found: Recovery) -> NDArray[np.bool_]:
