@@ -46,11 +46,11 @@ def by_direction(label: NDArray[np.int64], direction: NDArray[np.int64], d: int)
 
 
 def without_doubles(
-    label: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[np.int64], d: int
+    label: NDArray[np.int64], direction: NDArray[np.int64], d: int
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """(N,) labels as nodes, and which rows would make one with two rows of a direction: these keep their `node`."""
+    """(N,) labels as nodes, but that rows are alone which would make one with two rows of a direction; and these."""
     torn = np.asarray((by_direction(label, direction, d) > 1).any(axis=1))[label]
-    return by_first_row(np.where(torn, len(label) + node, label)), torn
+    return by_first_row(np.where(torn, len(label) + np.arange(len(label)), label)), torn
 
 
 def coupled_in_common(matrix: sp.csr_array, node: NDArray[np.int64]) -> float:

@@ -127,7 +127,7 @@ def nodes_by_component(
         second.append(s)
         alone[np.setdiff1d(rows_c, r)] = True
     label = joined(np.concatenate(first), np.concatenate(second), len(group))
-    node, torn = without_doubles(label, np.arange(len(group)), direction, d)
+    node, torn = without_doubles(label, direction, d)
     unsettled = np.bincount(group, alone | torn)[group] > 0
     return node, unsettled & (np.bincount(node)[node] < d)
 

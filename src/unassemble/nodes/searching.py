@@ -19,7 +19,7 @@ from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST, NEARLY_ALL
 from .constants import adding_up, proven_directions, row_sizes, unaccounted, uncoupled_rows, with_penalty
 from .directions import spread_directions, with_least_sums
 from .filling import filled, filled_by_direction
-from .grouping import by_direction, by_first_row, pattern_of, same_pattern
+from .grouping import by_direction, by_first_row, pattern_of, same_pattern, without_doubles
 from .numbering import Numbering, measured
 from .orders import Reading, directions_by_component, nodes_by_component, nodes_in_runs
 
@@ -150,8 +150,7 @@ def _by_equilibrium(inner: sp.csr_array, whole: sp.csr_array, d: int, kind: str)
     if kind == "interleaved":
         node, open_row = nodes_in_runs(inner, group, direction, d), None
     else:
-        open_row = np.asarray((by_direction(group, direction, d) > 1).any(axis=1))[group]  # several of some direction
-        node = by_first_row(np.where(open_row, len(group) + np.arange(len(group)), group))
+        node, open_row = without_doubles(group, direction, d)
         if _even(inner, group, direction, d) <= MOST:
             return None
     return Reading(node, direction, open_row, ~proven_directions(whole, direction, group, d))
