@@ -89,14 +89,10 @@ def _relative(given: Equations, allowed: float) -> Equations:
 def _rotation(nodes: Nodes, k: int) -> Equations:
     """All rows' equation for rotation k, as it stands."""
     layout, order = nodes.layout, nodes.matrix.shape[0]
-    rows, columns, values = [], [], []
+    operator = sp.csr_array((order, nodes.n * layout.dim))
     for direction, coordinate, sign in layout.turned(layout.turning[k]):
-        part = nodes.direction(direction).tocoo()
-        rows.append(part.row)
-        columns.append(part.col * layout.dim + coordinate)
-        values.append(sign * part.data)
-    place = np.concatenate(rows), np.concatenate(columns)
-    operator = sp.csr_array((np.concatenate(values), place), shape=(order, nodes.n * layout.dim))
+        axis = sp.csr_array(sign * np.eye(layout.dim)[[coordinate]])
+        operator = operator + sp.kron(nodes.direction(direction), axis, format="csr")
     own = nodes.direction(len(layout.displacements) + k) if layout.rotations else sp.csr_array((order, nodes.n))
     right, lever, size = (np.asarray(part.sum(axis=1)).ravel() for part in (-own, abs(own), abs(operator)))
     return Equations(operator, right, size, lever, np.arange(order), np.full(order, k))

@@ -18,6 +18,7 @@ from ..nodes.nodal import determined
 from ..tolerances import CANCELLED
 from .layouts import PLANE
 from .nodes import Nodes
+from .straight import blocks_at
 
 _FLAT = 0.3  # of its width: how thick a quadrilateral may be
 _MOST_PER_NODE = 4  # triangles of surfaces, of which two are a quadrilateral: by Euler two a node, more where they meet
@@ -130,10 +131,7 @@ def _balanced(nodes: Nodes, points: NDArray, i: NDArray, j: NDArray, allowed: fl
     j, T^T A_ij is minus the member's own block of node j, and symmetric.
     """
     b = nodes.layout.block_size
-    every, place = np.arange(b), b * np.column_stack([i, j])
-    rows, columns = place[:, 0, None, None] + every[:, None], place[:, 1, None, None] + every
-    block = np.asarray(nodes.matrix[np.broadcast_to(rows, (len(i), b, b)).ravel(),
-                                    np.broadcast_to(columns, (len(i), b, b)).ravel()]).reshape(-1, b, b)  # fmt: skip
+    block = blocks_at(nodes.matrix, b * i, b * j, b)
     turn = nodes.layout.rigid_motions(points[i] - points[j]).transpose(0, 2, 1)
     left = turn @ block
     left = np.pad(left, ((0, 0), (0, 0), (0, left.shape[1] - left.shape[2])))  # what no rotation takes up has to vanish

@@ -109,15 +109,17 @@ def shown_by_members(matrix: sp.csr_array, layout: Layout) -> NDArray[np.bool_]:
     for k in range(1, len(layout.displacements)):
         some = entries_at(matrix, i + k, j + k) < 0
         i, j = i[some], j[some]
-    every = np.arange(b)
-    rows, columns = i[:, None, None] + every[:, None], j[:, None, None] + every
-    shape = (len(i), b, b)
-    blocks = entries_at(matrix, np.broadcast_to(rows, shape).ravel(), np.broadcast_to(columns, shape).ravel())
-    blocks = blocks.reshape(shape)
+    blocks = blocks_at(matrix, i, j, b)
     good = misfits(blocks, told_by_blocks(blocks, layout), layout) <= SUMMED
     begins = np.zeros(order, dtype=bool)
     begins[i[good]] = begins[j[good]] = True
     return begins
+
+
+def blocks_at(matrix: sp.csr_array, i: NDArray[np.int64], j: NDArray[np.int64], b: int) -> NDArray[np.float64]:
+    """(k, b, b) blocks of a matrix that begin with rows i and columns j."""
+    rows, columns = np.broadcast_arrays(i[:, None, None] + np.arange(b)[:, None], j[:, None, None] + np.arange(b))
+    return entries_at(matrix, rows.ravel(), columns.ravel()).reshape(-1, b, b)
 
 
 def entries_at(matrix: sp.csr_array, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.float64]:
