@@ -34,7 +34,10 @@ def members_and_cells(nodes: Nodes, points: NDArray[np.float64], allowed: float)
     pairs = np.column_stack(sp.triu(nodes.graph, 1).nonzero()).astype(np.int64)
     pairs = pairs[determined(points)[pairs].all(axis=1)]
     alone = np.logical_and(*_balanced(nodes, points, pairs[:, 0], pairs[:, 1], allowed))
-    triangles, quads = _shell_cells(_graph_of(nodes.n, pairs[~alone]), points)
+    graph = _graph_of(nodes.n, pairs[~alone])
+    quads, triangles = _around(points, shared_cliques(graph, 4)), simplices(graph, 2)
+    inside = _graph_of(nodes.n, quads).cliques(triangles)  # all sides are those of quadrilaterals, or diagonals
+    triangles = _counter_clockwise(points, triangles[~inside])
     if len(triangles) + 2 * len(quads) > _MOST_PER_NODE * nodes.n:  # faces of solids, and planes through them
         triangles, quads = triangles[:0], quads[:0]
     else:
@@ -46,17 +49,6 @@ def _graph_of(n: int, *cells: NDArray[np.int64]) -> Graph:
     """The graph of n nodes in which those of each cell, (m, k), are coupled to each other."""
     pairs = [some[:, pair] for some in cells for pair in combinations(range(some.shape[1]), 2)]
     return Graph.of(n, *np.concatenate(pairs).T)
-
-
-def _shell_cells(graph: Graph, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Cliques that are cells: (m, 4) quadrilaterals, after (m, 3) triangles with a side that is none of theirs.
-
-    Nor is that a diagonal. Corners stand in order around the cell; in the plane counter-clockwise.
-    """
-    quads = _around(points, shared_cliques(graph, 4))
-    triangles = simplices(graph, 2)
-    triangles = triangles[~_graph_of(graph.n, quads).cliques(triangles)]
-    return _counter_clockwise(points, triangles), quads
 
 
 def _around(points: NDArray[np.float64], cliques: NDArray[np.int64]) -> NDArray[np.int64]:
