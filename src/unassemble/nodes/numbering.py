@@ -70,16 +70,6 @@ class Numbering:
         """Whether its nodes look like nodes, however few of their rows annihilate constants."""
         return self.share > HARDLY_ANY and self.quality > MOST * self.share
 
-    @property
-    def settled(self) -> bool:
-        """Whether nodes of so many directions show, and none lacks one without a trace: no other number need be tried.
-
-        They show where all rows of each couple to the same nodes, or nearly all do, sums vanish in most rows and hardly
-        a node lacks any.
-        """
-        shows = self.common == 1 or (self.share >= MOST and self.quality > NEARLY_ALL * self.share)
-        return self.sound and shows and not self.odd
-
 
 def measured(matrix: sp.csr_array, reading: Reading, d: int, kind: str, *, searched: bool = True) -> Numbering:
     """A numbering and what speaks for it; of one that was `searched` for more is asked."""

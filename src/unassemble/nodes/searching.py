@@ -34,8 +34,11 @@ def searched(matrix: sp.csr_array, sizes: tuple[int, ...], *, as_stored: bool = 
     live, inner = live_part(matrix)
     found: list[Numbering] = []
     for kind, d, reading in _readings(inner, sizes, as_stored):
-        found.append(measured(matrix, _of_all_rows(reading, live, matrix.shape[0]), d, kind))
-        if found[-1].settled and found[-1] is max(found, key=lambda one: one.quality):
+        one = measured(matrix, _of_all_rows(reading, live, matrix.shape[0]), d, kind)
+        found.append(one)
+        # Rows of each node couple to the same nodes, or nearly all do, most sums vanish and hardly a node lacks any.
+        shows = one.common == 1 or (one.share >= MOST and one.quality > NEARLY_ALL * one.share)
+        if one.sound and shows and not one.odd and one is max(found, key=lambda one: one.quality):
             break
     return found
 

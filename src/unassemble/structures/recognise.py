@@ -187,14 +187,11 @@ def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray
 def _shortest_runs(matrix: sp.csr_array, most: int, begins: NDArray[np.bool_]) -> NDArray[np.int64]:
     """(N,) nodes of neighbouring rows, each of at most so many; a node of so many `begins` with some rows, (N,).
 
-    A matrix cut into nodes is written down with one index for each unknown that a node couples to, and one number
-    for each of its own unknowns beside it. Rows of one node couple to nearly the same unknowns, so that hardly a
-    number is a zero and the indices are shared; rows of two nodes share few. What takes least to write down is
-    found by dynamic programming.
-
-    What the first cut takes for one node is one unknown to couple to for the next, as long as fewer nodes come of it:
-    rows of nodes some of whose directions are not coupled, as in flat shells along an axis, meet the same nodes. Every
-    row has an entry on the diagonal.
+    A matrix cut into nodes is written down with one index for each unknown that a node couples to, and one number for
+    each of its own unknowns beside it. Rows of one node couple to nearly the same unknowns, so that hardly a number is
+    a zero and the indices are shared; rows of two nodes share few. The shortest description is found by dynamic
+    programming. What it takes for one node is one unknown to couple to for the next, as long as fewer nodes come of it:
+    rows of nodes some of whose directions are not coupled, as in flat shells along an axis, meet the same nodes.
     """
     order = matrix.shape[0]
     pattern = sp.csr_array(pattern_of(matrix))
@@ -222,12 +219,10 @@ def _cut(pattern: sp.csr_array, most: int, begins: NDArray[np.bool_]) -> NDArray
         ways = cost[row] + least[row + 1 : row + 1 + most]
         length[row] = ways.argmin() + 1
         least[row] = ways[length[row] - 1]
-    first = np.zeros(order, dtype=np.int64)
-    row = 0
-    while row < order:
-        first[row] = 1
-        row += int(length[row])
-    return np.cumsum(first) - 1
+    starts = [0]
+    while starts[-1] < order:
+        starts.append(starts[-1] + int(length[starts[-1]]))
+    return np.repeat(np.arange(len(starts) - 1), np.diff(starts))
 
 
 def _continued(matrix: sp.csr_array, one: StructuralNumbering) -> StructuralNumbering:
