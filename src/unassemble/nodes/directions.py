@@ -106,9 +106,7 @@ class _Body:
         breadth_first = sp.csgraph.breadth_first_order
         order = breadth_first(self._pattern, 0, directed=False, return_predecessors=False)
         order = breadth_first(self._pattern, order[-1], directed=False, return_predecessors=False)
-        rank = np.empty(len(order), np.int64)
-        rank[order] = np.arange(len(order))
-        nodes = self._nodes[np.argsort(rank[self._nodes[:, 0]])]
+        nodes = self._nodes[np.argsort(np.argsort(order)[self._nodes[:, 0]])]
         for part in _SEEDS:
             known = np.full(len(given), -1)
             known[nodes[int(part * (len(nodes) - 1))]] = np.arange(self._d)
@@ -132,8 +130,7 @@ class _Body:
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Likeliest directions of all rows, and by how much they beat the next, if the others are as they are."""
         held = np.flatnonzero(direction >= 0)
-        field = np.zeros((len(direction), self._d))
-        field[held, direction[held]] = 1
+        field = np.eye(self._d)[direction] * (direction >= 0)[:, None]
         around = self._shifted[rows]
         field[rows] = solved(sp.csr_array(around[:, rows]), -(around[:, held] @ field[held]))
         best, margin = direction.copy(), np.full(len(direction), -np.inf)
@@ -202,7 +199,7 @@ def _named(
 def _least(matrix: sp.csr_array, given: NDArray[np.float64], direction: NDArray[np.int64]) -> NDArray[np.float64]:
     """(n, d) shares for which the sum of ``|matrix @ shares + given|``, (m, d), is nearly least.
 
-    Each row of shares adds up to one. Found by a primal-dual method from directions (n,); see Pock and Chambolle.
+    Found by a primal-dual method from directions (n,); see Pock and Chambolle.
     """
     size, back = abs(matrix), sp.csr_array(matrix.T)
     ahead = 1 / np.maximum(np.asarray(size.sum(axis=0)).ravel(), np.finfo(float).tiny)[:, None]
