@@ -21,7 +21,8 @@ T^{cc} is a multiple of the identity plus one of rank one, whose direction is w_
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -42,18 +43,12 @@ from ..nullspace.atlas import null_fields
 from ..nullspace.placing import Solution, pieces_of
 
 
-@dataclass(frozen=True, eq=False)
-class Straight:
+class Straight(NamedTuple):
     """A piece whose axes elements told: points (n, d), NaN elsewhere; lambda / mu; what the identities alone say."""
 
     points: NDArray[np.float64]
     ratio: float
     evidence: Evidence
-
-    @property
-    def nodes(self) -> NDArray[np.bool_]:
-        """(n,) which nodes belong to it."""
-        return determined(self.points)
 
 
 def straightened(nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.bool_]) -> Solution | None:
@@ -119,13 +114,13 @@ def _functions(null: NDArray[np.float64]) -> NDArray[np.float64]:
 def in_place(found: Solution | None, valid: NDArray[np.bool_], straight: list[Straight]) -> Solution:
     """Straight pieces, one at least, in place of the bent ones that they are part of."""
     base = found or Solution(valid, np.empty(0, np.int64), np.empty(0), (), (), exact=True, warnings=())
-    better = {int(base.component[one.nodes].max()) for one in straight} if found else set()
+    better = {int(base.component[determined(one.points)].max()) for one in straight} if found else set()
     parts = [
         (base.component == k, base.points, *of_piece)
         for k, of_piece in enumerate(zip(base.evidence, base.freedoms, strict=True))
         if k not in better
     ]
-    parts += [(one.nodes, one.points, one.evidence, "") for one in straight]
+    parts += [(determined(one.points), one.points, one.evidence, "") for one in straight]
     component, points = np.full(len(valid), -1), np.full(straight[0].points.shape, np.nan)
     for k, (here, x, _, _) in enumerate(parts):
         component[here], points[here] = k, x[here]
@@ -158,9 +153,14 @@ def _tables(
 ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Tables G and entries of pairs of nodes, (e, d, d) each and relative to their row, for one rule after the other.
 
-    Of the rows of some nodes; without the pairs of cells of which not all can be there.
+    Of the rows of some nodes that lost no neighbour, from all over the body; without the pairs of cells of which not
+    all can be there.
     """
-    some = entries.at(_sampled(entries))
+    i, j = np.divmod(entries.key, entries.n)
+    nodes = np.unique([i, j])
+    whole, chosen = nodes[entries.complete[nodes]], np.zeros(entries.n, dtype=bool)
+    chosen[whole[np.unique(np.linspace(0, len(whole) - 1, SAMPLE).astype(int))]] = True
+    some = entries.at(np.flatnonzero(chosen[i] | chosen[j]))
     block = replace(block, cells=block.cells[Pairs.of(block.cells, some).seen])
     pairs = Pairs.of(block.cells, some)
     doubtful = contested(block.kind.base, block.cells[:, : block.kind.corners])
@@ -171,16 +171,6 @@ def _tables(
     for rule in rules(block.kind):
         tables = Model(picture, block.cells, block.kind, rule).assembled(pairs, some, first)
         yield tables[sure] * weight, some.value[sure] * weight
-
-
-def _sampled(entries: Entries) -> NDArray[np.int64]:
-    """Pairs in the rows of some nodes that lost no neighbour, from all over the body."""
-    i, j = np.divmod(entries.key, entries.n)
-    nodes = np.unique(np.concatenate([i, j]))
-    whole = nodes[entries.complete[nodes]]
-    chosen = np.zeros(entries.n, dtype=bool)
-    chosen[whole[np.unique(np.linspace(0, len(whole) - 1, SAMPLE).astype(int))]] = True
-    return np.flatnonzero(chosen[i] | chosen[j])
 
 
 def _tensors(tables: NDArray, values: NDArray) -> NDArray[np.float64] | None:
