@@ -25,13 +25,10 @@ from ...tolerances import ALIKE, SMALL
 
 def boundary_terms(d: int) -> NDArray[np.float64]:
     """(d, d, d, 2 d) what p_1 .. p_d, q_1 .. q_d put into the places c, b, a."""
-    terms = np.zeros((d, d, d, 2 * d))
-    for k in range(d):
-        for m in range(d):
-            terms[k, m, m, k] += 1  # delta_ab p_c
-            terms[m, k, m, d + k] += 1  # delta_ac q_b
-            terms[m, m, k, d + k] += 1  # delta_cb q_a
-    return terms
+    one = np.eye(d)
+    p = np.einsum("ab,ck->cbak", one, one)
+    q = np.einsum("ac,bk->cbak", one, one) + np.einsum("cb,ak->cbak", one, one)
+    return np.concatenate([p, q], axis=3)
 
 
 def seen_terms(valid: NDArray[np.bool_], terms: NDArray[np.float64]) -> NDArray[np.float64]:
