@@ -102,12 +102,6 @@ def valid_pairs(nodal: NodalMatrix) -> NDArray[np.bool_]:
     return np.asarray(valid & sure[:, None, :])
 
 
-def linked(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(nnz,) pairs of nodes, the first of which has a row that touches the other; valid (n, d, d) or (n, d, d, d)."""
-    pairs = valid if valid.ndim == 3 else np.asarray(valid.any(axis=3))
-    return np.asarray((np.abs(nodal.data) * pairs[nodal.node]).max(axis=(1, 2)) > 0)
-
-
 def eliminated(nodal: NodalMatrix) -> NDArray[np.bool_]:
     """(n, d) unknowns that were taken out of nodes of which others are left."""
     present = nodal.row_of >= 0

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...errors import GeometryError
 from ...linalg import UpperTriangle, nearly_singular
 from ...linalg.definite import STEPS
-from ...nodes.nodal import NodalMatrix, determined, linked, valid_pairs
+from ...nodes.nodal import NodalMatrix, determined, valid_pairs
 from ...nodes.shape import in_gauge, shape
 from ...recovery import Evidence
 from ...tolerances import ALIKE, SINGULAR, SMALL
@@ -105,7 +105,8 @@ def pieces_of(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.
 
     That nodes lie in one plane is said in places of rows that they lack; nothing but that makes no piece.
     """
-    live = linked(nodal, valid)
+    pairs = np.asarray(valid.reshape(*valid.shape[:3], -1).any(axis=3))
+    live = (np.abs(nodal.data) * pairs[nodal.node]).max(axis=(1, 2)) > 0
     link = sp.csr_array((np.ones(live.sum()), (nodal.node[live], nodal.indices[live])), shape=(nodal.n, nodal.n))
     _, label = sp.csgraph.connected_components(link, directed=False)
     own = valid.reshape(nodal.n, nodal.dim, -1).any(axis=2) & (nodal.row_of >= 0)
