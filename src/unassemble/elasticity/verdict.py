@@ -74,7 +74,7 @@ def of_few_digits(
 ) -> tuple[str, Reason]:
     """Status and reason where the entries are rounded, which is an error bar: how well positions are known."""
     objection = _to_positions(nodal, solution, numbering, exact=False) or _to_identities(nodal, solution, numbering)
-    if objection.text:
+    if objection:
         return "uncertified", hidden(objection, rounding)
     if np.isnan(error):
         return "uncertified", NOTHING_LEFT
@@ -106,14 +106,14 @@ def verdict(
 ) -> tuple[str, Reason]:
     """Status and reason, by the largest residual of a valid identity and the cells that were found."""
     objection = _to_positions(nodal, solution, numbering)
-    if objection.text:
+    if objection:
         return "uncertified", objection
     if found.certified and found.backward_error <= CERTIFIED:
         count = count_of(sum(map(len, found.blocks.values())), "element")
         return "certified", Reason(f"the matrix re-assembled on the {count} is the given one")
     nearly = _softest(solution)
     objection = _to_identities(nodal, solution, numbering)
-    if objection.text:
+    if objection:
         return "uncertified", objection
     if np.isnan(error):
         return "uncertified", NOTHING_LEFT
@@ -132,8 +132,8 @@ def _softest(solution: Solution) -> float:
     return min((one.gap for one in solution.evidence if one.gap > 0), default=1.0)
 
 
-def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, *, exact: bool = True) -> Reason:
-    """Why positions may be wrong whatever elements say; without words where nothing is to be said.
+def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, *, exact: bool = True) -> Reason | None:
+    """Why positions may be wrong whatever elements say; None where nothing is to be said.
 
     Entries that are rounded have no `exact` null vector.
     """
@@ -162,11 +162,11 @@ def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, 
             "rows between them lack entries, or belong to other axes, as at inclined supports, or to other nodes",
             advice=GIVE_NUMBERING,
         )
-    return Reason("")
+    return None
 
 
-def _to_identities(nodal: NodalMatrix, solution: Solution, numbering: Numbering) -> Reason:
-    """Why identities alone, without elements that re-assemble, certify nothing; without words where they do."""
+def _to_identities(nodal: NodalMatrix, solution: Solution, numbering: Numbering) -> Reason | None:
+    """Why identities alone, without elements that re-assemble, certify nothing; None where they do."""
     if solution.straight:
         return Reason(
             "elements told the axes of a homogeneous body, but re-assembled on them the matrix is not the given one"
@@ -179,7 +179,7 @@ def _to_identities(nodal: NodalMatrix, solution: Solution, numbering: Numbering)
             advice=GIVE_NUMBERING,
         )
     odd = _came_apart(nodal)
-    return Reason(f"{_lacking(odd)}: its rows belong to other nodes", GIVE_NUMBERING) if odd else Reason("")
+    return Reason(f"{_lacking(odd)}: its rows belong to other nodes", GIVE_NUMBERING) if odd else None
 
 
 def _came_apart(nodal: NodalMatrix) -> int:
