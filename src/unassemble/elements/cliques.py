@@ -15,12 +15,9 @@ class Graph:
     """Neighbours of nodes, with fast answers to "are these two coupled?", from a symmetric pattern (n, n)."""
 
     def __init__(self, pattern: sp.csr_array):
-        coo = pattern.tocoo()
+        coo = pattern.sorted_indices().tocoo()
         off = coo.row != coo.col
-        order = np.lexsort((coo.col[off], coo.row[off]))
-        self.n = pattern.shape[0]
-        self.row = coo.row[off][order].astype(np.int64)
-        self.col = coo.col[off][order].astype(np.int64)
+        self.n, self.row, self.col = pattern.shape[0], coo.row[off].astype(np.int64), coo.col[off].astype(np.int64)
         self.start = np.searchsorted(self.row, np.arange(self.n + 1))
         self._key = self.row * self.n + self.col
 

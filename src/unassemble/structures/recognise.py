@@ -63,14 +63,11 @@ def find_structure(
     kind : {None, "interleaved", "by component"}
     block_size : int, optional
     """
-    orders = ORDERS if kind is None else (kind,)
-    sizes = {layout.block_size for layout in _KNOWN}
-    usual = {
-        (b, name): regular(matrix.shape[0], b, name)
-        for b in sizes
-        for name in orders
-        if matrix.shape[0] % b == 0 and matrix.shape[0] >= 2 * b
+    order, orders = matrix.shape[0], ORDERS if kind is None else (kind,)
+    sizes = {
+        layout.block_size for layout in _KNOWN if order % layout.block_size == 0 and order >= 2 * layout.block_size
     }
+    usual = {(b, name): regular(order, b, name) for b in sizes for name in orders}
     best = _best(matrix, usual, block_size)
     if (best is None or best.share < MOST) and kind != "by component" and matrix.diagonal().all():
         other = _best(matrix, {(b, "interleaved"): _with_gaps(matrix, b) for b in (3, 6)}, block_size)
@@ -131,13 +128,9 @@ def given_structure(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> 
     if len(np.unique(node * size + direction)) < len(node):
         return None
     fitting = [layout for layout in LAYOUTS if layout.block_size == size]
-    shares = [_share(matrix, layout, direction) for layout in fitting]
-    if size != SPACE.block_size and max(shares, default=0) <= HARDLY_ANY:
-        return None
-    if not fitting:
-        return None
-    best = int(np.argmax(shares))
-    return StructuralNumbering(fitting[best], node, direction, "given", shares[best])
+    found = [StructuralNumbering(one, node, direction, "given", _share(matrix, one, direction)) for one in fitting]
+    best = max(found, key=lambda one: one.share, default=None)
+    return best if best and (size == SPACE.block_size or best.share > HARDLY_ANY) else None
 
 
 def _share(matrix: sp.csr_array, layout: Layout, direction: NDArray) -> float:

@@ -8,6 +8,7 @@ bars' directions; where the truss has enough of them, these are its translations
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -80,14 +81,12 @@ def truss_numbering(
         See :func:`bars_of`.
     """
     order = matrix.shape[0]
-    for d in (3, 2) if block_size is None else (block_size,):
-        if order % d or order < 2 * d:
-            continue
-        for name in ORDERS if kind is None else (kind,):
-            node, direction = regular(order, d, name)
-            numbering = Numbering(d, node, direction, uncoupled_rows(matrix), name, 0.0, 1.0)
-            if bars_of(nodal_matrix(matrix, numbering), allowed) is not None:
-                return numbering
+    sizes = [d for d in ((3, 2) if block_size is None else (block_size,)) if order % d == 0 and order >= 2 * d]
+    for d, name in product(sizes, ORDERS if kind is None else (kind,)):
+        node, direction = regular(order, d, name)
+        numbering = Numbering(d, node, direction, uncoupled_rows(matrix), name, 0.0, 1.0)
+        if bars_of(nodal_matrix(matrix, numbering), allowed) is not None:
+            return numbering
     return None
 
 
