@@ -23,7 +23,7 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     doubtful = np.zeros(nodal.n, dtype=bool)
     doubtful[numbering.node_of_row[numbering.open_row]] = True
     doubtful &= (nodal.row_of < 0).any(axis=1)
-    return replace(nodal, doubtful=doubtful) if doubtful.any() else nodal
+    return replace(nodal, doubtful=doubtful)
 
 
 def unconfirmed(
@@ -38,9 +38,7 @@ def unconfirmed(
     confirmed: NDArray[np.bool_] = np.zeros(nodal.n, dtype=bool)
     if shown is not None:
         confirmed = np.asarray((shown | (nodal.row_of < 0)).all(axis=1))
-    if numbering.likely:
-        return determined(points) & ~confirmed
-    return np.zeros(nodal.n, dtype=bool) if nodal.doubtful is None else nodal.doubtful & ~confirmed
+    return (determined(points) if numbering.likely else nodal.doubtful) & ~confirmed
 
 
 def unborne(nodal: NodalMatrix, solution: Solution, found: Cells) -> NDArray[np.bool_]:

@@ -82,9 +82,7 @@ def _completed(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NodalMatri
     """
     d = nodal.dim
     present = nodal.row_of >= 0
-    gone = eliminated(nodal)
-    if nodal.doubtful is not None:  # the missing row may be another node's
-        gone = gone & ~nodal.doubtful[:, None]
+    gone = eliminated(nodal) & ~nodal.doubtful[:, None]  # or the missing row may be another node's
     whole = surrounded(nodal, valid)  # or more is missing than a roller takes
     graph = nodal.graph
     count = graph @ gone.astype(float)

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from ..nodes.nodal import NodalMatrix, without_trace
 from ..nodes.numbering import Numbering
@@ -184,8 +183,7 @@ def _to_identities(nodal: NodalMatrix, solution: Solution, numbering: Numbering)
 
 def _came_apart(nodal: NodalMatrix) -> int:
     """How many nodes lack directions without a trace, doubtful ones aside, which get no coordinates."""
-    apart: NDArray[np.bool_] = np.asarray(without_trace(nodal).any(axis=1))
-    return int(np.count_nonzero(apart if nodal.doubtful is None else apart & ~nodal.doubtful))
+    return int(np.count_nonzero(without_trace(nodal).any(axis=1) & ~nodal.doubtful))
 
 
 def _lacking(odd: int) -> str:

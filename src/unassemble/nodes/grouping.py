@@ -27,9 +27,7 @@ def same_pattern(matrix: sp.csr_array, identity: NDArray[np.bool_] | None = None
 def by_first_row(label: NDArray) -> NDArray[np.int64]:
     """Renumber labels by the first row that carries them."""
     _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
-    rank = np.empty(len(first), dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return rank[inverse]
+    return np.argsort(np.argsort(first))[inverse]
 
 
 def joined(first: NDArray[np.int64], second: NDArray[np.int64], n: int) -> NDArray[np.int64]:

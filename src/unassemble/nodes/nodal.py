@@ -27,7 +27,7 @@ class NodalMatrix:
     row_of: NDArray[np.int64]  # (n, d) of the matrix, -1 where there is none
     size: NDArray[np.float64]  # (n,) mean absolute sum of a node's off-diagonal blocks, the unit of its equations
     penalised: NDArray[np.bool_]  # (n, d) unknowns with a penalty on the diagonal
-    doubtful: NDArray[np.bool_] | None = None  # (n,) nodes whose rows, or directions, may be others
+    doubtful: NDArray[np.bool_]  # (n,) nodes whose rows, or directions, may be others
 
     @property
     def n(self) -> int:
@@ -79,7 +79,7 @@ def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
     at = np.flatnonzero(own)[node]
     data[at, direction, direction] = 0  # before the rest is added up: it would be lost beside the penalty
     data[at, direction, direction] = -np.add.reduceat(data, indptr[:-1])[node, direction, direction]
-    return NodalMatrix(indptr, indices, data, row_of.reshape(n, d), size, penalised)
+    return NodalMatrix(indptr, indices, data, row_of.reshape(n, d), size, penalised, np.zeros(n, dtype=bool))
 
 
 def valid_pairs(nodal: NodalMatrix) -> NDArray[np.bool_]:
