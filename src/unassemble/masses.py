@@ -31,18 +31,9 @@ def weighed(
     """The mesh of a stiffness matrix, by `recover`, with its density, or in the size in which the density is 1.
 
     The mass matrix is consistent, or lumped: each diagonal entry the sum of a row of the consistent one. Of anchors two
-    and more tell the size; one stays where it is.
-
-    Raises
-    ------
-    InputError
-        If the matrices differ in size.
-    MatrixError
-        If one is no square matrix of finite numbers.
-    GeometryError
-        If this is not the mass matrix of the mesh with one density, or masses of such meshes are not read.
-    RecoveryError
-        As `recover` does.
+    and more tell the size; one stays where it is. InputError if the matrices differ in size, MatrixError if one is no
+    square matrix of finite numbers, GeometryError if this is not the mass matrix of the mesh with one density, or
+    masses of such meshes are not read, RecoveryError as of `recover`.
     """
     A, given = as_csr(stiffness), read_matrix(masses) if is_file(masses) else masses
     try:

@@ -26,12 +26,7 @@ def recover_vector(
 ) -> Recovery:
     """Recover a vector-valued matrix whose numbering is known; see :class:`.nodes.anchoring.Request`.
 
-    Raises
-    ------
-    InputError
-        For anchors that do not fit.
-    RecoveryError
-        If no piece is determined.
+    InputError for anchors that do not fit, RecoveryError if no piece is determined.
     """
     numbering, rounding = reading.numbering, reading.rounding
     request = Request(matrix, clock, anchors, cells, reading.why, rounding)

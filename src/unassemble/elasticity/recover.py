@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -41,15 +40,7 @@ from .verdict import (
 
 
 def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Body:
-    """Recover a solid body whose numbering is known.
-
-    Raises
-    ------
-    InputError
-        For anchors that do not fit.
-    RecoveryError
-        If no piece is determined.
-    """
+    """Recover a solid body; InputError for anchors that do not fit, RecoveryError if no piece is determined."""
     if uncoupled(nodal):
         raise GeometryError(
             "the directions are not coupled, as those of a vector Laplacian: these are scalar matrices side by side, "
@@ -68,27 +59,19 @@ def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Bo
         if why:
             raise GeometryError(no_positions(why))
 
+    return _described(nodal, numbering, solution, request)
+
+
+def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, request: Request) -> Body:
+    """The body, with its certificate, material and cells, and the sentences that go with them."""
+    cells, rounding = request.cells, request.rounding
+
     def placed_again(matrix: sp.csr_array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         other = with_doubts(without_springs(nodal_matrix(matrix, numbering)), numbering)
         with blas_threads(1):
             again = solve(other)
         return again.points, residuals(other, again.valid, again.points)
 
-    return _described(nodal, numbering, solution, request, placed_again)
-
-
-def _described(
-    nodal: NodalMatrix,
-    numbering: Numbering,
-    solution: Solution,
-    request: Request,
-    placed_again: Callable[[sp.csr_array], tuple[NDArray[np.float64], NDArray[np.float64]]],
-) -> Body:
-    """The body, with its certificate, material and cells, and the sentences that go with them.
-
-    `placed_again` finds points and misfits from another matrix that may have been rounded to the given one.
-    """
-    cells, rounding = request.cells, request.rounding
     with request.clock("certify"):
         misfits = residuals(nodal, solution.valid, solution.points)
         error = float(np.abs(misfits).max()) if len(misfits) else float("nan")
@@ -102,8 +85,7 @@ def _described(
     alone = status == "certified" and not found.certified
     lone = determined(solution.points) & ~checked(nodal, solution) if alone else np.zeros(nodal.n, dtype=bool)
     if lone.any() and not cells:  # only elements can confirm them
-        more = replace(request, cells=True)
-        return _described(nodal, numbering, solution, more, placed_again)
+        return _described(nodal, numbering, solution, replace(request, cells=True))
     if alone and not (determined(solution.points) & ~lone).any():
         status, reason, lone = "uncertified", NOTHING_CHECKED, np.zeros_like(lone)
     bar = None

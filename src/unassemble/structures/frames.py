@@ -29,13 +29,7 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
     """Recover the coordinates of a structure whose nodes and directions are known, in true units of length.
 
     Anchors move pieces; size and axes are the matrix's own. Rounding is looked for anew, as directions are known now.
-
-    Raises
-    ------
-    InputError
-        For anchors that do not fit.
-    RecoveryError
-        If no node is determined.
+    InputError for anchors that do not fit, RecoveryError if no node is determined.
     """
     layout, node = numbering.layout, numbering.node_of_row
     sized, moves = bool(layout.rotations), len(layout.displacements)
