@@ -38,10 +38,9 @@ def candidates(graph: Graph, points: NDArray[np.float64]) -> Iterator[tuple[Bloc
     picture.
     """
     d, known = points.shape[1], int(np.isfinite(points).all(axis=1).sum())
-    known_kinds = (kind for kind in KINDS.values() if kind.dim == d and kind.degree < 3 and not kind.linear_simplex)
-    kinds = {kind.name: kind for kind in known_kinds}
+    kinds = [kind for kind in KINDS.values() if kind.dim == d and kind.degree < 3 and not kind.linear_simplex]
     simplex = KINDS["triangle" if d == 2 else "tetra"]
-    for kind in sorted(kinds.values(), key=lambda kind: -kind.nodes):
+    for kind in sorted(kinds, key=lambda kind: -kind.nodes):
         sets = shared_cliques(graph, kind.nodes)
         if kind.name == "triangle6":
             sets = np.unique(np.vstack([sets, straight_simplices(graph, points)]), axis=0)

@@ -91,8 +91,8 @@ def _solved(given: Equations, layout: Layout, piece: Piece) -> tuple[NDArray[np.
     d, b, n, m = layout.dim, layout.block_size, len(piece.nodes), len(piece.rows)
     part = given[piece.rows]
     place = np.searchsorted(piece.nodes, part.row // b)
-    known = piece.nodes[np.minimum(place, n - 1)] == part.row // b  # a row may not depend on its node
-    own = (part.row >= 0) & known
+    # A row may not depend on its node.
+    own = (part.row >= 0) & (piece.nodes[np.minimum(place, n - 1)] == part.row // b)
     local = replace(part, operator=piece.operator, row=np.where(own, place * b + part.row % b, -1))
     if not layout.rotations:
         points, evidence, probes = up_to_size(piece, d)
