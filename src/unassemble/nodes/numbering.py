@@ -27,7 +27,7 @@ class Numbering:
     common: float  # how far the rows of a node couple to the same nodes: 1 if all do
     # nodes that lack a direction without a trace; in an order without gaps, those whose rows cannot be one node's
     odd: int = 0
-    open_row: NDArray[np.bool_] | None = None  # in order: rows that may be one node's with others, by pattern and order
+    open_row: NDArray[np.bool_] | None = None  # by component: rows of which neither pattern nor order tells the node
     unnamed: NDArray[np.bool_] | None = None  # rows whose direction nothing proves
 
     @property

@@ -40,18 +40,15 @@ Solve = Callable[[Piece], tuple[NDArray[np.float64], Evidence, NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """Positions (n, d) of the nodes of all pieces and the piece of each, NaN and -1 where not determined.
+    """Positions of the nodes of all pieces."""
 
-    With one evidence per piece; of the equations, (m,), those that positions rest on and those of them that a
-    disturbance would change without being noticed; and nodes whose rows contradict the others, and were left out.
-    """
-
-    points: NDArray[np.float64]
-    component: NDArray[np.int64]
-    evidence: tuple[Evidence, ...]
-    used: NDArray[np.bool_]
-    unnoticed: NDArray[np.bool_]
+    points: NDArray[np.float64]  # (n, d), NaN where not determined
+    component: NDArray[np.int64]  # (n,) piece of each node, -1 where not determined
+    evidence: tuple[Evidence, ...]  # one per piece
+    used: NDArray[np.bool_]  # (m,) equations that these positions rest on
+    unnoticed: NDArray[np.bool_]  # (m,) those of them that a disturbance would change without being noticed
     notes: tuple[str, ...] = ()
+    # nodes whose rows contradict the others, and were left out
     spoiled: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 
     @property
