@@ -15,7 +15,9 @@ Exact null fields of the body are exactly those of value zero.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.linalg
@@ -33,6 +35,8 @@ PATCH = {2: 6000, 3: 1900}  # rows per chart: larger ones cost more to factorise
 _MOST = 64  # fields of the whole body to look for, at most
 _LEAST = 8
 
+Of = Callable[[NDArray[np.int64]], Identities]  # those of some rows
+
 
 def null_fields(
     nodal: NodalMatrix,
@@ -43,9 +47,10 @@ def null_fields(
     terms: NDArray[np.float64] | None = None,
 ) -> Fields:
     """Least singular fields of all valid identities of a body's nodes, (m,), by charts of no more rows than `patch`."""
+    of: Of = partial(identities, nodal, valid, terms=terms)
     size, graph = patch or PATCH[nodal.dim], nodal.graph
     parts = [body[part] for part in _patches(graph[body][:, body], size)] if len(body) > 1.5 * size else [body]
-    made = [_chart(nodal, valid, rows, terms, whole=len(parts) == 1) for rows in parts]
+    made = [_chart(of, graph, rows, whole=len(parts) == 1) for rows in parts]
     made = [one for one in made if len(one.nodes)] or made[:1]
     if len(made) == 1:
         return made[0]
@@ -54,7 +59,7 @@ def null_fields(
     place, triangle = np.full(nodal.n, -1), np.zeros((0, k))
     place[nodes] = np.arange(len(nodes))
     for part in parts:  # Rayleigh-Ritz on the whole body, part by part
-        local = identities(nodal, valid, part, terms)
+        local = of(part)
         residual = local.residual(fields[place[local.columns]]).reshape(-1, k)
         triangle = np.asarray(np.linalg.qr(np.vstack([triangle, np.linalg.qr(residual, mode="r")]), mode="r"))
     _, values, v = svd(triangle)
@@ -116,23 +121,16 @@ class Fields:
     charts: int = 1
 
 
-def _chart(
-    nodal: NodalMatrix,
-    valid: NDArray[np.bool_],
-    rows: NDArray[np.int64],
-    terms: NDArray[np.float64] | None,
-    *,
-    whole: bool,
-) -> Fields:
-    """Compute the least singular fields of the identities of some rows; see :func:`.identities.identities`.
+def _chart(of: Of, graph: sp.csr_array, rows: NDArray[np.int64], *, whole: bool) -> Fields:
+    """Compute the least singular fields of the identities of some rows, by themselves and in a graph of nodes.
 
     If these are not the `whole` body's, fields are added until the rest is stiff, so that the charts together hold
     every field of the body that fits.
     """
-    local = identities(nodal, valid, rows, terms)
+    local = of(rows)
     own = len(local.rows)
     if own and not whole:
-        local = _supported(local, nodal, valid, terms)
+        local = _supported(local, of, graph)
     n, d = len(local.columns), local.dim
     if not n:
         return Fields(local.columns, np.empty((0, d, 0)), np.empty(0), 0)
@@ -150,9 +148,7 @@ def _chart(
     return Fields(local.columns, fields, values, own)
 
 
-def _supported(
-    local: Identities, nodal: NodalMatrix, valid: NDArray[np.bool_], terms: NDArray[np.float64] | None
-) -> Identities:
+def _supported(local: Identities, of: Of, graph: sp.csr_array) -> Identities:
     """The identities, and those of the neighbours of rows at the rim that have too few to place what they touch.
 
     Each node takes d equations, which the rows that touch it share. A row with many neighbours that no other row of the
@@ -162,10 +158,10 @@ def _supported(
     short = _short(local)
     if not short.any():
         return local
-    near = np.unique(nodal.graph[local.rows[short]].indices)
-    more = identities(nodal, valid, np.union1d(local.rows, near), terms)
+    near = np.unique(graph[local.rows[short]].indices)
+    more = of(np.union1d(local.rows, near))
     kept = ~_short(more) | np.isin(more.rows, local.rows)
-    return more if kept.all() else identities(nodal, valid, more.rows[kept], terms)
+    return more if kept.all() else of(more.rows[kept])
 
 
 def _short(local: Identities) -> NDArray[np.bool_]:
