@@ -1,7 +1,5 @@
 """Mesh formats by extension: what each can hold, and how meshio is told to write it."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -25,48 +23,21 @@ _LINES = frozenset({"line"})
 
 @dataclass(frozen=True)
 class MeshFormat:
-    """How a mesh goes into one file format.
+    """How a mesh goes into one file format."""
 
-    Attributes
-    ----------
-    name : str
-        The format's name in meshio; empty for our own ``.npz``.
-    dimension : {2, 3}
-        Coordinates of each point of a planar mesh. Where the format attaches meaning to it, that has 2.
-    cells : frozenset of str
-        Kinds of cells, by meshio's names, that it holds in meshio's hands; ``"vertex"`` for bare points.
-    polygons : bool
-        Whether it holds cells of any number of vertices.
-    data : {"all", "boundary", "none"}
-        Point data that it takes along; ``"boundary"``: one integer label, which marks the boundary.
-    undetermined : bool
-        Whether it can hold points without coordinates (NaN). Readers of text formats mostly do not know that word.
-    keeps_rows : bool
-        Whether points have numbers at all; otherwise each triangle repeats its corners.
-    digits : int or None
-        Significant digits that coordinates keep, None for all.
-    options : mapping
-        For meshio's writer.
-    needs : str
-        A package that meshio needs for it and does not bring along.
-    cannot : str
-        Why the format can hold no mesh of ours; empty where it can.
-    """
-
-    name: str
-    dimension: int = 3
-    cells: frozenset[str] = _ALL
-    polygons: bool = False
-    data: str = "all"
-    undetermined: bool = False
-    keeps_rows: bool = True
-    digits: int | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
-    needs: str = ""
-    cannot: str = ""
+    name: str  # in meshio; empty for our own ``.npz``
+    dimension: int = 3  # coordinates of each point of a planar mesh: 2 where the format attaches meaning to it
+    cells: frozenset[str] = _ALL  # kinds, by meshio's names, that it holds in meshio's hands; "vertex" for bare points
+    polygons: bool = False  # whether it holds cells of any number of vertices
+    data: str = "all"  # point data that it takes along; "none", or "boundary": one integer label, which marks that
+    undetermined: bool = False  # whether it can hold NaN for coordinates: readers of text mostly do not know that word
+    keeps_rows: bool = True  # whether points have numbers at all; otherwise each triangle repeats its corners
+    digits: int | None = None  # significant ones that coordinates keep, None for all
+    options: Mapping[str, Any] = field(default_factory=dict)  # for meshio's writer
+    needs: str = ""  # a package that meshio needs for it and does not bring along
+    cannot: str = ""  # why the format can hold no mesh of ours
 
 
-_TWO_FILES = "it is two files that belong together"
 _NOT_COMPRESSED = "meshio writes it without compressing: write {} and compress that"
 
 # XML inside the one file: heavy data in a side file could not be renamed into place together with it.
@@ -78,8 +49,10 @@ _NASTRAN = MeshFormat("nastran", cells=_ALL | _HALFWAY | _LINES | {"quad9"}, dat
 # meshio turns the nodes of quadratic cells when it writes this one, and not when it reads.
 _PERMAS = MeshFormat("permas", cells=_ALL | _LINES, data="none")
 _NETGEN = MeshFormat("netgen", cells=_ALL | _HALFWAY | _LINES, data="none")
+_SVG_OPTIONS = {"float_fmt": ".12g", "image_width": None}
+_SVG = MeshFormat("svg", dimension=2, cells=_FLAT, data="none", keeps_rows=False, options=_SVG_OPTIONS)
 _TECPLOT = MeshFormat("tecplot", dimension=2, cells=_CELLS)
-_TETGEN = MeshFormat("tetgen", cannot=_TWO_FILES)
+_TETGEN = MeshFormat("tetgen", cannot="it is two files that belong together")
 _UGRID = MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True)
 _UGRID_SINGLE = MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True, digits=7)
 
@@ -114,14 +87,7 @@ FORMATS: Mapping[str, MeshFormat] = {
     ".post.gz": MeshFormat("permas", cannot=_NOT_COMPRESSED.format(".post")),
     ".stl": MeshFormat("stl", cells=_TRIANGLES, data="none", keeps_rows=False),
     ".su2": MeshFormat("su2", dimension=2, cells=_CELLS, data="none"),
-    ".svg": MeshFormat(
-        "svg",
-        dimension=2,
-        cells=_FLAT,
-        data="none",
-        keeps_rows=False,
-        options={"float_fmt": ".12g", "image_width": None},
-    ),
+    ".svg": _SVG,
     ".tec": _TECPLOT,
     ".ugrid": MeshFormat("ugrid", cells=_CELLS, data="none", digits=7),
     # Binary variants of UGRID are told by a second extension: byte order, Fortran records, size of numbers.
@@ -138,15 +104,6 @@ FORMATS: Mapping[str, MeshFormat] = {
 }
 
 
-def _unknown(path: str) -> str:
-    """The sentence about an extension that no format has: the nearest ones, and where all stand."""
-    suffix = PurePath(path).suffix.lower()
-    what = f"no mesh format has the extension {suffix!r}" if suffix else "it has no extension, which names the format"
-    near = [known for known in get_close_matches(suffix, FORMATS, n=3, cutoff=0.7) if not FORMATS[known].cannot]
-    which = f"did you mean {' or '.join(near)}?" if near else "use .npz, .vtu, .msh, .obj or .stl, for instance"
-    return f"cannot write {path!r}: {what}; {which} (the list is on the page 'Command line and files' of the manual)"
-
-
 def format_of(path: str | os.PathLike[str]) -> tuple[str, MeshFormat]:
     """Extension and format that a file name asks for; upper and lower case are alike.
 
@@ -160,7 +117,14 @@ def format_of(path: str | os.PathLike[str]) -> tuple[str, MeshFormat]:
     name = PurePath(path).name.lower()
     fitting = [suffix for suffix in FORMATS if name.endswith(suffix) and name != suffix]
     if not fitting:
-        raise OutputError(_unknown(os.fspath(path)))
+        suffix = PurePath(path).suffix.lower()
+        what = f"no mesh format has the extension {suffix!r}" if suffix else "it has no extension, to name the format"
+        near = [known for known in get_close_matches(suffix, FORMATS, n=3, cutoff=0.7) if not FORMATS[known].cannot]
+        which = f"did you mean {' or '.join(near)}?" if near else "use .npz, .vtu, .msh, .obj or .stl, for instance"
+        raise OutputError(
+            f"cannot write {os.fspath(path)!r}: {what}; {which} (the list is on the page 'Command line and files' of "
+            "the manual)"
+        )
     suffix = max(fitting, key=len)
     mesh_format = FORMATS[suffix]
     if mesh_format.cannot:

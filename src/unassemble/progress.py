@@ -1,12 +1,9 @@
 """The stage that long work is in, on a terminal."""
 
-from __future__ import annotations
-
 import sys
 import threading
 import time
 from shutil import get_terminal_size
-from types import TracebackType
 from typing import IO, Self
 
 _SENTENCES = {
@@ -34,15 +31,8 @@ class StageDisplay:
 
     It appears only if the stream is a terminal and the work takes longer than a moment, and vanishes at the end.
 
-    Parameters
-    ----------
-    stream : text stream, optional
-        Standard error by default.
-    enabled : bool
-    wanted : bool
-        Whether it was asked for, and is shown on a stream that is no terminal as well, as in a notebook.
-    delay, interval : float
-        Seconds before the line appears, and between its updates.
+    The stream is standard error by default. Where the line is `wanted` it is shown on a stream that is no terminal as
+    well, as in a notebook. `delay` and `interval` are seconds before it appears, and between its updates.
     """
 
     def __init__(
@@ -60,10 +50,9 @@ class StageDisplay:
         self._stage = ""
         self._start = time.time()
         self._done = threading.Event()
+        shown = enabled and (wanted or self._stream.isatty())
         # A thread, because stages may spend minutes in compiled code that calls nobody.
-        self._thread = (
-            threading.Thread(target=self._show, daemon=True) if enabled and (wanted or self._stream.isatty()) else None
-        )
+        self._thread = threading.Thread(target=self._show, daemon=True) if shown else None
 
     def __call__(self, stage: str) -> None:
         """Tell that a stage begins."""
@@ -74,9 +63,7 @@ class StageDisplay:
             self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._done.set()
         if self._thread:
             self._thread.join()

@@ -1,7 +1,5 @@
 """Other libraries' warnings, kept from a user who can do nothing about them."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """What a scalar matrix may be that of, from the likeliest on: the first that fits is the answer."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ Laplacian mesh comes back up to a rotation and reflection, which do not commute 
 applied.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

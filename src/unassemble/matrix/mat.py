@@ -1,50 +1,139 @@
 """MATLAB files of versions 4 to 7.3, SuiteSparse's ``Problem.A`` included.
 
 The reader of scipy (1.17) ends the process by a segmentation fault on some damaged files of version 5; the one here
-looks at every length before it believes it, and unpacks nothing but what may hold a sparse matrix.
+looks at every length before it believes it, and unpacks nothing but what may hold a sparse matrix. Format: MathWorks,
+MAT-File Format (the document of that name, level 5). A file is a row of data elements, each with a tag of type and
+length; a variable is an element that holds elements.
 """
 
-from __future__ import annotations
-
+import struct
+import zlib
+from collections.abc import Iterator
+from enum import IntEnum
 from typing import Any, BinaryIO
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from ..errors import MatrixFileError
 from .canonical import canonical, entry_rows
-from .mat5 import Variable, read_mat5
+
+_NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+
+_Element = tuple[int, memoryview]  # type and content
+
+
+class _Type(IntEnum):
+    """Of data elements that are no numbers; and classes of arrays, and flags of theirs, that matter here."""
+
+    MATRIX, COMPRESSED = 14, 15
+    STRUCT, SPARSE = 2, 5
+    LOGICAL, COMPLEX = 0x200, 0x800
 
 
 def read_mat(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
-    """Read the sparse variable of a MATLAB file.
+    """Read the sparse variable of a MATLAB file of versions 5 to 7; its index arrays are still to be checked.
 
-    The SuiteSparse collection keeps explicit zeros, which MATLAB cannot store, as the pattern
-    ``Problem.Zeros``; they are put back into ``Problem.A``.
-
-    Parameters
-    ----------
-    stream : binary file
-    name : str
-        What to call it in messages.
-    variable : str, optional
-        Which one, such as ``"A"`` or ``"Problem.A"``; needed where several are sparse and square.
-
-    Returns
-    -------
-    scipy sparse array
-        Its index arrays are still to be checked.
+    `name` is what to call the file in messages, and `variable` which one to read, such as ``"A"`` or ``"Problem.A"``;
+    it is needed where several are sparse and square.
 
     Raises
     ------
     MatrixFileError
         If there is no sparse variable, or the choice is open.
-    ValueError
-        If the file is truncated or damaged, in a few words.
+    ValueError, zlib.error, struct.error
+        If the file is truncated or damaged.
     """
-    variables = read_mat5(stream.read())
-    others = {v.name: v.shape for v in variables}
-    return _chosen(dict(_sparse_variables(variables)), others, name, variable)
+    content = stream.read()
+    order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
+    if order is None:
+        raise ValueError("the header does not tell the order of bytes")
+    found: dict[str, Any] = {}
+    others: dict[str, tuple[int, ...]] = {}
+    for kind, data in _elements(memoryview(content)[128:], order):
+        if kind == _Type.COMPRESSED:
+            kind, data = _unpacked(data, order)
+        if kind == _Type.MATRIX:
+            for key, shape, A in _variables(data, order):
+                others[key] = shape
+                if A is not None:
+                    found[key] = A
+    return _chosen(found, others, name, variable)
+
+
+def _elements(content: memoryview, order: str) -> Iterator[_Element]:
+    """The data elements in a stretch of bytes."""
+    at = 0
+    while at < len(content):
+        word, size = struct.unpack(order + "2I", content[at : at + 8])
+        start, end = at + 8, at + 8 + size
+        at = end if word == _Type.COMPRESSED else end + -size % 8
+        if word >> 16:  # a small one, in the tag itself
+            start, end, at = start - 4, start - 4 + (word >> 16), start
+            if end > at:
+                raise ValueError("a small data element is too long")
+        if end > len(content):
+            raise ValueError("a data element ends beyond the file")
+        yield word & 0xFFFF if word >> 16 else word, content[start:end]
+
+
+def _unpacked(data: memoryview, order: str) -> _Element:
+    """The element in a compressed one; only its beginning, where that shows that it is of no use."""
+    enough = 4096  # bytes
+    beginning = zlib.decompressobj().decompress(data, enough)
+    # Two tags come before the flags.
+    if len(beginning) < enough or beginning[16 if order == "<" else 19] in (_Type.STRUCT, _Type.SPARSE):
+        return next(_elements(memoryview(zlib.decompress(data)), order))
+    (kind,) = struct.unpack(order + "I", beginning[:4])
+    return kind, memoryview(beginning)[8:]
+
+
+def _variables(data: memoryview, order: str, called: str = "") -> Iterator[tuple[str, tuple[int, ...], Any]]:
+    """Name, shape and, where it is sparse, the value of a variable, and of the fields of one that is a structure."""
+    elements = _elements(data, order)
+    flags, shape, name = _numbers(elements, order), tuple(_numbers(elements, order).tolist()), _text(elements)
+    kind, name = int(flags[0]) & 0xFF, called or name
+    yield name, shape, _sparse(elements, order, shape, int(flags[0])) if kind == _Type.SPARSE else None
+    if kind != _Type.STRUCT or shape != (1, 1):
+        return
+    width, names = _numbers(elements, order), _text(elements)
+    if len(width) != 1 or width[0] < 1 or len(names) % width[0]:
+        raise ValueError("the names of the fields of a structure have no length")
+    for k in range(0, len(names), int(width[0])):
+        kind, field = next(elements, (0, data))
+        if kind != _Type.MATRIX:
+            raise ValueError("a field of a structure is no array")
+        if len(field):
+            one = next(_variables(field, order, f"{name}.{names[k : k + int(width[0])].split(chr(0))[0]}"))
+            yield from [one] if one[2] is not None else []
+
+
+def _numbers(elements: Iterator[_Element], order: str) -> NDArray:
+    """The next element as an array of numbers."""
+    kind, data = next(elements, (0, memoryview(b"")))
+    if kind not in _NUMBERS:
+        raise ValueError(f"a data element of type {kind} is found in the place of numbers")
+    return np.frombuffer(data, order + _NUMBERS[kind]).astype(_NUMBERS[kind], copy=False)
+
+
+def _text(elements: Iterator[_Element]) -> str:
+    return bytes(next(elements, (0, b""))[1]).decode("latin-1")
+
+
+def _sparse(elements: Iterator[_Element], order: str, shape: tuple[int, ...], flags: int) -> Any:
+    rows, starts = _numbers(elements, order), _numbers(elements, order)
+    # What a logical matrix stores is true; MATLAB announces its bytes as doubles.
+    values = np.ones(len(rows), dtype=bool) if flags & _Type.LOGICAL else _numbers(elements, order)
+    if flags & _Type.COMPLEX:
+        values = values + 1j * _numbers(elements, order)
+    if rows.dtype.kind == "f" or starts.dtype.kind == "f":
+        raise ValueError("the indices of a sparse variable are not integers")
+    if len(starts) != shape[1] + 1 or not 0 <= starts[-1] <= min(len(rows), len(values)):
+        raise ValueError("the arrays of a sparse variable do not belong together")
+    rows, starts = (one.astype(np.int32 if one.dtype.itemsize <= 4 else np.int64) for one in (rows, starts))
+    n_stored = int(starts[-1])  # more places may be reserved
+    return sp.csc_array((values[:n_stored], rows[:n_stored], starts), shape=shape)
 
 
 def read_mat4(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
@@ -52,8 +141,12 @@ def read_mat4(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
     from scipy.io import loadmat
 
     held = {key: value for key, value in loadmat(stream).items() if not key.startswith("__")}
-    found = {key: sp.coo_array(value) for key, value in held.items() if _is_matrix(value)}
-    return _chosen(found, {key: np.shape(value) for key, value in held.items()}, name, variable)
+    found = {
+        key: sp.coo_array(value)
+        for key, value in held.items()
+        if sp.issparse(value) or (value.ndim == 2 and value.dtype.kind in "biufc" and min(value.shape) > 1)
+    }
+    return _chosen(found, {key: value.shape for key, value in held.items()}, name, variable)
 
 
 def read_mat73(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
@@ -77,8 +170,6 @@ def read_mat73(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
 
     with h5py.File(stream, "r") as file:
         file.visititems(visit)
-        for key in [key for key in found if key.endswith(".A") and f"{key[:-1]}Zeros" in found]:
-            found[key] = _with_zeros(found[key], found.pop(f"{key[:-1]}Zeros"))
     return _chosen(found, others, name, variable)
 
 
@@ -95,48 +186,29 @@ def _sparse_group(group: Any) -> Any:
     return sp.csc_array((values, group["ir"][()].astype(index), group["jc"][()].astype(index)), shape=(rows, columns))
 
 
-def _is_matrix(value: Any) -> bool:
-    dense = isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "biufc" and min(value.shape) > 1
-    return bool(sp.issparse(value) or dense)
-
-
 def _chosen(found: dict[str, Any], others: dict[str, tuple[int, ...]], name: str, variable: str | None) -> Any:
-    """The variable that is asked for, or the only square one."""
-    held = _listed({key: A.shape for key, A in found.items()} or others)
+    """The variable that is asked for, or the only square one.
+
+    The SuiteSparse collection keeps explicit zeros, which MATLAB cannot store, as the pattern ``Problem.Zeros``; they
+    are put back into ``Problem.A``.
+    """
+    for key in [key for key in found if key.endswith(".A")]:
+        zeros = found.pop(f"{key[:-1]}Zeros", None)
+        if zeros is not None and zeros.shape == found[key].shape:
+            A, zeros = canonical(found[key]), canonical(zeros)
+            rows = np.concatenate([entry_rows(A), entry_rows(zeros)])
+            data = np.concatenate([A.data, np.zeros(zeros.nnz, dtype=A.dtype)])
+            found[key] = sp.coo_array((data, (rows, np.concatenate([A.indices, zeros.indices]))), shape=A.shape)
+    sizes = {key: A.shape for key, A in found.items()} or others
+    shown = [f"{key[:40]!r} of size {' x '.join(map(str, shape[:4]))}" for key, shape in list(sizes.items())[:6]]
+    held = ", ".join(shown) + ", ..." * (len(sizes) > 6) or "nothing"
     if variable is not None:
         if variable not in found:
             raise MatrixFileError(f"{name} has no sparse variable {variable!r}: it holds {held}")
         return found[variable]
-    square = [A for A in found.values() if A.shape[0] == A.shape[1]]
-    candidates = square or list(found.values())
+    candidates = [A for A in found.values() if A.shape[0] == A.shape[1]] or list(found.values())
     if not candidates:
         raise MatrixFileError(f"{name} holds no sparse variable (it holds {held}): make one by sparse(A) and save it")
     if len(candidates) > 1:
         raise MatrixFileError(f"{name} holds several sparse variables ({held}): choose one by `variable=NAME`")
     return candidates[0]
-
-
-def _sparse_variables(variables: list[Variable]) -> list[tuple[str, Any]]:
-    found = []
-    for v in variables:
-        if v.sparse is not None:
-            found.append((v.name, v.sparse))
-        sparse = {f.name: f.sparse for f in v.fields if f.sparse is not None}
-        zeros = sparse.pop("Zeros", None) if "A" in sparse else None
-        if zeros is not None and zeros.shape == sparse["A"].shape:
-            sparse["A"] = _with_zeros(sparse["A"], zeros)
-        found += [(f"{v.name}.{key}", A) for key, A in sparse.items()]
-    return found
-
-
-def _with_zeros(A: Any, zeros: Any) -> Any:
-    """A with the pattern of `zeros` stored as explicit zeros."""
-    A, zeros = canonical(A), canonical(zeros)
-    rows = np.concatenate([entry_rows(A), entry_rows(zeros)])
-    data = np.concatenate([A.data, np.zeros(zeros.nnz, dtype=A.dtype)])
-    return sp.coo_array((data, (rows, np.concatenate([A.indices, zeros.indices]))), shape=A.shape)
-
-
-def _listed(sizes: dict[str, tuple[int, ...]]) -> str:
-    shown = [f"{key[:40]!r} of size {' x '.join(map(str, shape[:4]))}" for key, shape in list(sizes.items())[:6]]
-    return (", ".join(shown) + (", ..." if len(sizes) > 6 else "")) or "nothing"

@@ -1,7 +1,5 @@
 """Sparse matrices of ``scipy.sparse.save_npz``, dense ones of ``numpy.save``; nothing is ever unpickled."""
 
-from __future__ import annotations
-
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -12,19 +10,9 @@ from .canonical import working_dtype
 
 
 def read_npz(stream: BinaryIO, name: str) -> Any:
-    """Read what ``scipy.sparse.save_npz`` has written.
+    """Read what ``scipy.sparse.save_npz`` has written, as stored; index arrays are still to be checked.
 
-    Parameters
-    ----------
-    stream : binary file
-        Seekable, at its beginning.
-    name : str
-        What to call it in messages.
-
-    Returns
-    -------
-    scipy sparse matrix or array
-        As stored; its index arrays are still to be checked.
+    `name` is what to call the file in messages.
 
     Raises
     ------
