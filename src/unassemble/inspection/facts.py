@@ -21,7 +21,7 @@ from ..operators import VectorReading
 from ..planar.conformal import estimate_scale
 from ..recovery import ELEMENT_NAMES
 from ..structures import StructuralNumbering
-from ..structures.bars import bars_of
+from ..structures.trusses import bars_of
 from ..tolerances import ROUNDED, SUMMED
 from ..topology import Piece, Topology
 from ..topology.manifold import Cycles, surface_readings
