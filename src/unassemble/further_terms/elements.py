@@ -24,10 +24,8 @@ from ..errors import RecoveryError
 from ..matrix import OperatorMatrix
 from ..recovery import PlanarMesh
 from ..tolerances import SUSPICIOUS
-from .again import Held
-from .mass import size_note
-from .row_sums import RowSums
-from .scaling import unscaled
+from .held import Held, RowSums, size_note
+from .recover import unscaled
 
 Of = Callable[[OperatorMatrix, Iterable[Cells]], PlanarMesh]
 Sized = Callable[[OperatorMatrix, Sequence[Cells]], PlanarMesh]
@@ -44,7 +42,7 @@ class LessMass:
 
 def less_mass(matrix: OperatorMatrix) -> LessMass | None:
     """A matrix c L + s M less s M; None where row sums show no mass, or rows no such cells that tell it."""
-    sign = RowSums.of(matrix).sign
+    sign = RowSums(matrix).sign
     cells = next(shown_cells(matrix, mass=True), None) if sign else None
     weights = cells and told_by_entries(matrix, cells.blocks)
     if not cells or not weights or not all((sign * some > 0).all() for some in weights.values()):
@@ -66,7 +64,7 @@ def recover_elements_with_terms(
     anchored : bool
         Whether positions are given, so that no piece may change its size.
     """
-    sums = RowSums.of(matrix)
+    sums = RowSums(matrix)
     if not sums.there.any():
         return None
 
@@ -80,9 +78,7 @@ def recover_elements_with_terms(
         cells = next(shown_cells(matrix), None)
         if cells is None:
             return None
-        scaled = (
-            None if sums.sign else unscaled(Held(matrix, None), lambda left: of_cells(left, shown_cells(left)), clock)
-        )
+        scaled = None if sums.sign else unscaled(Held(matrix), lambda left: of_cells(left, shown_cells(left)), clock)
         if scaled is not None:
             return scaled
         guessed = guessed_from_sums(sums.values, cells.blocks)  # serendipity functions have integrals of both signs
@@ -99,7 +95,7 @@ def _settled(
 
     As many rounds as `patience` are mixed, and may pass without a better one.
     """
-    blocks, area = cells.blocks, float(RowSums.of(matrix).values.sum())  # times s
+    blocks, area = cells.blocks, float(RowSums(matrix).values.sum())  # times s
     x, ends = (
         np.concatenate([some.ravel() for some in start.values()]),
         np.cumsum([some.size for some in start.values()]),
@@ -129,7 +125,7 @@ def _settled(
         found = replace(found, uniqueness="searched" if found.uniqueness == "proved" else found.uniqueness)
         notes += ["that no other mesh, with another mass, fits as well is not proved"] if found.certified else []
     operator, terms = "c L + s M, M the consistent mass matrix,", Terms(matrix.diagonal, reaction)
-    return Held(matrix, None).with_terms(found, terms, operator, *notes)
+    return Held(matrix).with_terms(found, terms, operator, *notes)
 
 
 def _in_one_size(found: PlanarMesh, sums: NDArray[np.float64], blocks: Blocks) -> PlanarMesh:
