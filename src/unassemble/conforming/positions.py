@@ -12,10 +12,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from ..linalg import factorisation
 from ..planar.conformal import ConformalOptions, smooth_start
-from ..planar.krylov import ShiftedSearch
-from ..planar.pencil import ConformalPencil
+from ..planar.pencil import ConformalPencil, ShiftedSearch
 from ..tolerances import SUMMED
 from ..topology.keys import distinct
 from .parts import Part
@@ -60,7 +58,7 @@ def corner_positions(part: Part, weights: NDArray, scale: float | None) -> tuple
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     piece, options = part.piece, ConformalOptions()
     pencil = ConformalPencil(part.n_corners, edges, piece.boundary, relative)
-    search = ShiftedSearch(pencil, factorisation, options.krylov_steps)
+    search = ShiftedSearch(pencil, options.krylov_steps)
     start = smooth_start(part.n_corners, piece.boundary, piece.loop_offsets)
     if scale is not None:
         z, c, _ = search.at(scale / unit * (1 - options.margin), start, steps=2)

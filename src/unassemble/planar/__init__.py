@@ -6,9 +6,8 @@ from .cotangent import edge_weights, weight_gradient
 from .deviations import coordinate_covariances
 from .frame import canonical_frame, collinear, fit_similarity
 from .hinges import join
-from .krylov import ShiftedSearch
 from .normal import WeightJacobian
-from .pencil import ConformalPencil
+from .pencil import ConformalPencil, ShiftedSearch
 from .piece import PieceMesh, refined
 from .polish import PolishOptions, polish
 

@@ -22,11 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from ..linalg import factorisation
 from ..tolerances import ALIKE, LITTLE, MOST, ROUNDED, SUMMED
 from ..topology import Piece
-from .krylov import ShiftedSearch
-from .pencil import ConformalPencil
+from .pencil import ConformalPencil, ShiftedSearch
 
 _log = logging.getLogger(__name__)
 
@@ -87,7 +85,9 @@ def _estimate(piece: Piece, weights: NDArray) -> _Estimate:
     if not sign:
         raise GeometryError("the off-diagonal entries add up to zero, those of a Laplacian cannot")
     largest = float(np.abs(weights).max())  # taken out, so that no square overflows
-    sizes = _scales_of_triangles(piece, weights / largest)
+    a, b, c = (weights / largest / np.where(piece.inner, 2, 1))[piece.opposite].T
+    form = a * b + b * c + c * a
+    sizes = 2 * np.sqrt(form[form > 0])  # of triangles of which the three shares belong to a triangle at all
     if not len(sizes):
         size, scatter, common = float(np.sqrt(3) * np.abs(weights / largest).mean()), np.inf, None
     else:
@@ -112,14 +112,6 @@ def _common(values: NDArray[np.float64]) -> float | None:
     if count < min(MOST * len(values), max(LITTLE * len(values), _MANY)) or 2 * alike.max() > count:
         return None
     return float(np.median(values[first : first + count]))
-
-
-def _scales_of_triangles(piece: Piece, weights: NDArray) -> NDArray[np.float64]:
-    """|c| by each triangle of which the three shares belong to a triangle at all."""
-    share = weights / np.where(piece.facing[:, 1] >= 0, 2, 1)
-    a, b, c = share[piece.opposite].T
-    form = a * b + b * c + c * a
-    return np.asarray(2 * np.sqrt(form[form > 0]))
 
 
 def conformal_map(
@@ -165,7 +157,7 @@ def conformal_map(
         row = int(piece.vertices[np.argmin(sums)])
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     pencil = ConformalPencil(piece.n_vertices, piece.edges, piece.boundary, relative)
-    search = ShiftedSearch(pencil, factorisation, options.krylov_steps)
+    search = ShiftedSearch(pencil, options.krylov_steps)
     z = start = smooth_start(piece.n_vertices, piece.boundary, piece.loop_offsets)
     known = scale if scale is not None else estimate.likely
     if known is not None:
@@ -194,7 +186,7 @@ def conformal_map(
             break
     if near:
         z = search.corrected(z, c)
-    _log.debug("scale %.16g after %d factorisations, %d solves", c * unit, search.factorisations, search.solves)
+    _log.debug("scale %.16g after %d factorisations", c * unit, search.factorisations)
     return ConformalMap(z, float(c * unit), search.factorisations, search.solves, converged)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import SolverError
 from ..tolerances import LARGEST_NOISE, LAST_DIGITS, SIGMAS
 from ..topology import Piece
-from .cautious import CautiousOptions, cautious_polish, count_flipped
+from .cautious import MOST_VERTICES, cautious_polish, count_flipped
 from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
 from .polish import PolishedMesh, errors_of_one_size, polish
@@ -30,13 +30,7 @@ class PieceMesh:
     doubt: float = 0.0
 
 
-def positions(
-    piece: Piece,
-    weights: NDArray,
-    *,
-    scale: float | None,
-    sharp: bool,
-) -> PieceMesh:
+def positions(piece: Piece, weights: NDArray, *, scale: float | None, sharp: bool) -> PieceMesh:
     """Conformal solve; `sharp` where no polish follows."""
     found = conformal_map(piece, weights, scale=scale, sharp=sharp)
     notes = () if found.converged else ("the conformal solve did not converge",)
@@ -90,11 +84,8 @@ def refined(
     spread = weight_roundings(piece, mesh.z) if rounding else noise
     try:
         found = _polished(piece, weights, mesh.z, scale, spread)
-        if (
-            rounding
-            and spread is not None
-            and errors_of_one_size(weights / found.scale - edge_weights(piece, found.z), spread)
-        ):
+        misfit = weights / found.scale - edge_weights(piece, found.z)
+        if rounding and spread is not None and errors_of_one_size(misfit, spread):
             spread = noise
             found = _polished(piece, weights, found.z, scale, spread)
     except SolverError as error:
@@ -110,11 +101,7 @@ def refined(
 
 
 def _polished(
-    piece: Piece,
-    weights: NDArray,
-    start: NDArray,
-    scale: float | None,
-    spread: NDArray | None,
+    piece: Piece, weights: NDArray, start: NDArray, scale: float | None, spread: NDArray | None
 ) -> PolishedMesh:
     """By the chord iteration; where it fails, by small steps from the better of start and result.
 
@@ -123,14 +110,14 @@ def _polished(
     try:
         found = polish(piece, weights, start, scale=scale, spread=spread)
     except SolverError:  # steps that led to flat triangles; small ones do not
-        if piece.n_vertices > CautiousOptions().most_vertices:
+        if piece.n_vertices > MOST_VERTICES:
             raise
         return cautious_polish(piece, weights, start, scale=scale, spread=spread)
     finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
     flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
     if found.converged and not flipped:
         return found
-    if piece.n_vertices > CautiousOptions().most_vertices:
+    if piece.n_vertices > MOST_VERTICES:
         return found
     nearest = found.z if flipped <= count_flipped(piece, start) else start
     again = cautious_polish(piece, weights, nearest, scale=scale, spread=spread)

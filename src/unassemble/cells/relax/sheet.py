@@ -13,11 +13,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...linalg import factorisation
 from ...planar.cotangent import corner_gradients
-from ...planar.krylov import ShiftedSearch
 from ...planar.normal import distant_pair
-from ...planar.pencil import ConformalPencil
+from ...planar.pencil import ConformalPencil, ShiftedSearch
 from ...topology.keys import with_sides
 from ..candidates.candidates import Candidates
 from ..judge.triangulation import fans_of
@@ -132,7 +130,7 @@ class Sheet:
         RecoveryError
             If there is none.
         """
-        search = ShiftedSearch(self.pencil(strength), factorisation, 8)
+        search = ShiftedSearch(self.pencil(strength), 8)
         noise = np.random.default_rng(0).standard_normal((self.n_vertices, 2)).view(np.complex128).ravel()
         z, c = (start.z, start.c) if start else (noise, 1.0)
         shift = _SHIFT * c

@@ -10,7 +10,7 @@ import heapq
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import islice
 
 import numpy as np
@@ -23,7 +23,7 @@ from ..candidates.choosing import chosen
 from ..judge.labelling import Labelling
 from ..relax.sheet import Sheet
 from .leaps import leap
-from .moves import turned
+from .moves import Move, turned
 from .options import DEFAULT, SearchOptions
 from .updates import Updates
 
@@ -112,7 +112,7 @@ class BestFirst:
                 self._seen.add(self._updates.outline(labelling.labels))
                 self._ranked += 1
                 judge.spend(self._options.ranking)
-                changed = self._changed(labelling)
+                changed = map(partial(self._turned, labelling.labels), self._updates.ranked(labelling))
             asked = 0
             for labels in islice(changed, self._options.batch):
                 asked += 1
@@ -132,15 +132,9 @@ class BestFirst:
             self._ranked * self._least > self._options.patience * (self._first - self._least)
         )
 
-    def _changed(self, labelling: Labelling) -> Iterator[NDArray[np.bool_]]:
-        """Small changes of the labels; where the first few are in vain, also all clear ones at once."""
-        for k, move in enumerate(self._updates.ranked(labelling)):
-            if k == self._options.batch and self._n_faces == self._candidates.count:
-                yield leap(self._updates.sheet, labelling.labels)
-            yield self._whole(turned(labelling.labels, move))
-
-    def _whole(self, labels: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """With cells on all edges, unless some cells claim no half-edges."""
+    def _turned(self, labels: NDArray[np.bool_], move: Move) -> NDArray[np.bool_]:
+        """The labels after a move; with cells on all edges, unless some cells claim no half-edges."""
+        labels = turned(labels, move)
         if labels[self._n_faces :].any():
             return labels
         return chosen(self._candidates, np.where(labels, 1.0, -np.inf))
