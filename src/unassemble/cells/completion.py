@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
@@ -18,7 +18,7 @@ from ..topology import Numbering, Piece, Polygons, Topology, components, located
 from ..topology.keys import contains, distinct, pair_keys
 from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained, with_pieces
 from .judge.labelling import Labelling, add_differing_factors
-from .search.options import DEFAULT
+from .search.options import SEARCH
 from .search.search import first_labelling, label_cells
 from .undivided import undivided
 
@@ -28,8 +28,8 @@ class _Part:
     """What components of the graph were found to be; rows of edges are left as they are."""
 
     pieces: Solved
-    vanished: NDArray[np.int64]
-    polygons: Polygons
+    vanished: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    polygons: Polygons = field(default_factory=Polygons.none)
 
 
 def completed(
@@ -53,22 +53,13 @@ def completed(
     scale : float, optional
         c, where it is known.
 
-    Returns
-    -------
-    matrix : OperatorMatrix
-        With the vanished entries of the cells' triangles as zeros.
-    topology : Topology
-        Of that matrix; components of which nothing can be made are among its failures.
-    meshes : list of PieceMesh or RecoveryError
-        Unpolished positions.
+    Returns the matrix with the vanished entries of the cells' triangles as zeros; its topology, components of which
+    nothing can be made being among its failures; and unpolished positions of each piece, or why there are none.
 
-    Raises
-    ------
-    RecoveryError
-        If no component has cells.
+    Raises RecoveryError if no component has cells.
     """
     kept = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
-    parts = [_Part(kept, np.empty((0, 2), np.int64), Polygons.none())]
+    parts = [_Part(kept)]
     failures: list[RecoveryError] = []
     components_with_pieces = with_pieces(matrix.n, matrix.edges, topology.pieces)
 
@@ -77,7 +68,7 @@ def completed(
         return misfits_of(matrix, [(piece, attempt(piece)) for piece in topology.pieces])
 
     by_graph_alone = matrix.unweighted and scale is None
-    budget = Budget(0 if by_graph_alone else DEFAULT.worth(matrix.n))
+    budget = Budget(0 if by_graph_alone else SEARCH.worth(matrix.n))
     for part, own in components_with_pieces:
         if not doubtful[part.vertices[0]]:
             continue
@@ -98,7 +89,7 @@ def guessed(matrix: OperatorMatrix, topology: Topology) -> tuple[OperatorMatrix,
     doubtful = unexplained(matrix, topology)
     unsolved = GeometryError("not solved")
     kept: Solved = [(piece, unsolved) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
-    parts = [_Part(kept, np.empty((0, 2), np.int64), Polygons.none())]
+    parts = [_Part(kept)]
     for part in components(matrix.n, matrix.edges):
         if doubtful[part.vertices[0]]:
             labelling = first_labelling(len(part.vertices), part.edges, -matrix.entries[part.edge_rows])
@@ -122,14 +113,17 @@ def _labelled(
     labelling = label_cells(len(numbering.vertices), numbering.edges, weights, scale, errors, budget)
     if labelling is not None and labelling.fits:
         return _part(matrix, numbering, labelling)
-    before = _misfit_of_own(misfit_of_triangles(), numbering, own, attempt, scale)
+    misfit = misfit_of_triangles().copy()
+    if solved := [(piece, mesh) for piece in own if isinstance(mesh := attempt(piece), PieceMesh)]:
+        add_differing_factors(solved, misfit, scale)
+    before = float(np.sqrt(np.mean(misfit[numbering.edge_rows] ** 2)))
     if labelling is not None and labelling.size < LITTLE * before and labelling.misfit.max() < 1:
         return _part(matrix, numbering, labelling)
     n, e = len(numbering.vertices), len(numbering.edges)
     if labelling is None or not own:
         require_planar(n, numbering.edges)
     if own:
-        return _Part([(piece, attempt(piece)) for piece in own], np.empty((0, 2), np.int64), Polygons.none())
+        return _Part([(piece, attempt(piece)) for piece in own])
     if labelling is None:
         raise GeometryError(
             f"no cells can be put on the graph of the matrix ({n} rows, {e} entries above the diagonal)"
@@ -138,17 +132,6 @@ def _labelled(
         f"of the meshes tried on the graph of the matrix, which is planar ({n} rows, {e} entries above the diagonal), "
         "none has its entries: they may belong to no mesh, as those of a network, or lack zeros that should be stored"
     )
-
-
-def _misfit_of_own(
-    misfit: NDArray, numbering: Numbering, own: list[Piece], attempt: Attempt, scale: float | None
-) -> float:
-    """Root mean square misfit of a component's triangles; what their factors differ by counts as in a labelling."""
-    solved = [(piece, mesh) for piece in own if isinstance(mesh := attempt(piece), PieceMesh)]
-    misfit = misfit.copy()
-    if solved:
-        add_differing_factors(solved, misfit, scale)
-    return float(np.sqrt(np.mean(misfit[numbering.edge_rows] ** 2)))
 
 
 def _part(matrix: OperatorMatrix, numbering: Numbering, labelling: Labelling) -> _Part:

@@ -19,6 +19,7 @@ from ..budget import SAMPLE
 from ..elements.kinds import KINDS, Kind
 from ..errors import TopologyError
 from ..matrix import OperatorMatrix
+from ..topology.keys import found, pair_keys
 from .affine import ElementEntries
 from .sets import NodeSets, pairs_of
 
@@ -184,7 +185,8 @@ def _trials(
     for ring in _RINGS[kind.corners]:
         around = np.take_along_axis(corners, np.broadcast_to(ring, corners.shape), axis=1)
         ends = np.take_along_axis(sets, around, axis=1)
-        place, known = _known_sides(n, ends, sides)
+        # Where the sides of the ring are among those of two cells.
+        place, known = found(sides.keys, pair_keys(n, ends, np.roll(ends, -1, axis=1)))
         fits = (known.sum(axis=1) == per_cell) & ((kind.degree - 1) * (~known).sum(axis=1) == n_open)
         pattern = known @ (1 << np.arange(kind.corners))
         for code in np.unique(pattern[fits]):
@@ -216,16 +218,6 @@ def _parted(
     np.put_along_axis(free, inner, False, axis=1)
     open_rows = np.argsort(~free, axis=1, kind="stable")
     return corners, inner, open_rows, free.sum(axis=1)
-
-
-def _known_sides(n: int, ends: NDArray[np.int64], sides: _Sides) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """(m, c) place of each side of corners in a ring among those of two cells, and whether it is there."""
-    following = np.roll(ends, -1, axis=1)
-    keys = np.minimum(ends, following) * n + np.maximum(ends, following)
-    if not len(sides.keys):
-        return np.zeros(ends.shape, np.int64), np.zeros(ends.shape, dtype=bool)
-    place = np.minimum(np.searchsorted(sides.keys, keys), len(sides.keys) - 1)
-    return place, sides.keys[place] == keys
 
 
 def _local(sets: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from ..errors import GeometryError
 from ..tolerances import ALIKE, LITTLE, MOST, ROUNDED, SUMMED
 from ..topology import Piece
+from ..topology.keys import runs
 from .pencil import ConformalPencil, ShiftedSearch
 
 _log = logging.getLogger(__name__)
@@ -201,8 +202,7 @@ def smooth_start(n: int, boundary: NDArray, loop_offsets: NDArray) -> NDArray:
     """
     z = 0.01 * np.random.default_rng(0).standard_normal((n, 2)).view(np.complex128).ravel()
     length = np.diff(loop_offsets)
-    place = np.arange(len(boundary)) - np.repeat(loop_offsets[:-1], length)
-    angle = 2 * np.pi * place / np.repeat(length, length)
-    size = np.repeat(length / length.max(), length)
+    loop, place = runs(length)
+    angle, size = 2 * np.pi * place / length[loop], (length / length.max())[loop]
     np.add.at(z, boundary[:, 0], size * (np.exp(1j * angle) + 0.5 * np.exp(-1j * angle)))
     return z

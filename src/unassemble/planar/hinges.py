@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import breadth_first_order, connected_components
+from scipy.sparse.csgraph import breadth_first_order
 
 from ..linalg import least_norm
 from ..tolerances import ALIKE, ROUNDED
 from ..topology import Topology
+from ..topology.numbering import connected
 
 _DENSE = 100  # pieces; above, sparse linear algebra is faster, and none is turned over by itself
 
@@ -133,8 +134,7 @@ def groups(topology: Topology) -> NDArray[np.int64]:
     n = len(topology.pieces)
     piece = np.repeat(np.arange(n), [p.n_vertices for p in topology.pieces])
     vertex = np.concatenate([p.vertices for p in topology.pieces])
-    graph = coo_array((np.ones(len(piece)), (piece, n + vertex)), shape=(n + topology.n_vertices,) * 2)
-    return np.asarray(connected_components(graph, directed=False)[1][:n])
+    return connected(n + topology.n_vertices, piece, n + vertex)[1][:n]
 
 
 def _along_trees(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> list[NDArray]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..errors import SolverError
 from ..linalg import UpperTriangle, factorisation
 from ..topology import Piece
-from ..topology.together import Together
+from ..topology.surface import Together
 
 
 @dataclass(frozen=True, eq=False)

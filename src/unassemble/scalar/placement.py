@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..options import Direction
 from ..planar.frame import Similarity, canonical_frame, collinear, fit_similarity
-from ..planar.hinges import groups
+from ..planar.hinges import groups, join
 from ..reductions import ConstantTensor
 from ..topology import Piece, Topology
+from .notes import piece_notes, topology_notes
 
 Anchor = tuple[int, float, float]
 
@@ -138,6 +139,29 @@ class Placement:
         if len(rows) == 1:
             positions = positions + (targets[0] - positions[rows[0]])
         return positions, notes
+
+    def placed(
+        self,
+        topology: Topology,
+        positions: Sequence[NDArray],
+        remarks: Sequence[Sequence[str]],
+        sizes: NDArray[np.float64] | None = None,
+    ) -> tuple[list[NDArray], NDArray[np.complex128], list[str]]:
+        """Every piece in its final frame, relative to its origin, hinges joined.
+
+        `positions`: of each piece, (k,) in any frame; `remarks`: on each; `sizes` (pieces,): factors of pieces of which
+        less than two positions are known.
+
+        Returns `placed`, (k,) each; `origins` (pieces,); `notes`: what is to be said.
+        """
+        origins, known = self.origins(topology), np.array([self.known_positions(piece) for piece in topology.pieces])
+        placed, said = [], []
+        for label, piece in enumerate(topology.pieces):
+            z, more = self.apply(piece, positions[label], origins[label])
+            placed.append(z if sizes is None or known[label] >= 2 else sizes[label] * z)
+            said.append((*remarks[label], *more))
+        notes = [*piece_notes(said), *self.unused(topology), *topology_notes(topology)]
+        return join(topology, placed, known), origins, notes
 
     def known_positions(self, piece: Piece) -> int:
         """How many points of a piece are fixed from outside; a direction counts as two."""

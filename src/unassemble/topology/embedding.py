@@ -7,11 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from . import planarity
-from .cycles import chordless_four_cycles, three_cycles
+from .cycles import chordless_four_cycles, not_faces, three_cycles
 from .faces import FaceComplex, around, from_cycles, from_rotation
 from .keys import distinct
-from .separating import not_faces
+from .planarity import rotation_system
 
 
 def short_faces(n: int, edges: NDArray) -> list[NDArray[np.int64]]:
@@ -65,7 +64,7 @@ def _drawings(n: int, edges: NDArray, cycles: list[NDArray]) -> Iterator[FaceCom
         drawing = drawing_with_faces(n, edges, [triangles[~crowded(n, edges, triangles).any(axis=1)], quads])
     if drawing is not None:
         yield drawing
-    rotation = planarity.rotation_system(n, edges)
+    rotation = rotation_system(n, edges)
     if rotation is not None:
         yield from_rotation(n, edges, *rotation)
 
@@ -107,7 +106,7 @@ def _with_faces(n: int, edges: NDArray, cycles: list[NDArray]) -> tuple[NDArray,
         hub += len(s)
     halves = np.column_stack([edges[rim].ravel(), np.repeat(midpoint[rim], 2)])
     plain = np.delete(edges, rim, axis=0)
-    rotation = planarity.rotation_system(hub, np.concatenate([plain, halves, *spokes]))
+    rotation = rotation_system(hub, np.concatenate([plain, halves, *spokes]))
     if rotation is None:
         return None
     tail, head = rotation

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from .keys import Grouped
+from .keys import Grouped, runs
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +46,7 @@ def components(n: int, edges: NDArray) -> list[Numbering]:
 
     `n`: number of vertices; `edges` (e, 2): pairs i < j in lexicographic order.
     """
-    graph = sp.coo_array((np.ones(len(edges), np.int8), edges.T), shape=(n, n))
-    count, label = csgraph.connected_components(graph, directed=False)
+    count, label = connected(n, *edges.T)
     used = np.zeros(n, dtype=bool)
     used[edges] = True
     vertices, rows = Grouped(np.where(used, label, -1), count), Grouped(label[edges[:, 0]], count)
@@ -59,6 +58,16 @@ def components(n: int, edges: NDArray) -> list[Numbering]:
         Numbering(vertices.order[v[k] : v[k + 1]], rows.order[e[k] : e[k + 1]], local[e[k] : e[k + 1]])
         for k in order.tolist()
     ]
+
+
+def connected(n: int, one: NDArray, other: NDArray) -> tuple[int, NDArray[np.int64]]:
+    """Number of connected components of a graph with edges between `one` and `other`, (e,) each; and that of each row.
+
+    Isolated vertices count; components are numbered in order of their lowest vertices.
+    """
+    graph = sp.coo_array((np.ones(len(one), np.int8), (one, other)), shape=(n, n))
+    count, label = csgraph.connected_components(graph, directed=False)
+    return int(count), label.astype(np.int64)
 
 
 def breadth_first(graph: sp.csr_array) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -98,7 +107,5 @@ def neighbours(graph: sp.csr_array, vertices: NDArray) -> tuple[NDArray[np.int64
 
     Returns `place` (k,): which of `vertices`, in increasing order; `neighbour` (k,).
     """
-    count = graph.indptr[vertices + 1] - graph.indptr[vertices]
-    place = np.repeat(np.arange(len(vertices)), count)
-    within = np.arange(len(place)) - np.repeat(np.cumsum(count) - count, count)
+    place, within = runs(graph.indptr[vertices + 1] - graph.indptr[vertices])
     return place, graph.indices[graph.indptr[vertices[place]] + within].astype(np.int64)

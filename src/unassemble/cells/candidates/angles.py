@@ -71,24 +71,16 @@ def likeliest_scale(complex_: FaceComplex, weights: NDArray) -> float:
         return unit
     short = np.flatnonzero(complex_.simple & (complex_.size <= max(SHORT, length.min())))
     faces = short[np.linspace(0, len(short) - 1, min(len(short), SAMPLE)).astype(int)]
-    return unit * float(np.exp(np.median(np.log(scales_of_faces(complex_, weights / unit, faces)))))
-
-
-def scales_of_faces(complex_: FaceComplex, cotangents: NDArray, faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(k,) the c for which angles facing the sides of some faces, of given cotangents over c, (e,), add up to pi."""
     size = complex_.size[faces]
     first = np.cumsum(size) - size
     face = np.repeat(np.arange(len(faces)), size)
-    place = np.arange(len(face)) + (complex_.offsets[faces] - first)[face]
-    unit = float(np.median(np.abs(cotangents[cotangents != 0])))
-    share = (cotangents / unit)[complex_.order[place] >> 1]
-    low, high = np.full(len(faces), -8.0), np.full(len(faces), 8.0)
+    share = (weights / unit)[complex_.order[np.arange(len(face)) + (complex_.offsets[faces] - first)[face]] >> 1]
+    low, high = np.full(len(faces), -8.0), np.full(len(faces), 8.0)  # of log c of each face
     for _ in range(40):
         middle = (low + high) / 2
-        angle = facing_angles(share / np.exp(middle)[face])
-        above = np.add.reduceat(angle, first) > np.pi  # angles grow with c
+        above = np.add.reduceat(facing_angles(share / np.exp(middle)[face]), first) > np.pi  # angles grow with c
         low, high = np.where(above, low, middle), np.where(above, middle, high)
-    return unit * np.asarray(np.exp((low + high) / 2))
+    return float(unit * np.exp(np.median((low + high) / 2)))
 
 
 def outer_faces(blocks: FaceComplex, sums: NDArray) -> NDArray[np.bool_]:

@@ -18,7 +18,7 @@ from ...planar.normal import distant_pair
 from ...planar.pencil import ConformalPencil, ShiftedSearch
 from ...topology.keys import with_sides
 from ..candidates.candidates import Candidates
-from ..judge.triangulation import fans_of
+from ..judge.labelling import fans_of
 
 LONGEST = 40
 """Edges of a face that may be a cell."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,11 +12,37 @@ from ...errors import RecoveryError
 from ...matrix.operator import row_sizes
 from ..judge.labelling import Labelling
 from ..relax.sheet import STEEPEST, Sheet
-from .low_rank import ChangedMaps
-from .moves import Move, Neighbours, turned
-from .options import DEFAULT, SearchOptions
+from .low_rank import ChangedMaps, Move, turned
+from .options import SEARCH
 
 _BATCH = 5e4  # triangles times moves that are computed together
+
+
+class _Neighbours:
+    """What is near what among the candidates of a sheet."""
+
+    def __init__(self, sheet: Sheet):
+        n, count = sheet.n_vertices, sheet.candidates.count
+        corner = _incidence(np.repeat(sheet.cell, 3), sheet.triangles.ravel(), (count, n))
+        self._touching = (corner @ corner.T).tocsr()
+        cell, half = sheet.candidates.sides.T
+        taken = _incidence(cell, half, (count, 2 * len(sheet.candidates.edges)))
+        rivals = (taken @ taken.T).tocsr()
+        self._rivals = [own.tolist() for own in np.split(rivals.indices, rivals.indptr[1:-1])]
+
+    def touching(self, move: Move) -> list[int]:
+        """Candidates that share a vertex with one of the move."""
+        indices, start = self._touching.indices, self._touching.indptr
+        return sorted({int(k) for cell in move for k in indices[start[cell] : start[cell + 1]]})
+
+    def with_rivals(self, labels: Sequence[bool] | NDArray[np.bool_], cells: Sequence[int]) -> Move:
+        """The cells, and those that have to give way to the new ones among them."""
+        gone = {other for k in cells if not labels[k] for other in self._rivals[k] if labels[other]}
+        return tuple(sorted({*cells} | gone))
+
+
+def _incidence(row: NDArray, column: NDArray, shape: tuple[int, int]) -> sp.csr_array:
+    return sp.csr_array((np.ones(len(row)), (row, column)), shape=shape)
 
 
 class Updates:
@@ -25,10 +51,10 @@ class Updates:
     `free` (cells,): labels that may change; all of them by default.
     """
 
-    def __init__(self, sheet: Sheet, free: NDArray[np.bool_] | None = None, options: SearchOptions = DEFAULT):
-        self.sheet, self._options = sheet, options
+    def __init__(self, sheet: Sheet, free: NDArray[np.bool_] | None = None):
+        self.sheet = sheet
         self._free = sheet.chosen if free is None else sheet.chosen & free
-        self._near = Neighbours(sheet)
+        self._near = _Neighbours(sheet)
         n, m = sheet.n_vertices, len(sheet.triangles)
         smaller = row_sizes(n, sheet.edges, np.abs(sheet.weights))[sheet.edges].min(axis=1)
         smaller = np.maximum(smaller, np.finfo(float).tiny)  # entries next to far larger ones underflow
@@ -49,21 +75,21 @@ class Updates:
         """
         labels = labelling.labels
         try:
-            maps = ChangedMaps(self.sheet, labels, self._options.near)
+            maps = ChangedMaps(self.sheet, labels, SEARCH.near)
         except RecoveryError:
             return
-        most = int(np.clip(self._options.moves_work / self.sheet.n_vertices, 1, self._options.moves))
+        most = int(np.clip(SEARCH.moves_work / self.sheet.n_vertices, 1, SEARCH.moves))
         now = labels.tolist()
         moves = list(dict.fromkeys(self._near.with_rivals(now, (k,)) for k in self._suspects(labelling)[:most]))
         left = self._left(maps, labels, moves)
         alone, given = self._alone(moves, left), set[Move]()
         for level in range(2, levels + 1):
-            first = np.argsort(left, kind="stable")[: self._options.leaders].tolist()
+            first = np.argsort(left, kind="stable")[: SEARCH.leaders].tolist()
             more = self._joined(labels, {moves[k]: float(left[k]) for k in first}, alone, set(moves))[:most]
             left = np.append(left, self._left(maps, labels, more))
             moves += more
             order = [k for k in np.argsort(left, kind="stable").tolist() if np.isfinite(left[k])]
-            for move in (moves[k] for k in order[: len(order) if level == levels else self._options.soon]):
+            for move in (moves[k] for k in order[: len(order) if level == levels else SEARCH.soon]):
                 if move not in given:
                     given.add(move)
                     yield move
@@ -77,20 +103,20 @@ class Updates:
         that touches it, of the `usual` ones; and these `more` moves.
         """
         labels = labelling.labels
-        maps = ChangedMaps(self.sheet, labels, self._options.nearest)
+        maps = ChangedMaps(self.sheet, labels, SEARCH.nearest)
         now = labels.tolist()
         first = np.flatnonzero(self._free & supposed).tolist()
         moves = list(dict.fromkeys([*more, *(self._near.with_rivals(now, (k,)) for k in first)]))
         if not moves:
             return
-        most = int(self._options.beside_work / self.sheet.n_vertices) + 1
+        most = int(SEARCH.beside_work / self.sheet.n_vertices) + 1
         left = self._left(maps, labels, moves)
         leaders = dict(zip(moves, left.tolist(), strict=True))
         pairs = self._joined(labels, leaders, self._alone(moves, left), set(moves), usual)[:most]
-        moves, left = moves + pairs, np.append(left, self._left(maps, labels, pairs, self._options.faint))
+        moves, left = moves + pairs, np.append(left, self._left(maps, labels, pairs, SEARCH.faint))
         seen = {self.outline(labels)}
         for k in np.argsort(left, kind="stable").tolist():
-            if not left[k] <= self._options.faint:
+            if not left[k] <= SEARCH.faint:
                 return
             if (outline := self.outline(turned(labels, moves[k]))) not in seen:
                 seen.add(outline)
