@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 
@@ -15,8 +15,8 @@ from ..matrix import OperatorMatrix
 from ..planar.piece import PieceMesh
 from ..tolerances import LITTLE
 from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar
-from ..topology.keys import contains, distinct, pair_keys
-from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained, with_pieces
+from ..topology.keys import Grouped, contains, distinct, pair_keys
+from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained
 from .judge.labelling import Labelling, add_differing_factors
 from .search.options import SEARCH
 from .search.search import first_labelling, label_cells
@@ -41,17 +41,8 @@ def completed(
 ) -> tuple[OperatorMatrix, Topology, list[Outcome]]:
     """Read every doubtful component again.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    topology : Topology
-        Surfaces of 3-cycles; see :func:`unassemble.topology.surfaces`.
-    attempt : callable
-        Gives positions of one of its pieces, or says why there are none.
-    doubtful : (n,) bool
-        See :func:`in_doubt`.
-    scale : float, optional
-        c, where it is known.
+    `topology`: surfaces of 3-cycles, see :func:`unassemble.topology.surfaces`; `attempt`: gives positions of one of its
+    pieces, or says why there are none; `doubtful` (n,): see :func:`in_doubt`; `scale`: c, where it is known.
 
     Returns the matrix with the vanished entries of the cells' triangles as zeros; its topology, components of which
     nothing can be made being among its failures; and unpolished positions of each piece, or why there are none.
@@ -61,7 +52,7 @@ def completed(
     kept = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
     parts = [_Part(kept)]
     failures: list[RecoveryError] = []
-    components_with_pieces = with_pieces(matrix.n, matrix.edges, topology.pieces)
+    components_with_pieces = _with_pieces(matrix.n, matrix.edges, topology.pieces)
 
     @cache
     def misfit_of_triangles() -> NDArray[np.float64]:
@@ -79,6 +70,20 @@ def completed(
     if not any(part.pieces for part in parts):
         raise failures[0]
     return _merged(matrix, topology, parts, tuple(map(str, failures)))
+
+
+def _with_pieces(n: int, edges: NDArray[np.int64], pieces: Sequence[Piece]) -> list[tuple[Numbering, list[Piece]]]:
+    """Each component, the largest first, and its pieces in their order; in linear time.
+
+    `edges` (e, 2): pairs i < j in lexicographic order; `pieces`: none of which belongs to two components.
+    """
+    parts = components(n, edges)
+    label = np.full(n, -1)
+    for k, part in enumerate(parts):
+        label[part.vertices] = k
+    own = Grouped(label[np.array([piece.vertices[0] for piece in pieces], dtype=np.int64)], len(parts))
+    bounds, order = own.start.tolist(), own.order.tolist()
+    return [(part, [pieces[j] for j in order[bounds[k] : bounds[k + 1]]]) for k, part in enumerate(parts)]
 
 
 def guessed(matrix: OperatorMatrix, topology: Topology) -> tuple[OperatorMatrix, Topology]:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecoveryError, SolverError
 from ..matrix import OperatorMatrix
-from ..planar.cautious import cautious_polish
 from ..planar.piece import PieceMesh
-from ..planar.polish import SHORT, polish
+from ..planar.polish import CAREFUL, SHORT, polish
 from ..tolerances import ALIKE, SMALL
-from ..topology import Numbering, Piece, Topology, components
-from ..topology.keys import Grouped
+from ..topology import Piece, Topology
 from ..topology.numbering import connected
 from .judge.labelling import even
 from .judge.within_errors import misfits
@@ -32,11 +30,7 @@ Solved = list[tuple[Piece, Outcome]]
 
 
 def in_doubt(
-    matrix: OperatorMatrix,
-    topology: Topology,
-    attempt: Attempt,
-    scale: float | None,
-    noise: float | None,
+    matrix: OperatorMatrix, topology: Topology, attempt: Attempt, scale: float | None, noise: float | None
 ) -> NDArray[np.bool_]:
     """(n,) rows of components with nonzero entries on no triangle, or entries that do not fit.
 
@@ -74,8 +68,7 @@ def _shortly_polished(
         return mesh
     weights = -matrix.entries[piece.edge_rows]
     try:
-        step = cautious_polish(piece, weights, mesh.z, scale=scale) if small_steps else None
-        found = step or polish(piece, weights, mesh.z, scale=scale, options=SHORT)
+        found = polish(piece, weights, mesh.z, scale=scale, options=CAREFUL if small_steps else SHORT)
     except SolverError as error:
         return error
     return PieceMesh(found.z, found.scale)
@@ -98,25 +91,6 @@ def _components_of(matrix: OperatorMatrix, rows: NDArray) -> NDArray[np.bool_]:
     chosen = np.zeros(matrix.n, dtype=bool)
     if not len(rows):
         return chosen
-    label = components_of(matrix)
+    label = connected(matrix.n, *matrix.edges.T)[1]
     chosen[label[matrix.edges[rows, 0]]] = True
     return chosen[label]
-
-
-def components_of(matrix: OperatorMatrix) -> NDArray[np.int64]:
-    """(n,) number of the connected component of each row."""
-    return connected(matrix.n, *matrix.edges.T)[1]
-
-
-def with_pieces(n: int, edges: NDArray[np.int64], pieces: Sequence[Piece]) -> list[tuple[Numbering, list[Piece]]]:
-    """Each component, the largest first, and its pieces in their order; in linear time.
-
-    `edges` (e, 2): pairs i < j in lexicographic order; `pieces`: none of which belongs to two components.
-    """
-    parts = components(n, edges)
-    label = np.full(n, -1)
-    for k, part in enumerate(parts):
-        label[part.vertices] = k
-    own = Grouped(label[np.array([piece.vertices[0] for piece in pieces], dtype=np.int64)], len(parts))
-    bounds, order = own.start.tolist(), own.order.tolist()
-    return [(part, [pieces[j] for j in order[bounds[k] : bounds[k + 1]]]) for k, part in enumerate(parts)]

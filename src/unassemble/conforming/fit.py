@@ -78,7 +78,13 @@ def fitted(
     Raises GeometryError, SolverError.
     """
     z, c = _corner_positions(part, weights, scale)
-    straight = _by_best_rule(part, weights, z, c, noise)
+    trials = []  # with straight sides: the quadrature that fits best, of those that fit alike the first
+    for rule in _rules(part, straight=True):
+        trials.append(_with_rule(part, weights, z, c, noise, rule, straight=True))
+        if trials[-1].size <= AGREED:
+            break
+    least = min(trial.size for trial in trials)
+    straight = next((trial for trial in trials if trial.size <= max(AGREED, _ALIKE * least)), trials[0])
     if part.degree == 1 or not refine or straight.size < max(CERTIFIED**0.5, _left_by(noise, c)):
         return _settled(straight, scale, noise) if refine else straight
     straight, curved = _polished(straight, weights, scale, noise), None
@@ -115,17 +121,6 @@ def _settled(start: Fitted, scale: float | None, noise: NDArray | None) -> Fitte
 def _left_by(noise: NDArray | None, c: float) -> float:
     """Misfit that noise may leave."""
     return 0.0 if noise is None else 2 * float(np.sqrt(np.mean(noise**2))) / abs(c)
-
-
-def _by_best_rule(part: Part, weights: NDArray, z: NDArray, c: float, noise: NDArray | None) -> Fitted:
-    """With straight sides and the quadrature that fits best; of those that fit alike the first."""
-    trials = []
-    for rule in _rules(part, straight=True):
-        trials.append(_with_rule(part, weights, z, c, noise, rule, straight=True))
-        if trials[-1].size <= AGREED:
-            return trials[-1]
-    least = min(trial.size for trial in trials)
-    return next((trial for trial in trials if trial.size <= _ALIKE * least), trials[0])
 
 
 def _with_rule(

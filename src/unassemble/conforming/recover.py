@@ -37,21 +37,8 @@ def recover_conforming(
 ) -> ConformingMesh:
     """The mesh of a checked scalar matrix, certified or the nearest.
 
-    Parameters
-    ----------
-    stored : OperatorMatrix
-    shown : iterable of Cells
-        See :func:`shown_cells`.
-    placement : Placement
-    clock : Clock
-    options : ScalarOptions
-
-    Raises
-    ------
-    TopologyError
-        If rows form no cells.
-    GeometryError
-        If the entries fit none that they form.
+    `shown`: see :func:`shown_cells`. Raises TopologyError if rows form no cells, GeometryError if the entries fit none
+    that they form.
     """
     task = Task(options=options, placement=placement, noise=Noise.known(stored, options.noise))
     failure: Exception = TopologyError("no sets of rows that are coupled to each other are cells of any known element")

@@ -59,11 +59,6 @@ class _Sides:
     middle: NDArray[np.bool_]
 
 
-def kind_of_size(k: int) -> Kind:
-    """The planar kind with so many nodes."""
-    return KINDS[_KINDS[k]]
-
-
 def ordered_cells(
     matrix: OperatorMatrix, found: NodeSets, *, mass: bool = False
 ) -> Iterator[tuple[dict[Kind, NDArray[np.int64]], bool]]:
@@ -71,10 +66,7 @@ def ordered_cells(
 
     With each, whether the graph alone tells them. With a mass term nothing else stands on the diagonal.
 
-    Raises
-    ------
-    TopologyError
-        If the sets do not overlap as cells do.
+    Raises TopologyError if the sets do not overlap as cells do.
     """
     sums = np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n)
     size = np.abs(matrix.diagonal if mass else sums)
@@ -84,7 +76,7 @@ def ordered_cells(
     others: dict[Kind, _Second] = {}
     first = 0
     for sets in found.sets:
-        kind = kind_of_size(sets.shape[1])
+        kind = KINDS[_KINDS[sets.shape[1]]]
         per_cell = sides.per_cell[first : first + len(sets)]
         blocks[kind], others[kind] = _ordered(matrix, kind, sets, sides, per_cell, size, every, mass=mass)
         first += len(sets)
@@ -195,7 +187,8 @@ def _trials(
             between = sides.between[place[some]] if none.size and len(sides.keys) else none
             local = _local(sets[some], between)
             for fill in _fillings(kind, known[some[0]]):
-                yield some, _filled(around[some], local, open_rows[some], inner[some], fill)
+                on_sides = [open_rows[some, f - 100] if f >= 100 else local[:, f] for f in fill]
+                yield some, np.column_stack([around[some], *on_sides, inner[some]])
 
 
 def _parted(
@@ -251,15 +244,3 @@ def _fillings(kind: Kind, known: NDArray[np.bool_]) -> list[tuple[int, ...]]:
                 filling += [100 + next(rest) for _ in range(per_side)]
         fillings.append(tuple(filling))
     return fillings
-
-
-def _filled(
-    corners: NDArray[np.int64],
-    local: NDArray[np.int64],
-    open_rows: NDArray[np.int64],
-    inner: NDArray[np.int64],
-    fill: tuple[int, ...],
-) -> NDArray[np.int64]:
-    """(m, k) places of a cell's nodes in meshio's order."""
-    on_sides = [open_rows[:, f - 100] if f >= 100 else local[:, f] for f in fill]
-    return np.column_stack([corners, *on_sides, inner])

@@ -55,14 +55,8 @@ def recover_elements_with_terms(
 ) -> PlanarMesh | None:
     """The mesh of c L + s M or S c L S; None where row sums show neither, or nothing comes near.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    of_cells : callable
-        Recovers a matrix c L + D on cells that its rows may form.
-    clock : Clock
-    anchored : bool
-        Whether positions are given, so that no piece may change its size.
+    `of_cells`: recovers a matrix c L + D on cells that its rows may form; `anchored`: whether positions are given, so
+    that no piece may change its size.
     """
     sums = RowSums(matrix)
     if not sums.there.any():
@@ -116,7 +110,10 @@ def _settled(
         if least < SUSPICIOUS or since >= patience:
             break
         rounds = [*rounds[-patience:], (x, reaction * np.concatenate([some.ravel() for some in areas.values()]) - x)]
-        x = _mixed(rounds)
+        place, change = (np.stack(some) for some in zip(*rounds, strict=True))
+        past = np.linalg.lstsq(np.diff(change, axis=0).T, change[-1])[0]
+        step = change[-1] - past @ np.diff(change, axis=0)
+        x = place[-1] - past @ np.diff(place, axis=0) + step / 3  # whole steps lead away from s h^2 / c = 0.2 on
     if best is None:
         return None
     found, reaction = best
@@ -143,12 +140,3 @@ def _in_one_size(found: PlanarMesh, sums: NDArray[np.float64], blocks: Blocks) -
     centre = np.column_stack([np.bincount(component, x) / count for x in found.points.T])[component]
     bars = None if found.standard_deviations is None else factor * found.standard_deviations
     return replace(found, points=centre + factor * (found.points - centre), standard_deviations=bars)
-
-
-def _mixed(rounds: list[tuple[NDArray, NDArray]]) -> NDArray[np.float64]:
-    """Where to go on, from some places and what a round changes there."""
-    place, change = (np.stack(some) for some in zip(*rounds, strict=True))
-    there, step = place[-1], change[-1]
-    past = np.linalg.lstsq(np.diff(change, axis=0).T, step)[0]
-    there, step = there - past @ np.diff(place, axis=0), step - past @ np.diff(change, axis=0)
-    return np.asarray(there + step / 3)  # whole steps lead away from s h^2 / c = 0.2 on

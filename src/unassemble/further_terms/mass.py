@@ -16,18 +16,11 @@ from ..reaction import Skeleton, areas_of_mass, fit_metric
 from ..recovery import PlanarMesh
 from ..tolerances import ALIKE, CERTIFIED
 from ..topology import Topology
-from ..words import sentences
 from .held import Held, Plain, RowSums, size_note
-
-_NO_SHAPE = "a mass matrix has no shape: it depends on the areas of the triangles alone, and any that have them will do"
-_OTHER = (
-    "that no other areas, with another c, fit as well is not proved: the fit of edge lengths was started once, and at "
-    "its end the equations determine all of them"
-)
 
 
 def mass_alone(held: Held, topology: Topology, skeleton: Skeleton, sums: RowSums) -> PlanarMesh | None:
-    """Triangles and areas of a mass matrix; None where areas do not explain the matrix.
+    """Triangles and areas of a mass matrix; None where areas do not explain it.
 
     There are e + n equations for m areas, and triangles that are none, holes of three edges, come out with area zero.
     """
@@ -55,9 +48,8 @@ def mass_alone(held: Held, topology: Topology, skeleton: Skeleton, sums: RowSums
         node_status=np.ones(matrix.n, dtype=np.int8),
         status="certified",
         uniqueness="proved",
-        reason=sentences(
-            (f"the mass matrix of triangles with these areas is the given one to {error:.1e} (relative)", _NO_SHAPE)
-        ),
+        reason=f"the mass matrix of triangles with these areas is the given one to {error:.1e} (relative). A mass "
+        "matrix has no shape: it depends on the areas of the triangles alone, and any that have them will do",
         operator="mass",
         backward_error=error,
         n_holes=topology.n_holes + int(hole.sum()),
@@ -88,8 +80,13 @@ def with_consistent_mass(
     reaction = sums.sign * float(metric.areas.sum() / _areas_of(found).sum())
     found = replace(found, uniqueness="searched" if found.uniqueness == "proved" else found.uniqueness)
     terms = Terms(matrix.diagonal, reaction)
-    operator = "c L + s M, M the consistent mass matrix,"
-    return held.with_terms(found, terms, operator, size_note(reaction), *((_OTHER,) if found.certified else ()))
+    notes = [size_note(reaction)]
+    if found.certified:
+        notes.append(
+            "that no other areas, with another c, fit as well is not proved: the fit of edge lengths was started once, "
+            "and at its end the equations determine all of them"
+        )
+    return held.with_terms(found, terms, "c L + s M, M the consistent mass matrix,", *notes)
 
 
 def with_lumped_mass(held: Held, found: PlanarMesh, sums: RowSums) -> PlanarMesh:

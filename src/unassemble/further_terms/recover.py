@@ -39,13 +39,8 @@ def recover_with_terms(
     Rows of c L add up to zero. Where they do not, D is whatever it is if the other entries are those of a Laplacian.
     If they are not, sums of one sign are those of a mass term, and sums of both those of S c L S.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    plain : callable
-        Recovers a matrix c L + D; knows relative sizes of its pieces if told the squared lengths of edges.
-    clock : Clock
-    tensor : (kxx, kxy, kyy), optional
+    `plain`: recovers a matrix c L + D; knows relative sizes of its pieces if told the squared lengths of edges;
+    `tensor`: (kxx, kxy, kyy) to be undone.
     """
     sums = RowSums(matrix)
     if not sums.there.any():

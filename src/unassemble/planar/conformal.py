@@ -64,10 +64,7 @@ def estimate_scale(piece: Piece, weights: NDArray) -> float:
     The halves g = cot / 2 of a triangle's three weights satisfy g1 g2 + g2 g3 + g3 g1 = 1/4. Sharing
     each weight equally between its two triangles gives one value of c from each triangle; the median counts.
 
-    Raises
-    ------
-    GeometryError
-        If the weights add up to zero.
+    Raises GeometryError if the weights add up to zero.
     """
     return _estimate(piece, weights).scale
 
@@ -125,22 +122,11 @@ def conformal_map(
 ) -> ConformalMap:
     """Positions and scale of one piece.
 
-    Parameters
-    ----------
-    piece : Piece
-    weights : (e,) float64
-        -A_ij = c w_ij of each edge.
-    scale : float, optional
-        c, where it is known. Otherwise a value in which most triangles agree, or more of them than in any other, is
-        tried first, or c = 1 if their median allows it.
-    sharp : bool
-        Go on until z, not only c, has converged. A polish does not need that.
-    options : ConformalOptions, optional
+    `weights` (e,): -A_ij = c w_ij of each edge; `scale`: c, where it is known. Otherwise a value in which most
+    triangles agree, or more of them than in any other, is tried first, or c = 1 if their median allows it. `sharp`: go
+    on until z, not only c, has converged, which a polish does not need.
 
-    Raises
-    ------
-    GeometryError
-        If no map of positive area is found.
+    Raises GeometryError if no map of positive area is found.
     """
     options = options or ConformalOptions()
     estimate = _estimate(piece, weights)

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from ..errors import SolverError
 from ..tolerances import LARGEST_NOISE, LAST_DIGITS, SIGMAS
 from ..topology import Piece
-from .cautious import MOST_VERTICES, cautious_polish, count_flipped
 from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
-from .polish import PolishedMesh, errors_of_one_size, polish
+from .polish import CAREFUL, MOST_CAREFUL, PolishedMesh, count_flipped, errors_of_one_size, polish
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,17 +109,17 @@ def _polished(
     try:
         found = polish(piece, weights, start, scale=scale, spread=spread)
     except SolverError:  # steps that led to flat triangles; small ones do not
-        if piece.n_vertices > MOST_VERTICES:
+        if piece.n_vertices > MOST_CAREFUL:
             raise
-        return cautious_polish(piece, weights, start, scale=scale, spread=spread)
+        return polish(piece, weights, start, scale=scale, spread=spread, options=CAREFUL)
     finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
     flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
     if found.converged and not flipped:
         return found
-    if piece.n_vertices > MOST_VERTICES:
+    if piece.n_vertices > MOST_CAREFUL:
         return found
     nearest = found.z if flipped <= count_flipped(piece, start) else start
-    again = cautious_polish(piece, weights, nearest, scale=scale, spread=spread)
+    again = polish(piece, weights, nearest, scale=scale, spread=spread, options=CAREFUL)
     return again if again.residual < found.residual or not finite else found
 
 

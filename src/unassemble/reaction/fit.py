@@ -76,23 +76,11 @@ class _Equations:
 def fit_metric(skeleton: Skeleton, entries: NDArray, sums: NDArray, trust: NDArray) -> tuple[Metric, float] | None:
     """The metric with which a mesh has these entries, c being any; None where the iteration breaks down.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        All edges at triangles.
-    entries : (e,) float64
-        A_ij.
-    sums : (n,) float64
-        A 1, all positive.
-    trust : (n,) float64
-        Weights of the row sums, relative to those of entries: less than 1 where they have lost digits.
+    `skeleton`: all edges at triangles; `entries` (e,): A_ij; `sums` (n,): A 1, all positive; `trust` (n,): weights of
+    the row sums, relative to those of entries: less than 1 where they have lost digits.
 
-    Returns
-    -------
-    Metric
-        In units of length in which s = 1.
-    float
-        Root mean square of the equations' residuals: cosines, and relative areas.
+    Returns the metric, in units of length in which s = 1, and the root mean square of the equations' residuals:
+    cosines, and relative areas.
     """
     equations = _Equations(skeleton, entries, sums, trust)
     metric, c = equations.start()
@@ -112,8 +100,14 @@ def fit_metric(skeleton: Skeleton, entries: NDArray, sums: NDArray, trust: NDArr
                 return None
             wanted = log_u * metric.u
             change = metric.within(wanted, 0.9)
-            moved = _shortened(equations, metric, c, change, log_c, before)
-            damping = damping * 8 if moved is None else damping
+            for reach in 0.4 ** np.arange(5):  # the longest of a step and some shorter ones that lowers the residual
+                trial = Metric(skeleton, metric.u + reach * change)
+                factor = c * np.exp(np.clip(reach * log_c, -2, 2))
+                if np.linalg.norm(trial_residual := equations.residual(trial, factor)) < before:
+                    moved = trial, factor, trial_residual
+                    break
+            else:
+                damping *= 8
         if moved is None:
             break
         metric, c, residual = moved
@@ -147,16 +141,3 @@ def _solved(derivative: sp.csr_array, by_c: NDArray, residual: NDArray, damping:
     rest = (1 + damping) * (by_c @ by_c) - coupling @ by_scale
     log_c = -float((by_c @ residual - coupling @ by_residual) / rest)
     return -by_residual - log_c * by_scale, log_c
-
-
-def _shortened(
-    equations: _Equations, metric: Metric, c: float, change: NDArray, log_c: float, before: float
-) -> tuple[Metric, float, NDArray] | None:
-    """The longest of a step and some shorter ones that lowers the residual."""
-    for reach in 0.4 ** np.arange(5):
-        trial = Metric(metric.skeleton, metric.u + reach * change)
-        factor = c * np.exp(np.clip(reach * log_c, -2, 2))
-        residual = equations.residual(trial, factor)
-        if np.linalg.norm(residual) < before:
-            return trial, factor, residual
-    return None

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cells import SEARCHED_ROWS, Alternative, alternatives, components_of
+from ..cells import SEARCHED_ROWS, Alternative, alternatives
 from ..certify import certify
 from ..clock import Clock
 from ..linalg import blas_threads
@@ -18,6 +18,7 @@ from ..planar.deviations import coordinate_covariances
 from ..recovery import PlanarMesh
 from ..tolerances import SIGMAS
 from ..topology import Polygons, local_numbering, surfaces
+from ..topology.numbering import connected
 from .evidence import pooled_noise, weigh
 from .joined import JoinedMesh
 from .noise import Noise
@@ -36,14 +37,7 @@ def recover_scalar(
 ) -> PlanarMesh:
     """The mesh of a checked scalar matrix, of as few digits as its entries seem to have, or else of exact ones.
 
-    Parameters
-    ----------
-    stored : OperatorMatrix
-    placement : Placement
-    clock : Clock
-    options : ScalarOptions
-    squared_lengths : (e,) float64, optional
-        Of the edges, where they are known from elsewhere: they give pieces their relative sizes.
+    `squared_lengths` (e,): of the edges, where they are known from elsewhere: they give pieces their relative sizes.
     """
     task = Task(options, placement, Noise.known(stored, options.noise), squared_lengths)
     found = _recovered(stored, clock, task)
@@ -149,7 +143,8 @@ def _report(
     refused = found.status == "uncertified" and not found.distant
     if options.noise and evidence.noise is not None and evidence.noise < 0.5 * options.noise:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
-    if found.uniqueness == "searched" and np.bincount(components_of(findings.stored)).max() > SEARCHED_ROWS:
+    component = connected(findings.stored.n, *findings.stored.edges.T)[1]
+    if found.uniqueness == "searched" and np.bincount(component).max() > SEARCHED_ROWS:
         notes.append(f"other meshes were looked for in connected parts of up to {SEARCHED_ROWS:,} rows only")
     return PlanarMesh(
         **mesh.fields(triangulate=options.triangulate),

@@ -108,27 +108,24 @@ def solve(topology: Topology, matrix: OperatorMatrix, clock: Clock, task: Task) 
     with clock("polish") if refine else nullcontext():
         starts = meshes
         meshes = _polished(topology, matrix, starts, scale, noise) if refine else starts
-        if noise and noise.digits and not _is_rounding(topology, matrix, meshes, noise):
-            noise = None
-            meshes = _polished(topology, matrix, starts, scale, noise) if refine else starts
+        if noise and noise.digits:
+            z, scales = [mesh.z for mesh in meshes], np.array([mesh.scale for mesh in meshes])
+            left = left_by_all(topology.pieces, -matrix.entries, z, scales)
+            rows = np.concatenate([piece.edge_rows for piece in topology.pieces])
+            with np.errstate(all="ignore"):  # flat triangles
+                rounding = np.sqrt(np.mean((left / with_vanished(topology, noise)[rows] / noise.sigma) ** 2)) <= NOISY
+            if not rounding:  # sizes that errors of rounding have are no guide to others
+                noise = None
+                meshes = _polished(topology, matrix, starts, scale, noise) if refine else starts
         topology, meshes = _successes(topology, list(map(_sound, topology.pieces, meshes)))
     return Solved(matrix, topology, meshes, noise)
-
-
-def _is_rounding(topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], noise: Noise) -> bool:
-    """Whether a misfit has about the size of errors of rounding; with others, sizes that these have are no guide."""
-    scales = np.array([mesh.scale for mesh in meshes])
-    left = left_by_all(topology.pieces, -matrix.entries, [mesh.z for mesh in meshes], scales)
-    error = noise.sigma * noise.on(topology)[np.concatenate([piece.edge_rows for piece in topology.pieces])]
-    with np.errstate(all="ignore"):  # flat triangles
-        return bool(np.sqrt(np.mean((left / error) ** 2)) <= NOISY)
 
 
 def _polished(
     topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], scale: float | None, noise: Noise | None
 ) -> list[PieceMesh]:
     """Each piece by itself; under known noise those that share vertices with the c of the one that tells it best."""
-    errors = with_vanished(topology) if noise is None else noise.on(topology)
+    errors = with_vanished(topology, noise)
 
     def polished(p: int, scale: float | None) -> PieceMesh:
         piece = topology.pieces[p]

@@ -64,7 +64,7 @@ class Held:
         Entries of few digits that a mesh has exactly may be no rounded ones.
         """
         test, error = self.test, self.certificate.backward_error
-        if test is None or not test.possible:
+        if test is None or test.freedom <= 0:  # no more entries than unknowns
             return False
         short = error <= SUSPICIOUS or not test.passed
         return not (error <= CERTIFIED and (test.drowned or (test.noise.digits is not None and short)))

@@ -22,19 +22,10 @@ def three_cycles(n: int, edges: NDArray) -> tuple[NDArray, NDArray]:
     "forward" algorithm, linear in the number of edges on planar graphs (Chiba and Nishizeki, SIAM
     J. Comput. 14, 1985).
 
-    Parameters
-    ----------
-    n : int
-        Number of vertices.
-    edges : (e, 2) int
-        Pairs i < j in lexicographic order.
+    `n`: number of vertices; `edges` (e, 2): pairs i < j in lexicographic order.
 
-    Returns
-    -------
-    triangles : (m, 3) int64
-        Vertices, in no particular orientation.
-    opposite : (m, 3) int64
-        The edge (row of `edges`) that faces each corner.
+    Returns `triangles` (m, 3): vertices, in no particular orientation; `opposite` (m, 3): the row of `edges` that faces
+    each corner.
     """
     e = len(edges)
     degree = np.bincount(edges.ravel(), minlength=n)

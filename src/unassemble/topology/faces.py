@@ -128,7 +128,14 @@ def from_cycles(n: int, edges: NDArray, cycles: list[NDArray]) -> FaceComplex | 
     sides = [around(n, edges, c) for c in cycles]
     used = np.bincount(np.concatenate([s.ravel() for s in sides]), minlength=2 * len(edges))
     bare = np.flatnonzero(~used.reshape(-1, 2).any(axis=1))
-    if (used > 1).any() or not _hanging(n, edges)[bare].all():
+    hanging = np.zeros(len(edges), dtype=bool)
+    for _ in range(20):  # rounds of plucking leaves
+        degree = np.bincount(edges[~hanging].ravel(), minlength=n)
+        leaf = ~hanging & (degree[edges] == 1).any(axis=1)
+        if not leaf.any():
+            break
+        hanging |= leaf
+    if (used > 1).any() or not hanging[bare].all():
         return None
     successor = np.full(2 * len(edges), -1, dtype=np.int64)
     for side in sides:
@@ -193,18 +200,6 @@ def _with_boundary(successor: NDArray) -> NDArray[np.int64]:
         turning = turning[predecessor[current[turning]] >= 0]
     successor[free] = current
     return successor
-
-
-def _hanging(n: int, edges: NDArray) -> NDArray[np.bool_]:
-    """Edges of the trees that hang on the rest of the graph, as far as a few rounds of plucking leaves go."""
-    hanging = np.zeros(len(edges), dtype=bool)
-    for _ in range(20):
-        degree = np.bincount(edges[~hanging].ravel(), minlength=n)
-        leaf = ~hanging & (degree[edges] == 1).any(axis=1)
-        if not leaf.any():
-            break
-        hanging |= leaf
-    return hanging
 
 
 def _cyclic_neighbour(key: NDArray, step: int) -> NDArray[np.int64]:

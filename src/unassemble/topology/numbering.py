@@ -24,10 +24,8 @@ class Numbering:
 def local_numbering(n: int, edges: NDArray) -> Numbering:
     """Number vertices in breadth-first order.
 
-    The rows of a matrix may lie in any order, and on large meshes most of the time would go into waiting for
-    memory: after this, what lies near each other on the mesh does so in memory.
-
-    `n`: number of vertices; `edges` (e, 2): pairs i < j in lexicographic order.
+    The rows of a matrix may lie in any order, and on large meshes most of the time would go into waiting for memory:
+    after this, what lies near each other on the mesh does so in memory. `edges` (e, 2): as in a :class:`Numbering`.
     """
     upper = sp.coo_array((np.ones(len(edges), np.int8), edges.astype(np.int32).T), shape=(n, n)).tocsr()
     vertices, _ = breadth_first(upper + upper.T)
@@ -42,10 +40,7 @@ def local_numbering(n: int, edges: NDArray) -> Numbering:
 
 
 def components(n: int, edges: NDArray) -> list[Numbering]:
-    """Connected components with edges, each in a numbering of its own, largest first.
-
-    `n`: number of vertices; `edges` (e, 2): pairs i < j in lexicographic order.
-    """
+    """Connected components with edges, (e, 2), each in a numbering of its own, largest first."""
     count, label = connected(n, *edges.T)
     used = np.zeros(n, dtype=bool)
     used[edges] = True
@@ -71,9 +66,7 @@ def connected(n: int, one: NDArray, other: NDArray) -> tuple[int, NDArray[np.int
 
 
 def breadth_first(graph: sp.csr_array) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Search each component from its lowest vertex.
-
-    `graph` (n, n): both triangles of a symmetric pattern; entries do not count.
+    """Search each component of a symmetric pattern (n, n) from its lowest vertex.
 
     Returns `order` (n,): vertices in the order in which they are reached; `parent` (n,): -1 at the start of each
     component.

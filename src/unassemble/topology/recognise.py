@@ -54,12 +54,7 @@ def located(error: RecoveryError, part: Numbering, *, named: bool) -> RecoveryEr
 
 
 def require_planar(n: int, edges: NDArray) -> None:
-    """Do nothing for a planar graph.
-
-    Raises
-    ------
-    NotPlanarError
-    """
+    """Do nothing for a planar graph; else raise NotPlanarError."""
     if _too_many(n, edges):
         raise _not_planar(f"{len(edges)} edges on {n} rows are more than 3 n - 6")
     if rotation_system(n, edges) is None:

@@ -15,13 +15,8 @@ from numpy.typing import NDArray
 from ...budget import SAMPLE
 from ...topology.faces import FaceComplex
 
-FULL = 1.3 * np.pi
-"""Angle sum below which a face may be a cell."""
-
 SHORT = 4
 """Edges of faces that are cells unless the numbers say otherwise."""
-
-_LARGEST, _GAP, _MANY = 3 * np.pi, 0.2 * np.pi, 50  # or below a gap so wide, if so many lie below that
 
 
 def facing_angles(cotangents: NDArray) -> NDArray[np.float64]:
@@ -32,23 +27,6 @@ def facing_angles(cotangents: NDArray) -> NDArray[np.float64]:
 def face_sums(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]:
     """(faces,) sum of the angles of half-edges around each face, about pi for a cell."""
     return np.asarray(np.bincount(complex_.face, angles), dtype=np.float64)
-
-
-def largest_sum(sums: NDArray[np.float64]) -> float:
-    """Where angle sums of cells end and those of holes begin: where they mostly do, or in a clear gap above many cells.
-
-    What lies in such a gap already stays; above many holes that are alike there is another, and may be wider.
-    """
-    sums = np.sort(sums[sums < _LARGEST])
-    gap = np.diff(sums, append=_LARGEST)
-    gap[: _MANY - 1] = 0
-    clear = np.flatnonzero(gap >= _GAP)
-    if not len(clear) or ((sums[clear] < FULL) & (sums[clear] + gap[clear] > FULL)).any():
-        return FULL
-    widest = clear[np.argmax(gap[clear])]
-    if sums[widest] < FULL:
-        return FULL
-    return float(sums[widest] + gap[widest] / 2)
 
 
 def vertex_excess(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]:

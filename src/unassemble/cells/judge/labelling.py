@@ -60,7 +60,11 @@ class Labelling:
         n, edges, weights, known = candidates.n_vertices, bare.edges, bare.weights, {} if known is None else known
         placed: Placed = []
         for piece in bare.pieces:
-            name = _key_of(piece)
+            # The same for the same triangles in the same orientation, which positions go with.
+            triangles = piece.vertices[piece.triangles]
+            first = triangles.argmin(axis=1)[:, None]
+            triangles = np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1)
+            name = triangles[np.lexsort(triangles.T)].tobytes()
             if name not in known:
                 known[name] = _map_of(piece, weights[piece.edge_rows])
             if (mesh := known[name]) is not None:
@@ -154,14 +158,6 @@ def even(misfit: NDArray) -> bool:
         return False
     size = float(np.sqrt(np.mean(misfit**2)))
     return size < 0.03 and float(misfit.max()) < 8 * size and float(np.median(misfit)) > 0.3 * size
-
-
-def _key_of(piece: Piece) -> bytes:
-    """The same for the same triangles in the same orientation, which positions go with."""
-    triangles = piece.vertices[piece.triangles]
-    first = triangles.argmin(axis=1)[:, None]
-    triangles = np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1)
-    return triangles[np.lexsort(triangles.T)].tobytes()
 
 
 def _map_of(piece: Piece, weights: NDArray) -> PieceMesh | None:

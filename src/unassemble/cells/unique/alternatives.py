@@ -47,13 +47,7 @@ _MOST_SOLVED = 60
 
 @dataclass(frozen=True)
 class Alternative:
-    """Another mesh that fits as well as the one found, in the place where they differ.
-
-    Attributes
-    ----------
-    cells, other_cells : tuple of tuple of int
-        Cells that only the one or the other has, rows in running order.
-    """
+    """Another mesh that fits as well as the one found: cells that only the one or the other has, in running order."""
 
     cells: tuple[Cell, ...]
     other_cells: tuple[Cell, ...]
@@ -64,18 +58,9 @@ def alternatives(
 ) -> list[Alternative]:
     """One other mesh for each component of up to 1,000 rows that has any.
 
-    Parameters
-    ----------
-    stored : OperatorMatrix
-        Without the vanished entries.
-    cells : Polygons
-        Of the mesh that was found, counter-clockwise.
-    z : (n,) complex128
-        Positions in the frame in which the operator is the Laplacian.
-    scale : float, optional
-        c, where it is known.
-    agree : float
-        Relative difference of numbers that noise may cause.
+    `stored`: without the vanished entries; `cells`: of the mesh that was found, counter-clockwise; `z` (n,) complex:
+    positions in the frame in which the operator is the Laplacian; `scale`: c, where it is known; `agree`: relative
+    difference of numbers that noise may cause.
     """
     found = []
     for part in components(stored.n, stored.edges):
