@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..topology.boundary import loops
 from ..topology.keys import contains
+from ..topology.orientation import loops
 from .kinds import KINDS, Kind
 
 Blocks = Mapping[str, NDArray[np.int64]]  # cells by kind
