@@ -36,10 +36,7 @@ def run(folder: str | Path = "demo-output", *, echo: Callable[[str], None] = lam
 
     It is made where it does not exist. What there is to say goes to `echo`, line by line or in blocks.
 
-    Raises
-    ------
-    InputError
-        If a package that meshes or assembles is not installed, or the folder cannot be written into.
+    Raises InputError if a package that meshes or assembles is not installed, or the folder cannot be written into.
     """
     folder = made_folder(folder)
     recoveries = []

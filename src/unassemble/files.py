@@ -19,10 +19,7 @@ def whole_file(path: str | os.PathLike[str], suffix: str) -> Iterator[Path]:
     The draft lies in a folder of its own beside the target, a link being followed, so that side files of a writer
     vanish with it and the last step is a rename within one file system. An old file stays as it is until then.
 
-    Raises
-    ------
-    OutputError
-        If the system refuses to write.
+    Raises OutputError if the system refuses to write.
     """
     try:
         target = Path(path).resolve()

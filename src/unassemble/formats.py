@@ -39,37 +39,27 @@ class MeshFormat:
 
 
 _NOT_COMPRESSED = "meshio writes it without compressing: write {} and compress that"
-
-# XML inside the one file: heavy data in a side file could not be renamed into place together with it.
-# (meshio imports h5py even then.)
-_XDMF = MeshFormat("xdmf", cells=_EVERY | _LINES, undetermined=True, options={"data_format": "XML"}, needs="h5py")
-_EXODUS = MeshFormat("exodus", cells=_EVERY | _LINES, dimension=2, undetermined=True, needs="netCDF4")
-# Eleven significant digits are what the sixteen columns of a field hold at any sign and exponent.
-_NASTRAN = MeshFormat("nastran", cells=_ALL | _HALFWAY | _LINES | {"quad9"}, data="none", digits=11)
-# meshio turns the nodes of quadratic cells when it writes this one, and not when it reads.
-_PERMAS = MeshFormat("permas", cells=_ALL | _LINES, data="none")
-_NETGEN = MeshFormat("netgen", cells=_ALL | _HALFWAY | _LINES, data="none")
 _SVG_OPTIONS = {"float_fmt": ".12g", "image_width": None}
-_SVG = MeshFormat("svg", dimension=2, cells=_FLAT, data="none", keeps_rows=False, options=_SVG_OPTIONS)
-_TECPLOT = MeshFormat("tecplot", dimension=2, cells=_CELLS)
-_TETGEN = MeshFormat("tetgen", cannot="it is two files that belong together")
-_UGRID = MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True)
-_UGRID_SINGLE = MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True, digits=7)
 
 FORMATS: Mapping[str, MeshFormat] = {
     ".npz": MeshFormat("", dimension=2, undetermined=True),
     ".avs": MeshFormat("avsucd", cells=_ALL | _LINES),
-    ".bdf": _NASTRAN,
+    # Eleven significant digits are what the sixteen columns of a field hold at any sign and exponent.
+    **dict.fromkeys(
+        (".bdf", ".fem", ".nas"),
+        MeshFormat("nastran", cells=_ALL | _HALFWAY | _LINES | {"quad9"}, data="none", digits=11),
+    ),
     ".cgns": MeshFormat("cgns", cells=frozenset({"tetra"}), data="none", needs="h5py"),
-    ".dat": _TECPLOT,
-    ".dato": _PERMAS,
-    ".dato.gz": MeshFormat("permas", cannot=_NOT_COMPRESSED.format(".dato")),
-    ".e": _EXODUS,
-    ".ele": _TETGEN,
-    ".ex2": _EXODUS,
-    ".exo": _EXODUS,
+    **dict.fromkeys((".dat", ".tec"), MeshFormat("tecplot", dimension=2, cells=_CELLS)),
+    # meshio turns the nodes of quadratic cells when it writes this one, and not when it reads.
+    **dict.fromkeys((".dato", ".post"), MeshFormat("permas", cells=_ALL | _LINES, data="none")),
+    **{f"{one}.gz": MeshFormat("permas", cannot=_NOT_COMPRESSED.format(one)) for one in (".dato", ".post")},
+    **dict.fromkeys(
+        (".e", ".ex2", ".exo"),
+        MeshFormat("exodus", cells=_EVERY | _LINES, dimension=2, undetermined=True, needs="netCDF4"),
+    ),
+    **dict.fromkeys((".ele", ".node"), MeshFormat("tetgen", cannot="it is two files that belong together")),
     ".f3grid": MeshFormat("flac3d", cells=_SOLID, data="none"),
-    ".fem": _NASTRAN,
     ".h5m": MeshFormat("h5m", cells=frozenset({"triangle", "tetra"}), undetermined=True, needs="h5py"),
     ".hmf": MeshFormat("hmf", cells=_EVERY | _LINES, undetermined=True, needs="h5py"),
     ".inp": MeshFormat("abaqus", cells=_CELLS | _HALFWAY | _LINES | {"quad9"}, data="none"),
@@ -78,41 +68,41 @@ FORMATS: Mapping[str, MeshFormat] = {
     ".mesh": MeshFormat("medit", dimension=2, cells=_CELLS | _LINES, data="boundary"),
     ".meshb": MeshFormat("medit", dimension=2, cells=_CELLS | _LINES, data="boundary", undetermined=True),
     ".msh": MeshFormat("gmsh", cells=_EVERY, undetermined=True),  # Gmsh, not ANSYS, which shares the extension
-    ".nas": _NASTRAN,
-    ".node": _TETGEN,
     ".obj": MeshFormat("obj", cells=_FLAT, data="none"),
     ".off": MeshFormat("off", cells=_TRIANGLES, data="none"),
     ".ply": MeshFormat("ply", cells=_FLAT | _LINES | {"vertex"}, undetermined=True),
-    ".post": _PERMAS,
-    ".post.gz": MeshFormat("permas", cannot=_NOT_COMPRESSED.format(".post")),
     ".stl": MeshFormat("stl", cells=_TRIANGLES, data="none", keeps_rows=False),
     ".su2": MeshFormat("su2", dimension=2, cells=_CELLS, data="none"),
-    ".svg": _SVG,
-    ".tec": _TECPLOT,
+    ".svg": MeshFormat("svg", dimension=2, cells=_FLAT, data="none", keeps_rows=False, options=_SVG_OPTIONS),
     ".ugrid": MeshFormat("ugrid", cells=_CELLS, data="none", digits=7),
-    # Binary variants of UGRID are told by a second extension: byte order, Fortran records, size of numbers.
-    **{f".{kind}.ugrid": _UGRID for kind in ("b8l", "b8", "lb8l", "lb8", "r8", "lr8")},
-    **{f".{kind}.ugrid": _UGRID_SINGLE for kind in ("b4", "lb4", "r4", "lr4")},
-    ".vol": _NETGEN,
-    ".vol.gz": _NETGEN,
+    # Binary variants are told by a second extension: byte order, Fortran records, size of numbers.
+    **dict.fromkeys(
+        (".b8l.ugrid", ".b8.ugrid", ".lb8l.ugrid", ".lb8.ugrid", ".r8.ugrid", ".lr8.ugrid"),
+        MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True),
+    ),
+    **dict.fromkeys(
+        (".b4.ugrid", ".lb4.ugrid", ".r4.ugrid", ".lr4.ugrid"),
+        MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True, digits=7),
+    ),
+    **dict.fromkeys((".vol", ".vol.gz"), MeshFormat("netgen", cells=_ALL | _HALFWAY | _LINES, data="none")),
     ".vtk": MeshFormat("vtk", cells=_EVERY | _LINES, undetermined=True),
     ".vtu": MeshFormat("vtu", cells=_EVERY | _LINES, polygons=True, undetermined=True),
     ".wkt": MeshFormat("wkt", cells=_TRIANGLES, data="none", keeps_rows=False),
-    ".xdmf": _XDMF,
+    # XML inside the one file: heavy data in a side file could not be renamed into place together with it.
+    # (meshio imports h5py even then.)
+    **dict.fromkeys(
+        (".xdmf", ".xmf"),
+        MeshFormat("xdmf", cells=_EVERY | _LINES, undetermined=True, options={"data_format": "XML"}, needs="h5py"),
+    ),
     ".xml": MeshFormat("dolfin-xml", dimension=2, cells=frozenset({"triangle", "tetra"}), data="none"),
-    ".xmf": _XDMF,
 }
 
 
 def format_of(path: str | os.PathLike[str]) -> tuple[str, MeshFormat]:
     """Extension and format that a file name asks for; upper and lower case are alike.
 
-    Raises
-    ------
-    OutputError
-        If the extension is unknown, or its writer not installed.
-    FormatError
-        If the format has no place for any mesh of ours.
+    Raises OutputError if the extension is unknown, or its writer not installed; FormatError if the format has no place
+    for any mesh of ours.
     """
     name = PurePath(path).name.lower()
     fitting = [suffix for suffix in FORMATS if name.endswith(suffix) and name != suffix]

@@ -56,12 +56,8 @@ class VectorReading:
 def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) -> VectorReading:
     """Find the nodes of a matrix that is said to be vector-valued; options are those of :func:`unassemble.recover`.
 
-    Raises
-    ------
-    InputError
-        For numberings that do not fit the matrix.
-    RecoveryError
-        If no numbering makes rows annihilate translations.
+    Raises InputError for numberings that do not fit the matrix; RecoveryError if no numbering makes rows annihilate
+    translations.
     """
     beam = _beam(matrix) if numbering is None and block_size is None else None
     if beam is not None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from .export import save, to_meshio
 from .modes import modes_of
-from .quiet import quiet_libraries
+from .progress import quiet_libraries
 from .recovery import Body, ConformingMesh, PlanarMesh, Recovery, Structure, Surface
 from .report import build_report, write_report
 from .summary import one_line, summary, table

@@ -19,8 +19,7 @@ from .metric import could_be_planar, flattened, perhaps_planar, realised, recove
 from .operators import VectorReading, asked_for, second_reading, vector_valued
 from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions
 from .outputs import PlanarMesh, Recovery, Surface
-from .progress import StageDisplay
-from .quiet import quiet_libraries
+from .progress import StageDisplay, quiet_libraries
 from .readings import ScalarReadings
 from .scalar.placement import Placement
 from .tolerances import LARGEST_NOISE, ROUNDED

@@ -1,8 +1,11 @@
-"""The stage that long work is in, on a terminal."""
+"""What a user sees of long work: the stage that it is in, and no warnings of other libraries."""
 
 import sys
 import threading
 import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from shutil import get_terminal_size
 from typing import IO, Self
 
@@ -82,3 +85,11 @@ class StageDisplay:
                 line.set_description_str(self._stage or "working")
                 if self._done.wait(self._interval):
                     return
+
+
+@contextmanager
+def quiet_libraries() -> Iterator[None]:
+    """Warnings that come from other modules than this package's are not shown; its own are faults, and are."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module=r"(?!unassemble\b)")
+        yield

@@ -83,10 +83,7 @@ class ScalarReadings:
     def likeliest(self) -> PlanarMesh:
         """The mesh of the first reading that fits, or else of the first that comes near.
 
-        Raises
-        ------
-        RecoveryError
-            If there is none.
+        Raises RecoveryError if there is none.
         """
         if self.options.method != "conformal":
             return self._plain(self.matrix)

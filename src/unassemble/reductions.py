@@ -18,10 +18,7 @@ from .errors import InputError
 class ConstantTensor:
     """Symmetric positive definite K.
 
-    Raises
-    ------
-    InputError
-        If K is not finite and positive definite.
+    Raises InputError if K is not finite and positive definite.
     """
 
     kxx: float

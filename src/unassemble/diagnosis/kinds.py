@@ -36,7 +36,7 @@ class Diagnosis:
     kind: str
     name: str  #: The same in words, to follow "the matrix is".
     evidence: tuple[str, ...] = ()  #: What speaks for it, the strongest first.
-    #: What to do next; empty where recovery is. Of cells that are read: what to do where the entries fit none.
+    #: What to do next; empty where recovery is. Of cells that are read, what to do where the entries fit none.
     advice: str = ""
 
     @property

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import GeometryError, NotPlanarError, RecoveryError
 from ..matrix import OperatorMatrix
 from ..recovery import ConformingMesh, PlanarMesh
-from ..tolerances import CERTIFIED, MOST, ROUNDED, SMALL, SUMMED
+from ..tolerances import CERTIFIED, MOST, ROUNDED, SMALL
 from ..words import count_of, sentences
 from .cliques import CELLS, cells_of, mostly, often
 from .kinds import CONSTANT, KEEP_ALL, PLANAR, TERMS, UNKNOWN, UNREAD, WITHOUT_MASS, Diagnosis
@@ -37,11 +37,9 @@ class Sums:
     @classmethod
     def of(cls, matrix: OperatorMatrix) -> Sums:
         """Those of a matrix."""
-        ends, twice = matrix.edges.ravel(), np.repeat(matrix.entries, 2)
-        size = np.bincount(ends, np.abs(twice), matrix.n)
-        sums = matrix.diagonal + np.bincount(ends, twice, matrix.n)
-        alone = size == 0
-        zero = (np.abs(sums) <= SUMMED * (size + np.abs(matrix.diagonal))) & ~alone
+        size = np.bincount(matrix.edges.ravel(), np.repeat(np.abs(matrix.entries), 2), matrix.n)
+        sums, alone = matrix.row_sums, size == 0
+        zero = matrix.adds_up & ~alone
         penalised = (SMALL * np.abs(matrix.diagonal) > size) & ~alone
         rest = ~(zero | alone | penalised)
         signs = np.unique(np.sign(sums[rest]))
@@ -187,18 +185,14 @@ def explained(error: RecoveryError, matrix: OperatorMatrix) -> RecoveryError:
             like = replace(found, advice=_where_nothing_fits(found, matrix))
             said = like.sentence(f"{begun}, and no mesh that was found has these entries, though the graph is that of")
         return NotPlanarError(said, error.why)
-    return (
-        GeometryError(found.sentence("no planar mesh has these entries: they are those of")) if found.unread else error
-    )
+    said = found.sentence("no planar mesh has these entries: they are those of")
+    return GeometryError(said) if found.unread else error
 
 
 def judged(mesh: PlanarMesh, matrix: OperatorMatrix) -> PlanarMesh:
     """A mesh that does not fit, or proves nothing, with what the matrix is as the reason, where that shows.
 
-    Raises
-    ------
-    GeometryError
-        If the matrix is a mass matrix, or one of segments on a line, so that the mesh means nothing.
+    Raises a GeometryError if the matrix is a mass matrix, or one of segments on a line, so that the mesh means nothing.
     """
     if mesh.status != "uncertified":
         return mesh

@@ -47,8 +47,8 @@ def seeming(matrix: OperatorMatrix) -> str:
         return said
     if np.count_nonzero(matrix.entries) >= matrix.n * (matrix.n - 1) / 2:
         return (
-            "every row is coupled to all others, as where other unknowns were condensed: each feels the supports then, "
-            "so that rows do not annihilate translations, which is what tells positions"
+            "every row is coupled to every other, as where other unknowns were condensed: each feels the supports "
+            "then, so that rows do not annihilate translations, which is what tells positions"
         )
     if said := about_translations(matrix):
         return said

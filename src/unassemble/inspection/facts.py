@@ -21,7 +21,7 @@ from ..operators import VectorReading
 from ..planar.conformal import estimate_scale
 from ..recovery import ELEMENT_NAMES
 from ..structures import StructuralNumbering
-from ..structures.bars import bars_of
+from ..structures.trusses import bars_of
 from ..tolerances import ROUNDED, SUMMED
 from ..topology import Piece, Topology
 from ..topology.manifold import Cycles, surface_readings
@@ -34,7 +34,6 @@ def matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
     """Of any matrix."""
     degree = np.bincount(matrix.edges.ravel(), minlength=matrix.n)
     size = matrix.row_size
-    sums = matrix.diagonal + np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n)
     graph = sp.csr_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
     n_isolated = int(np.count_nonzero(degree == 0))
     smaller = np.minimum(size[matrix.edges[:, 0]], size[matrix.edges[:, 1]])
@@ -45,7 +44,7 @@ def matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
         "n_connected": int(csgraph.connected_components(graph, directed=False)[0]) - n_isolated,
         "n_isolated": n_isolated,
         "n_vanished": int(np.count_nonzero(np.abs(matrix.entries) <= ROUNDED * smaller)),
-        "n_zero_sums": int(np.count_nonzero((np.abs(sums) <= SUMMED * size) & (degree > 0))),
+        "n_zero_sums": int(np.count_nonzero((np.abs(matrix.row_sums) <= SUMMED * size) & (degree > 0))),
         "warnings": matrix.warnings,
     }
 

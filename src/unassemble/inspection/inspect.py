@@ -11,7 +11,7 @@ from ..diagnosis import PLANAR, Diagnosis, diagnosed, further_terms, indefinite,
 from ..errors import NotPlanarError, RecoveryError
 from ..matrix import OperatorMatrix, load
 from ..operators import VectorReading, second_reading, vector_valued
-from ..quiet import quiet_libraries
+from ..progress import quiet_libraries
 from ..tolerances import MOST
 from ..topology import Topology, components, located, require_planar, surfaces
 from ..words import count_of
@@ -35,21 +35,20 @@ class Inspection:
     n_isolated: int  #: Rows without an off-diagonal entry.
     n_vanished: int  #: Off-diagonal entries stored as zero, or of at most 1e-12 relative to their rows.
     n_zero_sums: int  #: Rows that sum to zero, relative to their largest off-diagonal entry; isolated ones not counted.
-    warnings: tuple[str, ...]
+    warnings: tuple[str, ...]  #: What was changed as the matrix was checked.
     planar: bool = True  #: Whether the graph is that of a planar mesh, as far as that is known.
     obstacle: str = ""  #: Why no mesh is recognised; empty where one is.
-    n_triangles: int = 0
+    n_triangles: int = 0  #: Triangles among the cells.
     n_faces: int = 0  #: All cells, and the regions between boundary loops.
     n_holes: int = 0  #: Bounded ones of these regions.
-    n_boundary_edges: int = 0
+    n_boundary_edges: int = 0  #: Edges on the boundary.
     n_pieces: int = 0  #: Edge-connected ones.
     n_hinges: int = 0  #: Vertices that join them.
     n_bare_edges: int = 0  #: Edges of no cell.
     n_undetermined: int = 0  #: Rows of no cell.
     scale: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))  #: (n_pieces,) c, to some ten per cent.
-    mixed_signs: tuple[
-        int, ...
-    ] = ()  #: Rows, the first in each piece, in which c would have the other sign than in most.
+    #: Rows, the first in each piece, in which c would have the other sign than in most.
+    mixed_signs: tuple[int, ...] = ()
     block_size: int = 1  #: Unknowns per node, 1 for a scalar matrix.
     n_nodes: int = 0  #: Nodes of a vector-valued matrix.
     numbering: str = ""  #: How its unknowns stand.
@@ -58,7 +57,7 @@ class Inspection:
     n_polygons: int = 0  #: Cells of more than three vertices, whose diagonals have no entry.
     #: Sides of the boundary that face a right angle and have no entry; counted among its edges.
     n_vanished_sides: int = 0
-    #: ``"graph"``: cycles of three edges are cells; or ``"entries"``, if edges are left over and the entries suggest
+    #: ``"graph"``, cycles of three edges are cells; or ``"entries"``, if edges are left over and the entries suggest
     #: others. :func:`unassemble.recover` begins with these; it holds the result against the entries, and changes cells
     #: where that asks for it. Empty where there is no mesh.
     cells_from: str = ""
@@ -67,10 +66,10 @@ class Inspection:
     evidence: tuple[str, ...] = ()  #: What speaks for it, the strongest first.
     advice: str = ""  #: What to do next; empty where recovery is.
     surface: str = ""  #: What kind of surface the graph is that of, where that is none in the plane.
-    #: Of scalar matrices whose rows form cells of other elements than linear triangles: ``"P2"``, ``"Q1"``, ...
+    #: Of scalar matrices whose rows form cells of other elements than linear triangles ``"P2"``, ``"Q1"``, ...
     element: str = ""
     n_quads: int = 0  #: Quadrilaterals, beside `n_triangles`.
-    #: Of scalar matrices: what was added to the Laplacian, or done to it, as row sums tell; begins with a comma.
+    #: Of scalar matrices, what was added to the Laplacian, or done to it, as row sums tell; begins with a comma.
     further: str = ""
 
     @property

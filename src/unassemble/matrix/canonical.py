@@ -18,10 +18,7 @@ def canonical(A: Any) -> sp.csr_array:
     argument is not changed; arrays may be shared with it. The result is of dtype float64, complex128 or bool, with
     columns increasing within each row.
 
-    Raises
-    ------
-    MatrixError
-        If the index arrays contradict the shape, or there are far more rows than entries.
+    Raises MatrixError if the index arrays contradict the shape, or there are far more rows than entries.
     """
     if problem := inconsistency(A):
         raise MatrixError(f"the sparse matrix is damaged: {problem}; build it anew from rows, columns and values")
@@ -44,10 +41,7 @@ def canonical(A: Any) -> sp.csr_array:
 def as_csr(A: Any) -> sp.csr_array:
     """A square matrix of finite numbers, sparse or dense, in compressed rows; see :func:`canonical`.
 
-    Raises
-    ------
-    MatrixError
-        If it is none.
+    Raises MatrixError if it is none.
     """
     kind = f"an object of type {type(A).__name__}"
     if not sp.issparse(A):

@@ -14,10 +14,9 @@ import scipy.sparse as sp
 
 from ..errors import InputError, MatrixFileError, UnassembleError
 from ..formats import FORMATS
+from .binary import read_mat, read_mat4, read_mat73, read_npy, read_npz
 from .canonical import canonical, inconsistency
 from .check import check_matrix
-from .mat import read_mat, read_mat4, read_mat73
-from .npz import read_npy, read_npz
 from .operator import OperatorMatrix
 from .signatures import HEAD, foreign, kind_of
 from .text import read_market, read_triplets

@@ -72,10 +72,7 @@ def symmetric_entries(
     Returns (e,) entries; the largest difference relative to the largest off-diagonal entry of the two rows; and in
     sentences what was added or averaged, but for differences as rounding leaves them in nearly every matrix.
 
-    Raises
-    ------
-    MatrixError
-        Naming the pair that differs most.
+    Raises MatrixError naming the pair that differs most.
     """
     warnings: tuple[str, ...] = ()
     if pairs.one_sided:

@@ -51,12 +51,7 @@ def read_market(stream: BinaryIO, name: str) -> sp.coo_array:
     Both triangles where the file holds one. Explicit zeros and duplicates as they stand in a coordinate file; zeros of
     the dense array layout are left out. `name` is what to call the file in messages.
 
-    Raises
-    ------
-    MatrixFileError
-        If the file does not keep to the format.
-    MatrixError
-        If it holds a pattern without numbers.
+    Raises MatrixFileError if the file does not keep to the format; MatrixError if it holds a pattern without numbers.
     """
     text = io.TextIOWrapper(stream, encoding="latin-1")
     try:
@@ -194,10 +189,7 @@ def read_triplets(stream: BinaryIO, name: str) -> sp.coo_array:
     in either, else from 1. The matrix is square, as large as its largest number asks for; a file with entries on one
     side of the diagonal only is taken for the half of a symmetric matrix.
 
-    Raises
-    ------
-    MatrixFileError
-        If a line is of another form.
+    Raises MatrixFileError if a line is of another form.
     """
     text = stream.read().decode("utf-8-sig", "replace").translate(str.maketrans(",;Dd", "  Ee"))
     try:

@@ -40,12 +40,12 @@ class Recovery:
     boundary: NDArray[np.int64] = field(default_factory=none_of(2))
     #: (loops + 1,) loop k is ``boundary[boundary_offsets[k]:boundary_offsets[k + 1]]``.
     boundary_offsets: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
-    #: (n,) 0 determined, 1 not determined by the matrix, 2 plausible: a position that entries do not determine.
+    #: (n,) 0 determined, 1 not determined by the matrix, 2 plausible, a position that entries do not determine.
     node_status: NDArray[np.int8]
-    #: ``"certified"``, ``"ambiguous"`` or ``"uncertified"``: whether the mesh gives the matrix back, and no other mesh
+    #: ``"certified"``, ``"ambiguous"`` or ``"uncertified"``, whether the mesh gives the matrix back, and no other mesh
     #: is known that does.
     status: str
-    #: Of other meshes that fit: ``"proved"``, none can; ``"searched"``, a search found none; ``"ambiguous"``, there is
+    #: Of other meshes that fit ``"proved"``, none can; ``"searched"``, a search found none; ``"ambiguous"``, there is
     #: one; None where this one does not fit.
     uniqueness: str | None = None
     reason: str  #: Why, in one sentence or two.
@@ -55,7 +55,7 @@ class Recovery:
     #: ``"structure"`` where they have displacements only and elements are of any kind; ``"surface laplacian"``.
     operator: str
     reaction: float = 0.0  #: The factor s of the mass matrix in the operator, 0 if none.
-    #: Beside a mass matrix: mass over area or volume, on the mesh as it is given here; 1 where the mesh is in the size
+    #: Beside a mass matrix, mass over area or volume, on the mesh as it is given here; 1 where the mesh is in the size
     #: that makes it so.
     density: float | None = None
     #: Largest difference between an off-diagonal entry and the re-assembled one, relative to the largest off-diagonal
@@ -63,14 +63,14 @@ class Recovery:
     #: relative to the size of its row.
     backward_error: float
     timings: Mapping[str, float] = field(default_factory=dict)  #: Seconds by stage.
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  #: What was changed, guessed or left open.
     #: (k, 2) rows and columns of the entries that fit worst, worst first, suspects before others; empty where all fit.
     worst_entries: NDArray[np.int64] = field(default_factory=none_of(2))
     #: (k,) their misfit, as in `backward_error`.
     worst_misfits: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    node_of_row: NDArray[np.int64] | None = None  #: (N,) vector-valued matrices: node of each matrix row.
+    node_of_row: NDArray[np.int64] | None = None  #: (N,) node of each matrix row, if it is vector-valued.
     direction_of_row: NDArray[np.int64] | None = None  #: (N,) and its direction.
-    #: Vector-valued matrices: how the unknowns stand, ``"interleaved"``, ``"by component"``, ``"pattern"`` (in no
+    #: Of vector-valued matrices, how the unknowns stand, ``"interleaved"``, ``"by component"``, ``"pattern"`` (in no
     #: order, found by the pattern) or ``"given"``.
     numbering: str = ""
     choice: str = ""  #: Why the matrix was taken for this operator's, where that was not asked for.

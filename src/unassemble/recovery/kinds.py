@@ -22,12 +22,12 @@ class PlanarMesh(Recovery):
 
     n_holes: int  #: Bounded boundary loops, over all pieces.
     polygons_offsets: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))  #: (polygons + 1,)
-    #: (polygons_offsets[-1],) cells that the matrix leaves undivided, counter-clockwise: polygon k is
+    #: (polygons_offsets[-1],) cells that the matrix leaves undivided, counter-clockwise, where polygon k is
     #: ``polygons_data[polygons_offsets[k]:polygons_offsets[k + 1]]``.
     polygons_data: NDArray[np.int64] = field(default_factory=none_of())
     #: (n, 2) one standard deviation of each coordinate, on request.
     standard_deviations: NDArray[np.float64] | None = None
-    #: With noise, or entries that were rounded: ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``,
+    #: With noise, or entries that were rounded, ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``,
     #: ``largest``, ``largest_p_value``; see :func:`unassemble.certify.chi_square_verdict`.
     chi_square: Mapping[str, float] | None = None
     #: Standard deviation of independent errors of the entries that would leave the misfit; None where it is no noise.
@@ -36,7 +36,7 @@ class PlanarMesh(Recovery):
     missing_term: str = ""
     #: (k, 2) entries that stand out from the misfit of their piece, at most one of each.
     suspects: NDArray[np.int64] = field(default_factory=none_of(2))
-    #: (m,) of a mass matrix, which tells no shape: s times the areas of the triangles; `points` are NaN.
+    #: (m,) of a mass matrix, which tells no shape, s times the areas of the triangles; `points` are NaN.
     areas: NDArray[np.float64] | None = None
     #: (n,) the diagonal matrix S, of geometric mean 1, where the matrix is S c L S.
     row_scaling: NDArray[np.float64] | None = None
@@ -103,18 +103,18 @@ class Surface(Recovery):
 
     edges: NDArray[np.int64]  #: (e, 2) sides of the triangles, rows i < j.
     edge_lengths: NDArray[np.float64]  #: (e,) mean 1 in each piece.
-    #: (n,) what the angles about a vertex lack: of 2 pi, or of pi on the boundary; added up where several sheets touch
+    #: (n,) what the angles about a vertex lack of 2 pi, or of pi on the boundary; added up where several sheets touch
     #: in a vertex, NaN where there is none. Over a piece it adds up to 2 pi times the Euler characteristic.
     curvature: NDArray[np.float64]
     #: (number of pieces,) Euler characteristic; sheets that only touch in a vertex count as apart there.
     euler: NDArray[np.int64]
     orientable: NDArray[np.bool_]  #: (number of pieces,)
     loops: NDArray[np.int64]  #: (number of pieces,) boundary loops.
-    #: Of coordinates in space: ``misfit``, the root mean square difference of edge lengths relative to their mean,
+    #: Of coordinates in space ``misfit``, the root mean square difference of edge lengths relative to their mean,
     #: ``largest``, the largest such difference, and ``misfits``, those of all starts.
     realisation: Mapping[str, Any] | None = None
-    chi_square: Mapping[str, float] | None = None  #: With noise: the test that rows sum to zero, as in `PlanarMesh`.
-    length_deviations: NDArray[np.float64] | None = None  #: (e,) with noise, on request: one standard deviation.
+    chi_square: Mapping[str, float] | None = None  #: With noise, the test that rows sum to zero, as in `PlanarMesh`.
+    length_deviations: NDArray[np.float64] | None = None  #: (e,) with noise, on request, one standard deviation.
 
     @property
     def flat(self) -> bool:
@@ -139,10 +139,10 @@ class Surface(Recovery):
 class Evidence:
     """How uniquely the matrix determines a piece of a body or structure."""
 
-    #: Independent fields that satisfy all valid identities, nodes that stay loose left out. 4 in space, 3 in the plane:
+    #: Independent fields that satisfy all valid identities, nodes that stay loose left out. 4 in space, 3 in the plane,
     #: translations and scale. One less where no field but translations is exact.
     null_dimension: int
-    residual: float  #: Singular value of the coordinates: norm of the residual over the norm of the centred field.
+    residual: float  #: Singular value of the coordinates, norm of the residual over the norm of the centred field.
     gap: float  #: Singular value of the best field that is none of these; an upper bound on large bodies.
     rows: int  #: Nodes with valid identities.
 
@@ -152,7 +152,7 @@ class Mechanical(Recovery):
     """What bodies and structures share: positions that solve linear identities."""
 
     evidence: tuple[Evidence, ...] = ()  #: The null space of each piece's identities.
-    #: Of entries with few digits: how far off a node may be, ten standard deviations, over its piece's diameter.
+    #: Of entries with few digits, how far off a node may be, ten standard deviations, over its piece's diameter.
     position_error: float | None = None
     #: (m, 4) cells of four corners, counter-clockwise in the plane.
     quads: NDArray[np.int64] = field(default_factory=none_of(4))
@@ -168,7 +168,7 @@ class Body(Mechanical):
 
     tetrahedra: NDArray[np.int64] = field(default_factory=none_of(4))  #: (m, 4)
     hexahedra: NDArray[np.int64] = field(default_factory=none_of(8))  #: (m, 8)
-    #: (m, k) quadratic cells: the nodes that each has besides its corners, in meshio's order; else empty.
+    #: (m, k) of quadratic cells the nodes that each has besides its corners, in meshio's order; else empty.
     mid_nodes: NDArray[np.int64] = field(default_factory=none_of(0))
     poisson_ratio: float | None = None  #: Where it is one number; that of plane strain in the plane.
     #: (n_cells, 2) lambda and mu of each cell, as in `scale`.

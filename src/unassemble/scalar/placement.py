@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..options import Direction, FrameOptions
 from ..planar.frame import Similarity, canonical_frame, collinear, fit_similarity
-from ..planar.hinges import groups
+from ..planar.hinges import groups, join
 from ..reductions import ConstantTensor
 from ..topology import Piece, Topology
+from .notes import piece_notes, topology_notes
 
 Anchor = tuple[int, float, float]
 
@@ -79,10 +80,10 @@ class Placement:
         targets = targets - origin
         if len(rows) >= 2:
             return self._by_anchors(piece, z, rows, targets)
-        if self.direction and np.isin(self.direction[:2], piece.vertices).all():
-            ends = piece.local(np.array(self.direction[:2]))
-            positions = self._by_direction(piece, z, ends)
-            notes: list[str] = []
+        notes: list[str] = []
+        if self._directed(piece):
+            assert self.direction is not None
+            positions = self._by_direction(piece, z, piece.local(np.array(self.direction[:2])))
         elif self.tensor:
             raise InputError(
                 f"`tensor` cannot be undone for the piece of row {piece.vertices.min()} without its orientation: "
@@ -95,10 +96,32 @@ class Placement:
             positions = positions + (targets[0] - positions[rows[0]])
         return positions, notes
 
-    def known_positions(self, piece: Piece) -> int:
-        """How many points of a piece are fixed from outside; a direction counts as two."""
-        anchored = len(self._anchors_of(piece)[0])
-        return 2 if self.direction and np.isin(self.direction[:2], piece.vertices).all() else anchored
+    def placed(
+        self,
+        topology: Topology,
+        positions: Sequence[NDArray],
+        remarks: Sequence[Sequence[str]],
+        sizes: NDArray[np.float64] | None = None,
+    ) -> tuple[list[NDArray], NDArray[np.complex128], list[str]]:
+        """Every piece in its final frame, relative to its origin, hinges joined.
+
+        `positions`: of each piece, (k,) in any frame; `remarks`: on each; `sizes` (pieces,): factors of pieces of which
+        less than two positions are known.
+
+        Returns `placed`, (k,) each; `origins` (pieces,); `notes`: what is to be said.
+        """
+        origins, placed, said = self.origins(topology), [], []
+        # Points of each piece that are fixed from outside; a direction counts as two.
+        known = np.array([2 if self._directed(p) else len(self._anchors_of(p)[0]) for p in topology.pieces])
+        for label, piece in enumerate(topology.pieces):
+            z, more = self.apply(piece, positions[label], origins[label])
+            placed.append(z if sizes is None or known[label] >= 2 else sizes[label] * z)
+            said.append((*remarks[label], *more))
+        notes = [*piece_notes(said), *self.unused(topology), *topology_notes(topology)]
+        return join(topology, placed, known), origins, notes
+
+    def _directed(self, piece: Piece) -> bool:
+        return self.direction is not None and bool(np.isin(self.direction[:2], piece.vertices).all())
 
     def unused(self, topology: Topology) -> list[str]:
         """Sentences about what was given and could not be used."""
@@ -106,7 +129,7 @@ class Placement:
         lost = [row for row, _, _ in self.anchors if topology.multiplicity[row] == 0]
         if lost:
             notes.append(f"the anchors of rows {', '.join(map(str, lost))} belong to no triangle and were not used")
-        if self.direction and not any(np.isin(self.direction[:2], p.vertices).all() for p in topology.pieces):
+        if self.direction and not any(map(self._directed, topology.pieces)):
             notes.append("`direction` joins rows of different pieces and was not used")
         return notes
 
@@ -127,13 +150,11 @@ class Placement:
             frame = min(fits, key=lambda fit: fit[1])[0]
             if self.handed:
                 notes.append("three or more anchors fix the mirror image; `handed` was not used")
-        elif self.handed:
-            frame = self._handed([fit[0] for fit in fits], z, rows[:2])
-        elif self.tensor:
-            raise InputError("two anchors leave the mirror image open: give a third, not in line, or `handed`")
         else:
-            frame = fits[canonical_frame(z, piece.edges, piece.boundary)[0].mirror][0]
-            notes.append("the anchors leave two mirror images; the choice between them is by convention")
+            both = "two anchors leave the mirror image open: give a third, not in line, or `handed`"
+            frame = self._of_two([fit[0] for fit in fits], piece, z, rows[:2], both)
+            if not self.handed:
+                notes.append("the anchors leave two mirror images; the choice between them is by convention")
         placed = frame(z)
         misfit = float(np.abs(placed[rows] - known).max())
         if misfit > 1e-6 * np.abs(known - known.mean()).max():
@@ -144,23 +165,20 @@ class Placement:
         assert self.direction is not None
         aim = np.exp(1j * np.deg2rad(self.direction[2]))
         aim = self.tensor.to_laplacian(aim) if self.tensor else aim
-        frames = []
-        for mirror in (False, True):
-            line = z[ends[1]] - z[ends[0]]
-            frames.append(Similarity(complex(aim / (np.conj(line) if mirror else line)), 0j, mirror))
-        if self.handed:
-            frame = self._handed(frames, z, ends)
-        elif self.tensor:
-            raise InputError("`direction` leaves the mirror image open: add `handed`")
-        else:
-            frame = frames[canonical_frame(z, piece.edges, piece.boundary)[0].mirror]
+        line = z[ends[1]] - z[ends[0]]
+        frames = [Similarity(complex(aim / line), 0j), Similarity(complex(aim / np.conj(line)), 0j, mirror=True)]
+        frame = self._of_two(frames, piece, z, ends, "`direction` leaves the mirror image open: add `handed`")
         placed = frame(z)
         placed = self.tensor.from_laplacian(placed) if self.tensor else placed
         length = np.abs(placed[piece.edges[:, 0]] - placed[piece.edges[:, 1]]).mean()
         return (placed - placed.mean()) / length
 
-    def _handed(self, frames: list[Similarity], z: NDArray, ends: NDArray) -> Similarity:
-        """The frame that puts the centroid on the wanted side of the line between two vertices."""
+    def _of_two(self, frames: list[Similarity], piece: Piece, z: NDArray, ends: NDArray, error: str) -> Similarity:
+        """The frame that puts the centroid on the wanted side of the line between two vertices, or by convention."""
+        if not self.handed:
+            if self.tensor:
+                raise InputError(error)
+            return frames[canonical_frame(z, piece.edges, piece.boundary)[0].mirror]
         line, offset = z[ends[1]] - z[ends[0]], z.mean() - z[ends[0]]
         side = (np.conj(line) * offset).imag
         if abs(side) < 1e-9 * abs(line) * np.abs(z - z.mean()).max():

@@ -1,9 +1,9 @@
-"""MATLAB files of versions 4 to 7.3, SuiteSparse's ``Problem.A`` included.
+"""Binary files: scipy's ``.npz``, numpy's ``.npy``, MATLAB's of versions 4 to 7.3; nothing is ever unpickled.
 
-The reader of scipy (1.17) ends the process by a segmentation fault on some damaged files of version 5; the one here
-looks at every length before it believes it, and unpacks nothing but what may hold a sparse matrix. Format: MathWorks,
-MAT-File Format (the document of that name, level 5). A file is a row of data elements, each with a tag of type and
-length; a variable is an element that holds elements.
+The reader of scipy (1.17) ends the process by a segmentation fault on some damaged MATLAB files of version 5; the one
+here looks at every length before it believes it, and unpacks nothing but what may hold a sparse matrix. Format:
+MathWorks, MAT-File Format (the document of that name, level 5). A file is a row of data elements, each with a tag of
+type and length; a variable is an element that holds elements.
 """
 
 import struct
@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import MatrixFileError
-from .canonical import canonical, entry_rows
+from .canonical import canonical, entry_rows, working_dtype
 
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 
@@ -32,18 +32,55 @@ class _Type(IntEnum):
     LOGICAL, COMPLEX = 0x200, 0x800
 
 
+def read_npz(stream: BinaryIO, name: str) -> Any:
+    """Read what ``scipy.sparse.save_npz`` has written, as stored; index arrays are still to be checked.
+
+    `name` is what to call the file in messages.
+
+    Raises MatrixFileError if it holds no sparse matrix, or Python objects; ValueError if arrays do not belong together.
+    """
+    with np.load(stream, allow_pickle=False) as archive:
+        held = archive.files
+    if {"points", "node_status"} <= set(held):
+        raise MatrixFileError(
+            f"{name} is a mesh (as `recover` writes it), and a matrix is asked for: name the matrix's file"
+        )
+    if "format" not in held:
+        what = ", ".join(repr(key[:40]) for key in held[:5]) + ", ..." * (len(held) > 5) or "nothing"
+        raise MatrixFileError(f"{name} holds no sparse matrix ({what}): save one with scipy.sparse.save_npz")
+    stream.seek(0)
+    return _without_objects(sp.load_npz, stream, name)
+
+
+def read_npy(stream: BinaryIO, name: str) -> sp.coo_array:
+    """Read a dense array of ``numpy.save``; its zeros are absent entries.
+
+    Raises MatrixFileError if it holds Python objects, or no matrix of numbers.
+    """
+    dense = _without_objects(np.load, stream, name)  # which does not unpickle unless told
+    if dense.ndim != 2 or dense.dtype.kind not in "biufc":
+        what = f"an array of type {dense.dtype} with {dense.ndim} dimensions"
+        raise MatrixFileError(f"{name} holds {what}, and a matrix of numbers has two")
+    return sp.coo_array(dense.astype(working_dtype(dense.dtype), copy=False))
+
+
+def _without_objects(load: Any, stream: BinaryIO, name: str) -> Any:
+    try:
+        return load(stream)
+    except ValueError as error:
+        if "allow_pickle" in str(error):
+            raise MatrixFileError(f"{name} holds Python objects, which are never loaded") from error
+        raise
+
+
 def read_mat(stream: BinaryIO, name: str, variable: str | None = None) -> Any:
     """Read the sparse variable of a MATLAB file of versions 5 to 7; its index arrays are still to be checked.
 
     `name` is what to call the file in messages, and `variable` which one to read, such as ``"A"`` or ``"Problem.A"``;
     it is needed where several are sparse and square.
 
-    Raises
-    ------
-    MatrixFileError
-        If there is no sparse variable, or the choice is open.
-    ValueError, zlib.error, struct.error
-        If the file is truncated or damaged.
+    Raises MatrixFileError if there is no sparse variable, or the choice is open; ValueError, zlib.error, struct.error
+    if the file is truncated or damaged.
     """
     content = stream.read()
     order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
