@@ -120,7 +120,7 @@ def _unfolded(piece: Piece, z: NDArray, options: StartOptions) -> NDArray[np.com
 def _folded(piece: Piece, z: NDArray) -> NDArray[np.bool_]:
     """(n,) vertices of triangles that are turned over, and those inside around which triangles go more than once."""
     corner = z[piece.triangles]
-    angle = np.angle((np.roll(corner, 1, axis=1) - corner) / (np.roll(corner, -1, axis=1) - corner))
+    angle = np.angle((np.roll(corner, 1, axis=1) - corner) * np.conj(np.roll(corner, -1, axis=1) - corner))
     around = np.bincount(piece.triangles.ravel(), angle.ravel(), piece.n_vertices)
     folded = np.abs(around - 2 * np.pi) > 1
     folded[piece.boundary] = False
