@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells.undivided import undivided
-from ..certify import certify
+from ..certify import Certificate, certify
 from ..certify_elements import certify_elements
 from ..clock import Clock
 from ..matrix import OperatorMatrix
@@ -24,7 +24,6 @@ from ..topology.keys import with_sides
 from ..topology.pieces import planar_pieces
 from ..words import count_of
 from .lattice import Lattice, rows_alike
-from .witness import Witness
 
 _RULE = "2 x 2 Gauss"
 
@@ -67,8 +66,8 @@ def recover_lattice(
             triangles = _divided(cells)
             factor = np.full(len(triangles), float(mesh.scale[0]))
             certificate = certify(matrix.edges, matrix.entries, points, triangles, factor, placement.coefficients)
-        witness = Witness.of(matrix, certificate, len(points), lattice.shift)
-    if not witness.backward_error <= CERTIFIED:
+        error = _backward_error(matrix, certificate, len(points), lattice.shift)
+    if not error <= CERTIFIED:
         return None
     kind: Callable[..., PlanarMesh] = PlanarMesh
     undivided_cells = [] if lattice.neighbours == 8 else vanished_notes(topology)
@@ -85,15 +84,31 @@ def recover_lattice(
         uniqueness="ambiguous",
         reason=(
             f"the lattice, continued by {count_of(len(gone), 'vertex that has', 'vertices that have')} no row, gives "
-            f"the matrix back to {witness.backward_error:.1e} (relative), row sums included"
+            f"the matrix back to {error:.1e} (relative), row sums included"
         ),
         operator=placement.operator,
-        backward_error=witness.backward_error,
+        backward_error=error,
         n_holes=topology.n_holes,
         timings=clock.timings,
         warnings=(*matrix.warnings, *_lattice_notes(lattice), *notes, *undivided_cells),
         eliminated_points=gone,
     )
+
+
+def _backward_error(matrix: OperatorMatrix, found: Certificate, n_points: int, shift: float) -> float:
+    """Of entries and of diagonal entries, which say how much is gone, of rows that come first among the points.
+
+    Relative to the largest off-diagonal entry of each row; infinite where a triangle is flat or turned over.
+    """
+    n = matrix.n
+    sums = np.zeros(n)
+    for end in matrix.edges.T:
+        sums += np.bincount(end, matrix.entries, n)
+    for end in found.pairs.T:
+        sums += np.bincount(end, found.differences, n_points)[:n]
+    diagonal = np.abs(shift - sums - matrix.diagonal) / matrix.row_size
+    entries = found.misfits[(found.pairs < n).all(axis=1)]
+    return np.inf if len(found.flipped) else max(float(entries.max()), float(diagonal.max()))
 
 
 def _lattice_notes(lattice: Lattice) -> list[str]:

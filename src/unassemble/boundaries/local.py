@@ -6,7 +6,7 @@ others: each vertex has a damping, and a step counts where it lowers the squares
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,58 +14,22 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..topology import Piece
-from .fit import Scale, System, WholeEntries, first_flips
+from .fit import System, WholeEntries, first_flips
 from .patch import Patch, distance, spread
 from .shape import ShapePrior
 
 
-@dataclass(frozen=True)
-class AnewOptions:
-    """Settings of fits from random triangles.
-
-    Attributes
-    ----------
-    reach : int
-        Distance in edges up to which vertices move.
-    random, schedule : tuple of (float, int)
-        Weights of the prior and steps with it: with random triangles, then as ever.
-    """
-
-    reach: int = 3
-    random: tuple[tuple[float, int], ...] = ((0.1, 10), (0.01, 5))
-    schedule: tuple[tuple[float, int], ...] = ((1e-3, 10), (0.0, 20))
-
-
 def fit_near(
-    problem: WholeEntries,
-    z: NDArray[np.complex128],
-    scale: Scale,
-    whole: NDArray[np.bool_],
-    free: NDArray[np.bool_],
-    schedule: tuple[tuple[float, int], ...],
-    rng: np.random.Generator | None = None,
-) -> NDArray[np.complex128]:
-    """Positions of which some are improved; the others, and c, stay.
+    problem: WholeEntries, z: NDArray, scale: float, whole: NDArray[np.bool_], free: NDArray[np.bool_],
+    schedule: Sequence[tuple[float, int]], rng: np.random.Generator | None = None,
+) -> NDArray[np.complex128]:  # fmt: skip
+    """Positions of which some, (n,) bool, are improved; the others, and c, stay.
 
-    Parameters
-    ----------
-    problem : WholeEntries
-    z : (n,) complex128
-    scale : float
-    whole : (e,) bool
-        Entries to be fitted; sides of the others have a prior.
-    free : (n,) bool
-        Vertices that move.
-    schedule : tuple of (float, int)
-        Weights of the prior, one after the other, and numbers of steps with each.
-    rng : Generator, optional
-        For triangles that the prior has at random.
+    A schedule has weights of the prior, one after the other, and numbers of steps with each; with a generator the prior
+    has random triangles.
     """
     patch = Patch.about(problem.piece, free)
-    region = None if problem.region is None else problem.region[patch.triangles]
-    part = WholeEntries(
-        patch.piece, problem.weights[patch.edges], problem.guessed[patch.edges], scale, patch.free, region
-    )
+    part = WholeEntries(patch.piece, problem.weights[patch.edges], problem.guessed[patch.edges], scale, patch.free)
     moved = z.copy()
     try:
         for mu, steps in schedule:
@@ -76,24 +40,19 @@ def fit_near(
 
 
 def fit_anew(
-    problem: WholeEntries,
-    z: NDArray[np.complex128],
-    scale: float,
-    whole: NDArray[np.bool_],
-    places: NDArray[np.bool_],
+    problem: WholeEntries, z: NDArray, scale: float, whole: NDArray[np.bool_], places: NDArray[np.bool_],
     rng: np.random.Generator,
-    options: AnewOptions | None = None,
-) -> NDArray[np.complex128]:
+) -> NDArray[np.complex128]:  # fmt: skip
     """Positions about places that do not fit, (n,) bool, from random triangles at the rim; what is no better stays.
 
     Few entries may have several solutions next to each other and a minimum that is none, each with triangles of its
     own: which of them a fit comes to is decided by the prior.
     """
-    options, piece = options or AnewOptions(), problem.piece
-    free = distance(piece, places, options.reach) <= options.reach
+    piece = problem.piece
+    free = distance(piece, places, 3) <= 3
     with np.errstate(all="ignore"):  # random triangles may lead far away
-        there = fit_near(problem, z, scale, whole, free, options.random, rng)
-        there = fit_near(problem, there, scale, whole, free, options.schedule)
+        there = fit_near(problem, z, scale, whole, free, ((0.1, 10), (0.01, 5)), rng)
+        there = fit_near(problem, there, scale, whole, free, ((1e-3, 10), (0.0, 20)))
     ends = piece.edges[free[piece.edges].all(axis=1)].T
     graph = sp.coo_array((np.ones(ends.shape[1], np.int8), ends), shape=(len(z), len(z)))
     label = np.where(free, csgraph.connected_components(graph, directed=False)[1], -1)
@@ -108,14 +67,14 @@ def fit_anew(
 
 def _fitted(
     part: WholeEntries, z: NDArray, whole: NDArray[np.bool_], mu: float, steps: int,
-    rng: np.random.Generator | None, first: float = 1e-3,
+    rng: np.random.Generator | None,
 ) -> NDArray[np.complex128]:  # fmt: skip
     piece, scale = part.piece, part.known_scale
     prior = ShapePrior.of(piece, ~whole).about(part.free)
     prior = prior if rng is None else prior.unlike(rng)
     whole = whole & part.asked
     fitted = piece.triangles[(whole[piece.opposite] | (mu > 0)).any(axis=1)]
-    damping = np.full(len(z), first)
+    damping = np.full(len(z), 1e-3)
     misfit, shape = part.residuals(z, scale, whole, prior, mu)
     for _ in range(steps):
         if not (np.abs(misfit) > 1e-14).any():
@@ -154,7 +113,6 @@ def _near(piece: Piece, prior: ShapePrior, misfit: NDArray, shape: NDArray) -> N
     for ends, squares in ((piece.stencil, misfit**2), (prior.corners, shape**2)):
         for end in ends:
             total += np.bincount(end, squares, n)
-    here, there = total[piece.edges].T
-    return np.asarray(
-        total + np.bincount(piece.edges[:, 0], there, n) + np.bincount(piece.edges[:, 1], here, n), dtype=np.float64
-    )
+    one, other = piece.edges.T
+    near: NDArray[np.float64] = total + np.bincount(one, total[other], n) + np.bincount(other, total[one], n)
+    return near

@@ -12,23 +12,12 @@ from ..topology import Piece
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Triangles about vertices that move.
-
-    Attributes
-    ----------
-    piece : Piece
-        The triangles with a part in entries that moving vertices change; without boundary loops.
-    vertices, edges, triangles : (k,) int64, (e,) int64, (m,) int64
-        Of the whole piece.
-    free : (k,) bool
-        Vertices that move.
-    """
+    """The triangles with a part in entries that moving vertices change, as a piece without boundary loops."""
 
     piece: Piece
-    vertices: NDArray[np.int64]
-    edges: NDArray[np.int64]
-    triangles: NDArray[np.int64]
-    free: NDArray[np.bool_]
+    vertices: NDArray[np.int64]  # (k,) of the whole piece
+    edges: NDArray[np.int64]  # (e,)
+    free: NDArray[np.bool_]  # (k,) vertices that move
 
     @classmethod
     def about(cls, piece: Piece, free: NDArray[np.bool_]) -> Patch:
@@ -48,7 +37,7 @@ class Patch:
             vertices, edges, ends, triangles.reshape(-1, 3), opposite.reshape(-1, 3), facing,
             np.empty((0, 2), np.int64), np.zeros(1, np.int64),
         )  # fmt: skip
-        return cls(part, vertices, edges, chosen, free[vertices])
+        return cls(part, vertices, edges, free[vertices])
 
 
 def distance(piece: Piece, vertices: NDArray[np.bool_], most: int) -> NDArray[np.int64]:

@@ -19,7 +19,6 @@ from ..recovery import Surface
 from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE
 from ..topology.manifold import Cycles, in_four_cliques, surface_readings
 from ..words import count_of, sentences, words_of
-from .curvature import curvatures
 from .mesh import SurfaceMesh
 from .noise import length_deviations, row_sum_test, scale_deviation
 from .program import Metric, solve_metric
@@ -101,7 +100,11 @@ def _recovered(
     deviations = None
     if options.noise is not None and options.standard_deviations:
         with clock("deviations"):
-            deviations = _deviations(best, options.noise)
+            deviations = np.full(len(best.squared), np.nan)
+            for scale, (rows, opposite) in zip(best.scale, best.mesh.pieces(), strict=True):
+                if np.isfinite(scale):
+                    own = length_deviations(best.squared[rows], opposite)
+                    deviations[rows] = options.noise / abs(scale) * own
     if back:
         best = best.without_last(back)
         notes.append(f"{count_of(back, 'vertex was', 'vertices were')} put back, with the entries that rows lack")
@@ -126,14 +129,6 @@ def _require_few_handles(matrix: OperatorMatrix) -> None:
         raise TopologyError(
             f"{edges} on {rows} are those of no surface, unless it has more handles than a sixth of its rows"
         )
-
-
-def _deviations(found: _Found, sigma: float) -> NDArray[np.float64]:
-    deviations = np.full(len(found.squared), np.nan)
-    for scale, (rows, opposite) in zip(found.scale, found.mesh.pieces(), strict=True):
-        if np.isfinite(scale):
-            deviations[rows] = sigma / abs(scale) * length_deviations(found.squared[rows], opposite)
-    return deviations
 
 
 def _used(matrix: OperatorMatrix) -> tuple[OperatorMatrix, list[str]]:
@@ -252,16 +247,10 @@ _SUMS = {
 }
 
 
-def _report(
-    found: _Found,
-    verdict: _Verdict,
-    notes: list[str],
-    clock: Clock,
-    deviations: NDArray | None,
-) -> Surface:
+def _report(found: _Found, verdict: _Verdict, notes: list[str], clock: Clock, deviations: NDArray | None) -> Surface:
     mesh = found.mesh
     worst, misfits = found.certificate.entries.worst(10 if verdict.uniqueness is None else 0)
-    curvature = curvatures(mesh, found.squared)
+    curvature = mesh.curvature(found.squared)
     loop = mesh.loop_of_boundary
     order = np.argsort(loop, kind="stable")
     _, first = np.unique(loop[order], return_index=True)
