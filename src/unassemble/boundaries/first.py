@@ -14,8 +14,7 @@ from ..planar.conformal import ConformalOptions, conformal_map, estimate_scale
 from ..topology import Piece
 from .embedding import areas, tutte
 from .fit import Fit, FitOptions, WholeEntries
-from .local import fit_near
-from .patch import distance
+from .patch import distance, fit_near
 from .rim import Rim
 
 # Weights of the prior, one after the other, and once more.

@@ -14,8 +14,7 @@ from .embedding import areas
 from .first import first_fits
 from .fit import Fit, FitOptions, WholeEntries
 from .judge import determined
-from .local import fit_anew, fit_near
-from .patch import distance, nearest
+from .patch import distance, fit_anew, fit_near, nearest
 from .rim import Rim
 
 _log = logging.getLogger(__name__)

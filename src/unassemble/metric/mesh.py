@@ -21,33 +21,18 @@ from .program import angles
 class SurfaceMesh:
     """Triangles glued along edges, at most two on each.
 
-    Attributes
-    ----------
-    n : int
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order; each is a side of a triangle.
-    triangles : (m, 3) int64
-        Neighbours run along a common edge in opposite directions, in orientable pieces.
-    opposite : (m, 3) int64
-        Rows of `edges` that face the corners.
-    piece : (m,) int64
-        Label of the edge-connected piece, in order of the pieces' lowest vertices.
-    orientable : (number of pieces,) bool
-    fan : (m, 3) int64
-        Label of the fan of triangles about a vertex that each corner belongs to; a vertex has several where sheets of
-        surface touch in it.
-    boundary : (b,) int64
-        Rows of `edges` with a triangle on one side only.
+    Neighbours run along a common edge in opposite directions, in orientable pieces. A vertex has several fans where
+    sheets of surface touch in it.
     """
 
     n: int
-    edges: NDArray[np.int64]
-    triangles: NDArray[np.int64]
-    opposite: NDArray[np.int64]
-    piece: NDArray[np.int64]
-    orientable: NDArray[np.bool_]
-    fan: NDArray[np.int64]
-    boundary: NDArray[np.int64]
+    edges: NDArray[np.int64]  # (e, 2) pairs i < j in lexicographic order; each is a side of a triangle
+    triangles: NDArray[np.int64]  # (m, 3)
+    opposite: NDArray[np.int64]  # (m, 3) rows of `edges` that face the corners
+    piece: NDArray[np.int64]  # (m,) label of the edge-connected piece, in order of the pieces' lowest vertices
+    orientable: NDArray[np.bool_]  # of each piece
+    fan: NDArray[np.int64]  # (m, 3) label of the fan of triangles about a vertex that each corner belongs to
+    boundary: NDArray[np.int64]  # (b,) rows of `edges` with a triangle on one side only
 
     @classmethod
     def of(cls, cycles: Cycles, chosen: NDArray[np.bool_] | slice = slice(None)) -> SurfaceMesh:

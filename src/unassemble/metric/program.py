@@ -70,21 +70,11 @@ def longest_step(sides: NDArray, change: NDArray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Metric:
-    """Squared edge lengths of one edge-connected piece, and how they were found.
+    """Squared edge lengths of one edge-connected piece, and how they were found."""
 
-    Attributes
-    ----------
-    squared : (e,) float64
-        In the gauge of mean 1.
-    scale : float
-        The factor c of the weights.
-    history : tuple of float
-        Norm of the misfit of the weights, relative to theirs, before each step.
-    """
-
-    squared: NDArray[np.float64]
-    scale: float
-    history: tuple[float, ...]
+    squared: NDArray[np.float64]  # (e,) in the gauge of mean 1
+    scale: float  # the factor c of the weights
+    history: tuple[float, ...]  # norm of the misfit of the weights, relative to theirs, before each step
 
 
 class Normal:

@@ -83,7 +83,13 @@ def _recovered(
 ) -> Surface:
     """The same, the last `back` rows being those of vertices that were put back."""
     with clock("topology"):
-        _require_few_handles(matrix)
+        if len(matrix.edges) > 4 * matrix.n:
+            # Before 3-cycles are listed: dense graphs have most of all. By Euler's formula a closed surface of n
+            # vertices and g handles has 3 n - 6 + 6 g edges, and one with holes fewer.
+            raise TopologyError(
+                f"{count_of(len(matrix.edges), 'edge')} on {count_of(matrix.n, 'row')} are those of no surface, unless "
+                "it has more handles than a sixth of its rows"
+            )
         used, notes = _used(matrix)
         cycles = Cycles.of(used.n, used.edges)
         if triangles is None:
@@ -117,18 +123,6 @@ _SEVERAL = (
     "with one vertex put back into each hole where rows lack entries, lengths give all entries and row sums back, but "
     "so may several vertices in a hole"
 )
-
-
-def _require_few_handles(matrix: OperatorMatrix) -> None:
-    """Refuse graphs that have no surface of few handles, before 3-cycles are listed: dense ones have most of all.
-
-    A closed surface of n vertices and g handles has 3 n - 6 + 6 g edges (Euler's formula), and one with holes fewer.
-    """
-    if len(matrix.edges) > 4 * matrix.n:
-        edges, rows = (count_of(k, word) for k, word in ((len(matrix.edges), "edge"), (matrix.n, "row")))
-        raise TopologyError(
-            f"{edges} on {rows} are those of no surface, unless it has more handles than a sixth of its rows"
-        )
 
 
 def _used(matrix: OperatorMatrix) -> tuple[OperatorMatrix, list[str]]:
