@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SolverError
 from ..tolerances import LAST_DIGITS, ROUNDED
 from ..topology import Piece
 from .cotangent import edge_weights
@@ -106,6 +107,11 @@ def polish(
         Standard deviations of the errors of a up to a common factor, for instance
         :func:`~unassemble.planar.cotangent.weight_roundings`; of one size by default.
     options : PolishOptions, optional
+
+    Raises
+    ------
+    SolverError
+        If cells are flat at the start, or steps lead to equations that cannot be solved.
     """
     options = options or PolishOptions()
     extent = np.abs(z - z.mean()).max()
@@ -115,6 +121,8 @@ def polish(
     model = Cotangents(drawn) if isinstance(drawn, Piece) else drawn
     problem = Problem(model, weights, spread, scale)
     fit = problem.at(z)
+    if not np.isfinite(fit.weights).all():
+        raise SolverError("cells are flat")
     equations: NormalEquations | None = None
     system: GaussNewton | IterativeNormalEquations | None = None
     factorisations, steps, length, converged = 0, 0, np.inf, False
