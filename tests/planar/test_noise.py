@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from meshes import delaunay, diameter, largest_error, random_mesh, specimen
 from unassemble import GeometryError, SolverError, recover
 from unassemble.matrix import check_matrix
-from unassemble.planar import cautious_polish, conformal_map, count_flipped, polish
+from unassemble.planar import CAREFUL, conformal_map, count_flipped, polish
 from unassemble.planar import piece as pieces
 from unassemble.topology import surfaces
 
@@ -143,8 +143,8 @@ def test_start_far_off_is_polished_to_the_same_mesh_as_the_truth():
     piece = surfaces(checked.n, checked.edges).pieces[0]
     entries = -checked.entries[piece.edge_rows]
     start = conformal_map(piece, entries, sharp=False)
-    chord, careful = polish(piece, entries, start.z), cautious_polish(piece, entries, start.z)
-    truth = cautious_polish(piece, entries, known.points[piece.vertices] @ [1, 1j])
+    chord, careful = polish(piece, entries, start.z), polish(piece, entries, start.z, options=CAREFUL)
+    truth = polish(piece, entries, known.points[piece.vertices] @ [1, 1j], options=CAREFUL)
     assert not chord.converged
     assert careful.converged
     assert careful.residual == pytest.approx(truth.residual, rel=1e-6)
@@ -178,8 +178,10 @@ def test_misfit_that_is_no_fault_of_the_polish_is_not_told_from_one():
 
 
 def test_large_steps_that_fail_are_replaced_by_small_ones(monkeypatch):
-    def flat(*_, **__):
-        raise SolverError("flat triangles")
+    def flat(*given, options=None, **others):
+        if options is None:
+            raise SolverError("flat triangles")
+        return polish(*given, options=options, **others)
 
     known, sigma = specimen(*random_mesh(170, seed=3)), 1e-3
     monkeypatch.setattr("unassemble.planar.piece.polish", flat)

@@ -4,7 +4,7 @@ Where entries vanish the graph alone does not tell: see the page on theory in th
 """
 
 from .completion import completed, guessed
-from .doubt import Attempt, Outcome, components_of, in_doubt
+from .doubt import Attempt, Outcome, in_doubt
 from .undivided import undivided
 from .unique.alternatives import SEARCHED_ROWS, Alternative, alternatives
 
@@ -15,7 +15,6 @@ __all__ = [
     "Outcome",
     "alternatives",
     "completed",
-    "components_of",
     "guessed",
     "in_doubt",
     "undivided",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
@@ -15,10 +15,10 @@ from ..matrix import OperatorMatrix
 from ..planar.piece import PieceMesh
 from ..tolerances import LITTLE
 from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar
-from ..topology.keys import contains, distinct, pair_keys
-from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained, with_pieces
+from ..topology.keys import Grouped, contains, distinct, pair_keys
+from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained
 from .judge.labelling import Labelling, add_differing_factors
-from .search.options import DEFAULT
+from .search.options import SEARCH
 from .search.search import first_labelling, label_cells
 from .undivided import undivided
 
@@ -28,8 +28,8 @@ class _Part:
     """What components of the graph were found to be; rows of edges are left as they are."""
 
     pieces: Solved
-    vanished: NDArray[np.int64]
-    polygons: Polygons
+    vanished: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    polygons: Polygons = field(default_factory=Polygons.none)
 
 
 def completed(
@@ -41,43 +41,25 @@ def completed(
 ) -> tuple[OperatorMatrix, Topology, list[Outcome]]:
     """Read every doubtful component again.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    topology : Topology
-        Surfaces of 3-cycles; see :func:`unassemble.topology.surfaces`.
-    attempt : callable
-        Gives positions of one of its pieces, or says why there are none.
-    doubtful : (n,) bool
-        See :func:`in_doubt`.
-    scale : float, optional
-        c, where it is known.
+    `topology`: surfaces of 3-cycles, see :func:`unassemble.topology.surfaces`; `attempt`: gives positions of one of its
+    pieces, or says why there are none; `doubtful` (n,): see :func:`in_doubt`; `scale`: c, where it is known.
 
-    Returns
-    -------
-    matrix : OperatorMatrix
-        With the vanished entries of the cells' triangles as zeros.
-    topology : Topology
-        Of that matrix; components of which nothing can be made are among its failures.
-    meshes : list of PieceMesh or RecoveryError
-        Unpolished positions.
+    Returns the matrix with the vanished entries of the cells' triangles as zeros; its topology, components of which
+    nothing can be made being among its failures; and unpolished positions of each piece, or why there are none.
 
-    Raises
-    ------
-    RecoveryError
-        If no component has cells.
+    Raises RecoveryError if no component has cells.
     """
     kept = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
-    parts = [_Part(kept, np.empty((0, 2), np.int64), Polygons.none())]
+    parts = [_Part(kept)]
     failures: list[RecoveryError] = []
-    components_with_pieces = with_pieces(matrix.n, matrix.edges, topology.pieces)
+    components_with_pieces = _with_pieces(matrix.n, matrix.edges, topology.pieces)
 
     @cache
     def misfit_of_triangles() -> NDArray[np.float64]:
         return misfits_of(matrix, [(piece, attempt(piece)) for piece in topology.pieces])
 
     by_graph_alone = matrix.unweighted and scale is None
-    budget = Budget(0 if by_graph_alone else DEFAULT.worth(matrix.n))
+    budget = Budget(0 if by_graph_alone else SEARCH.worth(matrix.n))
     for part, own in components_with_pieces:
         if not doubtful[part.vertices[0]]:
             continue
@@ -90,6 +72,20 @@ def completed(
     return _merged(matrix, topology, parts, tuple(map(str, failures)))
 
 
+def _with_pieces(n: int, edges: NDArray[np.int64], pieces: Sequence[Piece]) -> list[tuple[Numbering, list[Piece]]]:
+    """Each component, the largest first, and its pieces in their order; in linear time.
+
+    `edges` (e, 2): pairs i < j in lexicographic order; `pieces`: none of which belongs to two components.
+    """
+    parts = components(n, edges)
+    label = np.full(n, -1)
+    for k, part in enumerate(parts):
+        label[part.vertices] = k
+    own = Grouped(label[np.array([piece.vertices[0] for piece in pieces], dtype=np.int64)], len(parts))
+    bounds, order = own.start.tolist(), own.order.tolist()
+    return [(part, [pieces[j] for j in order[bounds[k] : bounds[k + 1]]]) for k, part in enumerate(parts)]
+
+
 def guessed(matrix: OperatorMatrix, topology: Topology) -> tuple[OperatorMatrix, Topology]:
     """The cells that the angles suggest in components with nonzero entries on no triangle; nothing is solved.
 
@@ -98,7 +94,7 @@ def guessed(matrix: OperatorMatrix, topology: Topology) -> tuple[OperatorMatrix,
     doubtful = unexplained(matrix, topology)
     unsolved = GeometryError("not solved")
     kept: Solved = [(piece, unsolved) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
-    parts = [_Part(kept, np.empty((0, 2), np.int64), Polygons.none())]
+    parts = [_Part(kept)]
     for part in components(matrix.n, matrix.edges):
         if doubtful[part.vertices[0]]:
             labelling = first_labelling(len(part.vertices), part.edges, -matrix.entries[part.edge_rows])
@@ -122,14 +118,17 @@ def _labelled(
     labelling = label_cells(len(numbering.vertices), numbering.edges, weights, scale, errors, budget)
     if labelling is not None and labelling.fits:
         return _part(matrix, numbering, labelling)
-    before = _misfit_of_own(misfit_of_triangles(), numbering, own, attempt, scale)
+    misfit = misfit_of_triangles().copy()
+    if solved := [(piece, mesh) for piece in own if isinstance(mesh := attempt(piece), PieceMesh)]:
+        add_differing_factors(solved, misfit, scale)
+    before = float(np.sqrt(np.mean(misfit[numbering.edge_rows] ** 2)))
     if labelling is not None and labelling.size < LITTLE * before and labelling.misfit.max() < 1:
         return _part(matrix, numbering, labelling)
     n, e = len(numbering.vertices), len(numbering.edges)
     if labelling is None or not own:
         require_planar(n, numbering.edges)
     if own:
-        return _Part([(piece, attempt(piece)) for piece in own], np.empty((0, 2), np.int64), Polygons.none())
+        return _Part([(piece, attempt(piece)) for piece in own])
     if labelling is None:
         raise GeometryError(
             f"no cells can be put on the graph of the matrix ({n} rows, {e} entries above the diagonal)"
@@ -138,17 +137,6 @@ def _labelled(
         f"of the meshes tried on the graph of the matrix, which is planar ({n} rows, {e} entries above the diagonal), "
         "none has its entries: they may belong to no mesh, as those of a network, or lack zeros that should be stored"
     )
-
-
-def _misfit_of_own(
-    misfit: NDArray, numbering: Numbering, own: list[Piece], attempt: Attempt, scale: float | None
-) -> float:
-    """Root mean square misfit of a component's triangles; what their factors differ by counts as in a labelling."""
-    solved = [(piece, mesh) for piece in own if isinstance(mesh := attempt(piece), PieceMesh)]
-    misfit = misfit.copy()
-    if solved:
-        add_differing_factors(solved, misfit, scale)
-    return float(np.sqrt(np.mean(misfit[numbering.edge_rows] ** 2)))
 
 
 def _part(matrix: OperatorMatrix, numbering: Numbering, labelling: Labelling) -> _Part:

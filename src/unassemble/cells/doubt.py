@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from ..errors import RecoveryError, SolverError
 from ..matrix import OperatorMatrix
-from ..planar.cautious import cautious_polish
 from ..planar.piece import PieceMesh
-from ..planar.polish import SHORT, polish
+from ..planar.polish import CAREFUL, SHORT, polish
 from ..tolerances import ALIKE, SMALL
-from ..topology import Numbering, Piece, Topology, components
-from ..topology.keys import Grouped
-from .judge.labelling import even, misfits
+from ..topology import Piece, Topology
+from ..topology.numbering import connected
+from .judge.labelling import even
+from .judge.within_errors import misfits
 
 _WIDE = 200  # rows of a matrix on which the misfit of a wrong cell stays near it
 
@@ -32,11 +30,7 @@ Solved = list[tuple[Piece, Outcome]]
 
 
 def in_doubt(
-    matrix: OperatorMatrix,
-    topology: Topology,
-    attempt: Attempt,
-    scale: float | None,
-    noise: float | None,
+    matrix: OperatorMatrix, topology: Topology, attempt: Attempt, scale: float | None, noise: float | None
 ) -> NDArray[np.bool_]:
     """(n,) rows of components with nonzero entries on no triangle, or entries that do not fit.
 
@@ -52,9 +46,8 @@ def in_doubt(
     wrong = misfit > ALIKE
     if not wrong.any() or _like_noise(misfit, matrix.n):
         return doubtful
-    if _like_noise(
-        misfits_of(matrix, _shortly_polished(matrix, solved, scale, small_steps=bool(noise)))[rest], matrix.n
-    ):
+    solved = [(piece, _shortly_polished(matrix, piece, mesh, scale, small_steps=bool(noise))) for piece, mesh in solved]
+    if _like_noise(misfits_of(matrix, solved)[rest], matrix.n):
         return doubtful
     return doubtful | _components_of(matrix, rest[wrong])
 
@@ -67,31 +60,24 @@ def _like_noise(misfit: NDArray, n: int) -> bool:
     return even(misfit) and (n > _WIDE or float(np.sqrt(np.mean(misfit**2))) < SMALL)
 
 
-def _shortly_polished(matrix: OperatorMatrix, solved: Solved, scale: float | None, *, small_steps: bool) -> Solved:
+def _shortly_polished(
+    matrix: OperatorMatrix, piece: Piece, mesh: Outcome, scale: float | None, *, small_steps: bool
+) -> Outcome:
     """By a few steps; by small ones where noise may lead large ones to flat triangles."""
-    polished: Solved = []
-    for piece, mesh in solved:
-        outcome: Outcome = mesh
-        if isinstance(mesh, PieceMesh):
-            weights = -matrix.entries[piece.edge_rows]
-            try:
-                step = cautious_polish(piece, weights, mesh.z, scale=scale) if small_steps else None
-                found = step or polish(piece, weights, mesh.z, scale=scale, options=SHORT)
-                outcome = PieceMesh(found.z, found.scale)
-            except SolverError as error:
-                outcome = error
-        polished.append((piece, outcome))
-    return polished
+    if not isinstance(mesh, PieceMesh):
+        return mesh
+    weights = -matrix.entries[piece.edge_rows]
+    try:
+        found = polish(piece, weights, mesh.z, scale=scale, options=CAREFUL if small_steps else SHORT)
+    except SolverError as error:
+        return error
+    return PieceMesh(found.z, found.scale)
 
 
 def misfits_of(matrix: OperatorMatrix, solved: Solved) -> NDArray[np.float64]:
-    """(e,) as :func:`unassemble.cells.judge.labelling.misfits`."""
-    return misfits(
-        matrix.n,
-        matrix.edges,
-        -matrix.entries,
-        [(piece, mesh) for piece, mesh in solved if isinstance(mesh, PieceMesh)],
-    )
+    """(e,) of pieces that have positions, as :func:`.judge.within_errors.misfits`."""
+    placed = [(piece, mesh) for piece, mesh in solved if isinstance(mesh, PieceMesh)]
+    return misfits(matrix.n, matrix.edges, -matrix.entries, placed)
 
 
 def unexplained(matrix: OperatorMatrix, topology: Topology) -> NDArray[np.bool_]:
@@ -105,26 +91,6 @@ def _components_of(matrix: OperatorMatrix, rows: NDArray) -> NDArray[np.bool_]:
     chosen = np.zeros(matrix.n, dtype=bool)
     if not len(rows):
         return chosen
-    label = components_of(matrix)
+    label = connected(matrix.n, *matrix.edges.T)[1]
     chosen[label[matrix.edges[rows, 0]]] = True
     return chosen[label]
-
-
-def components_of(matrix: OperatorMatrix) -> NDArray[np.int32]:
-    """(n,) number of the connected component of each row."""
-    graph = sp.coo_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
-    return np.asarray(csgraph.connected_components(graph, directed=False)[1])
-
-
-def with_pieces(n: int, edges: NDArray[np.int64], pieces: Sequence[Piece]) -> list[tuple[Numbering, list[Piece]]]:
-    """Each component, the largest first, and its pieces in their order; in linear time.
-
-    `edges` (e, 2): pairs i < j in lexicographic order; `pieces`: none of which belongs to two components.
-    """
-    parts = components(n, edges)
-    label = np.full(n, -1)
-    for k, part in enumerate(parts):
-        label[part.vertices] = k
-    own = Grouped(label[np.array([piece.vertices[0] for piece in pieces], dtype=np.int64)], len(parts))
-    bounds, order = own.start.tolist(), own.order.tolist()
-    return [(part, [pieces[j] for j in order[bounds[k] : bounds[k + 1]]]) for k, part in enumerate(parts)]

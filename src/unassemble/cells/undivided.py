@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
-from ..topology import Piece, Polygons
-from ..topology.keys import distinct
-from ..topology.together import Together
+from ..topology import Piece, Polygons, loops
+from ..topology.keys import distinct, found
+from ..topology.numbering import connected
+from ..topology.surface import Together
 
 
 def undivided(pieces: Sequence[Piece], vanished: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Polygons]:
@@ -26,11 +25,7 @@ def undivided(pieces: Sequence[Piece], vanished: NDArray[np.bool_]) -> tuple[NDA
     owner, corner = np.divmod(np.flatnonzero(diagonal[whole.opposite].ravel()), 3)
     order = np.argsort(whole.opposite[owner, corner], kind="stable")  # both triangles of each diagonal in turn
     one, other = owner[order].reshape(-1, 2).T
-    m = len(whole.triangles)
-    _, group = csgraph.connected_components(
-        sp.coo_array((np.ones(len(one)), (one, other)), shape=(m, m)), directed=False
-    )
-    group = group.astype(np.int64)
+    group = connected(len(whole.triangles), one, other)[1]
     joined = (np.bincount(group) > 1)[group]
     triangle, turn = np.nonzero(joined[:, None] & ~diagonal[whole.opposite])
     tail, head = (whole.triangles[triangle, (turn + step) % 3] for step in (1, 2))
@@ -47,16 +42,11 @@ def _cycles(group: NDArray, tail: NDArray, head: NDArray, name: NDArray) -> Poly
     """
     order = np.lexsort((tail, group))
     group, tail, head = group[order], tail[order], head[order]
-    start = np.flatnonzero(np.diff(group, prepend=-1))
-    size = np.diff(np.append(start, len(group)))
     n = int(tail.max(initial=0)) + 1
-    key, wanted = group * n + tail, group * n + head
-    following = np.minimum(np.searchsorted(key, wanted), max(len(key) - 1, 0))
-    place, at = np.empty(len(group), dtype=np.int64), start
-    for step in range(int(size.max(initial=0))):
-        running = step < size
-        place[start[running] + step] = at[running]
-        at = following[at]
-    if (key[following] != wanted).any() or len(distinct(place)) < len(place):
+    following, there = found(group * n + tail, group * n + head)
+    if not there.all() or len(distinct(following)) < len(following):
         return None
-    return Polygons(np.append(0, np.cumsum(size)), name[tail[place]])
+    loop, around = loops(following)
+    if len(distinct(loop)) > len(distinct(group)):
+        return None
+    return Polygons(np.append(0, np.cumsum(np.bincount(loop))), name[tail[around]])

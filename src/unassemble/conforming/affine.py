@@ -19,6 +19,7 @@ from ..elements.kinds import Kind
 from ..elements.reference import exact_rule, shape_functions, shape_gradients
 from ..matrix import OperatorMatrix
 from ..tolerances import LITTLE
+from ..topology.keys import found
 from .sets import pairs_of
 
 
@@ -48,9 +49,8 @@ class ElementEntries:
         m, k = sets.shape
         keys = pairs_of(matrix.n, sets)
         parts = np.searchsorted(every, keys, side="right") - np.searchsorted(every, keys)
-        stored = matrix.edges @ [matrix.n, 1]
-        place = np.minimum(np.searchsorted(stored, keys), len(stored) - 1)
-        value = np.where(stored[place] == keys, matrix.entries[place], 0.0) / parts
+        place, there = found(matrix.edges @ [matrix.n, 1], keys)
+        value = np.where(there, matrix.entries[place], 0.0) / parts
         # Split evenly is a guess, and beside a flat cell a bad one: what is shared weighs less, all the more if large.
         own = np.sum(value**2, axis=1, where=parts == 1, keepdims=True)
         own = own / np.maximum(np.count_nonzero(parts == 1, axis=1, keepdims=True), 1)

@@ -91,8 +91,7 @@ class _Local:
     def metric(self) -> tuple[NDArray, NDArray, NDArray]:
         """What products of derivatives of shape functions are multiplied by."""
         scaled = self.weights / self.determinant
-        cross = self.s.real * self.t.real + self.s.imag * self.t.imag
-        return scaled * _square(self.t), -scaled * cross, scaled * _square(self.s)
+        return scaled * _real(self.t, self.t), -scaled * _real(self.s, self.t), scaled * _real(self.s, self.s)
 
     def squares(self) -> tuple[NDArray, NDArray, NDArray]:
         """The same for w D g_a g_b, complex."""
@@ -218,8 +217,3 @@ def _matmul(values: NDArray[np.complex128], factors: NDArray[np.float64]) -> NDA
     result = np.empty((len(values), factors.shape[1]), np.complex128)
     result.real, result.imag = (np.ascontiguousarray(part) @ factors for part in (values.real, values.imag))
     return result
-
-
-def _square(values: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Of the absolute values."""
-    return np.asarray(values.real**2 + values.imag**2)

@@ -1,21 +1,34 @@
-"""One part from its entries to positions of all nodes, polished to the level that the entries allow."""
+"""One part from its entries to positions of all nodes, polished to the level that the entries allow.
+
+Positions of corners come from the conformal pencil, whatever the element (theory: any conforming element). Where cells
+are straight, coordinates are determined by those of corners, z = P z_c, and the form M restricted to such fields,
+P' M P, is the one of linear elements on the corners: with quadratic or cubic triangles that of P1, exactly. So one
+problem of the size of the corners serves all orders, and its null space is that of linear elements.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..elements.reference import planar_rules
-from ..errors import SolverError
+from ..errors import GeometryError, SolverError
+from ..planar.conformal import ConformalOptions, smooth_start
+from ..planar.deviations import covariances
+from ..planar.normal import distant_pair
+from ..planar.pencil import ConformalPencil, ShiftedSearch
 from ..planar.polish import errors_of_one_size, polish
-from ..tolerances import AGREED, CERTIFIED, LAST_DIGITS, LITTLE, ROUNDED
+from ..scalar.solving import Task
+from ..tolerances import AGREED, CERTIFIED, LAST_DIGITS, LITTLE, ROUNDED, SUMMED
+from ..topology.keys import distinct
 from .assembly import Entries
 from .parts import Part
-from .positions import corner_positions
+from .sets import pairs_of
 
 _ALIKE = 1.01  # ratio of misfits of rules between which only rounding or noise decides
 
@@ -64,8 +77,14 @@ def fitted(
 
     Raises GeometryError, SolverError.
     """
-    z, c = corner_positions(part, weights, scale)
-    straight = _by_best_rule(part, weights, z, c, noise)
+    z, c = _corner_positions(part, weights, scale)
+    trials = []  # with straight sides: the quadrature that fits best, of those that fit alike the first
+    for rule in _rules(part, straight=True):
+        trials.append(_with_rule(part, weights, z, c, noise, rule, straight=True))
+        if trials[-1].size <= AGREED:
+            break
+    least = min(trial.size for trial in trials)
+    straight = next((trial for trial in trials if trial.size <= max(AGREED, _ALIKE * least)), trials[0])
     if part.degree == 1 or not refine or straight.size < max(CERTIFIED**0.5, _left_by(noise, c)):
         return _settled(straight, scale, noise) if refine else straight
     straight, curved = _polished(straight, weights, scale, noise), None
@@ -102,17 +121,6 @@ def _settled(start: Fitted, scale: float | None, noise: NDArray | None) -> Fitte
 def _left_by(noise: NDArray | None, c: float) -> float:
     """Misfit that noise may leave."""
     return 0.0 if noise is None else 2 * float(np.sqrt(np.mean(noise**2))) / abs(c)
-
-
-def _by_best_rule(part: Part, weights: NDArray, z: NDArray, c: float, noise: NDArray | None) -> Fitted:
-    """With straight sides and the quadrature that fits best; of those that fit alike the first."""
-    trials = []
-    for rule in _rules(part, straight=True):
-        trials.append(_with_rule(part, weights, z, c, noise, rule, straight=True))
-        if trials[-1].size <= AGREED:
-            return trials[-1]
-    least = min(trial.size for trial in trials)
-    return next((trial for trial in trials if trial.size <= _ALIKE * least), trials[0])
 
 
 def _with_rule(
@@ -160,3 +168,82 @@ def _polished(start: Fitted, weights: NDArray, scale: float | None, noise: NDArr
         return replace(start, notes=("the polish did not stay finite and was left out",))
     notes = () if found.converged else (f"the polish did not converge: its last step was {found.last_step:.0e} long",)
     return replace(start, z=found.z, scale=found.scale, spread=spread, misfit=misfit, notes=notes)
+
+
+def _among_corners(part: Part, weights: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Pairs of corners, lexicographic, and the weights of L restricted to straight cells."""
+    if part.degree == 1:
+        return part.edges, weights
+    n, c = part.n, part.n_corners
+    i, j = part.edges.T
+    sums = np.bincount(part.edges.ravel(), np.repeat(weights, 2), n)
+    place = np.concatenate([i, j, np.arange(n)]), np.concatenate([j, i, np.arange(n)])
+    whole = sp.csr_array((np.concatenate([-weights, -weights, sums]), place), shape=(n, n))
+    to_nodes = part.from_corners()
+    reduced = sp.csr_array(to_nodes.T @ (whole @ to_nodes))
+    pairs = [pairs_of(c, cells[:, : kind.corners]).ravel() for kind, cells in part.blocks.items()]
+    keys = distinct(np.concatenate(pairs))
+    edges = np.column_stack([keys // c, keys % c])
+    return edges, -np.asarray(reduced[edges[:, 0], edges[:, 1]]).ravel()
+
+
+def _corner_positions(part: Part, weights: NDArray, scale: float | None) -> tuple[NDArray[np.complex128], float]:
+    """Positions of corners up to a similarity, and c."""
+    edges, weights = _among_corners(part, weights)
+    unit = float(np.sign(weights.sum()) * np.median(np.abs(weights[weights != 0]))) if weights.any() else 0.0
+    if not unit:
+        raise GeometryError("the off-diagonal entries add up to zero, those of a Laplacian cannot")
+    relative = weights / unit
+    sums = np.bincount(edges.ravel(), np.repeat(relative, 2), part.n_corners)
+    if not (np.isfinite(relative).all() and (sums > SUMMED).all()):
+        row = int(part.piece.vertices[np.argmin(sums)])
+        raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
+    piece, options = part.piece, ConformalOptions()
+    pencil = ConformalPencil(part.n_corners, edges, piece.boundary, relative)
+    search = ShiftedSearch(pencil, options.krylov_steps)
+    start = smooth_start(part.n_corners, piece.boundary, piece.loop_offsets)
+    if scale is not None:
+        z, c, _ = search.at(scale / unit * (1 - options.margin), start, steps=2)
+        return search.corrected(z, c), scale
+    # Half the energy alone is definite, and from there the cluster of holomorphic maps is seen as one.
+    z, c, spread = search.at(0.0, start)
+    whole = 1 / unit  # c = 1 is common
+    while search.factorisations < options.max_factorisations:
+        distance = min(max(4 * spread, options.margin), 0.3)
+        likely = abs(c / whole - 1) <= distance
+        z, c, spread = search.at(whole * (1 - options.margin) if likely else c * (1 - distance), z)
+        whole = np.inf
+        if (distance <= 1e-9 or likely) and spread < 1e-12:
+            break
+    return search.corrected(z, c), float(c * unit)
+
+
+def deviations_of(n: int, fits: Sequence[Fitted], placed: Sequence[NDArray], task: Task) -> NDArray[np.float64]:
+    """(n, 2) standard deviations in the final frame, NaN for rows of no cell.
+
+    `placed` sequence of (k,): nodes of each part in that frame.
+    """
+    result = np.full((n, 2), np.nan)
+    tensor = task.placement.tensor
+    for fit, z in list(zip(fits, placed, strict=True))[::-1]:
+        z = np.asarray(tensor.to_laplacian(z)) if tensor else z
+        a, b, c = z[fit.part.piece.triangles].T
+        mirrored = (np.conj(b - a) * (c - a)).imag.sum() < 0
+        z = np.conj(z) if mirrored else z
+        parameters = z[: fit.entries.n]
+        stretch = (tensor.root if tensor else np.eye(2)) @ np.diag([1, -1 if mirrored else 1])
+        sigma = float(np.sqrt(np.mean(fit.spread**2)))
+        if task.noise is None:
+            sigma *= float(np.linalg.norm(fit.misfit / fit.spread)) / np.sqrt(max(fit.freedom, 1))
+        spread = fit.spread / np.sqrt(np.mean(fit.spread**2))
+        covariance = covariances(
+            fit.entries.jacobian(parameters, spread),
+            fit.entries.weights(parameters) / spread,
+            z,
+            distant_pair(parameters),
+            free_scale=task.scale is None,
+            stretch=stretch,
+            nodes=fit.entries.nodes,
+        )
+        result[fit.part.piece.vertices] = sigma / abs(fit.scale) * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    return result

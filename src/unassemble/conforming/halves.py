@@ -23,18 +23,9 @@ from ..topology.keys import pair_keys
 def halves(matrix: OperatorMatrix, nonzero: Graph) -> tuple[NDArray[np.int64], NDArray[np.int64] | None]:
     """All of these triangles; and with one pair, the one of which the numbers say least, divided the other way.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    nonzero : Graph
-        Of the entries that are not zero.
+    `nonzero`: graph of the entries that are not zero.
 
-    Returns
-    -------
-    likeliest : (m, 6) int64
-        Rows increase within a cell.
-    other : (m, 6) int64 or None
-        None where the graph tells all diagonals.
+    Returns both (m, 6), rows increasing within a cell; the second is None where the graph tells all diagonals.
     """
     ring = _rings(nonzero)
     key = matrix.edges @ [matrix.n, 1]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..elements.kinds import Kind
 from ..elements.reference import Rule, exact_rule, shape_functions, shape_gradients
 from ..matrix import OperatorMatrix
+from ..topology.keys import found
 from .affine import ElementEntries
 from .sets import pairs_of
 
@@ -52,13 +53,13 @@ def _spread(kind: Kind, areas: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def weights_at(points: NDArray[np.float64], blocks: Blocks) -> Weights:
     """Areas at the points of each cell of a mesh (n, 2)."""
-    found = {}
+    areas = {}
     for kind, cells in blocks.items():
         at, weights = _rule(kind)
         moved = (points[cells] - points[cells[:, :1]]).transpose(2, 0, 1)
         (xs, ys), (xt, yt) = (moved @ slopes.T for slopes in shape_gradients(kind, at).transpose(2, 0, 1))
-        found[kind] = np.abs(xs * yt - xt * ys) * weights
-    return found
+        areas[kind] = np.abs(xs * yt - xt * ys) * weights
+    return areas
 
 
 def less(matrix: OperatorMatrix, blocks: Blocks, weights: Weights) -> OperatorMatrix:
@@ -68,9 +69,7 @@ def less(matrix: OperatorMatrix, blocks: Blocks, weights: Weights) -> OperatorMa
     for kind, cells in blocks.items():
         value = shape_functions(kind, _rule(kind)[0])
         a, b = np.triu_indices(kind.nodes, 1)
-        keys = pairs_of(matrix.n, cells)
-        place = np.minimum(np.searchsorted(stored, keys), len(stored) - 1)
-        there = stored[place] == keys  # what vanished is left alone
+        place, there = found(stored, pairs_of(matrix.n, cells))  # what vanished is left alone
         products = weights[kind] @ (value[:, a] * value[:, b])
         off -= np.bincount(place[there], products[there], len(off))
         own -= np.bincount(cells.ravel(), (weights[kind] @ value**2).ravel(), matrix.n)

@@ -66,10 +66,7 @@ def parts_of(shown: Cells) -> list[Part]:
 
     Nodes are numbered in the order that the cells come with.
 
-    Raises
-    ------
-    TopologyError
-        If cells do not glue together to surfaces in the plane.
+    Raises TopologyError if cells do not glue together to surfaces in the plane.
     """
     n = len(shown.order)
     number = np.empty(n, dtype=np.int64)

@@ -11,24 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import SEARCHED_ROWS, Alternative
-from ..certify import Certificate
 from ..certify_elements import certify_elements
 from ..clock import Clock
 from ..elements.surface import boundary_loops
 from ..errors import GeometryError, SolverError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..planar.hinges import join
 from ..recovery import ConformingMesh
-from ..scalar.noise import Noise, NoiseTest
-from ..scalar.notes import piece_notes, topology_notes
+from ..scalar.noise import Noise
 from ..scalar.placement import Placement
 from ..scalar.solving import Task
 from ..scalar.verdict import Held
-from ..tolerances import CERTIFIED, SMALL
+from ..tolerances import SMALL
 from ..topology import Topology, local_numbering
-from .deviations import deviations_of
-from .fit import Fitted, fitted
+from ..topology.keys import found, pair_keys
+from .fit import Fitted, deviations_of, fitted
 from .parts import Part, parts_of, reversal
 from .roles import Cells, ordered_cells
 from .sets import node_sets
@@ -40,21 +37,8 @@ def recover_conforming(
 ) -> ConformingMesh:
     """The mesh of a checked scalar matrix, certified or the nearest.
 
-    Parameters
-    ----------
-    stored : OperatorMatrix
-    shown : iterable of Cells
-        See :func:`shown_cells`.
-    placement : Placement
-    clock : Clock
-    options : ScalarOptions
-
-    Raises
-    ------
-    TopologyError
-        If rows form no cells.
-    GeometryError
-        If the entries fit none that they form.
+    `shown`: see :func:`shown_cells`. Raises TopologyError if rows form no cells, GeometryError if the entries fit none
+    that they form.
     """
     task = Task(options=options, placement=placement, noise=Noise.known(stored, options.noise))
     failure: Exception = TopologyError("no sets of rows that are coupled to each other are cells of any known element")
@@ -70,14 +54,14 @@ def recover_conforming(
             break
         try:
             even = cells.even
-            found = _recovered(stored, cells, clock, task)
+            mesh = _recovered(stored, cells, clock, task)
         except (TopologyError, GeometryError, SolverError) as error:
             failure = error
             continue
-        if best is not None and best.certified and found.certified:
-            return _ambiguous(best, found)
-        if best is None or (not best.certified and (found.certified or found.backward_error < best.backward_error)):
-            best = found
+        if best is not None and best.certified and mesh.certified:
+            return _ambiguous(best, mesh)
+        if best is None or (not best.certified and (mesh.certified or mesh.backward_error < best.backward_error)):
+            best = mesh
         if best.uniqueness == "proved":
             break
     if best is None:
@@ -123,45 +107,43 @@ def shown_cells(stored: OperatorMatrix, *, mass: bool = False) -> Iterator[Cells
 def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -> ConformingMesh:
     with clock("cells"):
         parts = parts_of(cells)
-    topology = Topology(stored.n, stored.edges, tuple(part.piece for part in parts), "cliques")
+    placement, topology = (
+        task.placement,
+        Topology(stored.n, stored.edges, tuple(part.piece for part in parts), "cliques"),
+    )
     with clock("positions"):
         fits = [_fit(stored, part, task) for part in parts]
     with clock("place"):
-        placed, origins, notes = _placed(topology, fits, task)
+        placed, origins, notes = placement.placed(topology, [fit.nodes for fit in fits], [fit.notes for fit in fits])
         mesh = _Joined(parts, placed, stored.n)
+        shift = origins[mesh.component]
+        points = mesh.points + np.column_stack([shift.real, shift.imag])
     with clock("certify"):
         near = written = _held(stored, mesh, mesh.points, fits, task)
         if origins.any():
-            written = _held(stored, mesh, mesh.points + _shift(origins, mesh), fits, task)
+            written = _held(stored, mesh, points, fits, task)
     with clock("deviations"):
         bars = deviations_of(stored.n, fits, placed, task) if task.options.standard_deviations else None
-    found = verdict(stored, fits, (near, written), task, told=cells.told)
-    certificate = written.certificate
-    noise = task.noise.at(certificate.pairs, stored) if task.noise else None
-    worst, misfits = certificate.worst(10 if found.status == "uncertified" else 0, noise=noise)
+    status, uniqueness, reason = verdict(stored, fits, (near, written), task, told=cells.told)
     freedom = sum(fit.freedom for fit in fits)
+    left = float(np.linalg.norm(written.certificate.differences))
     return ConformingMesh(
-        points=mesh.points + _shift(origins, mesh),
+        points=points,
         **mesh.fields(),
+        **written.fields(10 if status == "uncertified" else 0),
         component=mesh.component,
         hinges=topology.hinges,
         scale=np.array([fit.scale for fit in fits]) / task.stretch,
         node_status=(topology.multiplicity == 0).astype(np.int8),
-        status=found.status,
-        uniqueness=found.uniqueness,
-        reason=found.reason,
-        operator=task.placement.operator,
-        backward_error=certificate.backward_error,
+        status=status,
+        uniqueness=uniqueness,
+        reason=reason,
+        operator=placement.operator,
         n_holes=sum(part.n_holes for part in parts),
         timings=clock.timings,
         warnings=(*stored.warnings, *notes),
-        worst_entries=worst,
-        worst_misfits=misfits,
         standard_deviations=bars,
-        chi_square=written.test.figures if written.test else None,
-        n_entries=len(certificate.misfits),
-        n_fitting=int(np.count_nonzero(certificate.misfits <= CERTIFIED)),
-        estimated_noise=float(np.linalg.norm(certificate.differences) / np.sqrt(freedom)) if freedom > 0 else None,
+        estimated_noise=left / float(np.sqrt(freedom)) if freedom > 0 else None,
         quadrature=", ".join(dict.fromkeys(rule for fit in fits for rule in fit.rule.values())),
         straight=all(fit.straight for fit in fits),
     )
@@ -170,31 +152,12 @@ def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -
 def _fit(stored: OperatorMatrix, part: Part, task: Task) -> Fitted:
     """A part with the positions that its entries give."""
     rows = part.piece.vertices[part.edges]
-    keys = stored.edges @ [stored.n, 1]
-    key = rows.min(axis=1) * stored.n + rows.max(axis=1)
-    place = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
-    there = keys[place] == key
+    place, there = found(stored.edges @ [stored.n, 1], pair_keys(stored.n, *rows.T))
     noise = None
     if task.noise is not None:
         noise = task.noise.sigma * np.where(there, task.noise.spread[place], SMALL)
     weights = -np.where(there, stored.entries[place], 0.0)
     return fitted(part, weights, scale=task.scale, noise=noise, refine=task.options.refine)
-
-
-def _placed(
-    topology: Topology, fits: Sequence[Fitted], task: Task
-) -> tuple[list[NDArray], NDArray[np.complex128], list[str]]:
-    """Nodes of every part in their final frame, relative to its origin; the origins; what is to be said."""
-    placement = task.placement
-    origins = placement.origins(topology)
-    placed, remarks = [], []
-    for piece, fit, origin in zip(topology.pieces, fits, origins, strict=True):
-        z, more = placement.apply(piece, fit.nodes, origin)
-        placed.append(z)
-        remarks.append((*fit.notes, *more))
-    known = np.array([placement.known_positions(piece) for piece in topology.pieces])
-    notes = [*piece_notes(remarks), *placement.unused(topology), *topology_notes(topology)]
-    return join(topology, placed, known), origins, notes
 
 
 class _Joined:
@@ -231,24 +194,15 @@ class _Joined:
         return fields | {"boundary": boundary, "boundary_offsets": offsets}
 
 
-def _shift(origins: NDArray[np.complex128], mesh: _Joined) -> NDArray[np.float64]:
-    """(n, 2) where the origin of each point's part is."""
-    shift = origins[mesh.component]
-    return np.column_stack([shift.real, shift.imag])
-
-
 def _held(stored: OperatorMatrix, mesh: _Joined, points: NDArray, fits: Sequence[Fitted], task: Task) -> Held:
     """A mesh with these points against the matrix, and against the errors of its entries."""
-    tensor, noise = task.placement.tensor, task.noise
+    tensor = task.placement.tensor
     if tensor:  # div(K grad) is a Laplacian in coordinates that K stretches
         z = tensor.to_laplacian(points @ [1, 1j])
         points = np.column_stack([z.real, z.imag])
     scale = np.array([fit.scale for fit in fits])
     rules = {name: rule for fit in fits for name, rule in fit.rule.items()}
     factors = {name: scale[piece] for name, piece in mesh.piece.items()}
-    certificate: Certificate = certify_elements(stored.edges, stored.entries, points, mesh.blocks, factors, rules)
-    if noise is None:
-        return Held(certificate, None)
-    misfit = certificate.differences / noise.at(certificate.pairs, stored)
+    certificate = certify_elements(stored.edges, stored.entries, points, mesh.blocks, factors, rules)
     known = 1 if task.scale is not None else 0
-    return Held(certificate, NoiseTest.of(noise, misfit, sum(fit.freedom + known for fit in fits), scale))
+    return Held.of(certificate, stored, task.noise, sum(fit.freedom + known for fit in fits), scale)

@@ -19,6 +19,7 @@ from ..budget import SAMPLE
 from ..elements.kinds import KINDS, Kind
 from ..errors import TopologyError
 from ..matrix import OperatorMatrix
+from ..topology.keys import found, pair_keys
 from .affine import ElementEntries
 from .sets import NodeSets, pairs_of
 
@@ -58,11 +59,6 @@ class _Sides:
     middle: NDArray[np.bool_]
 
 
-def kind_of_size(k: int) -> Kind:
-    """The planar kind with so many nodes."""
-    return KINDS[_KINDS[k]]
-
-
 def ordered_cells(
     matrix: OperatorMatrix, found: NodeSets, *, mass: bool = False
 ) -> Iterator[tuple[dict[Kind, NDArray[np.int64]], bool]]:
@@ -70,10 +66,7 @@ def ordered_cells(
 
     With each, whether the graph alone tells them. With a mass term nothing else stands on the diagonal.
 
-    Raises
-    ------
-    TopologyError
-        If the sets do not overlap as cells do.
+    Raises TopologyError if the sets do not overlap as cells do.
     """
     sums = np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n)
     size = np.abs(matrix.diagonal if mass else sums)
@@ -83,7 +76,7 @@ def ordered_cells(
     others: dict[Kind, _Second] = {}
     first = 0
     for sets in found.sets:
-        kind = kind_of_size(sets.shape[1])
+        kind = KINDS[_KINDS[sets.shape[1]]]
         per_cell = sides.per_cell[first : first + len(sets)]
         blocks[kind], others[kind] = _ordered(matrix, kind, sets, sides, per_cell, size, every, mass=mass)
         first += len(sets)
@@ -184,7 +177,8 @@ def _trials(
     for ring in _RINGS[kind.corners]:
         around = np.take_along_axis(corners, np.broadcast_to(ring, corners.shape), axis=1)
         ends = np.take_along_axis(sets, around, axis=1)
-        place, known = _known_sides(n, ends, sides)
+        # Where the sides of the ring are among those of two cells.
+        place, known = found(sides.keys, pair_keys(n, ends, np.roll(ends, -1, axis=1)))
         fits = (known.sum(axis=1) == per_cell) & ((kind.degree - 1) * (~known).sum(axis=1) == n_open)
         pattern = known @ (1 << np.arange(kind.corners))
         for code in np.unique(pattern[fits]):
@@ -193,7 +187,8 @@ def _trials(
             between = sides.between[place[some]] if none.size and len(sides.keys) else none
             local = _local(sets[some], between)
             for fill in _fillings(kind, known[some[0]]):
-                yield some, _filled(around[some], local, open_rows[some], inner[some], fill)
+                on_sides = [open_rows[some, f - 100] if f >= 100 else local[:, f] for f in fill]
+                yield some, np.column_stack([around[some], *on_sides, inner[some]])
 
 
 def _parted(
@@ -216,16 +211,6 @@ def _parted(
     np.put_along_axis(free, inner, False, axis=1)
     open_rows = np.argsort(~free, axis=1, kind="stable")
     return corners, inner, open_rows, free.sum(axis=1)
-
-
-def _known_sides(n: int, ends: NDArray[np.int64], sides: _Sides) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """(m, c) place of each side of corners in a ring among those of two cells, and whether it is there."""
-    following = np.roll(ends, -1, axis=1)
-    keys = np.minimum(ends, following) * n + np.maximum(ends, following)
-    if not len(sides.keys):
-        return np.zeros(ends.shape, np.int64), np.zeros(ends.shape, dtype=bool)
-    place = np.minimum(np.searchsorted(sides.keys, keys), len(sides.keys) - 1)
-    return place, sides.keys[place] == keys
 
 
 def _local(sets: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -259,15 +244,3 @@ def _fillings(kind: Kind, known: NDArray[np.bool_]) -> list[tuple[int, ...]]:
                 filling += [100 + next(rest) for _ in range(per_side)]
         fillings.append(tuple(filling))
     return fillings
-
-
-def _filled(
-    corners: NDArray[np.int64],
-    local: NDArray[np.int64],
-    open_rows: NDArray[np.int64],
-    inner: NDArray[np.int64],
-    fill: tuple[int, ...],
-) -> NDArray[np.int64]:
-    """(m, k) places of a cell's nodes in meshio's order."""
-    on_sides = [open_rows[:, f - 100] if f >= 100 else local[:, f] for f in fill]
-    return np.column_stack([corners, *on_sides, inner])

@@ -125,7 +125,12 @@ class Common:
             if not len(keys):
                 break
             alone = self._graph_of(keys)
-            middle = _paths(alone) if right_angles else simplices(alone, 2)
+            if right_angles:  # paths of two edges, the node between in the second place
+                place, end = alone.spread(alone.col)
+                first = alone.row[place]
+                middle = np.column_stack([first, alone.col[place], end])[first < end]
+            else:
+                middle = simplices(alone, 2)
             several = sp.csr_array(sum(self.closed[column] for column in middle.T))
             several.data = (several.data >= 2).astype(np.int32)
             several.eliminate_zeros()
@@ -134,14 +139,9 @@ class Common:
             # Around a vertex of three triangles two of the three share a node more.
             rows = several[size == 7].indices.reshape(-1, 7)
             rows = [several[size == 6].indices.reshape(-1, 6), *(np.delete(rows, k, axis=1) for k in range(7))]
-            found = once(
-                np.concatenate([found, self._coupled(once(np.concatenate(rows).astype(np.int64)), right_angles)])
-            )
+            new = once(np.concatenate(rows).astype(np.int64))
+            found = once(np.concatenate([found, new[self._absent(new) <= _ABSENT[6] + right_angles]]))
         return found
-
-    def _coupled(self, rows: NDArray[np.int64], more: int = 0) -> NDArray[np.int64]:
-        """Sets (m, k) of which nearly all are coupled to each other."""
-        return rows[self._absent(rows) <= _ABSENT[rows.shape[1]] + more]
 
     def _absent(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
         """(m,) pairs of each set that are not coupled."""
@@ -149,13 +149,6 @@ class Common:
         for a, b in combinations(range(rows.shape[1]), 2):
             absent += ~contains(self.keys, rows[:, a] * self.n + rows[:, b])
         return absent
-
-
-def _paths(graph: Graph) -> NDArray[np.int64]:
-    """(m, 3) paths of two edges, the node between in the second place."""
-    place, end = graph.spread(graph.col)
-    first = graph.row[place]
-    return np.column_stack([first, graph.col[place], end])[first < end]
 
 
 def once(rows: NDArray[np.int64]) -> NDArray[np.int64]:

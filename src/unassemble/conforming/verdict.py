@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,17 +15,10 @@ from ..words import count_of, sentences
 from .fit import Fitted
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What a mesh is worth."""
-
-    status: str
-    uniqueness: str | None
-    reason: str
-
-
-def verdict(stored: OperatorMatrix, fits: Sequence[Fitted], held: Sequence[Held], task: Task, *, told: bool) -> Verdict:
-    """The status of a mesh.
+def verdict(
+    stored: OperatorMatrix, fits: Sequence[Fitted], held: Sequence[Held], task: Task, *, told: bool
+) -> tuple[str, str | None, str]:
+    """Status, uniqueness and reason of a mesh.
 
     `fits`: its parts; `held` (Held, Held): the mesh about the origins of its parts, and as it is written; `told`:
     whether the graph alone tells the cells.
@@ -34,7 +26,7 @@ def verdict(stored: OperatorMatrix, fits: Sequence[Fitted], held: Sequence[Held]
     near, written = held
     reason = _obstacle(fits, near, task) or _bare(stored, fits)
     if reason:
-        return Verdict("uncertified", None, reason)
+        return "uncertified", None, reason
     uniqueness = "proved" if told else "searched"
     error = written.certificate.backward_error
     if not written.passes:
@@ -42,12 +34,12 @@ def verdict(stored: OperatorMatrix, fits: Sequence[Fitted], held: Sequence[Held]
             f"the mesh fits, but not as it is written: so far from the origin its coordinates have too few digits, and "
             f"the matrix is given back to {error:.1e} (relative) only"
         )
-        return Verdict("uncertified", uniqueness, why)
+        return "uncertified", uniqueness, why
     if written.test and written.by_noise:
         p = written.test.figures["p_value"]
-        return Verdict("certified", uniqueness, f"the misfit is that of {written.test.noise} (p = {p:.2g})")
+        return "certified", uniqueness, f"the misfit is that of {written.test.noise} (p = {p:.2g})"
     fits_well = f"the operator re-assembled on this mesh gives the matrix back to {error:.1e} (relative)"
-    return Verdict("certified", uniqueness, fits_well)
+    return "certified", uniqueness, fits_well
 
 
 def _obstacle(fits: Sequence[Fitted], near: Held, task: Task) -> str:

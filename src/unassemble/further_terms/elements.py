@@ -24,10 +24,8 @@ from ..errors import RecoveryError
 from ..matrix import OperatorMatrix
 from ..recovery import PlanarMesh
 from ..tolerances import SUSPICIOUS
-from .again import Held
-from .mass import size_note
-from .row_sums import RowSums
-from .scaling import unscaled
+from .held import Held, RowSums, size_note
+from .recover import unscaled
 
 Of = Callable[[OperatorMatrix, Iterable[Cells]], PlanarMesh]
 Sized = Callable[[OperatorMatrix, Sequence[Cells]], PlanarMesh]
@@ -44,7 +42,7 @@ class LessMass:
 
 def less_mass(matrix: OperatorMatrix) -> LessMass | None:
     """A matrix c L + s M less s M; None where row sums show no mass, or rows no such cells that tell it."""
-    sign = RowSums.of(matrix).sign
+    sign = RowSums(matrix).sign
     cells = next(shown_cells(matrix, mass=True), None) if sign else None
     weights = cells and told_by_entries(matrix, cells.blocks)
     if not cells or not weights or not all((sign * some > 0).all() for some in weights.values()):
@@ -57,16 +55,10 @@ def recover_elements_with_terms(
 ) -> PlanarMesh | None:
     """The mesh of c L + s M or S c L S; None where row sums show neither, or nothing comes near.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    of_cells : callable
-        Recovers a matrix c L + D on cells that its rows may form.
-    clock : Clock
-    anchored : bool
-        Whether positions are given, so that no piece may change its size.
+    `of_cells`: recovers a matrix c L + D on cells that its rows may form; `anchored`: whether positions are given, so
+    that no piece may change its size.
     """
-    sums = RowSums.of(matrix)
+    sums = RowSums(matrix)
     if not sums.there.any():
         return None
 
@@ -80,9 +72,7 @@ def recover_elements_with_terms(
         cells = next(shown_cells(matrix), None)
         if cells is None:
             return None
-        scaled = (
-            None if sums.sign else unscaled(Held(matrix, None), lambda left: of_cells(left, shown_cells(left)), clock)
-        )
+        scaled = None if sums.sign else unscaled(Held(matrix), lambda left: of_cells(left, shown_cells(left)), clock)
         if scaled is not None:
             return scaled
         guessed = guessed_from_sums(sums.values, cells.blocks)  # serendipity functions have integrals of both signs
@@ -99,7 +89,7 @@ def _settled(
 
     As many rounds as `patience` are mixed, and may pass without a better one.
     """
-    blocks, area = cells.blocks, float(RowSums.of(matrix).values.sum())  # times s
+    blocks, area = cells.blocks, float(RowSums(matrix).values.sum())  # times s
     x, ends = (
         np.concatenate([some.ravel() for some in start.values()]),
         np.cumsum([some.size for some in start.values()]),
@@ -120,7 +110,10 @@ def _settled(
         if least < SUSPICIOUS or since >= patience:
             break
         rounds = [*rounds[-patience:], (x, reaction * np.concatenate([some.ravel() for some in areas.values()]) - x)]
-        x = _mixed(rounds)
+        place, change = (np.stack(some) for some in zip(*rounds, strict=True))
+        past = np.linalg.lstsq(np.diff(change, axis=0).T, change[-1])[0]
+        step = change[-1] - past @ np.diff(change, axis=0)
+        x = place[-1] - past @ np.diff(place, axis=0) + step / 3  # whole steps lead away from s h^2 / c = 0.2 on
     if best is None:
         return None
     found, reaction = best
@@ -129,7 +122,7 @@ def _settled(
         found = replace(found, uniqueness="searched" if found.uniqueness == "proved" else found.uniqueness)
         notes += ["that no other mesh, with another mass, fits as well is not proved"] if found.certified else []
     operator, terms = "c L + s M, M the consistent mass matrix,", Terms(matrix.diagonal, reaction)
-    return Held(matrix, None).with_terms(found, terms, operator, *notes)
+    return Held(matrix).with_terms(found, terms, operator, *notes)
 
 
 def _in_one_size(found: PlanarMesh, sums: NDArray[np.float64], blocks: Blocks) -> PlanarMesh:
@@ -147,12 +140,3 @@ def _in_one_size(found: PlanarMesh, sums: NDArray[np.float64], blocks: Blocks) -
     centre = np.column_stack([np.bincount(component, x) / count for x in found.points.T])[component]
     bars = None if found.standard_deviations is None else factor * found.standard_deviations
     return replace(found, points=centre + factor * (found.points - centre), standard_deviations=bars)
-
-
-def _mixed(rounds: list[tuple[NDArray, NDArray]]) -> NDArray[np.float64]:
-    """Where to go on, from some places and what a round changes there."""
-    place, change = (np.stack(some) for some in zip(*rounds, strict=True))
-    there, step = place[-1], change[-1]
-    past = np.linalg.lstsq(np.diff(change, axis=0).T, step)[0]
-    there, step = there - past @ np.diff(place, axis=0), step - past @ np.diff(change, axis=0)
-    return np.asarray(there + step / 3)  # whole steps lead away from s h^2 / c = 0.2 on

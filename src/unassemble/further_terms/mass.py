@@ -8,27 +8,19 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..certify import Terms
 from ..clock import Clock
-from ..matrix import OperatorMatrix
-from ..reaction import MetricFit, Skeleton, areas_of_mass, fit_metric
+from ..reaction import Skeleton, areas_of_mass, fit_metric
 from ..recovery import PlanarMesh
 from ..tolerances import ALIKE, CERTIFIED
 from ..topology import Topology
-from ..words import sentences
-from .again import Held, Plain, areas_of
-from .row_sums import RowSums
-
-_NO_SHAPE = "a mass matrix has no shape: it depends on the areas of the triangles alone, and any that have them will do"
-_OTHER = (
-    "that no other areas, with another c, fit as well is not proved: the fit of edge lengths was started once, and at "
-    "its end the equations determine all of them"
-)
+from .held import Held, Plain, RowSums, size_note
 
 
 def mass_alone(held: Held, topology: Topology, skeleton: Skeleton, sums: RowSums) -> PlanarMesh | None:
-    """Triangles and areas of a mass matrix; None where areas do not explain the matrix.
+    """Triangles and areas of a mass matrix; None where areas do not explain it.
 
     There are e + n equations for m areas, and triangles that are none, holes of three edges, come out with area zero.
     """
@@ -56,9 +48,8 @@ def mass_alone(held: Held, topology: Topology, skeleton: Skeleton, sums: RowSums
         node_status=np.ones(matrix.n, dtype=np.int8),
         status="certified",
         uniqueness="proved",
-        reason=sentences(
-            (f"the mass matrix of triangles with these areas is the given one to {error:.1e} (relative)", _NO_SHAPE)
-        ),
+        reason=f"the mass matrix of triangles with these areas is the given one to {error:.1e} (relative). A mass "
+        "matrix has no shape: it depends on the areas of the triangles alone, and any that have them will do",
         operator="mass",
         backward_error=error,
         n_holes=topology.n_holes + int(hole.sum()),
@@ -72,35 +63,37 @@ def with_consistent_mass(
     held: Held, skeleton: Skeleton, sums: RowSums, plain: Plain, clock: Clock
 ) -> PlanarMesh | None:
     """The mesh of c L + s M; None where the fit of edge lengths does not come near the entries."""
-    if not sums.positive().all():  # rows of zeros
+    if not sums.sizes.all():  # rows of zeros
         return None
-    with clock("metric"):
-        fit = fit_metric(skeleton, sums.sign * held.matrix.entries, sums.positive(), sums.trust())
-    if fit is None or fit.residual >= ALIKE:
+    matrix, trust = held.matrix, np.minimum(1.0, CERTIFIED * sums.sizes / sums.rounding)
+    with clock("metric"):  # a sum that has lost so many digits that a certificate could notice weighs less
+        fit = fit_metric(skeleton, sums.sign * matrix.entries, sums.sizes, trust)
+    if fit is None or fit[1] >= ALIKE:
         return None
-    found = plain(_without_mass(held.matrix, sums.sign, fit), fit.metric.u)
-    reaction = sums.sign * float(fit.metric.areas.sum() / areas_of(found).sum())
-    found = replace(found, uniqueness="searched" if found.uniqueness == "proved" else found.uniqueness)
-    terms = Terms(held.matrix.diagonal, reaction)
-    operator = "c L + s M, M the consistent mass matrix,"
-    return held.with_terms(found, terms, operator, size_note(reaction), *((_OTHER,) if found.certified else ()))
-
-
-def _without_mass(matrix: OperatorMatrix, sign: int, fit: MetricFit) -> OperatorMatrix:
-    """The Laplacian that is left."""
-    skeleton, areas = fit.metric.skeleton, sign * fit.metric.areas
-    return replace(
+    metric = fit[0]
+    laplacian = replace(
         matrix,
-        entries=matrix.entries - skeleton.at_edges @ areas / 12,
-        diagonal=matrix.diagonal - skeleton.at_vertices @ areas / 6,
+        entries=matrix.entries - skeleton.at_edges @ (sums.sign * metric.areas) / 12,
+        diagonal=matrix.diagonal - skeleton.at_vertices @ (sums.sign * metric.areas) / 6,
     )
+    found = plain(laplacian, metric.u)
+    reaction = sums.sign * float(metric.areas.sum() / _areas_of(found).sum())
+    found = replace(found, uniqueness="searched" if found.uniqueness == "proved" else found.uniqueness)
+    terms = Terms(matrix.diagonal, reaction)
+    notes = [size_note(reaction)]
+    if found.certified:
+        notes.append(
+            "that no other areas, with another c, fit as well is not proved: the fit of edge lengths was started once, "
+            "and at its end the equations determine all of them"
+        )
+    return held.with_terms(found, terms, "c L + s M, M the consistent mass matrix,", *notes)
 
 
 def with_lumped_mass(held: Held, found: PlanarMesh, sums: RowSums) -> PlanarMesh:
     """A mesh of c L + D; if D is proportional to the areas about its vertices that is a lumped mass matrix."""
     if not found.certified:
         return found
-    areas, share = areas_of(found), np.zeros(held.matrix.n)
+    areas, share = _areas_of(found), np.zeros(held.matrix.n)
     np.add.at(share, found.divided()[0], areas[:, None] / 3)
     reaction = float(sums.values.sum() / areas.sum())
     allowed = ALIKE * np.abs(reaction * share) + sums.rounding
@@ -111,9 +104,8 @@ def with_lumped_mass(held: Held, found: PlanarMesh, sums: RowSums) -> PlanarMesh
     return again if again.certified else found
 
 
-def size_note(reaction: float) -> str:
-    """How lengths depend on s."""
-    return (
-        "the mesh has a size: if the factor of the mass matrix is s, lengths are those given here times "
-        f"sqrt({reaction:.12g} / s)"
-    )
+def _areas_of(mesh: PlanarMesh) -> NDArray[np.float64]:
+    """(m,) of all triangles, those of polygons too, as ``divided`` has them."""
+    a, b, c = mesh.points[mesh.divided()[0]].transpose(1, 2, 0)
+    (ux, uy), (wx, wy) = b - a, c - a
+    return np.asarray((ux * wy - uy * wx) / 2)

@@ -1,24 +1,34 @@
-"""Which terms a scalar matrix has besides a Laplacian and any diagonal: told by its row sums, tried in order."""
+"""Which terms a scalar matrix has besides a Laplacian and any diagonal: told by its row sums, tried in order.
+
+S c L S, as Jacobi scaling and equilibration leave it, with an unknown positive diagonal matrix S: L annihilates
+constants, so that this annihilates 1 / S. Where nothing else stands on the diagonal a positive null vector gives S, up
+to a factor that only c could tell it from. With an unknown D there is no such vector, and fewer entries off the
+diagonal than coordinates and factors.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
 
+from ..certify import Terms
 from ..clock import Clock
 from ..errors import RecoveryError
+from ..linalg import UpperTriangle, factorisation
+from ..linalg.definite import STEPS
 from ..matrix import OperatorMatrix
 from ..planar.conformal import conformal_map
 from ..planar.cotangent import edge_weights
 from ..reaction import Skeleton
 from ..recovery import PlanarMesh
-from ..tolerances import ALIKE
+from ..tolerances import ALIKE, LAST_DIGITS, SUMMED
 from ..topology import Topology, surfaces
-from .again import Held, Plain
+from .held import Held, Plain, RowSums
 from .mass import mass_alone, with_consistent_mass, with_lumped_mass
-from .row_sums import RowSums
-from .scaling import unscaled
 
 
 def recover_with_terms(
@@ -29,15 +39,10 @@ def recover_with_terms(
     Rows of c L add up to zero. Where they do not, D is whatever it is if the other entries are those of a Laplacian.
     If they are not, sums of one sign are those of a mass term, and sums of both those of S c L S.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    plain : callable
-        Recovers a matrix c L + D; knows relative sizes of its pieces if told the squared lengths of edges.
-    clock : Clock
-    tensor : (kxx, kxy, kyy), optional
+    `plain`: recovers a matrix c L + D; knows relative sizes of its pieces if told the squared lengths of edges;
+    `tensor`: (kxx, kxy, kyy) to be undone.
     """
-    sums = RowSums.of(matrix)
+    sums = RowSums(matrix)
     if not sums.there.any():
         return plain(matrix)
     with clock("topology"):
@@ -80,3 +85,44 @@ def _is_laplacian(matrix: OperatorMatrix, topology: Topology) -> bool:
         if not np.median(left) <= ALIKE * np.median(np.abs(weights)):
             return False
     return True
+
+
+def unscaled(held: Held, plain: Plain, clock: Clock) -> PlanarMesh | None:
+    """The mesh of S c L S; None where no positive vector is annihilated."""
+    matrix = held.matrix
+    with clock("scaling"):
+        null = _positive_null_vector(matrix)
+    if null is None:
+        return None
+    null = null / np.exp(np.log(null).mean())
+    i, j = matrix.edges.T
+    left = replace(matrix, entries=matrix.entries * null[i] * null[j], diagonal=matrix.diagonal * null**2)
+    found = plain(left)
+    note = "S and c are known up to a factor that one could give the other: the geometric mean of S is 1"
+    jacobi = np.ptp(matrix.diagonal) <= SUMMED * np.abs(matrix.diagonal).max()
+    more = ("the diagonal is constant, as Jacobi scaling leaves it",) if jacobi else ()
+    return held.with_terms(found, Terms(matrix.diagonal, scaling=1 / null), "S c L S", note, *more)
+
+
+def _positive_null_vector(matrix: OperatorMatrix) -> NDArray[np.float64] | None:
+    """(n,) a vector of positive numbers that the matrix annihilates up to rounding, if there is one."""
+    sign = np.sign(matrix.diagonal)
+    if not (sign[0] and (sign == sign[0]).all()):
+        return None
+    unit = 1 / np.sqrt(np.abs(matrix.diagonal))
+    scaled = sp.csr_array(sp.diags_array(unit) @ (sign[0] * matrix.csr()) @ sp.diags_array(unit))
+    shifted = UpperTriangle.of(sp.csr_array(scaled + LAST_DIGITS * sp.eye_array(matrix.n)))
+    factor = factorisation(shifted)
+    try:
+        factor.factorise(shifted)
+        x = np.ones(matrix.n)
+        for _ in range(STEPS + 1):
+            x = factor.solve(x)
+            x = x / np.abs(x).max()
+    finally:
+        factor.release()
+    if not np.isfinite(x).all():
+        return None
+    x = x * np.sign(x[0])
+    size = abs(scaled) @ np.abs(x)
+    return unit * x if (x > 0).all() and (np.abs(scaled @ x) <= SUMMED * size).all() else None

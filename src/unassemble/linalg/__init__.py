@@ -1,11 +1,9 @@
 """Sparse linear algebra behind one small interface."""
 
-from .definite import nearly_singular, solved
-from .factorisation import Factorisation, backend, factorisation
+from .definite import nearly_singular, solved, svd
+from .factorisation import Factorisation, backend, blas_threads, factorisation, threads
 from .least_norm import least_norm
 from .responses import SamplingOptions
-from .singular import svd
-from .threads import blas_threads, threads
 from .upper import UpperTriangle, upper_from_edges
 
 __all__ = [

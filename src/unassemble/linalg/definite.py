@@ -1,13 +1,15 @@
-"""Factorisation of a semidefinite matrix, made definite by a small multiple of the identity."""
+"""Semidefinite matrices made definite by a small multiple of the identity, normal equations, singular values."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
+import scipy.linalg
 import scipy.sparse as sp
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError, SolverError
 from .factorisation import Factorisation, factorisation
@@ -22,12 +24,7 @@ STEPS = 3
 
 @contextmanager
 def nearly_singular(matrix: UpperTriangle) -> Iterator[Factorisation]:
-    """Cholesky factor of a positive semidefinite matrix plus the least multiple of the identity that rounding allows.
-
-    Parameters
-    ----------
-    matrix : UpperTriangle
-        Real; a normal matrix, for example.
+    """Cholesky factor of a real semidefinite matrix plus the least multiple of the identity that rounding allows.
 
     Raises
     ------
@@ -44,7 +41,7 @@ def nearly_singular(matrix: UpperTriangle) -> Iterator[Factorisation]:
     for shift in _SHIFTS:
         data = matrix.data.copy()
         data[start] = (own + shift * typical * np.eye(block)).reshape(data[start].shape)
-        shifted = UpperTriangle(data, matrix.indices, matrix.indptr)
+        shifted = replace(matrix, data=data)
         solver = factorisation(shifted, definite=True)
         try:
             solver.factorise(shifted)
@@ -60,13 +57,7 @@ def nearly_singular(matrix: UpperTriangle) -> Iterator[Factorisation]:
 
 
 def solved(normal: sp.csr_array, rhs: NDArray) -> NDArray[np.float64]:
-    """Solve normal equations once.
-
-    Raises
-    ------
-    SolverError
-        If they are not finite, or singular.
-    """
+    """Solve normal equations (n, n) once; raises SolverError if they are not finite, or singular."""
     if not (np.isfinite(normal.data).all() and np.isfinite(rhs).all()):
         raise SolverError("normal equations are not finite")
     matrix = UpperTriangle.of(normal)
@@ -77,3 +68,17 @@ def solved(normal: sp.csr_array, rhs: NDArray) -> NDArray[np.float64]:
     if not np.isfinite(solution).all():
         raise SolverError("normal equations are singular")
     return np.asarray(solution)
+
+
+def svd(
+    matrix: ArrayLike, *, full_matrices: bool = True
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """U, singular values and V^T, as :func:`scipy.linalg.svd` has them.
+
+    By divide and conquer, which gives up now and then where many values are next to zero; then by QR iterations.
+    """
+    try:
+        found = scipy.linalg.svd(matrix, full_matrices=full_matrices)
+    except np.linalg.LinAlgError:
+        found = scipy.linalg.svd(matrix, full_matrices=full_matrices, lapack_driver="gesvd")
+    return found

@@ -17,17 +17,7 @@ def least_norm(matrix: sp.csr_array, right: NDArray) -> NDArray[np.complex128]:
     converge by a factor w^2 / (w^2 + s^2) for each singular value s. Rounding adds to the null space as what no x
     explains is large: where B x = r has a solution, it adds next to nothing.
 
-    Parameters
-    ----------
-    matrix : (m, k) sparse, complex128
-        B.
-    right : (m,) complex128
-        r.
-
-    Raises
-    ------
-    SolverError
-        If the factorisation breaks down.
+    `matrix` (m, k): B, complex; `right` (m,): r. Raises SolverError if the factorisation breaks down.
     """
     rows, columns = matrix.shape
     size = np.sqrt(np.asarray(abs(matrix).power(2).sum(axis=0)).ravel())

@@ -80,18 +80,10 @@ _ONE_AT_A_TIME = threading.RLock()  # two calls at once, even on matrices of the
 class PardisoFactorisation:
     """Factorisation L D L* of a Hermitian matrix, real or complex.
 
-    Parameters
-    ----------
-    matrix : UpperTriangle
-        Its pattern is analysed (ordered) now and kept for every later ``factorise``.
-    definite : bool
-        Real matrices only: use Cholesky, which fails where a pivot is not positive.
+    Real definite matrices by Cholesky, which fails where a pivot is not positive. The pattern is analysed (ordered)
+    once and kept for every later ``factorise``.
 
-    Raises
-    ------
-    SolverError
-        If a pivot is zero, or PARDISO gives up for another reason.
-    MemoryError
+    Raises SolverError if a pivot is zero, or PARDISO gives up for another reason; MemoryError.
     """
 
     def __init__(self, matrix: UpperTriangle, *, definite: bool = False):

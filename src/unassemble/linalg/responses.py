@@ -11,33 +11,20 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class SamplingOptions:
-    """How responses to the errors of entries are added up.
+    """How responses to the errors of entries are added up."""
 
-    Attributes
-    ----------
-    exact_up_to : int
-        Edges whose responses are computed one by one; above, random sign patterns stand in for them.
-    samples : int
-        Of these patterns: the relative standard error of a standard deviation is 1 / sqrt(2 samples).
-    block : int
-        Right-hand sides that are solved for together.
-    """
-
-    exact_up_to: int = 3000
-    samples: int = 400
-    block: int = 64
+    exact_up_to: int = 3000  # edges whose responses are computed one by one; above, random sign patterns stand in
+    samples: int = 400  # of these: the relative standard error of a standard deviation is 1 / sqrt(2 samples)
+    block: int = 64  # right-hand sides that are solved for together
 
 
 def noise_blocks(n_edges: int, options: SamplingOptions) -> Iterator[NDArray[np.float64]]:
     """Columns r with sum r r' = I, exactly or in the mean."""
-    if n_edges <= options.exact_up_to:
-        for start in range(0, n_edges, options.block):
-            width = min(options.block, n_edges - start)
-            block = np.zeros((n_edges, width))
-            block[start + np.arange(width), np.arange(width)] = 1
-            yield block
-        return
-    rng = np.random.default_rng(0)
-    for start in range(0, options.samples, options.block):
-        width = min(options.block, options.samples - start)
-        yield rng.choice([-1.0, 1.0], size=(n_edges, width)) / np.sqrt(options.samples)
+    exact, rng = n_edges <= options.exact_up_to, np.random.default_rng(0)
+    count = n_edges if exact else options.samples
+    for start in range(0, count, options.block):
+        width = min(options.block, count - start)
+        if exact:
+            yield np.eye(n_edges, width, -start)
+        else:
+            yield rng.choice([-1.0, 1.0], size=(n_edges, width)) / np.sqrt(count)

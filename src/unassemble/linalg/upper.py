@@ -13,37 +13,20 @@ from numpy.typing import NDArray
 class UpperTriangle:
     """Upper triangle, diagonal included, of a Hermitian (or real symmetric) matrix in CSR form.
 
-    Attributes
-    ----------
-    data : (nnz,) float64 or complex128, or (nnz, b, b) float64
-        Entries, or blocks of b x b entries; diagonal blocks are stored whole.
-    indices : (nnz,) int32
-        Columns, increasing within a row and starting with the diagonal, which is always stored.
-    indptr : (n + 1,) int32
-
-    Raises
-    ------
-    ValueError
-        If a row does not start with its diagonal: PARDISO would crash on it.
+    Raises ValueError if a row does not start with its diagonal: PARDISO would crash on it.
     """
 
-    data: NDArray
-    indices: NDArray[np.int32]
-    indptr: NDArray[np.int32]
+    data: NDArray  # (nnz,) float64 or complex128, or (nnz, b, b) float64 blocks, those of the diagonal stored whole
+    indices: NDArray[np.int32]  # (nnz,) columns, increasing within a row and starting with the diagonal
+    indptr: NDArray[np.int32]  # (n + 1,)
 
     def __post_init__(self) -> None:
         # PARDISO reads these arrays as they lie in memory: anything but 32-bit integers would crash it.
         for name in ("indices", "indptr"):
             object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=np.int32))
-        self._check_diagonal()
-
-    def _check_diagonal(self) -> None:
         start = self.indptr[:-1]
-        if len(self.indices):
-            first = self.indices[np.minimum(start, len(self.indices) - 1)]
-            wrong = (first != np.arange(self.n)) | (start == self.indptr[1:])
-        else:
-            wrong = np.ones(self.n, dtype=bool)
+        wrong = start == self.indptr[1:]
+        wrong[~wrong] = self.indices[start[~wrong]] != np.flatnonzero(~wrong)
         if wrong.any():
             raise ValueError(
                 f"row {int(np.argmax(wrong))} of the upper triangle does not start with its diagonal entry"
@@ -60,8 +43,8 @@ class UpperTriangle:
         n = len(matrix.indptr) - 1
         row = np.repeat(np.arange(n), np.diff(matrix.indptr))
         upper = matrix.indices >= row
-        indptr = np.concatenate([[0], np.cumsum(np.bincount(row[upper], minlength=n))])
-        return cls(np.ascontiguousarray(matrix.data[upper]), matrix.indices[upper], indptr)
+        indptr = np.append(0, np.cumsum(np.bincount(row[upper], minlength=n)))
+        return cls(matrix.data[upper], matrix.indices[upper], indptr)
 
     @property
     def n(self) -> int:
@@ -88,27 +71,11 @@ class UpperTriangle:
 
 
 def upper_from_edges(n: int, edges: NDArray, off_diagonal: NDArray, diagonal: NDArray) -> UpperTriangle:
-    """Build the triangle from an edge list.
+    """The triangle with some entries off the diagonal, (e,), and on it, (n,).
 
-    Parameters
-    ----------
-    n : int
-        Order of the matrix.
-    edges : (e, 2) int
-        Pairs i < j in lexicographic order, without repetition.
-    off_diagonal : (e,) float64 or complex128
-        Entries at (i, j).
-    diagonal : (n,) float64 or complex128
+    `edges` (e, 2): pairs i < j in lexicographic order, without repetition.
     """
-    count = np.bincount(edges[:, 0], minlength=n) + 1
-    indptr = np.zeros(n + 1, dtype=np.int32)
-    np.cumsum(count, out=indptr[1:])
-    is_diagonal = np.zeros(len(edges) + n, dtype=bool)
-    is_diagonal[indptr[:-1]] = True
-    indices = np.empty(len(edges) + n, dtype=np.int32)
-    indices[is_diagonal] = np.arange(n, dtype=np.int32)
-    indices[~is_diagonal] = edges[:, 1]
-    data = np.empty(len(edges) + n, dtype=np.result_type(off_diagonal, diagonal))
-    data[is_diagonal] = diagonal
-    data[~is_diagonal] = off_diagonal
-    return UpperTriangle(data, indices, indptr)
+    count = np.bincount(edges[:, 0], minlength=n)
+    start = np.cumsum(count) - count  # each row starts with its diagonal
+    data = np.insert(off_diagonal.astype(np.result_type(off_diagonal, diagonal), copy=False), start, diagonal)
+    return UpperTriangle(data, np.insert(edges[:, 1], start, np.arange(n)), np.append(0, np.cumsum(count + 1)))

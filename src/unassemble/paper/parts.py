@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..topology import Piece
-from ..topology.boundary import boundary_corners, following, loops
-from ..topology.orientation import glue
+from ..topology.orientation import boundary_corners, following, glue, loops
 from .corners import following_corner
 
 

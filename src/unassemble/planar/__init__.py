@@ -1,18 +1,17 @@
 """Scalar matrices in the plane: conformal null vector, unknown scale, polish, error bars, gauge."""
 
-from .cautious import cautious_polish, count_flipped
 from .conformal import ConformalOptions, conformal_map, estimate_scale
 from .cotangent import edge_weights, weight_gradient
 from .deviations import coordinate_covariances
 from .frame import canonical_frame, collinear, fit_similarity
 from .hinges import join
-from .krylov import ShiftedSearch
 from .normal import WeightJacobian
-from .pencil import ConformalPencil
+from .pencil import ConformalPencil, ShiftedSearch
 from .piece import PieceMesh, refined
-from .polish import PolishOptions, polish
+from .polish import CAREFUL, PolishOptions, count_flipped, polish
 
 __all__ = [
+    "CAREFUL",
     "ConformalOptions",
     "ConformalPencil",
     "PieceMesh",
@@ -20,7 +19,6 @@ __all__ = [
     "ShiftedSearch",
     "WeightJacobian",
     "canonical_frame",
-    "cautious_polish",
     "collinear",
     "conformal_map",
     "coordinate_covariances",

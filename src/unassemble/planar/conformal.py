@@ -22,11 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeometryError
-from ..linalg import factorisation
 from ..tolerances import ALIKE, LITTLE, MOST, ROUNDED, SUMMED
 from ..topology import Piece
-from .krylov import ShiftedSearch
-from .pencil import ConformalPencil
+from ..topology.keys import runs
+from .pencil import ConformalPencil, ShiftedSearch
 
 _log = logging.getLogger(__name__)
 
@@ -65,10 +64,7 @@ def estimate_scale(piece: Piece, weights: NDArray) -> float:
     The halves g = cot / 2 of a triangle's three weights satisfy g1 g2 + g2 g3 + g3 g1 = 1/4. Sharing
     each weight equally between its two triangles gives one value of c from each triangle; the median counts.
 
-    Raises
-    ------
-    GeometryError
-        If the weights add up to zero.
+    Raises GeometryError if the weights add up to zero.
     """
     return _estimate(piece, weights).scale
 
@@ -87,7 +83,9 @@ def _estimate(piece: Piece, weights: NDArray) -> _Estimate:
     if not sign:
         raise GeometryError("the off-diagonal entries add up to zero, those of a Laplacian cannot")
     largest = float(np.abs(weights).max())  # taken out, so that no square overflows
-    sizes = _scales_of_triangles(piece, weights / largest)
+    a, b, c = (weights / largest / np.where(piece.inner, 2, 1))[piece.opposite].T
+    form = a * b + b * c + c * a
+    sizes = 2 * np.sqrt(form[form > 0])  # of triangles of which the three shares belong to a triangle at all
     if not len(sizes):
         size, scatter, common = float(np.sqrt(3) * np.abs(weights / largest).mean()), np.inf, None
     else:
@@ -114,14 +112,6 @@ def _common(values: NDArray[np.float64]) -> float | None:
     return float(np.median(values[first : first + count]))
 
 
-def _scales_of_triangles(piece: Piece, weights: NDArray) -> NDArray[np.float64]:
-    """|c| by each triangle of which the three shares belong to a triangle at all."""
-    share = weights / np.where(piece.facing[:, 1] >= 0, 2, 1)
-    a, b, c = share[piece.opposite].T
-    form = a * b + b * c + c * a
-    return np.asarray(2 * np.sqrt(form[form > 0]))
-
-
 def conformal_map(
     piece: Piece,
     weights: NDArray,
@@ -132,22 +122,11 @@ def conformal_map(
 ) -> ConformalMap:
     """Positions and scale of one piece.
 
-    Parameters
-    ----------
-    piece : Piece
-    weights : (e,) float64
-        -A_ij = c w_ij of each edge.
-    scale : float, optional
-        c, where it is known. Otherwise a value in which most triangles agree, or more of them than in any other, is
-        tried first, or c = 1 if their median allows it.
-    sharp : bool
-        Go on until z, not only c, has converged. A polish does not need that.
-    options : ConformalOptions, optional
+    `weights` (e,): -A_ij = c w_ij of each edge; `scale`: c, where it is known. Otherwise a value in which most
+    triangles agree, or more of them than in any other, is tried first, or c = 1 if their median allows it. `sharp`: go
+    on until z, not only c, has converged, which a polish does not need.
 
-    Raises
-    ------
-    GeometryError
-        If no map of positive area is found.
+    Raises GeometryError if no map of positive area is found.
     """
     options = options or ConformalOptions()
     estimate = _estimate(piece, weights)
@@ -165,7 +144,7 @@ def conformal_map(
         row = int(piece.vertices[np.argmin(sums)])
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     pencil = ConformalPencil(piece.n_vertices, piece.edges, piece.boundary, relative)
-    search = ShiftedSearch(pencil, factorisation, options.krylov_steps)
+    search = ShiftedSearch(pencil, options.krylov_steps)
     z = start = smooth_start(piece.n_vertices, piece.boundary, piece.loop_offsets)
     known = scale if scale is not None else estimate.likely
     if known is not None:
@@ -194,7 +173,7 @@ def conformal_map(
             break
     if near:
         z = search.corrected(z, c)
-    _log.debug("scale %.16g after %d factorisations, %d solves", c * unit, search.factorisations, search.solves)
+    _log.debug("scale %.16g after %d factorisations", c * unit, search.factorisations)
     return ConformalMap(z, float(c * unit), search.factorisations, search.solves, converged)
 
 
@@ -209,8 +188,7 @@ def smooth_start(n: int, boundary: NDArray, loop_offsets: NDArray) -> NDArray:
     """
     z = 0.01 * np.random.default_rng(0).standard_normal((n, 2)).view(np.complex128).ravel()
     length = np.diff(loop_offsets)
-    place = np.arange(len(boundary)) - np.repeat(loop_offsets[:-1], length)
-    angle = 2 * np.pi * place / np.repeat(length, length)
-    size = np.repeat(length / length.max(), length)
+    loop, place = runs(length)
+    angle, size = 2 * np.pi * place / length[loop], (length / length.max())[loop]
     np.add.at(z, boundary[:, 0], size * (np.exp(1j * angle) + 0.5 * np.exp(-1j * angle)))
     return z

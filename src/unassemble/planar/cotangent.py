@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..topology import Piece
-from ..topology.together import Together
+from ..topology.surface import Together
 
 
 def _sides(piece: Piece, z: NDArray) -> tuple[tuple[NDArray, NDArray], tuple[NDArray, NDArray]]:

@@ -50,26 +50,17 @@ def covariances(
 ) -> NDArray[np.float64]:
     """Those of any model of the weights; see :func:`coordinate_covariances`.
 
-    Parameters
-    ----------
-    jacobian : Jacobian
-        By parameters, which are positions of some vertices.
-    weights : (e,) float64
-        w at z, over their standard deviations.
-    z : (n,) complex128
-        All vertices.
-    pins : (k,) int
-        Parameters that are held.
-    free_scale, stretch, options
-        As there.
-    nodes : callable
-        Displacements of all vertices, (n, k), for those of the parameters.
+    `jacobian`: by parameters, which are positions of some vertices; `weights` (e,): w at z, over their standard
+    deviations; `z` (n,): all vertices; `pins` (k,): parameters that are held; `nodes`: displacements of all vertices,
+    (n, k), for those of the parameters.
     """
     equations = NormalEquations(jacobian, pins)
     slope = jacobian.transpose(weights)
     response = equations.solve(slope)
     complement = float(weights @ weights) - float(np.vdot(slope, response).real)
-    gauge = _gauge(z)
+    one, d = np.ones(len(z)), z - z.mean()
+    fields = np.column_stack([one + 0j, 1j * one, d, 1j * d])  # displacements that change no angle
+    gauge = np.linalg.qr(np.stack([fields.real, fields.imag], axis=1).reshape(2 * len(z), 4))[0]
     root = np.eye(2) if stretch is None else stretch
     total = np.zeros((len(z), 2, 2))
     for noise in noise_blocks(len(weights), options or SamplingOptions()):
@@ -77,22 +68,10 @@ def covariances(
         if free_scale and complement > 0:
             along = (weights @ noise - np.real(slope.conj() @ y)) / complement
             y = y - response[:, None] * along
-        total += _spread(nodes(y), gauge, root)
+        moves = nodes(y)
+        flat = np.stack([moves.real, moves.imag], axis=1).reshape(2 * len(moves), -1)
+        flat -= gauge @ (gauge.T @ flat)
+        moved = root @ flat.reshape(len(moves), 2, -1)
+        total += moved @ moved.transpose(0, 2, 1)
     equations.release()
     return total
-
-
-def _spread(moves: NDArray, gauge: NDArray, root: NDArray) -> NDArray[np.float64]:
-    """(n, 2, 2) sums of the products of some displacements (n, k), without their similarities."""
-    flat = np.stack([moves.real, moves.imag], axis=1).reshape(2 * len(moves), -1)
-    flat -= gauge @ (gauge.T @ flat)
-    moved = root @ flat.reshape(len(moves), 2, -1)
-    return moved @ moved.transpose(0, 2, 1)
-
-
-def _gauge(z: NDArray) -> NDArray:
-    """Orthonormal basis (2n, 4) of displacements that change no angle."""
-    one, d = np.ones(len(z)), z - z.mean()
-    fields = (one + 0j, 1j * one, d, 1j * d)
-    columns = [np.stack([f.real, f.imag], axis=1).ravel() for f in fields]
-    return np.linalg.qr(np.column_stack(columns))[0]

@@ -30,17 +30,9 @@ def canonical_frame(z: NDArray, edges: NDArray, boundary: NDArray | None = None)
     turn for which the third moments of x and y are positive. Where second moments are equal in all directions the
     axes follow the edges, those of the boundary before others.
 
-    Parameters
-    ----------
-    z : (n,) complex128
-    edges : (e, 2) int
-    boundary : (b, 2) int, optional
+    `z` (n,) complex; `edges` (e, 2); `boundary` (b, 2).
 
-    Returns
-    -------
-    Similarity
-    str or None
-        Which part of the choice is arbitrary because moments tie or vanish.
+    Returns the frame, and which part of the choice is arbitrary because moments tie or vanish, or None.
     """
     centre = z.mean()
     size = float(np.abs(z[edges[:, 0]] - z[edges[:, 1]]).mean())
@@ -58,7 +50,16 @@ def canonical_frame(z: NDArray, edges: NDArray, boundary: NDArray | None = None)
     if mirror:  # conjugation turns y over after the half turn has set x
         turn = np.conj(turn)
     shift = -turn * (np.conj(centre) if mirror else centre)
-    return Similarity(complex(turn), complex(shift), mirror), _ambiguity(not tie, *sure)
+    arbitrary = None
+    if tie:
+        arbitrary = (
+            "the second moments are equal in all directions, so that the axes follow the edges, and the choice among "
+            "symmetric ones is arbitrary"
+        )
+    elif not all(sure):
+        vanishing = " and ".join(name for name, known in zip("xy", sure, strict=True) if not known)
+        arbitrary = f"the third moment of {vanishing} vanishes, so the choice among mirror images is arbitrary"
+    return Similarity(complex(turn), complex(shift), mirror), arbitrary
 
 
 def _along_edges(z: NDArray, edges: NDArray, boundary: NDArray | None) -> complex:
@@ -72,18 +73,6 @@ def _along_edges(z: NDArray, edges: NDArray, boundary: NDArray | None) -> comple
         if abs(mean) > LITTLE:
             return complex(np.exp(-1j * np.angle(mean) / power))
     return 1.0
-
-
-def _ambiguity(axis: bool, x: bool, y: bool) -> str | None:
-    if not axis:
-        return (
-            "the second moments are equal in all directions, so that the axes follow the edges, and the choice among "
-            "symmetric ones is arbitrary"
-        )
-    if x and y:
-        return None
-    vanishing = " and ".join(name for name, known in (("x", x), ("y", y)) if not known)
-    return f"the third moment of {vanishing} vanishes, so the choice among mirror images is arbitrary"
 
 
 def fit_similarity(z: NDArray, target: NDArray, *, mirror: bool = False) -> tuple[Similarity, float]:

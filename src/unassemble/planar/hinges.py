@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import breadth_first_order, connected_components
+from scipy.sparse.csgraph import breadth_first_order
 
 from ..linalg import least_norm
 from ..tolerances import ALIKE, ROUNDED
 from ..topology import Topology
+from ..topology.numbering import connected
 
 _DENSE = 100  # pieces; above, sparse linear algebra is faster, and none is turned over by itself
 
@@ -21,14 +22,8 @@ def join(topology: Topology, positions: list[NDArray], known: NDArray | None = N
     solutions the one nearest to t = 1. Where the pieces form a tree that is t = 1 exactly, and each keeps its own
     frame; where they close rings the matrix itself fixes, or restricts, their relative turns and mirror images.
 
-    Parameters
-    ----------
-    topology : Topology
-    positions : list of (n_p,) complex128
-        Each piece in its own frame.
-    known : (number of pieces,) int, optional
-        Known positions in each piece. Pieces with two or more stay where they are; of others joined to none
-        of those the one with the most, or the first, does.
+    `positions`: (n_p,) complex of each piece in its own frame; `known` (pieces,): known positions in each. Pieces with
+    two or more stay where they are; of others joined to none of those the one with the most, or the first, does.
     """
     if not len(topology.hinges):
         return positions
@@ -66,7 +61,12 @@ def _matching_images(
         return positions
     best = _joined(topology, positions, held)[1]
     if best > closed:
-        drawn = _as_drawn(topology, positions, held)
+        # Triangles of all pieces the same way round, as those of one embedding are; held pieces stay as they are.
+        corners = (z[piece.triangles].T for piece, z in zip(topology.pieces, positions, strict=True))
+        turned_over = np.array([float((np.conj(b - a) * (c - a)).imag.sum()) < 0 for a, b, c in corners])
+        group = groups(topology)
+        away = np.isin(group, group[held & turned_over]) ^ turned_over
+        drawn = [np.conj(z) if over else z for z, over in zip(positions, away, strict=True)]
         left = _joined(topology, drawn, held)[1]
         positions, best = (drawn, left) if left <= closed else (positions, best)
     if len(positions) > _DENSE:
@@ -81,15 +81,6 @@ def _matching_images(
             break
         best, positions = lowest, turned
     return positions
-
-
-def _as_drawn(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> list[NDArray]:
-    """Triangles of all pieces the same way round, as those of one embedding are; held pieces stay as they are."""
-    corners = (z[piece.triangles].T for piece, z in zip(topology.pieces, positions, strict=True))
-    turned = np.array([float((np.conj(b - a) * (c - a)).imag.sum()) < 0 for a, b, c in corners])
-    group = groups(topology)
-    away = np.isin(group, group[held & turned]) ^ turned
-    return [np.conj(z) if over else z for z, over in zip(positions, away, strict=True)]
 
 
 def rings(topology: Topology) -> int:
@@ -133,8 +124,7 @@ def groups(topology: Topology) -> NDArray[np.int64]:
     n = len(topology.pieces)
     piece = np.repeat(np.arange(n), [p.n_vertices for p in topology.pieces])
     vertex = np.concatenate([p.vertices for p in topology.pieces])
-    graph = coo_array((np.ones(len(piece)), (piece, n + vertex)), shape=(n + topology.n_vertices,) * 2)
-    return np.asarray(connected_components(graph, directed=False)[1][:n])
+    return connected(n + topology.n_vertices, piece, n + vertex)[1][:n]
 
 
 def _along_trees(topology: Topology, positions: list[NDArray], held: NDArray[np.bool_]) -> list[NDArray]:

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from ..errors import SolverError
 from ..tolerances import LARGEST_NOISE, LAST_DIGITS, SIGMAS
 from ..topology import Piece
-from .cautious import CautiousOptions, cautious_polish, count_flipped
 from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
-from .polish import PolishedMesh, errors_of_one_size, polish
+from .polish import CAREFUL, MOST_CAREFUL, PolishedMesh, count_flipped, errors_of_one_size, polish
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,13 +29,7 @@ class PieceMesh:
     doubt: float = 0.0
 
 
-def positions(
-    piece: Piece,
-    weights: NDArray,
-    *,
-    scale: float | None,
-    sharp: bool,
-) -> PieceMesh:
+def positions(piece: Piece, weights: NDArray, *, scale: float | None, sharp: bool) -> PieceMesh:
     """Conformal solve; `sharp` where no polish follows."""
     found = conformal_map(piece, weights, scale=scale, sharp=sharp)
     notes = () if found.converged else ("the conformal solve did not converge",)
@@ -90,11 +83,8 @@ def refined(
     spread = weight_roundings(piece, mesh.z) if rounding else noise
     try:
         found = _polished(piece, weights, mesh.z, scale, spread)
-        if (
-            rounding
-            and spread is not None
-            and errors_of_one_size(weights / found.scale - edge_weights(piece, found.z), spread)
-        ):
+        misfit = weights / found.scale - edge_weights(piece, found.z)
+        if rounding and spread is not None and errors_of_one_size(misfit, spread):
             spread = noise
             found = _polished(piece, weights, found.z, scale, spread)
     except SolverError as error:
@@ -110,11 +100,7 @@ def refined(
 
 
 def _polished(
-    piece: Piece,
-    weights: NDArray,
-    start: NDArray,
-    scale: float | None,
-    spread: NDArray | None,
+    piece: Piece, weights: NDArray, start: NDArray, scale: float | None, spread: NDArray | None
 ) -> PolishedMesh:
     """By the chord iteration; where it fails, by small steps from the better of start and result.
 
@@ -123,17 +109,17 @@ def _polished(
     try:
         found = polish(piece, weights, start, scale=scale, spread=spread)
     except SolverError:  # steps that led to flat triangles; small ones do not
-        if piece.n_vertices > CautiousOptions().most_vertices:
+        if piece.n_vertices > MOST_CAREFUL:
             raise
-        return cautious_polish(piece, weights, start, scale=scale, spread=spread)
+        return polish(piece, weights, start, scale=scale, spread=spread, options=CAREFUL)
     finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
     flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
     if found.converged and not flipped:
         return found
-    if piece.n_vertices > CautiousOptions().most_vertices:
+    if piece.n_vertices > MOST_CAREFUL:
         return found
     nearest = found.z if flipped <= count_flipped(piece, start) else start
-    again = cautious_polish(piece, weights, nearest, scale=scale, spread=spread)
+    again = polish(piece, weights, nearest, scale=scale, spread=spread, options=CAREFUL)
     return again if again.residual < found.residual or not finite else found
 
 

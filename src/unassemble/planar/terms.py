@@ -54,12 +54,14 @@ def lacking_term(
     try:
         jacobian = WeightJacobian(piece, z, spread)
         equations = NormalEquations(jacobian, distant_pair(z))
-        rest = _Complement(jacobian, equations, fitted if free_scale else None)
-        both = rest(np.column_stack([weights / scale / spread - fitted, terms]))
+        both = _unmoved(jacobian, equations, np.column_stack([weights / scale / spread - fitted, terms, fitted]))
         equations.release()
     except SolverError:
         return None
-    misfit, columns = both[:, 0], both[:, 1:]
+    if free_scale and (size := float(np.linalg.norm(both[:, -1]))) > 0:  # less what a change of scale explains
+        direction = both[:, -1] / size
+        both -= direction[:, None] * (direction @ both)
+    misfit, columns = both[:, 0], both[:, 1:-1]
     total = float(misfit @ misfit)
     if not total > 0:
         return None
@@ -103,25 +105,7 @@ def _terms(piece: Piece, z: NDArray) -> tuple[NDArray, NDArray[np.float64]]:
     return names, np.column_stack([*mass, *varying, np.ones(len(piece.edges))])
 
 
-class _Complement:
-    """The projector I - H off what displacements, and a change of scale, can explain."""
-
-    def __init__(self, jacobian: WeightJacobian, equations: NormalEquations, weights: NDArray | None):
-        self._jacobian, self._equations = jacobian, equations
-        self._direction = None
-        if weights is not None:
-            rest = self._off_range(weights[:, None])[:, 0]
-            size = float(np.linalg.norm(rest))
-            self._direction = rest / size if size > 0 else None
-
-    def __call__(self, changes: NDArray) -> NDArray:
-        """(e, k) -> (e, k)."""
-        changes = self._off_range(changes)
-        if self._direction is None:
-            return changes
-        return changes - self._direction[:, None] * (self._direction @ changes)
-
-    def _off_range(self, changes: NDArray) -> NDArray:
-        gradients = np.column_stack([self._jacobian.transpose(column) for column in changes.T])
-        moves = self._equations.solve(gradients)
-        return changes - np.column_stack([self._jacobian.forward(np.ascontiguousarray(move)) for move in moves.T])
+def _unmoved(jacobian: WeightJacobian, equations: NormalEquations, changes: NDArray) -> NDArray:
+    """What displacements cannot explain of some changes of the weights (e, k)."""
+    moves = equations.solve(np.column_stack([jacobian.transpose(column) for column in changes.T]))
+    return changes - np.column_stack([jacobian.forward(np.ascontiguousarray(move)) for move in moves.T])

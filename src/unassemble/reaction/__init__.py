@@ -1,6 +1,6 @@
 """Scalar matrices with a mass term, A = c L + s M: areas of triangles, and squared lengths of edges, from entries."""
 
-from .fit import MetricFit, MetricOptions, fit_metric
+from .fit import fit_metric
 from .metric import Metric, Skeleton, areas_of_mass
 
-__all__ = ["Metric", "MetricFit", "MetricOptions", "Skeleton", "areas_of_mass", "fit_metric"]
+__all__ = ["Metric", "Skeleton", "areas_of_mass", "fit_metric"]

@@ -28,38 +28,8 @@ from .metric import Metric, Skeleton
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class MetricOptions:
-    """Settings of the iteration."""
-
-    # the iteration ends after so many steps, or when as many as the second have not lowered the residual by a fifth
-    steps: int = 400
-    patience: int = 25
-    damping: float = 1e-2  # the first; relative to the diagonal of the normal equations
-    nearly: float = 0.9  # share of the way to a flat triangle that a step may go
-    tolerance: float = 1e-15  # root mean square of the equations' residuals at which nothing but rounding is left
-
-
 @dataclass(frozen=True, eq=False)
-class MetricFit:
-    """Result of :func:`fit_metric`."""
-
-    metric: Metric  # in units of length in which s = 1
-    residual: float  # root mean square of the equations' residuals: cosines, and relative areas
-
-
-def _cosine(x: NDArray) -> NDArray[np.float64]:
-    """Of the angle with cotangent x."""
-    return np.asarray(x / np.sqrt(1 + x * x))
-
-
-def _slope(x: NDArray) -> NDArray[np.float64]:
-    """Its derivative."""
-    return np.asarray((1 + x * x) ** -1.5)
-
-
-@dataclass(frozen=True, eq=False)
-class Equations:
+class _Equations:
     """Entries (e,), row sums (n,), all positive, and weights of the latter (n,)."""
 
     skeleton: Skeleton
@@ -70,15 +40,15 @@ class Equations:
     def residual(self, metric: Metric, c: float) -> NDArray[np.float64]:
         """(e + n,) cosines given minus fitted, and row sums fitted over given, minus one."""
         k, given = self._unit(c), self._given(metric) / c
-        cosines = _cosine(k * given) - _cosine(k * metric.weights)
+        one, other = (k * w / np.sqrt(1 + (k * w) ** 2) for w in (given, metric.weights))
         areas = self.skeleton.at_vertices @ metric.areas / (3 * self.sums) - 1
-        return np.concatenate([cosines, self.trust * areas])
+        return np.concatenate([one - other, self.trust * areas])
 
     def derivative(self, metric: Metric, c: float) -> tuple[sp.csr_array, NDArray[np.float64]]:
         """(e + n, e) by the logarithms of u, and (e + n,) by that of c."""
         of_weights, of_areas = metric.derivatives()
         k, given = self._unit(c), self._given(metric) / c
-        slope_given, slope = k * _slope(k * given), k * _slope(k * metric.weights)
+        slope_given, slope = (k * (1 + (k * w) ** 2) ** -1.5 for w in (given, metric.weights))
         cosines = sp.diags_array(slope_given / (12 * c)) @ (self.skeleton.at_edges @ of_areas)
         cosines = cosines - sp.diags_array(slope) @ of_weights
         sums = sp.diags_array(self.trust / (3 * self.sums)) @ (self.skeleton.at_vertices @ of_areas)
@@ -102,51 +72,42 @@ class Equations:
         return metric, float(np.sign(np.median(ratio)) * np.median(np.abs(ratio)))
 
 
-def fit_metric(
-    skeleton: Skeleton,
-    entries: NDArray,
-    sums: NDArray,
-    trust: NDArray,
-    options: MetricOptions | None = None,
-) -> MetricFit | None:
+@np.errstate(all="ignore")  # of a misfit that is not finite nothing comes
+def fit_metric(skeleton: Skeleton, entries: NDArray, sums: NDArray, trust: NDArray) -> tuple[Metric, float] | None:
     """The metric with which a mesh has these entries, c being any; None where the iteration breaks down.
 
-    Parameters
-    ----------
-    skeleton : Skeleton
-        All edges at triangles.
-    entries : (e,) float64
-        A_ij.
-    sums : (n,) float64
-        A 1, all positive.
-    trust : (n,) float64
-        Weights of the row sums, relative to those of entries: less than 1 where they have lost digits.
-    options : MetricOptions, optional
+    `skeleton`: all edges at triangles; `entries` (e,): A_ij; `sums` (n,): A 1, all positive; `trust` (n,): weights of
+    the row sums, relative to those of entries: less than 1 where they have lost digits.
+
+    Returns the metric, in units of length in which s = 1, and the root mean square of the equations' residuals:
+    cosines, and relative areas.
     """
-    options = options or MetricOptions()
-    equations = Equations(skeleton, entries, sums, trust)
-    with np.errstate(all="ignore"):  # of a misfit that is not finite nothing comes
-        metric, c = equations.start()
-        try:
-            return _descended(equations, metric, c, options) if c else None
-        except SolverError:
-            return None
-
-
-def _descended(equations: Equations, metric: Metric, c: float, options: MetricOptions) -> MetricFit:
+    equations = _Equations(skeleton, entries, sums, trust)
+    metric, c = equations.start()
+    if not c:
+        return None
     residual = equations.residual(metric, c)
     root = float(np.sqrt(len(residual)))
-    damping, history = options.damping, [float(np.linalg.norm(residual))]
-    for step in range(1, options.steps + 1):
-        before = float(np.linalg.norm(residual))
+    damping, patience, history = 1e-2, 25, [float(np.linalg.norm(residual))]
+    for step in range(1, 401):
+        before = history[-1]
         derivative, by_c = equations.derivative(metric, c)
         moved = None
         while moved is None and damping < 1e8:
-            log_u, log_c = _solved(derivative, by_c, residual, damping)
+            try:
+                log_u, log_c = _solved(derivative, by_c, residual, damping)
+            except SolverError:
+                return None
             wanted = log_u * metric.u
-            change = metric.within(wanted, options.nearly)
-            moved = _shortened(equations, metric, c, change, log_c, before)
-            damping = damping * 8 if moved is None else damping
+            change = metric.within(wanted, 0.9)
+            for reach in 0.4 ** np.arange(5):  # the longest of a step and some shorter ones that lowers the residual
+                trial = Metric(skeleton, metric.u + reach * change)
+                factor = c * np.exp(np.clip(reach * log_c, -2, 2))
+                if np.linalg.norm(trial_residual := equations.residual(trial, factor)) < before:
+                    moved = trial, factor, trial_residual
+                    break
+            else:
+                damping *= 8
         if moved is None:
             break
         metric, c, residual = moved
@@ -156,12 +117,12 @@ def _descended(equations: Equations, metric: Metric, c: float, options: MetricOp
         left = float(np.linalg.norm(residual))
         _log.debug("metric step %d: residual %.1e, stopped %.2g, c %.6g", step, left / root, stopped, c)
         history.append(left)
-        if step > options.patience and left > 0.8 * history[-1 - options.patience]:
+        if step > patience and left > 0.8 * history[-1 - patience]:
             break
         settled = not stopped and left > 0.5 * before and left < 1e-9 * root
-        if left < options.tolerance * root or settled:
+        if left < 1e-15 * root or settled:  # nothing but rounding is left
             break
-    return MetricFit(metric, float(np.linalg.norm(residual)) / root)
+    return metric, history[-1] / root
 
 
 def _solved(derivative: sp.csr_array, by_c: NDArray, residual: NDArray, damping: float) -> tuple[NDArray, float]:
@@ -180,16 +141,3 @@ def _solved(derivative: sp.csr_array, by_c: NDArray, residual: NDArray, damping:
     rest = (1 + damping) * (by_c @ by_c) - coupling @ by_scale
     log_c = -float((by_c @ residual - coupling @ by_residual) / rest)
     return -by_residual - log_c * by_scale, log_c
-
-
-def _shortened(
-    equations: Equations, metric: Metric, c: float, change: NDArray, log_c: float, before: float
-) -> tuple[Metric, float, NDArray] | None:
-    """The longest of a step and some shorter ones that lowers the residual."""
-    for reach in 0.4 ** np.arange(5):
-        trial = Metric(metric.skeleton, metric.u + reach * change)
-        factor = c * np.exp(np.clip(reach * log_c, -2, 2))
-        residual = equations.residual(trial, factor)
-        if np.linalg.norm(residual) < before:
-            return trial, factor, residual
-    return None

@@ -17,9 +17,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import SolverError
-from ..linalg.normal import NormalEquations
+from ..linalg import UpperTriangle, factorisation
 from ..topology import Piece
-from ..topology.together import Together
+from ..topology.surface import Together
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,11 +142,17 @@ def areas_of_mass(skeleton: Skeleton, entries: NDArray, diagonal: NDArray) -> ND
     given = np.concatenate([entries, diagonal])
     size = 1 / np.maximum(np.abs(given), np.finfo(float).tiny)  # graded meshes: all to the same number of digits
     weighted = sp.csr_array(sp.diags_array(size) @ matrix)
+    unit = 1 / np.sqrt(np.asarray(weighted.multiply(weighted).sum(axis=0)).ravel())
+    scaled = sp.csr_array(weighted @ sp.diags_array(unit))
+    normal = UpperTriangle.of(sp.csr_array(scaled.T @ scaled))
+    factor = factorisation(normal, definite=True)
+    areas = np.zeros(len(unit))
     try:
-        equations = NormalEquations(weighted)
-    except SolverError:
+        factor.factorise(normal)
+        for _ in range(2):  # the second step takes off the error of normal equations
+            areas = areas + unit * factor.solve(scaled.T @ (size * given - weighted @ areas))
+    except SolverError:  # the rank is not full to the square root of working accuracy
         return None
-    areas = equations.solve(size * given)
-    areas = areas + equations.solve(size * given - weighted @ areas)
-    equations.release()
-    return np.asarray(areas)
+    finally:
+        factor.release()
+    return areas

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..topology import Polygons, Topology
-from ..topology.together import Together, reversed_within
+from ..topology.surface import Together
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +25,11 @@ class JoinedMesh:
     scale: NDArray[np.float64]  # (number of pieces,)
     boundary: NDArray[np.int64]  # (b, 2) directed edges with the mesh on their left, loop by loop
     boundary_offsets: NDArray[np.int64]  # (loops + 1,)
+
+    def shifted(self, origins: NDArray[np.complex128]) -> NDArray[np.float64]:
+        """(n, 2) the points with the origin of each piece, (pieces,), added."""
+        shift = origins[self.component]
+        return self.points + np.column_stack([shift.real, shift.imag])
 
     def fields(self, *, triangulate: bool = False) -> dict[str, Any]:
         """What every planar mesh's recovery says of cells, pieces and boundary; polygons in triangles on request."""
@@ -53,15 +58,17 @@ class JoinedMesh:
         mirrored = np.bincount(pieces.triangle_piece, (np.conj(b - a) * (c - a)).imag, len(placed)) < 0
         turned = mirrored[pieces.triangle_piece, None]
         triangles = np.where(turned, pieces.triangles[:, [0, 2, 1]], pieces.triangles)
-        boundary = pieces.boundary[reversed_within(pieces.n_boundary, mirrored)]
-        boundary = np.where(np.repeat(mirrored, pieces.n_boundary)[:, None], boundary[:, ::-1], boundary)
+        boundary, lengths = [], []
+        for piece, over in zip(topology.pieces, mirrored, strict=True):
+            own, size = piece.vertices[piece.boundary], np.diff(piece.loop_offsets)
+            boundary.append(own[::-1, ::-1] if over else own)
+            lengths.append(size[::-1] if over else size)
         vanished = np.zeros(len(topology.edges), dtype=bool)
         vanished[topology.vanished] = True
         diagonal = vanished[pieces.edge_rows] & pieces.inner
         in_polygon, polygons = np.asarray(diagonal[pieces.opposite].any(axis=1)), topology.polygons
         if in_polygon.sum() != (polygons.size - 2).sum():  # some have no outline, as where cells do not fit
             in_polygon, polygons = np.zeros_like(in_polygon), Polygons.none()
-        lengths = pieces.loop_lengths[reversed_within(pieces.n_loops, mirrored)]
         return cls(
             points=points,
             triangles=pieces.vertices[triangles],
@@ -70,6 +77,6 @@ class JoinedMesh:
             polygons=polygons.counter_clockwise(points),
             component=component,
             scale=scale,
-            boundary=pieces.vertices[boundary],
-            boundary_offsets=np.append(0, np.cumsum(lengths)),
+            boundary=np.concatenate(boundary),
+            boundary_offsets=np.append(0, np.cumsum(np.concatenate(lengths))),
         )

@@ -54,10 +54,6 @@ class Noise:
             f"rounding to {self.digits}" if self.digits else f"noise of standard deviation {self.sigma:.3g} (absolute)"
         )
 
-    def on(self, topology: Topology) -> NDArray[np.float64]:
-        """(e',) standard deviations over `sigma` of all entries, those included that have vanished and are exact."""
-        return with_vanished(topology, self.spread)
-
     def at(self, pairs: NDArray[np.int64], stored: OperatorMatrix) -> NDArray[np.float64]:
         """(k,) standard deviations of entries at `pairs` (k, 2), those that are stored among them."""
         if len(pairs) == len(self.spread):
@@ -85,11 +81,6 @@ class NoiseTest:
         return cls(noise, freedom, figures, LARGEST_NOISE * float(np.abs(factors).min()), int(np.abs(misfit).argmax()))
 
     @property
-    def possible(self) -> bool:
-        """Whether there are more entries than unknowns."""
-        return self.freedom > 0
-
-    @property
     def drowned(self) -> bool:
         """Whether almost any mesh would pass."""
         return self.noise.sigma > self.limit
@@ -112,10 +103,8 @@ class NoiseTest:
         return self.likely and not (self.drowned or self.coincidence)
 
 
-def with_vanished(topology: Topology, spread: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-    """(e',) standard deviations of all entries over a common factor; of those stored given, or of one size."""
+def with_vanished(topology: Topology, noise: Noise | None) -> NDArray[np.float64]:
+    """(e',) standard deviations over sigma of all entries, those included that have vanished and are exact."""
     result = np.full(len(topology.edges), SMALL)
-    stored = np.ones(len(topology.edges), dtype=bool)
-    stored[topology.vanished] = False
-    result[stored] = 1.0 if spread is None else spread
+    result[np.delete(np.arange(len(result)), topology.vanished)] = 1.0 if noise is None else noise.spread
     return result

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,44 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..options import Direction
+from ..options import Direction, FrameOptions
 from ..planar.frame import Similarity, canonical_frame, collinear, fit_similarity
-from ..planar.hinges import groups
+from ..planar.hinges import groups, join
 from ..reductions import ConstantTensor
 from ..topology import Piece, Topology
+from .notes import piece_notes, topology_notes
 
 Anchor = tuple[int, float, float]
 
 
-def _converted(
-    anchors: Sequence[Anchor] | None, direction: Direction | None
-) -> tuple[tuple[Anchor, ...], Direction | None]:
-    """Rows as integers, coordinates as floats."""
-    for one in anchors or ():
-        if np.ndim(one) == 1 and len(one) == 4:
-            raise InputError(
-                f"the anchor of row {one[0]} has three coordinates, and this matrix belongs to a mesh in the plane: "
-                "leave out the third"
-            )
-    try:
-        placed = tuple((operator.index(row), float(x), float(y)) for row, x, y in anchors or ())
-    except (TypeError, ValueError) as error:
-        raise InputError("`anchors` of a mesh in the plane are triples (row, x, y), with whole rows") from error
-    try:
-        if direction is not None:
-            first, second, degrees = direction
-            direction = operator.index(first), operator.index(second), float(degrees)
-    except (TypeError, ValueError) as error:
-        raise InputError("`direction` is a triple (row, row, degrees), with whole rows") from error
-    return placed, direction
-
-
 @dataclass(frozen=True)
 class Placement:
-    """What is known of the true frame.
-
-    Raises InputError for values that contradict each other or themselves.
-    """
+    """What is known of the true frame."""
 
     anchors: tuple[Anchor, ...] = ()  # tuple of (row, x, y)
     tensor: ConstantTensor | None = None
@@ -68,35 +42,19 @@ class Placement:
         return "anisotropic laplacian" if self.tensor else "laplacian"
 
     @classmethod
-    def checked(
-        cls,
-        n: int,
-        anchors: Sequence[Anchor] | None,
-        tensor: tuple[float, float, float] | None,
-        direction: Direction | None,
-        handed: str | None,
-    ) -> Placement:
-        """Validate what a caller gives for a matrix of order n."""
-        placed, direction = _converted(anchors, direction)
-        rows = [row for row, _, _ in placed]
-        for row in rows + list(map(int, direction[:2] if direction else ())):
+    def of(cls, n: int, frame: FrameOptions) -> Placement:
+        """What options say of a mesh in the plane whose matrix has order n."""
+        rows = [row for row, *_ in frame.anchors]
+        for row, *place in frame.anchors:
+            if len(place) == 3:
+                raise InputError(
+                    f"the anchor of row {row} has three coordinates, and this matrix belongs to a mesh in the plane: "
+                    "leave out the third"
+                )
+        for row in rows + list(frame.direction[:2] if frame.direction else ()):
             if not 0 <= row < n:
                 raise InputError(f"row {row} is not in the matrix: its rows count from 0 to {n - 1}")
-        if len(set(rows)) < len(rows):
-            raise InputError(f"row {next(r for r in rows if rows.count(r) > 1)} is anchored twice")
-        if not np.isfinite([t[1:] for t in placed]).all():
-            raise InputError("an anchor's coordinates are not finite numbers")
-        if len({t[1:] for t in placed}) < len(placed):
-            raise InputError("two anchors have the same position: different rows are different points")
-        if direction and (direction[0] == direction[1] or not np.isfinite(direction[2])):
-            raise InputError("`direction` needs two different rows and a finite angle")
-        if handed not in (None, "left", "right"):
-            raise InputError(f"`handed` is 'left' or 'right', not {handed!r}")
-        if direction and len(placed) > 1:
-            raise InputError("`direction` and two or more anchors fix the same freedom: give one of them")
-        if handed and not direction and len(placed) < 2:
-            raise InputError("`handed` needs a line to refer to: give `direction` or two anchors as well")
-        return cls(placed, ConstantTensor(*tensor) if tensor is not None else None, direction, handed)
+        return cls(frame.anchors, frame.tensor, frame.direction, frame.handed)
 
     def origins(self, topology: Topology) -> NDArray[np.complex128]:
         """(number of pieces,) points that positions of each piece are found relative to; of joined pieces the same.
@@ -123,10 +81,10 @@ class Placement:
         targets = targets - origin
         if len(rows) >= 2:
             return self._by_anchors(piece, z, rows, targets)
-        if self.direction and np.isin(self.direction[:2], piece.vertices).all():
-            ends = piece.local(np.array(self.direction[:2]))
-            positions = self._by_direction(piece, z, ends)
-            notes: list[str] = []
+        notes: list[str] = []
+        if self._directed(piece):
+            assert self.direction is not None
+            positions = self._by_direction(piece, z, piece.local(np.array(self.direction[:2])))
         elif self.tensor:
             raise InputError(
                 f"`tensor` cannot be undone for the piece of row {piece.vertices.min()} without its orientation: "
@@ -139,10 +97,32 @@ class Placement:
             positions = positions + (targets[0] - positions[rows[0]])
         return positions, notes
 
-    def known_positions(self, piece: Piece) -> int:
-        """How many points of a piece are fixed from outside; a direction counts as two."""
-        anchored = len(self._anchors_of(piece)[0])
-        return 2 if self.direction and np.isin(self.direction[:2], piece.vertices).all() else anchored
+    def placed(
+        self,
+        topology: Topology,
+        positions: Sequence[NDArray],
+        remarks: Sequence[Sequence[str]],
+        sizes: NDArray[np.float64] | None = None,
+    ) -> tuple[list[NDArray], NDArray[np.complex128], list[str]]:
+        """Every piece in its final frame, relative to its origin, hinges joined.
+
+        `positions`: of each piece, (k,) in any frame; `remarks`: on each; `sizes` (pieces,): factors of pieces of which
+        less than two positions are known.
+
+        Returns `placed`, (k,) each; `origins` (pieces,); `notes`: what is to be said.
+        """
+        origins, placed, said = self.origins(topology), [], []
+        # Points of each piece that are fixed from outside; a direction counts as two.
+        known = np.array([2 if self._directed(p) else len(self._anchors_of(p)[0]) for p in topology.pieces])
+        for label, piece in enumerate(topology.pieces):
+            z, more = self.apply(piece, positions[label], origins[label])
+            placed.append(z if sizes is None or known[label] >= 2 else sizes[label] * z)
+            said.append((*remarks[label], *more))
+        notes = [*piece_notes(said), *self.unused(topology), *topology_notes(topology)]
+        return join(topology, placed, known), origins, notes
+
+    def _directed(self, piece: Piece) -> bool:
+        return self.direction is not None and bool(np.isin(self.direction[:2], piece.vertices).all())
 
     def unused(self, topology: Topology) -> list[str]:
         """Sentences about what was given and could not be used."""
@@ -150,7 +130,7 @@ class Placement:
         lost = [row for row, _, _ in self.anchors if topology.multiplicity[row] == 0]
         if lost:
             notes.append(f"the anchors of rows {', '.join(map(str, lost))} belong to no triangle and were not used")
-        if self.direction and not any(np.isin(self.direction[:2], p.vertices).all() for p in topology.pieces):
+        if self.direction and not any(map(self._directed, topology.pieces)):
             notes.append("`direction` joins rows of different pieces and was not used")
         return notes
 
@@ -171,13 +151,11 @@ class Placement:
             frame = min(fits, key=lambda fit: fit[1])[0]
             if self.handed:
                 notes.append("three or more anchors fix the mirror image; `handed` was not used")
-        elif self.handed:
-            frame = self._handed([fit[0] for fit in fits], z, rows[:2])
-        elif self.tensor:
-            raise InputError("two anchors leave the mirror image open: give a third, not in line, or `handed`")
         else:
-            frame = fits[canonical_frame(z, piece.edges, piece.boundary)[0].mirror][0]
-            notes.append("the anchors leave two mirror images; the choice between them is by convention")
+            both = "two anchors leave the mirror image open: give a third, not in line, or `handed`"
+            frame = self._of_two([fit[0] for fit in fits], piece, z, rows[:2], both)
+            if not self.handed:
+                notes.append("the anchors leave two mirror images; the choice between them is by convention")
         placed = frame(z)
         misfit = float(np.abs(placed[rows] - known).max())
         if misfit > 1e-6 * np.abs(known - known.mean()).max():
@@ -188,23 +166,20 @@ class Placement:
         assert self.direction is not None
         aim = np.exp(1j * np.deg2rad(self.direction[2]))
         aim = self.tensor.to_laplacian(aim) if self.tensor else aim
-        frames = []
-        for mirror in (False, True):
-            line = z[ends[1]] - z[ends[0]]
-            frames.append(Similarity(complex(aim / (np.conj(line) if mirror else line)), 0j, mirror))
-        if self.handed:
-            frame = self._handed(frames, z, ends)
-        elif self.tensor:
-            raise InputError("`direction` leaves the mirror image open: add `handed`")
-        else:
-            frame = frames[canonical_frame(z, piece.edges, piece.boundary)[0].mirror]
+        line = z[ends[1]] - z[ends[0]]
+        frames = [Similarity(complex(aim / line), 0j), Similarity(complex(aim / np.conj(line)), 0j, mirror=True)]
+        frame = self._of_two(frames, piece, z, ends, "`direction` leaves the mirror image open: add `handed`")
         placed = frame(z)
         placed = self.tensor.from_laplacian(placed) if self.tensor else placed
         length = np.abs(placed[piece.edges[:, 0]] - placed[piece.edges[:, 1]]).mean()
         return (placed - placed.mean()) / length
 
-    def _handed(self, frames: list[Similarity], z: NDArray, ends: NDArray) -> Similarity:
-        """The frame that puts the centroid on the wanted side of the line between two vertices."""
+    def _of_two(self, frames: list[Similarity], piece: Piece, z: NDArray, ends: NDArray, error: str) -> Similarity:
+        """The frame that puts the centroid on the wanted side of the line between two vertices, or by convention."""
+        if not self.handed:
+            if self.tensor:
+                raise InputError(error)
+            return frames[canonical_frame(z, piece.edges, piece.boundary)[0].mirror]
         line, offset = z[ends[1]] - z[ends[0]], z.mean() - z[ends[0]]
         side = (np.conj(line) * offset).imag
         if abs(side) < 1e-9 * abs(line) * np.abs(z - z.mean()).max():

@@ -49,7 +49,11 @@ def misfit(f: Findings, notes: Sequence[str]) -> Reason:
         return Reason.of("the mesh has triangles that are flat, or points that are not finite", advice=model)
     if len(certificate.flipped):
         return Reason.of(_turned_over(topology, certificate), *notes, advice=model)
-    differs = _differs(certificate)
+    (i, j), largest = certificate.pairs[certificate.misfits.argmax()], certificate.misfits.max()
+    differs = (
+        f"the re-assembled matrix differs most in the entry of rows {i} and {j}, by {largest:.1e} of the row's largest "
+        f"entry where {CERTIFIED:g} is allowed"
+    )
     if evidence.term and not f.known_scale:
         return lacking(f, evidence.term)
     if len(evidence.suspects):
@@ -89,14 +93,6 @@ def lacking(f: Findings, term: Term) -> Reason:
         return Reason.of(begun, which, advice="assemble the stiffness matrix alone, or lump the mass matrix")
     assert term.name == ONE_SIGN
     return Reason.of(begun, "most entries are off in one direction", advice=_CHECK_MODEL)
-
-
-def _differs(certificate: Certificate) -> str:
-    (i, j), largest = certificate.pairs[certificate.misfits.argmax()], certificate.misfits.max()
-    return (
-        f"the re-assembled matrix differs most in the entry of rows {i} and {j}, by {largest:.1e} of the row's largest "
-        f"entry where {CERTIFIED:g} is allowed"
-    )
 
 
 def _culprits(evidence: Evidence) -> str:

@@ -3,40 +3,29 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cells import SEARCHED_ROWS, Alternative, alternatives, components_of
+from ..cells import SEARCHED_ROWS, Alternative, alternatives
 from ..certify import certify
 from ..clock import Clock
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
-from ..planar.hinges import join
+from ..planar.deviations import coordinate_covariances
 from ..recovery import PlanarMesh
-from ..tolerances import CERTIFIED, SIGMAS
+from ..tolerances import SIGMAS
 from ..topology import Polygons, local_numbering, surfaces
-from .deviations import coordinate_deviations
-from .evidence import weigh
+from ..topology.numbering import connected
+from .evidence import pooled_noise, weigh
 from .joined import JoinedMesh
-from .noise import Noise, NoiseTest
-from .notes import piece_notes, topology_notes, vanished_notes
+from .noise import Noise
+from .notes import vanished_notes
 from .placement import Placement
 from .solving import Solved, Task, solve
 from .verdict import Findings, Held, Verdict, verdict
-
-
-@dataclass(frozen=True, eq=False)
-class _Placed:
-    """Pieces where they lie: positions and mesh relative to the origins of pieces, and points as they are written."""
-
-    positions: list[NDArray]
-    mesh: JoinedMesh
-    origins: NDArray[np.complex128]
-    points: NDArray[np.float64]
-    notes: list[str]
 
 
 def recover_scalar(
@@ -46,23 +35,11 @@ def recover_scalar(
     options: ScalarOptions,
     squared_lengths: NDArray | None = None,
 ) -> PlanarMesh:
-    """The mesh of a checked scalar matrix.
+    """The mesh of a checked scalar matrix, of as few digits as its entries seem to have, or else of exact ones.
 
-    Parameters
-    ----------
-    stored : OperatorMatrix
-    placement : Placement
-    clock : Clock
-    options : ScalarOptions
-    squared_lengths : (e,) float64, optional
-        Of the edges, where they are known from elsewhere: they give pieces their relative sizes.
+    `squared_lengths` (e,): of the edges, where they are known from elsewhere: they give pieces their relative sizes.
     """
-    noise = Noise.known(stored, options.noise)
-    return _by_digits(stored, clock, Task(options, placement, noise, squared_lengths))
-
-
-def _by_digits(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:
-    """The mesh of entries of as few digits as they seem to have, or else of exact ones."""
+    task = Task(options, placement, Noise.known(stored, options.noise), squared_lengths)
     found = _recovered(stored, clock, task)
     searched = "faces" in clock.timings  # for cells
     if searched and found.status == "uncertified" and task.noise and task.noise.digits:
@@ -80,67 +57,57 @@ def _recovered(stored: OperatorMatrix, clock: Clock, task: Task) -> PlanarMesh:
     if task.noise is not None:
         stored = replace(stored, errors=task.noise.sigma * task.noise.spread)
     solved = solve(topology, stored, clock, task)
+    topology = solved.topology
     with clock("place"):
-        placed = _place(solved, task)
+        sizes = None
+        if task.squared_lengths is not None:  # mean edge length of each piece; over all edges 1
+            lengths = [np.sqrt(task.squared_lengths[piece.edge_rows]) for piece in topology.pieces]
+            sizes = np.array([own.mean() for own in lengths]) / np.concatenate(lengths).mean()
+        z, remarks = [mesh.z for mesh in solved.meshes], [mesh.notes for mesh in solved.meshes]
+        placed, origins, notes = task.placement.placed(topology, z, remarks, sizes)
+        mesh = JoinedMesh.of(topology, placed, solved.scales / task.stretch)
     with clock("certify"):
-        near = _held_against(stored, solved, placed.mesh, placed.mesh.points, task)
+        near = _held_against(stored, solved, mesh, mesh.points, task)
         evidence = weigh(solved, near.certificate, free_scale=free_scale, search=not near.passes)
     deviations = None
     if task.options.standard_deviations:
         with clock("deviations"):
-            deviations = coordinate_deviations(solved, task, placed.positions)
-    written = _held_against(stored, solved, placed.mesh, placed.points, task) if placed.origins.any() else near
-    findings = Findings(
-        stored, solved, placed.mesh, placed.origins, near, written, evidence, not free_scale, task.options.polished
-    )
+            deviations = _deviations(solved, task, placed)
+    written = _held_against(stored, solved, mesh, mesh.shifted(origins), task) if origins.any() else near
+    findings = Findings(stored, solved, mesh, origins, near, written, evidence, not free_scale, task.options.polished)
 
     def other_meshes() -> tuple[list[Alternative], str]:
         with clock("ambiguity") if solved.topology.method == "the numbers" else nullcontext():  # else next to nothing
             return _other_meshes(findings, task)
 
-    return _report(findings, verdict(findings, other_meshes), placed, deviations, clock, task)
+    notes = [*solved.matrix.warnings, *notes, *vanished_notes(topology), *topology.failures]
+    return _report(findings, verdict(findings, other_meshes), notes, deviations, clock, task)
 
 
-def _place(solved: Solved, task: Task) -> _Placed:
-    """Every piece in its final frame, relative to its origin, hinges joined; and what is to be said about it."""
-    topology, placement = solved.topology, task.placement
-    origins = placement.origins(topology)
-    sizes = np.ones(len(topology.pieces)) if task.squared_lengths is None else _sizes(solved, task.squared_lengths)
-    placed, remarks = [], []
-    for label, (piece, mesh) in enumerate(zip(topology.pieces, solved.meshes, strict=True)):
-        z, more = placement.apply(piece, mesh.z, origins[label])
-        placed.append(z if placement.known_positions(piece) >= 2 else sizes[label] * z)
-        remarks.append((*mesh.notes, *more))
-    known = np.array([placement.known_positions(piece) for piece in topology.pieces])
-    placed = join(topology, placed, known)
-    notes = [*piece_notes(remarks), *placement.unused(topology), *topology_notes(topology)]
-    notes += [*vanished_notes(topology), *topology.failures]
-    joined = JoinedMesh.of(topology, placed, solved.scales / task.stretch)
-    shift = origins[joined.component]
-    return _Placed(placed, joined, origins, joined.points + np.column_stack([shift.real, shift.imag]), notes)
-
-
-def _sizes(solved: Solved, squared_lengths: NDArray) -> NDArray[np.float64]:
-    """(pieces,) mean edge length of each piece; over all edges 1."""
-    lengths = [np.sqrt(squared_lengths[piece.edge_rows]) for piece in solved.topology.pieces]
-    return np.array([own.mean() for own in lengths]) / np.concatenate(lengths).mean()
+def _deviations(solved: Solved, task: Task, placed: list[NDArray]) -> NDArray:
+    """(n, 2) standard deviations in the final frame, in which pieces are `placed`, (k,) each."""
+    pieces, meshes, tensor = solved.topology.pieces, solved.meshes, task.placement.tensor
+    free = task.scale is None
+    sigma = solved.noise.sigma if solved.noise else pooled_noise(solved, solved.freedom(free_scale=free))
+    result = np.full((solved.topology.n_vertices, 2), np.nan)
+    for p in range(len(pieces))[::-1]:  # the first piece at a hinge comes last
+        covariance = coordinate_covariances(
+            pieces[p],
+            tensor.to_laplacian(placed[p]) if tensor else placed[p],
+            free_scale=free,
+            stretch=tensor.root if tensor else None,
+            spread=meshes[p].spread,
+        )
+        own = sigma / abs(meshes[p].scale)
+        result[pieces[p].vertices] = own * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    return result
 
 
 def _held_against(stored: OperatorMatrix, solved: Solved, mesh: JoinedMesh, points: NDArray, task: Task) -> Held:
     """The certificate of a mesh with these points, and the test against noise."""
-    noise = solved.noise
-    certificate = certify(
-        stored.edges,
-        stored.entries,
-        points,
-        mesh.triangles,
-        mesh.scale[mesh.triangle_piece],
-        task.placement.coefficients,
-    )
-    if noise is None:
-        return Held(certificate, None)
-    misfit = certificate.differences / noise.at(certificate.pairs, stored)
-    return Held(certificate, NoiseTest.of(noise, misfit, solved.freedom(free_scale=task.scale is None), solved.scales))
+    noise, factors, tensor = solved.noise, mesh.scale[mesh.triangle_piece], task.placement.coefficients
+    certificate = certify(stored.edges, stored.entries, points, mesh.triangles, factors, tensor)
+    return Held.of(certificate, stored, noise, solved.freedom(free_scale=task.scale is None), solved.scales)
 
 
 def _other_meshes(findings: Findings, task: Task) -> tuple[list[Alternative], str]:
@@ -168,25 +135,21 @@ def _other_meshes(findings: Findings, task: Task) -> tuple[list[Alternative], st
 
 
 def _report(
-    findings: Findings, found: Verdict, placed: _Placed, deviations: NDArray | None, clock: Clock, task: Task
+    findings: Findings, found: Verdict, notes: list[str], deviations: NDArray | None, clock: Clock, task: Task
 ) -> PlanarMesh:
     """Everything under the names that callers know."""
     solved, evidence, mesh, held = findings.solved, findings.evidence, findings.mesh, findings.written
-    topology, noise, options = solved.topology, solved.noise, task.options
+    topology, options = solved.topology, task.options
     refused = found.status == "uncertified" and not found.distant
-    worst, misfits = held.certificate.worst(
-        10 if refused else 0,
-        noise=noise.at(held.certificate.pairs, findings.stored) if noise else None,
-        first=evidence.suspects,
-    )
-    notes = [*solved.matrix.warnings, *placed.notes]
     if options.noise and evidence.noise is not None and evidence.noise < 0.5 * options.noise:
         notes.append(f"the noise given is generous: the misfit is that of a standard deviation of {evidence.noise:.2g}")
-    if found.uniqueness == "searched" and np.bincount(components_of(findings.stored)).max() > SEARCHED_ROWS:
+    component = connected(findings.stored.n, *findings.stored.edges.T)[1]
+    if found.uniqueness == "searched" and np.bincount(component).max() > SEARCHED_ROWS:
         notes.append(f"other meshes were looked for in connected parts of up to {SEARCHED_ROWS:,} rows only")
     return PlanarMesh(
         **mesh.fields(triangulate=options.triangulate),
-        points=placed.points,
+        **held.fields(10 if refused else 0, evidence.suspects),
+        points=mesh.shifted(findings.origins),
         hinges=topology.hinges,
         node_status=(topology.multiplicity == 0).astype(np.int8),
         status=found.status,
@@ -194,18 +157,12 @@ def _report(
         reason=found.reason.text,
         advice=found.reason.advice,
         operator=task.placement.operator,
-        backward_error=held.certificate.backward_error,
         n_holes=topology.n_holes,
         timings=clock.timings,
         warnings=tuple(notes),
-        worst_entries=worst,
-        worst_misfits=misfits,
         standard_deviations=deviations,
-        chi_square=held.test.figures if held.test else None,
         estimated_noise=evidence.noise,
         missing_term=evidence.term.name if evidence.term else "",
-        n_entries=len(held.certificate.misfits),
-        n_fitting=int(np.count_nonzero(held.certificate.misfits <= CERTIFIED)),
         suspects=evidence.suspects,
         alternatives=tuple(found.others),
     )

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -11,20 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import Outcome, completed, in_doubt
+from ..clock import Clock
 from ..errors import GeometryError, RecoveryError, SolverError
 from ..linalg import blas_threads
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.cotangent import left_by_all
+from ..planar.hinges import groups
 from ..planar.piece import PieceMesh, brought_near, collapsed, positions, refined
 from ..tolerances import NOISY
-from ..topology import Piece, Polygons, Topology
+from ..topology import Piece, Topology
 from ..words import sentences
-from .factors import leaders
 from .noise import Noise, with_vanished
 from .placement import Placement
-
-Clock = Callable[[str], AbstractContextManager[None]]
 
 
 @dataclass(frozen=True)
@@ -71,19 +69,19 @@ class Solved:
         return len(self.topology.edges) - coordinates - (fitted if free_scale else 0)
 
 
-def solve(
-    topology: Topology,
-    matrix: OperatorMatrix,
-    clock: Clock,
-    task: Task,
-) -> Solved:
-    """Positions and scale of each piece.
+def leaders(topology: Topology) -> NDArray[np.int64]:
+    """(pieces,) of those that hang together by vertices the one that tells c best, with the most entries to spare."""
+    n = len(topology.pieces)
+    if not len(topology.hinges):
+        return np.arange(n)
+    group = groups(topology)
+    spare = np.array([piece.redundancy for piece in topology.pieces])
+    order = np.lexsort((-np.arange(n), spare, group))
+    return np.asarray(order[np.searchsorted(group[order], group, side="right") - 1])
 
-    Raises
-    ------
-    RecoveryError
-        If no piece has positions.
-    """
+
+def solve(topology: Topology, matrix: OperatorMatrix, clock: Clock, task: Task) -> Solved:
+    """Positions and scale of each piece; raises RecoveryError if no piece has any."""
     method, refine, scale, noise = task.options.method, task.options.polished, task.scale, task.noise
     drowning = refine and noise is not None and not noise.digits  # rounding to a few digits does not
 
@@ -98,7 +96,6 @@ def solve(
 
     with clock(method):
         doubtful = in_doubt(matrix, topology, start, scale, noise.sigma if noise and not noise.digits else None)
-
     if doubtful.any():
         with clock("faces"), blas_threads(1):  # hundreds of small readings
             matrix, topology, outcomes = completed(matrix, topology, start, doubtful, scale)
@@ -111,38 +108,29 @@ def solve(
     with clock("polish") if refine else nullcontext():
         starts = meshes
         meshes = _polished(topology, matrix, starts, scale, noise) if refine else starts
-        if noise and noise.digits and not _is_rounding(topology, matrix, meshes, noise):
-            noise = None
-            meshes = _polished(topology, matrix, starts, scale, noise) if refine else starts
-        topology, meshes = _successes(topology, [_sound(*both) for both in zip(topology.pieces, meshes, strict=True)])
+        if noise and noise.digits:
+            z, scales = [mesh.z for mesh in meshes], np.array([mesh.scale for mesh in meshes])
+            left = left_by_all(topology.pieces, -matrix.entries, z, scales)
+            rows = np.concatenate([piece.edge_rows for piece in topology.pieces])
+            with np.errstate(all="ignore"):  # flat triangles
+                rounding = np.sqrt(np.mean((left / with_vanished(topology, noise)[rows] / noise.sigma) ** 2)) <= NOISY
+            if not rounding:  # sizes that errors of rounding have are no guide to others
+                noise = None
+                meshes = _polished(topology, matrix, starts, scale, noise) if refine else starts
+        topology, meshes = _successes(topology, list(map(_sound, topology.pieces, meshes)))
     return Solved(matrix, topology, meshes, noise)
-
-
-def _is_rounding(topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], noise: Noise) -> bool:
-    """Whether a misfit has about the size of errors of rounding; with others, sizes that these have are no guide."""
-    scales = np.array([mesh.scale for mesh in meshes])
-    left = left_by_all(topology.pieces, -matrix.entries, [mesh.z for mesh in meshes], scales)
-    error = noise.sigma * noise.on(topology)[np.concatenate([piece.edge_rows for piece in topology.pieces])]
-    with np.errstate(all="ignore"):  # flat triangles
-        return bool(np.sqrt(np.mean((left / error) ** 2)) <= NOISY)
 
 
 def _polished(
     topology: Topology, matrix: OperatorMatrix, meshes: list[PieceMesh], scale: float | None, noise: Noise | None
 ) -> list[PieceMesh]:
     """Each piece by itself; under known noise those that share vertices with the c of the one that tells it best."""
-    errors = with_vanished(topology) if noise is None else noise.on(topology)
+    errors = with_vanished(topology, noise)
 
     def polished(p: int, scale: float | None) -> PieceMesh:
-        rows = topology.pieces[p].edge_rows
-        return refined(
-            topology.pieces[p],
-            -matrix.entries[rows],
-            meshes[p],
-            scale=scale,
-            rounding=noise is None,
-            noise=errors[rows],
-        )
+        piece = topology.pieces[p]
+        weights, own = -matrix.entries[piece.edge_rows], errors[piece.edge_rows]
+        return refined(piece, weights, meshes[p], scale=scale, rounding=noise is None, noise=own)
 
     lead = leaders(topology) if noise else np.arange(len(meshes))
     first = {p: polished(p, scale) for p in np.unique(lead).tolist()}
@@ -167,37 +155,20 @@ def _successes(topology: Topology, outcomes: list[Outcome]) -> tuple[Topology, l
         raise errors[0] if errors else GeometryError("the cycles of three edges form no mesh")
     if errors:
         pieces = [p for p, mesh in zip(topology.pieces, outcomes, strict=True) if isinstance(mesh, PieceMesh)]
+        used, polygons = np.zeros(topology.n_vertices, dtype=bool), topology.polygons
+        used[np.concatenate([piece.vertices for piece in pieces])] = True
+        if polygons.count:
+            whole = np.logical_and.reduceat(used[polygons.vertices], polygons.offsets[:-1])
+            polygons = polygons.chosen(whole, np.arange(topology.n_vertices))
         failures = (*topology.failures, *map(str, errors))
-        topology = replace(topology, pieces=tuple(pieces), polygons=_of_pieces(topology, pieces), failures=failures)
+        topology = replace(topology, pieces=tuple(pieces), polygons=polygons, failures=failures)
     return topology, meshes
 
 
-def _of_pieces(topology: Topology, pieces: list[Piece]) -> Polygons:
-    """The polygons all of whose vertices belong to some pieces."""
-    polygons = topology.polygons
-    if not polygons.count:
-        return polygons
-    used = np.zeros(topology.n_vertices, dtype=bool)
-    used[np.concatenate([piece.vertices for piece in pieces])] = True
-    whole = np.logical_and.reduceat(used[polygons.vertices], polygons.offsets[:-1])
-    return polygons.chosen(whole, np.arange(topology.n_vertices))
-
-
-def _start(
-    piece: Piece,
-    weights: NDArray,
-    method: str,
-    scale: float | None,
-    *,
-    sharp: bool,
-) -> PieceMesh:
-    if method == "angles":
-        return _by_angles(piece, weights, scale)
-    return positions(piece, weights, scale=scale, sharp=sharp)
-
-
-def _by_angles(piece: Piece, weights: NDArray, scale: float | None) -> PieceMesh:
-    """The method of the 2002 paper, with the constraint of its references [5, 10]."""
+def _start(piece: Piece, weights: NDArray, method: str, scale: float | None, *, sharp: bool) -> PieceMesh:
+    """By the conformal map, or by the method of the 2002 paper, with the constraint of its references [5, 10]."""
+    if method != "angles":
+        return positions(piece, weights, scale=scale, sharp=sharp)
     from ..paper import recover_angles
 
     found = recover_angles(piece, weights, scale=scale)

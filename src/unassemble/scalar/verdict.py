@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,14 +12,14 @@ from numpy.typing import NDArray
 from ..cells import Alternative
 from ..certify import Certificate, without_spare_equations
 from ..matrix import OperatorMatrix
-from ..tolerances import CERTIFIED, PLACED, SUSPICIOUS
+from ..tolerances import ALIKE, CERTIFIED, MAGNIFIED, PLACED, SUSPICIOUS
+from ..topology import Topology
 from ..words import Reason
 from .evidence import Evidence
-from .factors import discord
 from .joined import JoinedMesh
-from .noise import NoiseTest
+from .noise import Noise, NoiseTest
 from .reasons import ambiguous, astray, far_away, misfit, nothing_to_spare, unlikely, with_noise
-from .solving import Solved
+from .solving import Solved, leaders
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +27,35 @@ class Held:
     """A mesh held against the matrix, and against the errors of the entries where these are known."""
 
     certificate: Certificate
+    errors: NDArray[np.float64] | None  # (k,) standard deviations of the entries that the certificate compares
     test: NoiseTest | None
+
+    @classmethod
+    def of(
+        cls,
+        certificate: Certificate,
+        stored: OperatorMatrix,
+        noise: Noise | None,
+        freedom: int,
+        factors: NDArray[np.float64],
+    ) -> Held:
+        """A certificate, and the test where noise is known; `freedom`: entries less unknowns; `factors`: c."""
+        if noise is None:
+            return cls(certificate, None, None)
+        errors = noise.at(certificate.pairs, stored)
+        return cls(certificate, errors, NoiseTest.of(noise, certificate.differences / errors, freedom, factors))
+
+    def fields(self, count: int, first: NDArray | None = None) -> dict[str, Any]:
+        """What every result says of it, with the worst `count` entries, those of `first` (k, 2) before others."""
+        worst, misfits = self.certificate.worst(count, noise=self.errors, first=first)
+        return {
+            "backward_error": self.certificate.backward_error,
+            "worst_entries": worst,
+            "worst_misfits": misfits,
+            "chi_square": self.test.figures if self.test else None,
+            "n_entries": len(self.certificate.misfits),
+            "n_fitting": int(np.count_nonzero(self.certificate.misfits <= CERTIFIED)),
+        }
 
     @property
     def by_noise(self) -> bool:
@@ -35,7 +64,7 @@ class Held:
         Entries of few digits that a mesh has exactly may be no rounded ones.
         """
         test, error = self.test, self.certificate.backward_error
-        if test is None or not test.possible:
+        if test is None or test.freedom <= 0:  # no more entries than unknowns
             return False
         short = error <= SUSPICIOUS or not test.passed
         return not (error <= CERTIFIED and (test.drowned or (test.noise.digits is not None and short)))
@@ -117,22 +146,29 @@ def verdict(f: Findings, other_meshes: Callable[[], tuple[list[Alternative], str
 def _by_itself(f: Findings) -> tuple[bool, Reason]:
     """Whether the mesh fits as well as it is sure of its positions, and the reason."""
     error, test, topology = f.certificate.backward_error, f.near.test, f.solved.topology
-    good, apart = f.near.passes, discord(topology, f.solved.meshes, error, f.solved.noise)
+    good, apart = f.near.passes, _discord(f.solved, error)
     if good and apart:
-        return False, Reason.of(f"the matrix is given back to {error:.1e} (relative), but {apart[0]}", *apart[1:])
+        return False, Reason.of(f"the matrix is given back to {error:.1e} (relative), but {apart}")
     if test and f.near.by_noise:
         return _by_noise(f, test)
     doubt = max(mesh.doubt for mesh in f.solved.meshes)
     fits = f"the operator re-assembled on this mesh gives the matrix back to {error:.1e} (relative)"
     if not good:
         why = misfit(f, f.trouble)
-        return False, Reason.of(*apart, advice=why.advice) if apart else why
+        return False, Reason.of(apart, advice=why.advice) if apart else why
     if not doubt <= PLACED:
         return False, Reason.of(
             f"{fits}, but so may others: in double precision the entries determine the positions to about {doubt:.0e} "
             "of the size only"
         )
-    return (False, _bare(f)) if len(topology.bare_edges) else (True, Reason(fits))
+    if len(topology.bare_edges):
+        i, j = topology.edges[topology.bare_edges[0]]
+        return False, Reason.of(
+            f"the mesh gives the matrix back to {error:.1e} (relative), but the stored zero of rows {i} and {j} "
+            "belongs to no cell",
+            advice="forget stored zeros by `drop_zeros`, if they are no part of the structure",
+        )
+    return True, Reason(fits)
 
 
 def _by_noise(f: Findings, test: NoiseTest) -> tuple[bool, Reason]:
@@ -151,10 +187,39 @@ def _by_noise(f: Findings, test: NoiseTest) -> tuple[bool, Reason]:
     return f.near.passes, reason
 
 
-def _bare(f: Findings) -> Reason:
-    i, j = f.solved.topology.edges[f.solved.topology.bare_edges[0]]
-    return Reason.of(
-        f"the mesh gives the matrix back to {f.certificate.backward_error:.1e} (relative), but the stored zero of "
-        f"rows {i} and {j} belongs to no cell",
-        advice="forget stored zeros by `drop_zeros`, if they are no part of the structure",
-    )
+def _discord(solved: Solved, backward_error: float) -> str:
+    """What is wrong where pieces share vertices but not c, errors of entries allowed for; empty if nothing is.
+
+    Each piece by itself has its own c, and errors move it. Where the noise is known the others have been fitted with
+    the c of their leaders, if at all.
+    """
+    topology, noise, c = solved.topology, solved.noise, solved.scales
+    if not len(topology.hinges):
+        return ""
+    lead = leaders(topology)
+    difference = np.abs(c / c[lead] - 1)
+    # A null vector that is not polished may be off by more than the entries; noise says itself how much it explains.
+    if difference.max() > max(ALIKE, 0.0 if noise else MAGNIFIED * backward_error):
+        worst = int(difference.argmax())
+        named = " and ".join(
+            f"{c[p]:.6g} in piece {p}, of row {topology.pieces[p].vertices.min()}" for p in (int(lead[worst]), worst)
+        )
+        return f"pieces that share vertices have different factors c: {named}"
+    if noise and (rough := _unconfirmed(topology, lead)).any():
+        row = topology.pieces[int(rough.argmax())].vertices.min()
+        return f"the piece of row {row}, which shares vertices with others, has too few entries to tell under {noise}"
+    return ""
+
+
+def _unconfirmed(topology: Topology, lead: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(pieces,) those that may be something else, as far as the entries of each by itself go.
+
+    A piece with entries to spare tells c. One that hangs by a single vertex on pieces of which one does so can only be
+    read in itself, and no other way if nothing has vanished and no triangle may be a hole.
+    """
+    gone = np.zeros(len(topology.edges), dtype=bool)
+    gone[topology.vanished] = True
+    shared = np.array([np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces])
+    otherwise = np.array([gone[piece.edge_rows].any() or piece.enclosed.any() for piece in topology.pieces])
+    spare = np.array([piece.redundancy > 0 for piece in topology.pieces])
+    return np.asarray((shared > 0) & (~spare[lead] | ((otherwise | (shared > 1)) & ~spare)))

@@ -1,13 +1,12 @@
 """From the sparsity graph to faces, orientation, boundary loops and pieces; no coordinates here."""
 
-from .boundary import loops
-from .cycles import chordless_four_cycles, three_cycles
+from .cycles import chordless_four_cycles, not_faces, separating, three_cycles
 from .keys import with_sides
 from .numbering import Numbering, components, local_numbering
+from .orientation import loops
 from .pieces import planar_pieces
 from .polygons import Polygons
 from .recognise import located, require_planar, surfaces
-from .separating import not_faces, separating
 from .surface import Piece, Topology
 
 __all__ = [

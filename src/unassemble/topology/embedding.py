@@ -7,30 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from . import planarity
-from .cycles import chordless_four_cycles, three_cycles
+from .cycles import chordless_four_cycles, not_faces, three_cycles
 from .faces import FaceComplex, around, from_cycles, from_rotation
 from .keys import distinct
-from .separating import not_faces
-
-
-def short_faces(n: int, edges: NDArray) -> list[NDArray[np.int64]]:
-    """3-cycles and chordless 4-cycles that may all be faces: no edge lies on more than two of them.
-
-    Returns list of (m, 3) and (m, 4) vertices in running order.
-    """
-    triangles, opposite = three_cycles(n, edges)
-    count = np.bincount(opposite.ravel(), minlength=len(edges))
-    if (count > 2).any():
-        face = ~not_faces(n, edges, triangles, opposite)
-        triangles, opposite = triangles[face], opposite[face]
-        count = np.bincount(opposite.ravel(), minlength=len(edges))
-    quads = chordless_four_cycles(n, edges, count < 2)
-    if len(quads):
-        sides = around(n, edges, quads) >> 1
-        count = count + np.bincount(sides.ravel(), minlength=len(edges))
-        quads = quads[(count[sides] <= 2).all(axis=1)]
-    return [triangles, quads]
+from .planarity import rotation_system
 
 
 def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
@@ -44,10 +24,21 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
     """
     if n >= 3 and len(edges) > 3 * n - 6:  # not planar, and may have very many cycles
         return
-    cycles = short_faces(n, edges)
+    # 3-cycles and chordless 4-cycles, (m, 3) and (m, 4), that may all be faces: no edge lies on more than two of them.
+    triangles, opposite = three_cycles(n, edges)
+    count = np.bincount(opposite.ravel(), minlength=len(edges))
+    if (count > 2).any():
+        face = ~not_faces(n, edges, triangles, opposite)
+        triangles, opposite = triangles[face], opposite[face]
+        count = np.bincount(opposite.ravel(), minlength=len(edges))
+    quads = chordless_four_cycles(n, edges, count < 2)
+    if len(quads):
+        sides = around(n, edges, quads) >> 1
+        count = count + np.bincount(sides.ravel(), minlength=len(edges))
+        quads = quads[(count[sides] <= 2).all(axis=1)]
     given: list[FaceComplex] = []
     seen: set[bytes] = set()
-    for drawing in _drawings(n, edges, cycles):
+    for drawing in _drawings(n, edges, triangles, quads):
         seen.update(map(fingerprint, given))  # mostly there is no second one to compare with
         given.clear()
         if not seen or fingerprint(drawing) not in seen:
@@ -55,31 +46,20 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
             yield drawing
 
 
-def _drawings(n: int, edges: NDArray, cycles: list[NDArray]) -> Iterator[FaceComplex]:
-    surface = from_cycles(n, edges, cycles)
+def _drawings(n: int, edges: NDArray, triangles: NDArray, quads: NDArray) -> Iterator[FaceComplex]:
+    surface = from_cycles(n, edges, [triangles, quads])
     if surface is not None:
         yield surface
-    drawing = drawing_with_faces(n, edges, cycles)
+    drawing = _with_faces(n, edges, [triangles, quads])
     if drawing is None:
-        triangles, quads = cycles
-        drawing = drawing_with_faces(n, edges, [triangles[~crowded(n, edges, triangles).any(axis=1)], quads])
+        sides = around(n, edges, triangles) >> 1
+        crowded = (np.bincount(sides.ravel(), minlength=len(edges)) > 2)[sides].any(axis=1)
+        drawing = _with_faces(n, edges, [triangles[~crowded], quads])
     if drawing is not None:
         yield drawing
-    rotation = planarity.rotation_system(n, edges)
+    rotation = rotation_system(n, edges)
     if rotation is not None:
         yield from_rotation(n, edges, *rotation)
-
-
-def drawing_with_faces(n: int, edges: NDArray, cycles: list[NDArray]) -> FaceComplex | None:
-    """A drawing in which given cycles, (m_k, k) each, are faces; None if there is none, or no cycle is given."""
-    rotation = _with_faces(n, edges, cycles) if sum(map(len, cycles)) else None
-    return None if rotation is None else from_rotation(n, edges, *rotation)
-
-
-def crowded(n: int, edges: NDArray, triangles: NDArray) -> NDArray[np.bool_]:
-    """(m, 3) whether the sides of 3-cycles, each from a vertex to the next, lie on more than two of them."""
-    sides = around(n, edges, triangles) >> 1
-    return np.asarray((np.bincount(sides.ravel(), minlength=len(edges)) > 2)[sides])
 
 
 def fingerprint(drawing: FaceComplex) -> bytes:
@@ -90,12 +70,14 @@ def fingerprint(drawing: FaceComplex) -> bytes:
     return np.sort(sums).tobytes()
 
 
-def _with_faces(n: int, edges: NDArray, cycles: list[NDArray]) -> tuple[NDArray, NDArray] | None:
-    """Rotation system of an embedding in which given cycles are faces; None if there is none.
+def _with_faces(n: int, edges: NDArray, cycles: list[NDArray]) -> FaceComplex | None:
+    """A drawing in which given cycles, (m_k, k) each, are faces; None if there is none, or no cycle is given.
 
     Each cycle gets a hub, and each of its edges a midpoint joined to the hub: the hub must lie on one side of the
     cycle, and all midpoints on its rim see it.
     """
+    if not sum(map(len, cycles)):
+        return None
     sides = [around(n, edges, c) >> 1 for c in cycles]
     rim = distinct(np.concatenate([s.ravel() for s in sides]))
     midpoint = np.full(len(edges), -1)
@@ -107,7 +89,7 @@ def _with_faces(n: int, edges: NDArray, cycles: list[NDArray]) -> tuple[NDArray,
         hub += len(s)
     halves = np.column_stack([edges[rim].ravel(), np.repeat(midpoint[rim], 2)])
     plain = np.delete(edges, rim, axis=0)
-    rotation = planarity.rotation_system(hub, np.concatenate([plain, halves, *spokes]))
+    rotation = rotation_system(hub, np.concatenate([plain, halves, *spokes]))
     if rotation is None:
         return None
     tail, head = rotation
@@ -117,4 +99,4 @@ def _with_faces(n: int, edges: NDArray, cycles: list[NDArray]) -> tuple[NDArray,
     ends = edges[rim[head[on_rim] - n]]
     head = head.copy()
     head[on_rim] = ends.sum(axis=1) - tail[on_rim]
-    return tail, head
+    return from_rotation(n, edges, tail, head)

@@ -6,15 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
-from .boundary import loops
-from .keys import contains, distinct, first_rows, pair_keys
-from .orientation import glue, orient
-
-_ROUNDS = 20
+from .keys import contains, distinct, first_rows, pair_keys, runs
+from .numbering import connected
+from .orientation import glue, loops, orient
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +69,12 @@ class FaceComplex:
         """(2 e,) label of the part that hangs together by edges and faces."""
         m = len(self.successor)
         rows = np.arange(m)
-        graph = sp.coo_array((np.ones(2 * m, np.int8), (np.r_[rows, rows], np.r_[rows ^ 1, self.successor])))
-        return csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
+        return connected(m, np.r_[rows, rows], np.r_[rows ^ 1, self.successor])[1]
 
     def is_sphere(self) -> bool:
         """Euler's formula v - e + f = 2 for every block, a vertex counted once for each of its turns."""
         turn, _ = loops(self.successor[np.arange(len(self.successor)) ^ 1])
-        counts = [np.bincount(self.block[_first(label)]) for label in (turn, self.face)]
+        counts = [np.bincount(self.block[first_rows(label, int(label.max()) + 1)]) for label in (turn, self.face)]
         edges = np.bincount(self.block[::2])
         return bool((counts[0] - edges + counts[1] == 2).all())
 
@@ -133,7 +128,14 @@ def from_cycles(n: int, edges: NDArray, cycles: list[NDArray]) -> FaceComplex | 
     sides = [around(n, edges, c) for c in cycles]
     used = np.bincount(np.concatenate([s.ravel() for s in sides]), minlength=2 * len(edges))
     bare = np.flatnonzero(~used.reshape(-1, 2).any(axis=1))
-    if (used > 1).any() or not _hanging(n, edges)[bare].all():
+    hanging = np.zeros(len(edges), dtype=bool)
+    for _ in range(20):  # rounds of plucking leaves
+        degree = np.bincount(edges[~hanging].ravel(), minlength=n)
+        leaf = ~hanging & (degree[edges] == 1).any(axis=1)
+        if not leaf.any():
+            break
+        hanging |= leaf
+    if (used > 1).any() or not hanging[bare].all():
         return None
     successor = np.full(2 * len(edges), -1, dtype=np.int64)
     for side in sides:
@@ -158,12 +160,6 @@ def joined(n: int, edges: NDArray, a: NDArray, b: NDArray) -> NDArray[np.bool_]:
     return contains(edges[:, 0] * n + edges[:, 1], pair_keys(n, a, b))
 
 
-def fan(cycles: NDArray) -> NDArray[np.int64]:
-    """(m, k - 2, 3) triangles about the first vertex of cycles (m, k)."""
-    apex = np.broadcast_to(cycles[:, :1], (len(cycles), cycles.shape[1] - 2))
-    return np.stack([apex, cycles[:, 1:-1], cycles[:, 2:]], axis=-1)
-
-
 def _oriented(n: int, edges: NDArray, cycles: list[NDArray]) -> list[NDArray]:
     """Turn cycles so that neighbours run along common edges in opposite directions, as far as that is possible."""
     if not sum(map(len, cycles)):
@@ -174,7 +170,7 @@ def _oriented(n: int, edges: NDArray, cycles: list[NDArray]) -> list[NDArray]:
     first: list[NDArray] = []
     n_edges, n_triangles = len(edges), 0
     for c in cycles:
-        t = fan(c)
+        t = np.stack([np.broadcast_to(c[:, :1], c[:, 2:].shape), c[:, 1:-1], c[:, 2:]], axis=-1)
         ends = np.stack([t[:, :, [1, 2]], t[:, :, [2, 0]], t[:, :, [0, 1]]], axis=2)
         facing = half_edges(n, edges, ends[..., 0].ravel(), ends[..., 1].ravel()).reshape(t.shape) >> 1
         diagonal = n_edges + np.arange(len(c) * (c.shape[1] - 3)).reshape(len(c), c.shape[1] - 3)
@@ -206,27 +202,8 @@ def _with_boundary(successor: NDArray) -> NDArray[np.int64]:
     return successor
 
 
-def _hanging(n: int, edges: NDArray) -> NDArray[np.bool_]:
-    """Edges of the trees that hang on the rest of the graph, as far as a few rounds of plucking leaves go."""
-    hanging = np.zeros(len(edges), dtype=bool)
-    for _ in range(_ROUNDS):
-        degree = np.bincount(edges[~hanging].ravel(), minlength=n)
-        leaf = ~hanging & (degree[edges] == 1).any(axis=1)
-        if not leaf.any():
-            break
-        hanging |= leaf
-    return hanging
-
-
-def _first(label: NDArray) -> NDArray:
-    """One place of each label."""
-    return first_rows(label, int(label.max()) + 1)
-
-
 def _cyclic_neighbour(key: NDArray, step: int) -> NDArray[np.int64]:
     """Places of the cyclic neighbours within runs of equal keys."""
-    start = np.flatnonzero(np.diff(key, prepend=-1))
-    count = np.diff(np.append(start, len(key)))
-    place = np.arange(len(key))
-    base = np.repeat(start, count)
-    return base + (place - base + step) % np.repeat(count, count)
+    count = np.diff(np.append(np.flatnonzero(np.diff(key, prepend=-1)), len(key)))
+    run, place = runs(count)
+    return np.arange(len(key)) - place + (place + step) % count[run]

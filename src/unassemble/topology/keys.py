@@ -29,9 +29,21 @@ def numbered(values: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 def contains(values: NDArray, wanted: NDArray) -> NDArray[np.bool_]:
     """Whether each of `wanted` is among the sorted `values`."""
+    return found(values, wanted)[1]
+
+
+def found(values: NDArray, wanted: NDArray) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """The place of each of `wanted` in the sorted `values`, and whether it is there; if not the place is any."""
     if not len(values):
-        return np.zeros(np.shape(wanted), dtype=bool)
-    return values[np.minimum(np.searchsorted(values, wanted), len(values) - 1)] == wanted
+        return np.zeros(np.shape(wanted), dtype=np.int64), np.zeros(np.shape(wanted), dtype=bool)
+    place = np.minimum(np.searchsorted(values, wanted), len(values) - 1)
+    return place, values[place] == wanted
+
+
+def runs(count: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Of consecutive groups of so many rows each (groups,): the group of each row, and its place there."""
+    group = np.repeat(np.arange(len(count)), count)
+    return group, np.arange(len(group)) - (np.cumsum(count) - count)[group]
 
 
 def pair_keys(n: int, a: NDArray, b: NDArray) -> NDArray[np.int64]:
@@ -40,23 +52,10 @@ def pair_keys(n: int, a: NDArray, b: NDArray) -> NDArray[np.int64]:
 
 
 def with_sides(n: int, edges: NDArray, triangles: NDArray) -> tuple[NDArray[np.int64], NDArray, NDArray]:
-    """Edges of a graph and of triangles together.
+    """Edges of a graph, (e, 2), pairs i < j in lexicographic order, and of triangles (m, 3) together.
 
-    Parameters
-    ----------
-    n : int
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
-    triangles : (m, 3) int64
-
-    Returns
-    -------
-    edges : (e', 2) int64
-        In the same order.
-    given : (e,) int64
-        Rows of the given ones.
-    opposite : (m, 3) int64
-        Rows of those that face the corners.
+    Returns `edges` (e', 2) in the same order; `given` (e,): rows of the given ones; `opposite` (m, 3): rows of those
+    that face the corners.
     """
     known = edges[:, 0] * n + edges[:, 1]
     sides = pair_keys(n, triangles[:, [1, 2, 0]], triangles[:, [2, 0, 1]])
@@ -72,17 +71,11 @@ def first_rows(label: NDArray, n_labels: int) -> NDArray[np.int64]:
 
 
 class Grouped:
-    """Rows sorted by label; negative labels are left out.
+    """Rows sorted by label; negative labels are left out."""
 
-    Attributes
-    ----------
-    order : (k,) int64
-        Rows with label 0, 1, ..., each in increasing order.
-    start : (labels + 1,) int64
-        Those with label j are ``order[start[j]:start[j + 1]]``.
-    rank : (rows,) int64
-        Place of each among those with the same label.
-    """
+    order: NDArray[np.int64]  # (k,) rows with label 0, 1, ..., each in increasing order
+    start: NDArray[np.int64]  # (labels + 1,) those with label j are ``order[start[j]:start[j + 1]]``
+    rank: NDArray[np.int64]  # (rows,) place of each among those with the same label
 
     def __init__(self, label: NDArray, n_labels: int):
         order = np.argsort(label, kind="stable")

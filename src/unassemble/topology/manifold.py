@@ -9,12 +9,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, milp
-from scipy.sparse import csgraph
 
 from ..budget import SAMPLE
 from ..errors import TopologyError
 from ..words import count_of
 from .cycles import lookup, three_cycles
+from .numbering import connected
 
 # The program has a few 3-cycles for each neck, and solids of tetrahedra most of theirs.
 _SHARE = 0.5
@@ -23,23 +23,12 @@ _LEAST = 5  # triangles at the edges of a neck: two each, but for one edge that 
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """The 3-cycles of a graph.
+    """The 3-cycles of a graph."""
 
-    Attributes
-    ----------
-    n : int
-        Vertices.
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order.
-    triangles : (m, 3) int64
-    opposite : (m, 3) int64
-        Rows of `edges` that face the corners.
-    """
-
-    n: int
-    edges: NDArray[np.int64]
-    triangles: NDArray[np.int64]
-    opposite: NDArray[np.int64]
+    n: int  # vertices
+    edges: NDArray[np.int64]  # (e, 2) pairs i < j in lexicographic order
+    triangles: NDArray[np.int64]  # (m, 3)
+    opposite: NDArray[np.int64]  # (m, 3) rows of `edges` that face the corners
 
     @classmethod
     def of(cls, n: int, edges: NDArray) -> Cycles:
@@ -49,10 +38,7 @@ class Cycles:
     def among(self, triangles: NDArray[np.int64]) -> NDArray[np.bool_]:
         """(m,) those that are some given triangles.
 
-        Raises
-        ------
-        TopologyError
-            If a triangle is no 3-cycle, or an edge is left over.
+        Raises TopologyError if a triangle is no 3-cycle, or an edge is left over.
         """
         power = np.array([self.n**2, self.n, 1])
         chosen = np.isin(np.sort(self.triangles, axis=1) @ power, np.sort(triangles, axis=1) @ power)
@@ -75,15 +61,8 @@ def surface_readings(cycles: Cycles) -> Iterator[NDArray[np.bool_]]:
     sides of all its edges but one at most: that tells it from a triangle with too many neighbours. All selections of
     that size come, one by one.
 
-    Parameters
-    ----------
-    cycles : Cycles
-
-    Raises
-    ------
-    TopologyError
-        If there is none: an edge lies on no 3-cycle, or in three triangles whatever one does. A graph with edges on
-        three 3-cycles, all of whose edges belong to tetrahedra, is taken for that of a solid.
+    Raises TopologyError if there is none: an edge lies on no 3-cycle, or in three triangles whatever one does. A graph
+    with edges on three 3-cycles, all of whose edges belong to tetrahedra, is taken for that of a solid.
     """
     chosen, doubtful = _forced(cycles)
     rows = np.flatnonzero(doubtful)
@@ -91,7 +70,8 @@ def surface_readings(cycles: Cycles) -> Iterator[NDArray[np.bool_]]:
         yield _checked(cycles, chosen)
         return
     crowded = cycles.at_edges() > 2
-    solid = _all_of_component(cycles, in_four_cliques(cycles)) & crowded
+    component = connected(cycles.n, *cycles.edges.T)[1][cycles.edges[:, 0]]
+    solid = (np.bincount(component, ~in_four_cliques(cycles), minlength=cycles.n)[component] == 0) & crowded
     if solid.any():
         raise _crowded(cycles, int(np.argmax(solid * cycles.at_edges())))
     at, local = np.unique(cycles.opposite[rows], return_inverse=True)
@@ -162,13 +142,6 @@ def _forced(cycles: Cycles) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     if open_.sum() > SAMPLE // 20 + _SHARE * len(open_):
         raise _crowded(cycles, int(np.argmax(cycles.at_edges(open_))))
     return chosen, open_
-
-
-def _all_of_component(cycles: Cycles, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(e,) edges all of whose connected component are among some."""
-    graph = sp.coo_array((np.ones(len(cycles.edges), np.int8), cycles.edges.T), shape=(cycles.n, cycles.n))
-    label = csgraph.connected_components(graph, directed=False)[1][cycles.edges[:, 0]]
-    return np.bincount(label, ~some, minlength=cycles.n)[label] == 0
 
 
 def _crowded(cycles: Cycles, edge: int) -> TopologyError:

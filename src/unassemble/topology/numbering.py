@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from .keys import Grouped
+from .keys import Grouped, runs
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,10 +24,8 @@ class Numbering:
 def local_numbering(n: int, edges: NDArray) -> Numbering:
     """Number vertices in breadth-first order.
 
-    The rows of a matrix may lie in any order, and on large meshes most of the time would go into waiting for
-    memory: after this, what lies near each other on the mesh does so in memory.
-
-    `n`: number of vertices; `edges` (e, 2): pairs i < j in lexicographic order.
+    The rows of a matrix may lie in any order, and on large meshes most of the time would go into waiting for memory:
+    after this, what lies near each other on the mesh does so in memory. `edges` (e, 2): as in a :class:`Numbering`.
     """
     upper = sp.coo_array((np.ones(len(edges), np.int8), edges.astype(np.int32).T), shape=(n, n)).tocsr()
     vertices, _ = breadth_first(upper + upper.T)
@@ -42,12 +40,8 @@ def local_numbering(n: int, edges: NDArray) -> Numbering:
 
 
 def components(n: int, edges: NDArray) -> list[Numbering]:
-    """Connected components with edges, each in a numbering of its own, largest first.
-
-    `n`: number of vertices; `edges` (e, 2): pairs i < j in lexicographic order.
-    """
-    graph = sp.coo_array((np.ones(len(edges), np.int8), edges.T), shape=(n, n))
-    count, label = csgraph.connected_components(graph, directed=False)
+    """Connected components with edges, (e, 2), each in a numbering of its own, largest first."""
+    count, label = connected(n, *edges.T)
     used = np.zeros(n, dtype=bool)
     used[edges] = True
     vertices, rows = Grouped(np.where(used, label, -1), count), Grouped(label[edges[:, 0]], count)
@@ -61,10 +55,18 @@ def components(n: int, edges: NDArray) -> list[Numbering]:
     ]
 
 
-def breadth_first(graph: sp.csr_array) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Search each component from its lowest vertex.
+def connected(n: int, one: NDArray, other: NDArray) -> tuple[int, NDArray[np.int64]]:
+    """Number of connected components of a graph with edges between `one` and `other`, (e,) each; and that of each row.
 
-    `graph` (n, n): both triangles of a symmetric pattern; entries do not count.
+    Isolated vertices count; components are numbered in order of their lowest vertices.
+    """
+    graph = sp.coo_array((np.ones(len(one), np.int8), (one, other)), shape=(n, n))
+    count, label = csgraph.connected_components(graph, directed=False)
+    return int(count), label.astype(np.int64)
+
+
+def breadth_first(graph: sp.csr_array) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Search each component of a symmetric pattern (n, n) from its lowest vertex.
 
     Returns `order` (n,): vertices in the order in which they are reached; `parent` (n,): -1 at the start of each
     component.
@@ -98,7 +100,5 @@ def neighbours(graph: sp.csr_array, vertices: NDArray) -> tuple[NDArray[np.int64
 
     Returns `place` (k,): which of `vertices`, in increasing order; `neighbour` (k,).
     """
-    count = graph.indptr[vertices + 1] - graph.indptr[vertices]
-    place = np.repeat(np.arange(len(vertices)), count)
-    within = np.arange(len(place)) - np.repeat(np.cumsum(count) - count, count)
+    place, within = runs(graph.indptr[vertices + 1] - graph.indptr[vertices])
     return place, graph.indices[graph.indptr[vertices[place]] + within].astype(np.int64)

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .boundary import boundary_corners, following, loops
 from .keys import Grouped, distinct
-from .orientation import Gluing, glue, orient, reglue
+from .orientation import Gluing, boundary_corners, following, glue, loops, orient, reglue
 from .surface import Piece
 
 
@@ -41,7 +40,10 @@ def planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray)
     gluing = reglue(gluing, flip)
     corners = boundary_corners(gluing)
     loop, order = loops(following(triangles, gluing, corners))
-    at = _vertices_of_pieces(n, triangles, piece)
+    if piece.any():  # keys of all pairs that occur; of one piece without sorting
+        at = distinct(piece[:, None] * n + triangles)
+    else:
+        at = np.flatnonzero(np.bincount(triangles.ravel(), minlength=n))
     glued = _Surfaces(triangles, opposite, gluing, piece)
     if not _spheres_with_holes(n, glued, at, corners, loop):
         return None
@@ -70,15 +72,6 @@ def _spheres_with_holes(n: int, glued: _Surfaces, at: NDArray, corners: NDArray,
     return bool(((n_vertices - n_edges + n_triangles == 2 - n_loops) & (n_loops > 0)).all())
 
 
-def _vertices_of_pieces(n: int, triangles: NDArray, piece: NDArray) -> NDArray[np.int64]:
-    """Sorted keys piece * n + vertex of all pairs that occur."""
-    if not piece.any():
-        seen = np.zeros(n, dtype=bool)
-        seen[triangles] = True
-        return np.flatnonzero(seen)
-    return distinct(piece[:, None] * n + triangles)
-
-
 def _cut(n: int, edges: NDArray, glued: _Surfaces, at: NDArray, corners: NDArray, loop: NDArray) -> tuple[Piece, ...]:
     """Number each piece by itself: everything is sorted by piece, and pieces are slices of that."""
     triangles, opposite, gluing, piece = glued.triangles, glued.opposite, glued.gluing, glued.piece
@@ -105,6 +98,12 @@ def _cut(n: int, edges: NDArray, glued: _Surfaces, at: NDArray, corners: NDArray
     facing = gluing.faces[edge_rows]
     loop_start = np.flatnonzero(np.diff(loop[ring], prepend=-1))
     of_loops = Grouped(piece[corners // 3][ring[loop_start]], n_pieces)
+    # Where the loops of each piece start on its boundary, and where the last one ends.
+    start = of_loops.start + np.arange(n_pieces + 1)
+    owner = np.repeat(np.arange(n_pieces), np.diff(of_loops.start))
+    offsets = np.empty(start[-1], dtype=np.int64)
+    offsets[np.arange(len(loop_start)) + owner] = loop_start - of_boundary.start[owner]
+    offsets[start[1:] - 1] = np.diff(of_boundary.start)
     parts = (
         (at % n, vertex.start),
         (edge_rows, of_edges.start),
@@ -113,21 +112,10 @@ def _cut(n: int, edges: NDArray, glued: _Surfaces, at: NDArray, corners: NDArray
         (of_edges.rank[opposite[rows]], of_triangles.start),
         (np.where(facing < 0, -1, 3 * of_triangles.rank[facing // 3] + facing % 3), of_edges.start),
         (local(piece[corners // 3][ring], boundary[ring]), of_boundary.start),
-        _offsets_of_loops(loop_start, of_loops, of_boundary.start),
+        (offsets, start),
     )
     values = [value for value, _ in parts]
     cuts = [start.tolist() for _, start in parts]
     return tuple(
         Piece(*(value[cut[k] : cut[k + 1]] for value, cut in zip(values, cuts, strict=True))) for k in range(n_pieces)
     )
-
-
-def _offsets_of_loops(loop_start: NDArray, of_loops: Grouped, boundary_start: NDArray) -> tuple[NDArray, NDArray]:
-    """Where the loops of each piece start on its boundary, and where the last one ends; and how to cut this."""
-    n_pieces = len(boundary_start) - 1
-    start = of_loops.start + np.arange(n_pieces + 1)
-    owner = np.repeat(np.arange(n_pieces), np.diff(of_loops.start))
-    offsets = np.empty(start[-1], dtype=np.int64)
-    offsets[np.arange(len(loop_start)) + owner] = loop_start - boundary_start[owner]
-    offsets[start[1:] - 1] = np.diff(boundary_start)
-    return offsets, start

@@ -11,23 +11,10 @@ except ImportError:  # no wheels for this platform: networkx has the left-right 
     _suite = None
 
 
-def is_planar(n: int, edges: NDArray) -> bool:
-    """Whether the graph can be drawn without crossings."""
-    if n >= 3 and len(edges) > 3 * n - 6:
-        return False
-    if _suite is not None:
-        return bool(_suite.is_planar(edges.tolist()))
-    import networkx
-
-    return bool(networkx.check_planarity(networkx.Graph(edges.tolist()))[0])
-
-
 def rotation_system(n: int, edges: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
     """Half-edges tail -> head, grouped by tail, each group in its cyclic order about it in a planar embedding.
 
-    `edges` (e, 2).
-
-    Returns `tail` and `head` (2 e,), None if the graph is not planar.
+    `edges` (e, 2). Returns `tail` and `head` (2 e,), None if the graph is not planar.
     """
     if n >= 3 and len(edges) > 3 * n - 6:
         return None

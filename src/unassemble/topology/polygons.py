@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .keys import runs
+
 
 @dataclass(frozen=True, eq=False)
 class Polygons:
@@ -50,11 +52,21 @@ class Polygons:
         return np.diff(self.offsets)
 
     @property
-    def following(self) -> NDArray[np.int64]:
-        """(offsets[-1],) the vertex that follows each."""
+    def following_place(self) -> NDArray[np.int64]:
+        """(offsets[-1],) the place in `vertices` of the vertex that follows each."""
         place = np.arange(1, len(self.vertices) + 1)
         place[self.offsets[1:] - 1] = self.offsets[:-1]
-        return self.vertices[place]
+        return place
+
+    @property
+    def following(self) -> NDArray[np.int64]:
+        """(offsets[-1],) the vertex that follows each."""
+        return self.vertices[self.following_place]
+
+    @property
+    def cycles(self) -> list[tuple[int, ...]]:
+        """Vertices of each."""
+        return [tuple(cell.tolist()) for cell in np.split(self.vertices, self.offsets[1:-1])] if self.count else []
 
     def chosen(self, which: NDArray[np.bool_], number: NDArray) -> Polygons:
         """Some of the polygons, with vertex v called ``number[v]``."""
@@ -68,8 +80,8 @@ class Polygons:
         polygon; the others are diagonals.
         """
         size = self.size - 2
-        owner = np.repeat(np.arange(self.count), size)
-        step = np.arange(len(owner)) - np.repeat(np.cumsum(size) - size, size) + 1
+        owner, step = runs(size)
+        step += 1
         start = self.offsets[owner]
         triangles = np.column_stack(
             [self.vertices[start], self.vertices[start + step], self.vertices[start + step + 1]]
@@ -81,11 +93,9 @@ class Polygons:
 
         `points` (n, 2).
         """
-        size = self.size
-        owner = np.repeat(np.arange(self.count), size)
-        place = np.arange(len(self.vertices)) - self.offsets[owner]
-        following = self.offsets[owner] + (place + 1) % size[owner]
+        owner, following = np.repeat(np.arange(self.count), self.size), self.following_place
         x, y = (points[self.vertices] - points[self.vertices[self.offsets[owner]]]).T
         area = np.bincount(owner, x * y[following] - y * x[following], self.count)
-        backwards = self.offsets[owner] + size[owner] - 1 - place
-        return Polygons(self.offsets, self.vertices[np.where(area[owner] < 0, backwards, np.arange(len(owner)))])
+        place = np.arange(len(owner))
+        backwards = self.offsets[owner] + self.offsets[owner + 1] - 1 - place
+        return Polygons(self.offsets, self.vertices[np.where(area[owner] < 0, backwards, place)])

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NotPlanarError, RecoveryError
-from . import planarity
-from .cycles import three_cycles
+from .cycles import not_faces, three_cycles
 from .numbering import Numbering, components
 from .pieces import planar_pieces
-from .separating import not_faces
+from .planarity import rotation_system
 from .surface import Piece, Topology
 
 
@@ -34,16 +33,18 @@ def surfaces(n: int, edges: NDArray, numbering: Numbering | None = None) -> Topo
 
 
 def _surfaces_of(part: Numbering) -> list[Piece] | None:
-    try:
-        pieces = triangulated(len(part.vertices), part.edges)
-    except NotPlanarError:
+    """None where 3-cycles make no surface, or some are no sphere with holes; edges may be left over."""
+    n, edges = len(part.vertices), part.edges
+    if _too_many(n, edges):
         return None
-    return None if pieces is None else [in_whole(piece, part) for piece in pieces]
-
-
-def in_whole(piece: Piece, part: Numbering) -> Piece:
-    """A piece of a part of the graph, in the numbering of the whole."""
-    return replace(piece, vertices=part.vertices[piece.vertices], edge_rows=part.edge_rows[piece.edge_rows])
+    triangles, opposite = three_cycles(n, edges)
+    if (np.bincount(opposite.ravel(), minlength=1) > 2).any():
+        face = ~not_faces(n, edges, triangles, opposite)
+        triangles, opposite = triangles[face], opposite[face]
+    return [
+        replace(piece, vertices=part.vertices[piece.vertices], edge_rows=part.edge_rows[piece.edge_rows])
+        for piece in planar_pieces(n, edges, triangles, opposite) or ()
+    ] or None
 
 
 def located(error: RecoveryError, part: Numbering, *, named: bool) -> RecoveryError:
@@ -52,36 +53,17 @@ def located(error: RecoveryError, part: Numbering, *, named: bool) -> RecoveryEr
     return _not_planar(error.why, where) if isinstance(error, NotPlanarError) else type(error)(where + str(error))
 
 
-def triangulated(n: int, edges: NDArray) -> tuple[Piece, ...] | None:
-    """The surfaces that the 3-cycles of a graph make; None where they make none, or some are no sphere with holes.
-
-    Edges may be left over.
-
-    Raises
-    ------
-    NotPlanarError
-        If there are more edges than a planar graph can have.
-    """
-    if n >= 3 and len(edges) > 3 * n - 6:
-        raise _not_planar(f"{len(edges)} edges on {n} rows are more than 3 n - 6")
-    triangles, opposite = three_cycles(n, edges)
-    if (np.bincount(opposite.ravel(), minlength=1) > 2).any():
-        face = ~not_faces(n, edges, triangles, opposite)
-        triangles, opposite = triangles[face], opposite[face]
-    return planar_pieces(n, edges, triangles, opposite) or None
-
-
 def require_planar(n: int, edges: NDArray) -> None:
-    """Do nothing for a planar graph.
-
-    Raises
-    ------
-    NotPlanarError
-    """
-    if n >= 3 and len(edges) > 3 * n - 6:
+    """Do nothing for a planar graph; else raise NotPlanarError."""
+    if _too_many(n, edges):
         raise _not_planar(f"{len(edges)} edges on {n} rows are more than 3 n - 6")
-    if not planarity.is_planar(n, edges):
+    if rotation_system(n, edges) is None:
         raise _not_planar()
+
+
+def _too_many(n: int, edges: NDArray) -> bool:
+    """Whether there are more edges than a planar graph can have."""
+    return n >= 3 and len(edges) > 3 * n - 6
 
 
 def _not_planar(why: str = "", where: str = "") -> NotPlanarError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -78,6 +79,23 @@ class Piece:
         """Vertices of the loop with the most edges, in running order."""
         k = int(np.argmax(np.diff(self.loop_offsets)))
         return self.boundary[self.loop_offsets[k] : self.loop_offsets[k + 1], 0]
+
+
+class Together:
+    """Pieces, at least one, as one disjoint union: vertices, edges and triangles one piece after the other."""
+
+    def __init__(self, pieces: Sequence[Piece]):
+        self.n_vertices = np.array([len(piece.vertices) for piece in pieces])
+        n_edges, n_triangles = np.array([(len(piece.edges), len(piece.triangles)) for piece in pieces]).T
+        self.triangle_piece = np.repeat(np.arange(len(pieces)), n_triangles)  # (m,)
+        shift_vertices, shift_edges = (
+            (np.cumsum(count) - count)[self.triangle_piece, None] for count in (self.n_vertices, n_edges)
+        )
+        self.vertices = np.concatenate([piece.vertices for piece in pieces])  # (v,) rows of the matrix
+        self.edge_rows = np.concatenate([piece.edge_rows for piece in pieces])  # (e,) of the whole graph's edge list
+        self.triangles = np.concatenate([piece.triangles for piece in pieces]) + shift_vertices  # (m, 3)
+        self.opposite = np.concatenate([piece.opposite for piece in pieces]) + shift_edges  # (m, 3)
+        self.inner = np.concatenate([piece.inner for piece in pieces])  # (e,) edges with a triangle on both sides
 
 
 @dataclass(frozen=True, eq=False)

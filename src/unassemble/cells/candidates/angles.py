@@ -15,13 +15,8 @@ from numpy.typing import NDArray
 from ...budget import SAMPLE
 from ...topology.faces import FaceComplex
 
-FULL = 1.3 * np.pi
-"""Angle sum below which a face may be a cell."""
-
 SHORT = 4
 """Edges of faces that are cells unless the numbers say otherwise."""
-
-_LARGEST, _GAP, _MANY = 3 * np.pi, 0.2 * np.pi, 50  # or below a gap so wide, if so many lie below that
 
 
 def facing_angles(cotangents: NDArray) -> NDArray[np.float64]:
@@ -32,23 +27,6 @@ def facing_angles(cotangents: NDArray) -> NDArray[np.float64]:
 def face_sums(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]:
     """(faces,) sum of the angles of half-edges around each face, about pi for a cell."""
     return np.asarray(np.bincount(complex_.face, angles), dtype=np.float64)
-
-
-def largest_sum(sums: NDArray[np.float64]) -> float:
-    """Where angle sums of cells end and those of holes begin: where they mostly do, or in a clear gap above many cells.
-
-    What lies in such a gap already stays; above many holes that are alike there is another, and may be wider.
-    """
-    sums = np.sort(sums[sums < _LARGEST])
-    gap = np.diff(sums, append=_LARGEST)
-    gap[: _MANY - 1] = 0
-    clear = np.flatnonzero(gap >= _GAP)
-    if not len(clear) or ((sums[clear] < FULL) & (sums[clear] + gap[clear] > FULL)).any():
-        return FULL
-    widest = clear[np.argmax(gap[clear])]
-    if sums[widest] < FULL:
-        return FULL
-    return float(sums[widest] + gap[widest] / 2)
 
 
 def vertex_excess(complex_: FaceComplex, angles: NDArray) -> NDArray[np.float64]:
@@ -71,24 +49,16 @@ def likeliest_scale(complex_: FaceComplex, weights: NDArray) -> float:
         return unit
     short = np.flatnonzero(complex_.simple & (complex_.size <= max(SHORT, length.min())))
     faces = short[np.linspace(0, len(short) - 1, min(len(short), SAMPLE)).astype(int)]
-    return unit * float(np.exp(np.median(np.log(scales_of_faces(complex_, weights / unit, faces)))))
-
-
-def scales_of_faces(complex_: FaceComplex, cotangents: NDArray, faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(k,) the c for which angles facing the sides of some faces, of given cotangents over c, (e,), add up to pi."""
     size = complex_.size[faces]
     first = np.cumsum(size) - size
     face = np.repeat(np.arange(len(faces)), size)
-    place = np.arange(len(face)) + (complex_.offsets[faces] - first)[face]
-    unit = float(np.median(np.abs(cotangents[cotangents != 0])))
-    share = (cotangents / unit)[complex_.order[place] >> 1]
-    low, high = np.full(len(faces), -8.0), np.full(len(faces), 8.0)
+    share = (weights / unit)[complex_.order[np.arange(len(face)) + (complex_.offsets[faces] - first)[face]] >> 1]
+    low, high = np.full(len(faces), -8.0), np.full(len(faces), 8.0)  # of log c of each face
     for _ in range(40):
         middle = (low + high) / 2
-        angle = facing_angles(share / np.exp(middle)[face])
-        above = np.add.reduceat(angle, first) > np.pi  # angles grow with c
+        above = np.add.reduceat(facing_angles(share / np.exp(middle)[face]), first) > np.pi  # angles grow with c
         low, high = np.where(above, low, middle), np.where(above, middle, high)
-    return unit * np.asarray(np.exp((low + high) / 2))
+    return float(unit * np.exp(np.median((low + high) / 2)))
 
 
 def outer_faces(blocks: FaceComplex, sums: NDArray) -> NDArray[np.bool_]:

@@ -1,15 +1,23 @@
-"""Everything that can be a cell in an embedding: faces, and corners."""
+"""Everything that can be a cell in an embedding, faces and corners; and what other embeddings have.
+
+Where parts of a graph hang together by two vertices or one it has many embeddings, and cells that are faces of one are
+none of another. That matters near the last wrong labels only.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...tolerances import LITTLE
 from ...topology import Polygons
+from ...topology.cycles import three_cycles
 from ...topology.faces import FaceComplex, joined
+from ...topology.numbering import adjacency
 from .angles import SHORT, face_sums, facing_angles, likeliest_scale, outer_faces, vertex_excess
 
 
@@ -32,15 +40,11 @@ class Candidates:
     first: NDArray[np.bool_]  # (cells,) the faces that make the likeliest labelling without vanished boundary edges
     outer: NDArray[np.bool_]  # (cells,) the face of each block that bounds it from outside
     # (e,) standard deviations of the errors of the weights, where they are known
-    errors: NDArray[np.float64] | None = field(default=None, kw_only=True)
+    errors: NDArray[np.float64] | None
 
     @classmethod
     def of(
-        cls,
-        embedding: FaceComplex,
-        weights: NDArray,
-        scale: float | None = None,
-        errors: NDArray | None = None,
+        cls, embedding: FaceComplex, weights: NDArray, scale: float | None = None, errors: NDArray | None = None
     ) -> Candidates:
         """All candidates of one embedding of the graph."""
         blocks = embedding.split()
@@ -50,7 +54,7 @@ class Candidates:
         outer = outer_faces(blocks, sums)
         faces = np.flatnonzero(blocks.simple)
         empty = (blocks.size > SHORT) | outer | ~blocks.simple
-        corners, taken = corners_of(blocks.joined(empty), empty[blocks.face])
+        corners, taken = _corners_of(blocks.joined(empty), empty[blocks.face])
         excess = vertex_excess(blocks, angles)[corners[:, 1]]
         chosen = np.isin(blocks.face[blocks.order], faces)
         number = np.full(len(blocks.size), -1)
@@ -90,6 +94,18 @@ class Candidates:
         given = np.flatnonzero(self.weights)[0]
         return float(self.weights[given] / self.relative[given])
 
+    def with_more(self, cells: Sequence[Sequence[int]]) -> Candidates:
+        """With further cells, which claim no half-edges."""
+        more = np.zeros(len(cells), dtype=bool)
+        return replace(
+            self,
+            cells=Polygons.joined([self.cells, Polygons.of(cells)]) if len(cells) else self.cells,
+            corner=np.append(self.corner, more),
+            belief=np.append(self.belief, np.zeros(len(cells))),
+            first=np.append(self.first, more),
+            outer=np.append(self.outer, more),
+        )
+
     @property
     def triangles(self) -> NDArray[np.bool_]:
         """(cells,) faces of three edges, but for outer ones."""
@@ -109,7 +125,7 @@ class Candidates:
         return self.sides[order], np.append(start, len(order))
 
 
-def corners_of(embedding: FaceComplex, outside: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _corners_of(embedding: FaceComplex, outside: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Corners a-b-c, (k, 3), of which a-c is no edge, and pairs (corner, half-edge) of what each takes up as a cell.
 
     The side of a triangle that faces a right angle has the weight cot(pi / 2) / 2 = 0, and on the boundary no other
@@ -129,3 +145,25 @@ def corners_of(embedding: FaceComplex, outside: NDArray[np.bool_]) -> tuple[NDAr
     lone &= ~outside[halves[:, 0] ^ 1]
     far = np.column_stack([np.repeat(np.flatnonzero(lone), 2), halves[lone].ravel() ^ 1])
     return vertices, np.concatenate([near, far])
+
+
+def widened(candidates: Candidates, edges: NDArray[np.int64], misfit: NDArray[np.float64]) -> Candidates:
+    """With 3-cycles and corners about the places where a labelling does not fit, in both orientations.
+
+    `edges` (e, 2); `misfit` (e,): what a labelling leaves on these edges.
+    """
+    n, at = candidates.n_vertices, np.zeros(candidates.n_vertices)
+    np.maximum.at(at, edges.ravel(), np.repeat(misfit, 2))
+    near = at > LITTLE * at.max(initial=0.0)
+    triangles, _ = three_cycles(n, candidates.edges)
+    found = [triangles[near[triangles].any(axis=1)]]
+    graph = adjacency(n, candidates.edges)
+    for h in np.flatnonzero(near).tolist():
+        ends = graph.indices[graph.indptr[h] : graph.indptr[h + 1]].astype(np.int64)
+        if len(ends) <= 12:  # all pairs of these may make a corner
+            one, other = ends[np.stack(np.triu_indices(len(ends), 1))]
+            apart = ~joined(n, candidates.edges, one, other)
+            found.append(np.column_stack([one, np.full(len(one), h), other])[apart])
+    names = set(map(frozenset, candidates.cells.cycles))
+    new = [cell for cell in np.concatenate(found).tolist() if frozenset(cell) not in names]
+    return candidates.with_more([*new, *(cell[::-1] for cell in new)])

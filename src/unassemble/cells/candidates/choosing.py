@@ -7,16 +7,34 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from .angles import facing_angles, largest_sum
+from .angles import facing_angles
 from .candidates import Candidates
 
 
 def chosen(candidates: Candidates, value: NDArray, fallback: NDArray | None = None) -> NDArray[np.bool_]:
     """(cells,) compatible candidates of finite value, and others for edges that border none of these.
 
-    The others are those of the highest `fallback` value, by default those believed in most.
+    A nonzero weight is the cotangent of some angle: every edge borders a cell. The others are those of the highest
+    `fallback` value, by default those believed in most.
     """
-    return covering(candidates, compatible(candidates, value), candidates.belief if fallback is None else fallback)
+    labels = compatible(candidates, value)
+    value = candidates.belief if fallback is None else fallback
+    cell, half = candidates.sides.T
+    while True:
+        used = np.zeros(2 * len(candidates.edges), dtype=bool)
+        used[half[labels[cell]]] = True
+        bare = (candidates.weights != 0) & ~used.reshape(-1, 2).any(axis=1)
+        wanted = np.zeros(candidates.count, dtype=bool)
+        wanted[cell[bare[half >> 1]]] = True
+        wanted[cell[used[half]]] = False
+        wanted &= ~labels
+        if not wanted.any():
+            return labels
+        order = np.lexsort((-value[cell], half >> 1))
+        order = order[wanted[cell[order]] & bare[half[order] >> 1]]
+        best = np.zeros(candidates.count, dtype=bool)
+        best[cell[order[np.flatnonzero(np.diff(half[order] >> 1, prepend=-1))]]] = True
+        labels = labels | compatible(candidates, np.where(best, value, -np.inf))
 
 
 def compatible(candidates: Candidates, value: NDArray) -> NDArray[np.bool_]:
@@ -46,32 +64,6 @@ def compatible(candidates: Candidates, value: NDArray) -> NDArray[np.bool_]:
     return taken
 
 
-def covering(candidates: Candidates, labels: NDArray[np.bool_], value: NDArray) -> NDArray[np.bool_]:
-    """The same labels with further candidates, the most valued ones, for edges that border no cell.
-
-    A nonzero weight is the cotangent of some angle: every edge borders a cell.
-    """
-    labels = labels.copy()
-    cell, half = candidates.sides.T
-    while True:
-        used = np.zeros(2 * len(candidates.edges), dtype=bool)
-        used[half[labels[cell]]] = True
-        bare = (candidates.weights != 0) & ~used.reshape(-1, 2).any(axis=1)
-        blocked = np.zeros(candidates.count, dtype=bool)
-        blocked[cell[used[half]]] = True
-        wanted = np.zeros(candidates.count, dtype=bool)
-        wanted[cell[bare[half >> 1]]] = True
-        wanted &= ~blocked & ~labels
-        if not wanted.any():
-            return labels
-        order = np.lexsort((-value[cell], half >> 1))
-        order = order[wanted[cell[order]] & bare[half[order] >> 1]]
-        best = order[np.flatnonzero(np.diff(half[order] >> 1, prepend=-1))]
-        chosen = np.zeros(candidates.count, dtype=bool)
-        chosen[cell[best]] = True
-        labels |= compatible(candidates, np.where(chosen, value, -np.inf))
-
-
 _INNER = (-0.35 * np.pi, -0.55 * np.pi)
 """Angle excess above which a vertex may be an inner one."""
 _LEFT_OUT = 0.05
@@ -81,8 +73,7 @@ _LEFT_OUT = 0.05
 def likely_labels(candidates: Candidates) -> Iterator[NDArray[np.bool_]]:
     """(cells,) labels to begin with, the likeliest first."""
     long = ~candidates.corner & ~candidates.outer & (candidates.size > 3)
-    sums = (2 - candidates.belief) * np.pi  # those of holes are larger than pi
-    by_angles = long & (sums < largest_sum(sums[long]))
+    by_angles = long & (candidates.belief > 0.7)  # angles that add up to less than 1.3 pi
     corners = [candidates.corner & (candidates.belief > 0.5 + excess / np.pi) for excess in _INNER]
     corners.append(np.zeros_like(candidates.corner))
     faces = (candidates.first, candidates.triangles | by_angles)

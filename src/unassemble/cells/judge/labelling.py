@@ -6,20 +6,23 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
-from ...matrix.operator import row_sizes
-from ...planar.cotangent import weights_of_all
+from ...errors import GeometryError, SolverError
+from ...planar.conformal import ConformalOptions, conformal_map
 from ...planar.hinges import gap
 from ...planar.piece import PieceMesh
-from ...tolerances import ALIKE
+from ...tolerances import ALIKE, SMALL
 from ...topology import Piece, Topology
-from ...topology.keys import pair_keys, with_sides
+from ...topology.keys import contains, pair_keys, runs, with_sides
 from ...topology.pieces import planar_pieces
 from ..candidates.candidates import Candidates
-from .maps import map_of
-from .triangulation import triangulation
-from .within_errors import GAP, beyond, polished
+from .within_errors import Placed, misfits, polished
+
+_OPTIONS = ConformalOptions(max_factorisations=4)  # what takes more has wrong cells
+_SMALL = 40
+"""Vertices up to which dense linear algebra, without set-up, is faster: wrong labellings have many small pieces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +43,13 @@ class Labelling:
     def unsolved(cls, candidates: Candidates, labels: NDArray[np.bool_]) -> Labelling:
         """Triangulate the cells, without positions."""
         n = candidates.n_vertices
-        triangles = triangulation(candidates, labels)
+        triangles = _triangulation(candidates, labels)
         edges, given, opposite = with_sides(n, candidates.edges, triangles)
         weights = np.zeros(len(edges))
         weights[given] = candidates.weights
         pieces = planar_pieces(n, edges, triangles, opposite) or ()
-        return cls(candidates, labels, edges, weights, pieces, (None,) * len(pieces), misfits(n, edges, weights, []))
+        misfit = np.where(weights != 0, 1.0, 0.0)
+        return cls(candidates, labels, edges, weights, pieces, (None,) * len(pieces), misfit)
 
     @classmethod
     def of(
@@ -53,39 +57,39 @@ class Labelling:
     ) -> Labelling:
         """Triangulate the cells and solve every piece, but for those `known`, to which new ones are added."""
         bare = cls.unsolved(candidates, labels)
-        weights = bare.weights
-        known = {} if known is None else known
-        names = [_key_of(piece) for piece in bare.pieces]
-        for name, piece in zip(names, bare.pieces, strict=True):
+        n, edges, weights, known = candidates.n_vertices, bare.edges, bare.weights, {} if known is None else known
+        placed: Placed = []
+        for piece in bare.pieces:
+            # The same for the same triangles in the same orientation, which positions go with.
+            triangles = piece.vertices[piece.triangles]
+            first = triangles.argmin(axis=1)[:, None]
+            triangles = np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1)
+            name = triangles[np.lexsort(triangles.T)].tobytes()
             if name not in known:
-                known[name] = map_of(piece, weights[piece.edge_rows])
-        return bare.placed(tuple(known[name] for name in names))
-
-    def placed(self, meshes: tuple[PieceMesh | None, ...]) -> Labelling:
-        """With positions of each piece, or None."""
-        candidates, n, edges = self.candidates, self.candidates.n_vertices, self.edges
-        solved = [(piece, mesh) for piece, mesh in zip(self.pieces, meshes, strict=True) if mesh]
-        misfit = misfits(n, edges, self.weights, solved)
-        errors = self._errors
-        better = None if errors is None else polished(solved, self.weights, errors, misfit, candidates.scale)
-        if better is None or errors is None:
+                known[name] = _map_of(piece, weights[piece.edge_rows])
+            if (mesh := known[name]) is not None:
+                placed.append((piece, mesh))
+        misfit, errors = misfits(n, edges, weights, placed), bare._errors
+        better = None if errors is None else polished(placed, weights, errors, misfit, candidates.scale)
+        if better is None:
             errors = None
         else:
-            solved, meshes = better, tuple(mesh for _, mesh in better)
-            misfit = beyond(n, edges, solved, self.weights, errors)
-        _add_discord(n, edges, solved, misfit, candidates.scale, errors)
-        misfit[np.isin(edges, _crowded(candidates, self.labels)).any(axis=1)] = 1.0
-        return replace(self, meshes=meshes, misfit=misfit)
+            placed, misfit = better, misfits(n, edges, weights, better, errors)
+        _add_discord(n, edges, placed, misfit, candidates.scale, errors)
+        misfit[np.isin(edges, _crowded(candidates, labels)).any(axis=1)] = 1.0
+        found = dict(placed)
+        return replace(bare, meshes=tuple(map(found.get, bare.pieces)), misfit=misfit)
 
-    @cached_property
+    @property
     def _errors(self) -> NDArray[np.float64] | None:
-        """(e',) standard deviations, 0 for what has vanished; None where they are not known, or nothing is solved."""
+        """(e,) standard deviations, small for what has vanished; None where they are not known, or nothing is there."""
         given, n = self.candidates.errors, self.candidates.n_vertices
         if given is None or not self.pieces or not given.any():
             return None
-        errors = np.zeros(len(self.edges))
+        errors = np.full(len(self.edges), SMALL * np.median(given[given > 0]))
         keys = pair_keys(n, *self.edges.T)
-        errors[np.searchsorted(keys, pair_keys(n, *self.candidates.edges.T))] = given
+        place = np.searchsorted(keys, pair_keys(n, *self.candidates.edges.T))
+        errors[place] = np.maximum(errors[place], given)
         return errors
 
     @property
@@ -116,53 +120,33 @@ def _crowded(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[np.in
     return np.flatnonzero(np.bincount(apex[labels & candidates.corner], minlength=candidates.n_vertices) > 4)
 
 
-def misfits(n: int, edges: NDArray, weights: NDArray, solved: list[tuple[Piece, PieceMesh]]) -> NDArray[np.float64]:
-    """(e,) |c w - a| relative to the smaller of both rows' largest entries, at most 1; 1 on edges of no piece."""
-    misfit = np.where(weights != 0, 1.0, 0.0)
-    size = row_sizes(n, edges, np.abs(weights))
-    if not solved:
-        return misfit
-    rows = np.concatenate([piece.edge_rows for piece, _ in solved])
-    scale = np.repeat([mesh.scale for _, mesh in solved], [len(piece.edge_rows) for piece, _ in solved])
-    smaller = size[edges[rows]].min(axis=1)
-    with np.errstate(all="ignore"):  # flat triangles fit nothing
-        fitted = weights_of_all(*zip(*((piece, mesh.z) for piece, mesh in solved), strict=True))
-        left = np.abs(scale * fitted - weights[rows]) / smaller
-    misfit[rows] = np.where(left < 1, left, 1.0)
-    return misfit
-
-
 def _add_discord(
-    n: int,
-    edges: NDArray,
-    solved: list[tuple[Piece, PieceMesh]],
-    misfit: NDArray,
-    scale: float | None,
-    errors: NDArray | None,
+    n: int, edges: NDArray, placed: Placed, misfit: NDArray, scale: float | None, errors: NDArray | None
 ) -> None:
     """Raise the misfit where pieces do not go together: another scale, or rings of pieces that do not close.
 
     Small pieces by themselves fit nearly everything. What `errors` (e,) explain is left out.
     """
-    if not solved or (len(solved) == 1 and scale is None):
+    if not placed or (len(placed) == 1 and scale is None):
         return
-    add_differing_factors(solved, misfit, scale)
+    add_differing_factors(placed, misfit, scale)
     if (misfit > ALIKE).any():  # whether rings close is the last question, and the dearest
         return
-    topology = Topology(n, edges, tuple(piece for piece, _ in solved), "")
-    closed = 0.0 if errors is None else GAP * float(errors.max()) / min(abs(mesh.scale) for _, mesh in solved)
-    left = gap(topology, [mesh.z / np.abs(mesh.z).max() for _, mesh in solved], max(ALIKE, closed))
+    topology = Topology(n, edges, tuple(piece for piece, _ in placed), "")
+    # In units of their size and of the errors over c, what these may leave open.
+    closed = 0.0 if errors is None else 30.0 * float(errors.max()) / min(abs(mesh.scale) for _, mesh in placed)
+    left = gap(topology, [mesh.z / np.abs(mesh.z).max() for _, mesh in placed], max(ALIKE, closed))
     left = left if left > closed else 0.0
     at_hinges = np.isin(edges, topology.hinges).any(axis=1)
     misfit[at_hinges] = np.maximum(misfit[at_hinges], min(left, 1.0))
 
 
-def add_differing_factors(solved: list[tuple[Piece, PieceMesh]], misfit: NDArray, scale: float | None) -> None:
+def add_differing_factors(placed: Placed, misfit: NDArray, scale: float | None) -> None:
     """Raise the misfit of pieces with another factor than is known, or than the largest has, by that difference."""
-    scale = scale or max(solved, key=lambda item: item[0].n_vertices)[1].scale
-    apart = np.minimum(np.abs(np.array([mesh.scale for _, mesh in solved]) / scale - 1), 1.0)
-    rows = np.concatenate([piece.edge_rows for piece, _ in solved])
-    misfit[rows] = np.maximum(misfit[rows], np.repeat(apart, [len(piece.edge_rows) for piece, _ in solved]))
+    scale = scale or max(placed, key=lambda item: item[0].n_vertices)[1].scale
+    apart = np.minimum(np.abs(np.array([mesh.scale for _, mesh in placed]) / scale - 1), 1.0)
+    rows = np.concatenate([piece.edge_rows for piece, _ in placed])
+    misfit[rows] = np.maximum(misfit[rows], np.repeat(apart, [len(piece.edge_rows) for piece, _ in placed]))
 
 
 def even(misfit: NDArray) -> bool:
@@ -176,9 +160,77 @@ def even(misfit: NDArray) -> bool:
     return size < 0.03 and float(misfit.max()) < 8 * size and float(np.median(misfit)) > 0.3 * size
 
 
-def _key_of(piece: Piece) -> bytes:
-    """The same for the same triangles in the same orientation, which positions go with."""
-    triangles = piece.vertices[piece.triangles]
-    first = triangles.argmin(axis=1)[:, None]
-    triangles = np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1)
-    return triangles[np.lexsort(triangles.T)].tobytes()
+def _map_of(piece: Piece, weights: NDArray) -> PieceMesh | None:
+    """The conformal map; None where the entries allow none.
+
+    `weights` (e,): -A_ij of its edges.
+    """
+    if piece.n_vertices <= _SMALL:
+        return _small_map(piece, weights)
+    try:
+        found = conformal_map(piece, weights, sharp=False, options=_OPTIONS)
+    except (GeometryError, SolverError):
+        return None
+    return PieceMesh(found.z, found.scale) if np.isfinite(found.z).all() and found.scale else None
+
+
+def _small_map(piece: Piece, weights: NDArray) -> PieceMesh | None:
+    """The same by dense linear algebra: with the last vertex at zero, the greatest mu with T z = mu (c L / 2) z."""
+    size = float(np.abs(weights).max()) * np.sign(weights.sum())
+    if not size:
+        return None
+    n = piece.n_vertices
+    energy = np.zeros((n, n))
+    area = np.zeros((n, n), dtype=np.complex128)
+    i, j = piece.edges.T
+    energy[i, j] = energy[j, i] = -weights / (2 * size)
+    np.fill_diagonal(energy, -energy.sum(axis=1))
+    np.add.at(area, (piece.boundary[:, 0], piece.boundary[:, 1]), -0.25j)
+    np.add.at(area, (piece.boundary[:, 1], piece.boundary[:, 0]), 0.25j)
+    try:
+        value, vector = scipy.linalg.eigh(area[:-1, :-1], energy[:-1, :-1], subset_by_index=[n - 2, n - 2])
+    except np.linalg.LinAlgError:  # the energy of a mesh is positive
+        return None
+    with np.errstate(all="ignore"):
+        scale = float(size / value[0])
+    possible = value[0] > 0 and np.isfinite(scale) and np.isfinite(vector).all()
+    return PieceMesh(np.append(vector[:, 0], 0), scale) if possible else None
+
+
+def _triangulation(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(m, 3) triangles of the chosen cells, longer ones in fans.
+
+    The apex of a fan moves on where a diagonal would be an edge already, of the graph or of another cell.
+    """
+    n, shift = candidates.n_vertices, np.zeros(candidates.count, dtype=np.int64)
+    given = candidates.edges[:, 0] * n + candidates.edges[:, 1]
+    for _ in range(int(candidates.size.max())):
+        triangles, cell, diagonal = _fans(candidates, labels, shift)
+        # Each diagonal belongs to the triangle before it.
+        key, owner = pair_keys(n, *triangles[diagonal][:, [2, 0]].T), cell[diagonal]
+        value, place, count = np.unique(key, return_inverse=True, return_counts=True)
+        clash = contains(given, value) | (count > 1)
+        if not clash.any():
+            break
+        moved = owner[clash[place]]
+        # Of two cells that want the same diagonal one keeps it.
+        keeps = np.unique(key[clash[place]], return_index=True)[1]
+        moved = np.setdiff1d(moved, moved[keeps][count[clash] > 1])
+        shift[moved] += 1
+    return triangles
+
+
+def _fans(candidates: Candidates, labels: NDArray, shift: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Triangles, the cell of each, and whether its last side is a diagonal."""
+    cells = np.flatnonzero(labels)
+    cell, step = runs(candidates.size[cells] - 2)
+    cell, step = cells[cell], step + 1
+    start, length = candidates.cells.offsets[cell], candidates.size[cell]
+    corner = (shift[cell][:, None] + np.column_stack([np.zeros_like(step), step, step + 1])) % length[:, None]
+    return candidates.cells.vertices[start[:, None] + corner], cell, step < length - 2
+
+
+def fans_of(candidates: Candidates, labels: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(m, 3) triangles of cells, each in a fan about its first vertex, and (m,) the cell of each."""
+    triangles, cell, _ = _fans(candidates, labels, np.zeros(candidates.count, dtype=np.int64))
+    return triangles, cell

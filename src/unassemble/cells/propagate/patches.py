@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...tolerances import AGREED, LAST_DIGITS, SIGMAS
-from ...topology.keys import Grouped
+from ...topology.keys import Grouped, runs
 
 _MOST = 100  # trees behind one side that are listed anew: depth three where nothing is known, more where much is
 _LEVELS = 12  # of triangles in a tree; lists end long before, but where long rows of triangles lie between holes
@@ -88,8 +88,7 @@ class _Trees:
         times = np.where(self._hole, 0, count[one] * count[other])
         full = times > _MOST
         times[full] = 0
-        arc = np.repeat(arcs, times)
-        place = np.arange(len(arc)) - np.repeat(np.cumsum(times) - times, times)
+        arc, place = runs(times)
         i = options.start[one[arc]] + place // count[other[arc]]
         j = options.start[other[arc]] + place % count[other[arc]]
         a, b = left[i], left[j]

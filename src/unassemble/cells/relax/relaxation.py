@@ -12,8 +12,6 @@ one Newton step for each t, q falling with t. The path commits itself to whole l
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -23,45 +21,32 @@ from ...linalg import solved
 from ..candidates.candidates import Candidates
 from .sheet import Placed, Sheet, unpinned
 
-
-@dataclass(frozen=True)
-class PathOptions:
-    """The path of the barrier."""
-
-    # barriers t, and the ratio of one to the one before
-    first: float = 0.3
-    last: float = 1e-3
-    factor: float = 0.75
-    slack: float = 0.03  # q at the first barrier
-    near: float = 0.95  # strength of the first labels
-    nearest: float = 0.1  # of the way to 0 or 1 that one step leaves
-    outlier: float = 0.3  # misfit beyond which an edge counts by its misfit, not by the square
-    held: float = 1e-9  # keeps the problem definite where labels of zero leave vertices free
+_FIRST, _LAST, _FACTOR = 0.3, 1e-3, 0.75
+"""Barriers t, and the ratio of one to the one before."""
 
 
-def relaxed(sheet: Sheet, free: NDArray[np.bool_], options: PathOptions | None = None) -> NDArray[np.bool_] | None:
+def relaxed(sheet: Sheet, free: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
     """Whole labels at the end of a path that begins with all chosen candidates as cells.
 
     `free` (k,): which of the chosen candidates may be holes; the others are known cells.
 
     Returns (cells,), None where there is no conformal map on the way, or an equation is singular.
     """
-    options = options or PathOptions()
     strength = np.zeros(sheet.candidates.count)
-    strength[sheet.chosen] = np.where(free, options.near, 1.0)
-    changing, t, placed = np.flatnonzero(sheet.chosen)[free], options.first, None
+    strength[sheet.chosen] = np.where(free, 0.95, 1.0)
+    changing, t, placed = np.flatnonzero(sheet.chosen)[free], _FIRST, None
     try:
-        while t > options.last:
+        while t > _LAST:
             placed = sheet.mapped(strength, placed)
-            strength[changing] = _step(sheet, placed, strength, free, t, options)
-            t *= options.factor
+            strength[changing] = _step(sheet, placed, strength, free, t)
+            t *= _FACTOR
     except RecoveryError:
         return None
     return strength > 0.5
 
 
 def _step(
-    sheet: Sheet, placed: Placed, strength: NDArray, may_change: NDArray[np.bool_], t: float, options: PathOptions
+    sheet: Sheet, placed: Placed, strength: NDArray, may_change: NDArray[np.bool_], t: float
 ) -> NDArray[np.float64]:
     """New strengths of the candidates that may change."""
     s = strength[sheet.chosen][may_change]
@@ -71,19 +56,16 @@ def _step(
     columns = sp.hstack(
         [by_position[:, free], by_label[:, np.flatnonzero(may_change)], sp.csr_array(by_scale[:, None])]
     )
-    misfit, slack = sheet.misfit(placed, strength), options.slack * t / options.first
-    with np.errstate(divide="ignore"):
-        weighted = columns.T @ sp.diags_array(np.minimum(options.outlier / np.abs(misfit), 1.0) / slack)
-    held = np.full(moving + k + 1, options.held / slack)
+    misfit, slack = sheet.misfit(placed, strength), 0.03 * t / _FIRST
+    with np.errstate(divide="ignore"):  # larger misfits than 0.3 count themselves, not by their squares
+        weighted = columns.T @ sp.diags_array(np.minimum(0.3 / np.abs(misfit), 1.0) / slack)
+    held = np.full(moving + k + 1, 1e-9 / slack)  # labels of zero leave vertices free
     held[-1] += 0.0 if sheet.free_scale else 1.0
     held[moving : moving + k] = t / s**2 + t / (1 - s) ** 2
     rhs = weighted @ misfit
     rhs[moving : moving + k] += 1.0 + t / s - t / (1 - s)  # labels are drawn to 1
     step = solved((weighted @ columns + sp.diags_array(held)).tocsr(), rhs)
-    return np.clip(s + step[moving : moving + k], options.nearest * s, 1 - options.nearest * (1 - s))
-
-
-_SPARE = 2  # edges to each vertex, with which a mesh has far more equations than unknowns
+    return np.clip(s + step[moving : moving + k], 0.1 * s, 1 - 0.1 * (1 - s))  # not all of the way to 0 or 1
 
 
 def with_holes(candidates: Candidates, state: NDArray[np.int8]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]] | None:
@@ -99,7 +81,7 @@ def with_holes(candidates: Candidates, state: NDArray[np.int8]) -> tuple[NDArray
     """
     sides, e = candidates.triangle_sides, len(candidates.edges)
     count = np.bincount(sides.ravel(), minlength=e)
-    if e <= _SPARE * candidates.n_vertices or candidates.weights[count == 0].any():
+    if e <= 2 * candidates.n_vertices or candidates.weights[count == 0].any():
         return None
     number = np.flatnonzero(candidates.triangles)
     cells, free = np.zeros((2, candidates.count), dtype=bool)

@@ -13,22 +13,15 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...linalg import factorisation
-from ...planar.cotangent import corner_gradients
-from ...planar.krylov import ShiftedSearch
+from ...planar.cotangent import corner_gradients, cotangent
 from ...planar.normal import distant_pair
-from ...planar.pencil import ConformalPencil
+from ...planar.pencil import ConformalPencil, ShiftedSearch
 from ...topology.keys import with_sides
 from ..candidates.candidates import Candidates
-from ..judge.triangulation import fans_of
-
-LONGEST = 40
-"""Edges of a face that may be a cell."""
+from ..judge.labelling import fans_of
 
 STEEPEST = 1e5
 """Cotangents beyond belong to flat triangles."""
-
-_SHIFT = 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,42 +35,22 @@ class Placed:
 class Sheet:
     """Candidates of one embedding, triangulated once.
 
-    Parameters
-    ----------
-    candidates : Candidates
-    unit : float
-        A guess of c.
-    chosen : (cells,) bool, optional
-        Candidates that may be cells; all that can be unless given.
-
-    Attributes
-    ----------
-    chosen : (cells,) bool
-        Candidates that can be cells, k of them; these have triangles.
-    triangles : (m, 3) int64
-    cell : (m,) int64
-        Candidate of each triangle.
-    row : (m, 3) int64
-        Edges that face the corners.
-    edges : (e, 2) int64
-        Those of the graph and of the triangles.
-    weights : (e,) float64
-        -A_ij in units of the guess; zero for edges that the graph does not have.
-    typical : float
-        Median size of the weights.
+    `unit`: a guess of c; `chosen` (cells,): candidates that may be cells, all that can be unless given.
     """
 
     def __init__(self, candidates: Candidates, unit: float, chosen: NDArray[np.bool_] | None = None):
         self.candidates = candidates
-        self.unit = unit
         self.n_vertices = n = candidates.n_vertices
-        self.chosen = (candidates.size <= LONGEST) & ~candidates.outer if chosen is None else chosen
+        # (cells,) candidates that can be cells, k of them: these have triangles, (m, 3), of the candidates `cell`, (m,)
+        self.chosen = (candidates.size <= 40) & ~candidates.outer if chosen is None else chosen
         self.triangles, self.cell = fans_of(candidates, self.chosen)
+        # (e, 2) edges of the graph and of the triangles, and (m, 3) the rows of those that face the corners
         self.edges, given, self.row = with_sides(n, candidates.edges, self.triangles)
         tails, heads = self.triangles[:, [1, 2, 0]], self.triangles[:, [2, 0, 1]]
         self._sense = np.where(tails < heads, 1.0, -1.0)
         self._number = np.cumsum(self.chosen) - 1
         self.free_scale = candidates.scale is None
+        # (e,) -A_ij in units of the guess, zero for edges that the graph does not have; and their median size
         self.weights = np.zeros(len(self.edges))
         self.weights[given] = candidates.weights / unit
         self.typical = float(np.median(np.abs(self.weights[given][candidates.weights != 0])))
@@ -88,29 +61,22 @@ class Sheet:
 
     def misfit(self, placed: Placed, strength: NDArray) -> NDArray[np.float64]:
         """(e,) what is left of the weights, divided by their spread."""
-        w = self.fitted_weights(placed.z, strength)
+        halves = strength[self.cell][:, None] * self.cotangents(placed.z[self.triangles]) / 2
+        w = np.bincount(self.row.ravel(), halves.ravel(), len(self.weights))
         return np.asarray((self.weights / placed.c - w) / self.spread(placed.c))
-
-    def fitted_weights(self, z: NDArray, strength: NDArray) -> NDArray[np.float64]:
-        """(e,) half the cotangents at positions, each times the strength of its candidate."""
-        cotangent = strength[self.cell][:, None] * self.cotangents(z[self.triangles])
-        return np.asarray(np.bincount(self.row.ravel(), cotangent.ravel() / 2, len(self.weights)), dtype=np.float64)
 
     @staticmethod
     def cotangents(at: NDArray) -> NDArray[np.float64]:
         """(m, 3) cotangents at the corners of triangles, (m, 3) complex."""
-        u, w = at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at
-        product = np.conj(u) * w
         with np.errstate(all="ignore"):
-            cotangent = np.nan_to_num(product.real / product.imag, posinf=STEEPEST, neginf=-STEEPEST)
-        return np.clip(cotangent, -STEEPEST, STEEPEST)
+            found = cotangent(at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at)
+        return np.clip(np.nan_to_num(found, posinf=STEEPEST, neginf=-STEEPEST), -STEEPEST, STEEPEST)
 
     @staticmethod
     def gradients(at: NDArray) -> NDArray[np.complex128]:
         """(3, m, 3) derivatives of half the cotangents by the corner itself, the next one and the one after."""
-        u, w = at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at
         with np.errstate(all="ignore"):
-            at_u, at_w = corner_gradients(u, w)
+            at_u, at_w = corner_gradients(at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at)
         gradient = np.stack([-at_u - at_w, at_u, at_w])
         gradient[:, ~(np.abs(gradient) < STEEPEST**2).all(axis=0)] = 0
         return gradient
@@ -125,17 +91,11 @@ class Sheet:
         return ConformalPencil(self.n_vertices, self.edges, self.edges, self.weights / unit, self.around(strength))
 
     def mapped(self, strength: NDArray, start: Placed | None = None) -> Placed:
-        """The conformal map for fractional labels.
-
-        Raises
-        ------
-        RecoveryError
-            If there is none.
-        """
-        search = ShiftedSearch(self.pencil(strength), factorisation, 8)
+        """The conformal map for fractional labels; raises RecoveryError if there is none."""
+        search = ShiftedSearch(self.pencil(strength), 8)
         noise = np.random.default_rng(0).standard_normal((self.n_vertices, 2)).view(np.complex128).ravel()
         z, c = (start.z, start.c) if start else (noise, 1.0)
-        shift = _SHIFT * c
+        shift = 0.7 * c
         for _ in range(4):
             z, c, spread = search.at(shift, z)
             if spread < 1e-9:

@@ -10,7 +10,7 @@ import heapq
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import islice
 
 import numpy as np
@@ -22,9 +22,8 @@ from ..candidates.candidates import Candidates
 from ..candidates.choosing import chosen
 from ..judge.labelling import Labelling
 from ..relax.sheet import Sheet
-from .leaps import leap
-from .moves import turned
-from .options import DEFAULT, SearchOptions
+from .low_rank import Move, turned
+from .options import SEARCH
 from .updates import Updates
 
 _log = logging.getLogger(__name__)
@@ -65,29 +64,14 @@ def better(one: Labelling | None, other: Labelling) -> Labelling:
     return other if one is None or other.size < one.size else one
 
 
-def leapt(start: Labelling, judge: Judge, options: SearchOptions = DEFAULT) -> Labelling:
-    """The best of what all clear changes at once lead to, uphill too: with many wrong cells the misfit is no guide."""
-    best = labelling = start
-    sheet, seen = Sheet(start.candidates, start.scale), {start.labels.tobytes()}
-    for _ in range(options.leaps):
-        judge.spend(options.leaping)
-        labels = leap(sheet, labelling.labels)
-        if labelling.fits or judge.spent or labels.tobytes() in seen:
-            break
-        seen.add(labels.tobytes())
-        labelling = judge(start.candidates, labels)
-        best = better(best, labelling)
-    return best
-
-
 class BestFirst:
     """A search from one labelling, that has pieces.
 
     `free` (cells,): labels that may change; all of them by default.
     """
 
-    def __init__(self, start: Labelling, free: NDArray[np.bool_] | None = None, options: SearchOptions = DEFAULT):
-        self.best, self._options = start, options
+    def __init__(self, start: Labelling, free: NDArray[np.bool_] | None = None):
+        self.best = start
         self._candidates, self._scale = start.candidates, start.scale
         self._n_faces = int(start.candidates.sides[:, 0].max(initial=-1)) + 1
         self._free = np.ones(start.candidates.count, dtype=bool) if free is None else free
@@ -95,31 +79,31 @@ class BestFirst:
         self._first = self._least = start.mean_misfit
         self._ranked = self._in_vain = 0
         # Misfit, more where batches have been tried, a number that settles ties, the labelling and its changes.
-        near = start.pieces and start.misfit.sum() <= options.most_left
+        near = start.pieces and start.misfit.sum() <= SEARCH.most_left
         self._waiting: list[_Waiting] = [(self._least, -1, start, None)] if near else []
 
     @cached_property
     def _updates(self) -> Updates:
-        return Updates(Sheet(self._candidates, self._scale), self._free, self._options)
+        return Updates(Sheet(self._candidates, self._scale), self._free)
 
     def run(self, judge: Judge) -> Labelling:
         """Go on until a labelling fits, or the budget is spent, or the search is in vain; the best so far."""
-        while self._waiting and not (self.best.fits or judge.spent) and self._in_vain < self._options.in_vain:
+        while self._waiting and not (self.best.fits or judge.spent) and self._in_vain < SEARCH.in_vain:
             value, number, labelling, changed = heapq.heappop(self._waiting)
             if changed is None:
                 if self._hopeless:
                     break
                 self._seen.add(self._updates.outline(labelling.labels))
                 self._ranked += 1
-                judge.spend(self._options.ranking)
-                changed = self._changed(labelling)
+                judge.spend(SEARCH.ranking)
+                changed = map(partial(self._turned, labelling.labels), self._updates.ranked(labelling))
             asked = 0
-            for labels in islice(changed, self._options.batch):
+            for labels in islice(changed, SEARCH.batch):
                 asked += 1
-                if judge.spent or self._tried(labels, labelling, judge) < self._options.better * value:
+                if judge.spent or self._tried(labels, labelling, judge) < SEARCH.better * value:
                     break
             else:
-                value += self._options.tried * labelling.mean_misfit
+                value += SEARCH.tried * labelling.mean_misfit
             if asked:
                 heapq.heappush(self._waiting, (value, number, labelling, changed))
         _log.debug("best-first: misfit %.1e, %d labellings ranked", self.best.size, self._ranked)
@@ -128,19 +112,13 @@ class BestFirst:
     @property
     def _hopeless(self) -> bool:
         """Whether the misfit, about proportional to the number of wrong labels, will not be gone falling as it has."""
-        return self._ranked >= self._options.at_least and (
-            self._ranked * self._least > self._options.patience * (self._first - self._least)
+        return self._ranked >= SEARCH.at_least and (
+            self._ranked * self._least > SEARCH.patience * (self._first - self._least)
         )
 
-    def _changed(self, labelling: Labelling) -> Iterator[NDArray[np.bool_]]:
-        """Small changes of the labels; where the first few are in vain, also all clear ones at once."""
-        for k, move in enumerate(self._updates.ranked(labelling)):
-            if k == self._options.batch and self._n_faces == self._candidates.count:
-                yield leap(self._updates.sheet, labelling.labels)
-            yield self._whole(turned(labelling.labels, move))
-
-    def _whole(self, labels: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """With cells on all edges, unless some cells claim no half-edges."""
+    def _turned(self, labels: NDArray[np.bool_], move: Move) -> NDArray[np.bool_]:
+        """The labels after a move; with cells on all edges, unless some cells claim no half-edges."""
+        labels = turned(labels, move)
         if labels[self._n_faces :].any():
             return labels
         return chosen(self._candidates, np.where(labels, 1.0, -np.inf))

@@ -18,7 +18,10 @@ from numpy.typing import NDArray
 from ...errors import RecoveryError
 from ...linalg import solved
 from ..candidates.choosing import chosen
+from ..judge.labelling import Labelling
 from ..relax.sheet import Sheet, unpinned
+from .best_first import Judge, better
+from .options import SEARCH
 
 _RIDGE = 0.1
 _HELD = 1e-12
@@ -26,7 +29,22 @@ _CLEAR = 0.35
 """A label that is to change by so much is turned over."""
 
 
-def leap(sheet: Sheet, labels: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def leapt(start: Labelling, judge: Judge) -> Labelling:
+    """The best of what all clear changes at once lead to, uphill too: with many wrong cells the misfit is no guide."""
+    best = labelling = start
+    sheet, seen = Sheet(start.candidates, start.scale), {start.labels.tobytes()}
+    for _ in range(SEARCH.leaps):
+        judge.spend(SEARCH.leaping)
+        labels = _leap(sheet, labelling.labels)
+        if labelling.fits or judge.spent or labels.tobytes() in seen:
+            break
+        seen.add(labels.tobytes())
+        labelling = judge(start.candidates, labels)
+        best = better(best, labelling)
+    return best
+
+
+def _leap(sheet: Sheet, labels: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(cells,) labels with all clear changes made; as they are where there is no map."""
     strength = labels.astype(np.float64)
     try:

@@ -19,10 +19,21 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...linalg import factorisation
+from ...topology.keys import runs
 from ..relax.sheet import Sheet
-from .moves import Move
 
 _SMALL = 200  # vertices up to which all columns of the inverse are asked for at once
+
+
+Move = tuple[int, ...]
+"""Candidates whose labels are turned over together."""
+
+
+def turned(labels: NDArray[np.bool_], move: Move) -> NDArray[np.bool_]:
+    """The labels (cells,) after a move."""
+    after = labels.copy()
+    after[list(move)] ^= True
+    return after
 
 
 class ChangedMaps:
@@ -77,9 +88,7 @@ class ChangedMaps:
         cell = np.concatenate(moves)
         move = np.repeat(np.arange(len(moves)), [len(one) for one in moves])
         size = self._cells.size[cell]
-        owner = np.repeat(np.arange(len(cell)), size)
-        start = np.cumsum(size) - size
-        step = np.arange(len(owner)) - start[owner]
+        owner, step = runs(size)
         row = move[owner]
         slot = np.arange(len(row)) - np.searchsorted(row, np.arange(len(moves)))[row]
         corner, after, before = np.zeros((3, len(moves), int(slot.max()) + 1), dtype=np.int64)

@@ -61,4 +61,4 @@ class SearchOptions:
         return self.solves * self.price(n) + self.work
 
 
-DEFAULT = SearchOptions()
+SEARCH = SearchOptions()

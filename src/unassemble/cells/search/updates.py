@@ -12,11 +12,17 @@ from ...errors import RecoveryError
 from ...matrix.operator import row_sizes
 from ..judge.labelling import Labelling
 from ..relax.sheet import STEEPEST, Sheet
-from .low_rank import ChangedMaps
-from .moves import Move, Neighbours, turned
-from .options import DEFAULT, SearchOptions
+from .low_rank import ChangedMaps, Move, turned
+from .options import SEARCH
 
 _BATCH = 5e4  # triangles times moves that are computed together
+
+
+def _overlaps(row: NDArray, column: NDArray, shape: tuple[int, int]) -> list[list[int]]:
+    """Of each row the rows that have a column in common with it."""
+    member = sp.csr_array((np.ones(len(row)), (row, column)), shape=shape)
+    both = (member @ member.T).tocsr()
+    return [own.tolist() for own in np.split(both.indices, both.indptr[1:-1])]
 
 
 class Updates:
@@ -25,10 +31,12 @@ class Updates:
     `free` (cells,): labels that may change; all of them by default.
     """
 
-    def __init__(self, sheet: Sheet, free: NDArray[np.bool_] | None = None, options: SearchOptions = DEFAULT):
-        self.sheet, self._options = sheet, options
+    def __init__(self, sheet: Sheet, free: NDArray[np.bool_] | None = None):
+        self.sheet = sheet
         self._free = sheet.chosen if free is None else sheet.chosen & free
-        self._near = Neighbours(sheet)
+        count, (cell, half) = sheet.candidates.count, sheet.candidates.sides.T
+        self._touching = _overlaps(np.repeat(sheet.cell, 3), sheet.triangles.ravel(), (count, sheet.n_vertices))
+        self._rivals = _overlaps(cell, half, (count, 2 * len(sheet.candidates.edges)))
         n, m = sheet.n_vertices, len(sheet.triangles)
         smaller = row_sizes(n, sheet.edges, np.abs(sheet.weights))[sheet.edges].min(axis=1)
         smaller = np.maximum(smaller, np.finfo(float).tiny)  # entries next to far larger ones underflow
@@ -40,30 +48,38 @@ class Updates:
         """The same for labels that make the same surface, whichever cells they put together or divide."""
         return bytes(np.rint(self.sheet.around(labels.astype(np.float64))).astype(np.int8).tobytes())
 
-    def ranked(self, labelling: Labelling, *, levels: int = 3) -> Iterator[Move]:
+    def _with_rivals(self, labels: list[bool], cell: int) -> Move:
+        """A candidate, and those that have to give way if it is a new one."""
+        return tuple(sorted({cell, *(other for other in self._rivals[cell] if labels[other] and not labels[cell])}))
+
+    def ranked(self, labelling: Labelling) -> Iterator[Move]:
         """Moves that leave least, the best first; what is in the way of a new cell goes.
 
         Single labels and pairs, then also threes: these are told after a few of the others only.
 
-        `labelling`: in this drawing; with pieces; `levels`: labels in one move, at most.
+        `labelling`: in this drawing; with pieces.
         """
         labels = labelling.labels
         try:
-            maps = ChangedMaps(self.sheet, labels, self._options.near)
+            maps = ChangedMaps(self.sheet, labels, SEARCH.near)
         except RecoveryError:
             return
-        most = int(np.clip(self._options.moves_work / self.sheet.n_vertices, 1, self._options.moves))
-        now = labels.tolist()
-        moves = list(dict.fromkeys(self._near.with_rivals(now, (k,)) for k in self._suspects(labelling)[:most]))
+        most = int(np.clip(SEARCH.moves_work / self.sheet.n_vertices, 1, SEARCH.moves))
+        # Candidates about the largest misfits first.
+        at_vertex = np.bincount(labelling.edges.ravel(), np.repeat(labelling.misfit**2, 2), self.sheet.n_vertices)
+        cells, now = self.sheet.candidates.cells, labels.tolist()
+        owner = np.repeat(np.arange(cells.count), cells.size)
+        order = np.argsort(-(np.bincount(owner, at_vertex[cells.vertices], cells.count) / cells.size), kind="stable")
+        moves = list(dict.fromkeys(self._with_rivals(now, k) for k in order[self._free[order]].tolist()[:most]))
         left = self._left(maps, labels, moves)
         alone, given = self._alone(moves, left), set[Move]()
-        for level in range(2, levels + 1):
-            first = np.argsort(left, kind="stable")[: self._options.leaders].tolist()
+        for level in (2, 3):
+            first = np.argsort(left, kind="stable")[: SEARCH.leaders].tolist()
             more = self._joined(labels, {moves[k]: float(left[k]) for k in first}, alone, set(moves))[:most]
             left = np.append(left, self._left(maps, labels, more))
             moves += more
-            order = [k for k in np.argsort(left, kind="stable").tolist() if np.isfinite(left[k])]
-            for move in (moves[k] for k in order[: len(order) if level == levels else self._options.soon]):
+            best = [moves[k] for k in np.argsort(left, kind="stable").tolist() if np.isfinite(left[k])]
+            for move in best[: len(best) if level == 3 else SEARCH.soon]:
                 if move not in given:
                     given.add(move)
                     yield move
@@ -77,34 +93,24 @@ class Updates:
         that touches it, of the `usual` ones; and these `more` moves.
         """
         labels = labelling.labels
-        maps = ChangedMaps(self.sheet, labels, self._options.nearest)
+        maps = ChangedMaps(self.sheet, labels, SEARCH.nearest)
         now = labels.tolist()
         first = np.flatnonzero(self._free & supposed).tolist()
-        moves = list(dict.fromkeys([*more, *(self._near.with_rivals(now, (k,)) for k in first)]))
+        moves = list(dict.fromkeys([*more, *(self._with_rivals(now, k) for k in first)]))
         if not moves:
             return
-        most = int(self._options.beside_work / self.sheet.n_vertices) + 1
+        most = int(SEARCH.beside_work / self.sheet.n_vertices) + 1
         left = self._left(maps, labels, moves)
         leaders = dict(zip(moves, left.tolist(), strict=True))
         pairs = self._joined(labels, leaders, self._alone(moves, left), set(moves), usual)[:most]
-        moves, left = moves + pairs, np.append(left, self._left(maps, labels, pairs, self._options.faint))
+        moves, left = moves + pairs, np.append(left, self._left(maps, labels, pairs, SEARCH.faint))
         seen = {self.outline(labels)}
         for k in np.argsort(left, kind="stable").tolist():
-            if not left[k] <= self._options.faint:
+            if not left[k] <= SEARCH.faint:
                 return
             if (outline := self.outline(turned(labels, moves[k]))) not in seen:
                 seen.add(outline)
                 yield moves[k]
-
-    def _suspects(self, labelling: Labelling) -> list[int]:
-        """Candidates, those about the largest misfits first."""
-        sheet = self.sheet
-        at_vertex = np.bincount(labelling.edges.ravel(), np.repeat(labelling.misfit**2, 2), sheet.n_vertices)
-        cells = sheet.candidates.cells
-        owner = np.repeat(np.arange(cells.count), cells.size)
-        nearby = np.bincount(owner, at_vertex[cells.vertices], cells.count) / cells.size
-        order = np.argsort(-nearby, kind="stable")
-        return order[self._free[order]].tolist()
 
     def _alone(self, moves: list[Move], left: NDArray) -> NDArray[np.float64]:
         """(cells,) what is left after the change of one label, with what gives way; the most of all where not known."""
@@ -128,9 +134,9 @@ class Updates:
         free, value = (self._free if others is None else self._free & others).tolist(), alone.tolist()
         for move, left in leaders.items():
             after = turned(labels, move).tolist()
-            for other in self._near.touching(move):
-                if other not in move and free[other]:
-                    both = tuple(sorted({*move} ^ {*self._near.with_rivals(after, (other,))}))
+            for other in sorted({k for cell in move for k in self._touching[cell]} - {*move}):
+                if free[other]:
+                    both = tuple(sorted({*move} ^ {*self._with_rivals(after, other)}))
                     promise[both] = min(promise.get(both, np.inf), left + value[other])
         new = promise.keys() - told - {()}
         return sorted(new, key=lambda both: (promise[both], both))
@@ -159,8 +165,14 @@ class Updates:
             w = self._fitted(z[:, hopeful], after[:, hopeful], few)[edges]
             hopeful[hopeful] = _misfits(w, self._weights[edges]).sum(axis=0) <= most * len(self._weights)
         w = self._fitted(z[:, hopeful], after[:, hopeful])
+        c = np.ones(w.shape[1])
+        if self.sheet.free_scale:  # for each column, from the weights that it brings near the given ones
+            used = np.clip(w, -5.0, 5.0)  # more belongs to flat triangles
+            for _ in range(3):
+                c = (self._weights @ used) / np.maximum((used * used).sum(axis=0), np.finfo(float).tiny)
+                used = np.where(np.abs(c * w - self._weights[:, None]) < 0.5, w, 0.0)
         with np.errstate(all="ignore"):  # flat triangles beside small entries, or nothing at all, have no scale
-            left[hopeful] = _misfits(self._scales(w) * w, self._weights).mean(axis=0)
+            left[hopeful] = _misfits(c * w, self._weights).mean(axis=0)
         return left
 
     def _fitted(
@@ -176,16 +188,6 @@ class Updates:
         cotangent = _cotangents(z, sheet.triangles[triangles]) * labels[sheet.cell[triangles]]
         columns = (triangles + len(sheet.cell) * np.arange(3)[:, None]).ravel()
         return np.asarray(self._of_edge[:, columns] @ cotangent.reshape(len(columns), z.shape[1]))
-
-    def _scales(self, w: NDArray) -> NDArray[np.float64]:
-        """(k,) c for each column of weights over their row sizes, from those that it brings near the given ones."""
-        if not self.sheet.free_scale:
-            return np.ones(w.shape[1])
-        used = np.clip(w, -5.0, 5.0)  # more belongs to flat triangles
-        for _ in range(3):
-            c = (self._weights @ used) / np.maximum((used * used).sum(axis=0), np.finfo(float).tiny)
-            used = np.where(np.abs(c * w - self._weights[:, None]) < 0.5, w, 0.0)
-        return np.asarray(c)
 
 
 def _misfits(w: NDArray, weights: NDArray) -> NDArray[np.float64]:

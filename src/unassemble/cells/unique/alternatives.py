@@ -14,7 +14,7 @@ What then fits when solved by itself is another mesh with the same matrix.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain, islice
@@ -32,10 +32,10 @@ from ...topology.keys import contains, pair_keys
 from ..candidates.candidates import Candidates
 from ..judge.labelling import Labelling
 from ..relax.sheet import Sheet
-from ..search.moves import Move, turned
+from ..search.low_rank import Move, turned
 from ..search.updates import Updates
 from ..undivided import undivided
-from .around import Around, Cell, cycles
+from .around import Around, Cell
 
 SEARCHED_ROWS = 1000
 """Rows of a component around whose answer others are looked for: the cost grows like the square."""
@@ -47,13 +47,7 @@ _MOST_SOLVED = 60
 
 @dataclass(frozen=True)
 class Alternative:
-    """Another mesh that fits as well as the one found, in the place where they differ.
-
-    Attributes
-    ----------
-    cells, other_cells : tuple of tuple of int
-        Cells that only the one or the other has, rows in running order.
-    """
+    """Another mesh that fits as well as the one found: cells that only the one or the other has, in running order."""
 
     cells: tuple[Cell, ...]
     other_cells: tuple[Cell, ...]
@@ -64,32 +58,19 @@ def alternatives(
 ) -> list[Alternative]:
     """One other mesh for each component of up to 1,000 rows that has any.
 
-    Parameters
-    ----------
-    stored : OperatorMatrix
-        Without the vanished entries.
-    cells : Polygons
-        Of the mesh that was found, counter-clockwise.
-    z : (n,) complex128
-        Positions in the frame in which the operator is the Laplacian.
-    scale : float, optional
-        c, where it is known.
-    agree : float
-        Relative difference of numbers that noise may cause.
+    `stored`: without the vanished entries; `cells`: of the mesh that was found, counter-clockwise; `z` (n,) complex:
+    positions in the frame in which the operator is the Laplacian; `scale`: c, where it is known; `agree`: relative
+    difference of numbers that noise may cause.
     """
     found = []
     for part in components(stored.n, stored.edges):
         if len(part.vertices) <= SEARCHED_ROWS:
-            other = _other(stored, part, _within(part, cells, stored.n), z[part.vertices], scale, max(agree, ALIKE))
+            number = np.full(stored.n, -1)
+            number[part.vertices] = np.arange(len(part.vertices))
+            own = cells.chosen(number[cells.vertices[cells.offsets[:-1]]] >= 0, number)
+            other = _other(stored, part, own, z[part.vertices], scale, max(agree, ALIKE))
             found += [] if other is None else [other]
     return found
-
-
-def _within(part: Numbering, cells: Polygons, n: int) -> Polygons:
-    """The cells of a component in its numbering."""
-    number = np.full(n, -1)
-    number[part.vertices] = np.arange(len(part.vertices))
-    return cells.chosen(number[cells.vertices[cells.offsets[:-1]]] >= 0, number)
 
 
 def _other(
@@ -108,21 +89,21 @@ def _other(
     every = (around.regrouped, around.turned_over, _relabelled(around, answer))
     for move in chain.from_iterable(islice(moves, _MOST_SOLVED) for moves in every):
         other = Labelling.of(around.candidates, turned(answer.labels, move))
-        if other.fits and (others := _cells_of(other)) != own and not cracked(other):
-            return Alternative(*(_named(some, part.vertices) for some in (own - others, others - own)))
+        if other.fits and (others := _cells_of(other)) != own and not _cracked(other):
+            row = part.vertices.tolist()
+            only = own - others, others - own
+            return Alternative(*(tuple(sorted(_as_cell([row[v] for v in cell]) for cell in some)) for some in only))
     return None
 
 
 def _relabelled(around: Around, answer: Labelling) -> Iterator[Move]:
     """Small changes that low-rank updates do not tell from the answer."""
     with suppress(RecoveryError):
-        updates = Updates(Sheet(around.candidates, answer.scale))
-        yield from updates.as_good(answer, around.supposed, around.usual, around.reduced)
-
-
-def _named(cells: Iterable[Cell], rows: NDArray[np.int64]) -> tuple[Cell, ...]:
-    """By the rows of the matrix."""
-    return tuple(sorted(as_cell(rows[list(cell)].tolist()) for cell in cells))
+        supposed = around.candidates.corner  # their third sides are supposed to have vanished from the boundary
+        usual = around.candidates.first | supposed | around.labels
+        # Cells that give up a vertex at a right angle.
+        reduced: list[Move] = [tuple(sorted((a.cell, a.rest))) for a in around.right_angles if a.rest >= 0]
+        yield from Updates(Sheet(around.candidates, answer.scale)).as_good(answer, supposed, usual, reduced)
 
 
 def _embedding(part: Numbering, z: NDArray[np.complex128]) -> FaceComplex | None:
@@ -139,17 +120,17 @@ def _cells_of(labelling: Labelling) -> set[Cell]:
     n = labelling.candidates.n_vertices
     vanished = ~contains(pair_keys(n, *labelling.candidates.edges.T), pair_keys(n, *labelling.edges.T))
     triangles, polygons = undivided(labelling.pieces, vanished)
-    return {as_cell(cell) for cell in (*triangles.tolist(), *cycles(polygons))}
+    return {_as_cell(cell) for cell in (*triangles.tolist(), *polygons.cycles)}
 
 
-def as_cell(corners: list[int] | Cell) -> Cell:
+def _as_cell(corners: list[int] | Cell) -> Cell:
     """A cell by its corners in running order: the smallest first, then the smaller of its neighbours."""
     place = min(range(len(corners)), key=corners.__getitem__)
     cell = (*corners[place:], *corners[:place])
     return cell if cell[1] < cell[-1] else (cell[0], *cell[:0:-1])
 
 
-def cracked(labelling: Labelling) -> bool:
+def _cracked(labelling: Labelling) -> bool:
     """Whether a hole has no area, and a vertex lies on the side of the cell beyond.
 
     A slit whose vertices lie in the same places on both sides is none of these: such meshes are made on purpose.
@@ -165,12 +146,8 @@ def cracked(labelling: Labelling) -> bool:
         flat = np.abs(area) <= CANCELLED * length**2
         flat[np.argmax(np.abs(area))] = False  # the outer boundary
         for k in np.flatnonzero(flat).tolist():
-            if not _is_slit(tail[begin[k] : piece.loop_offsets[k + 1]] / length[k]):
+            places = np.unique(np.round(tail[begin[k] : piece.loop_offsets[k + 1]] / length[k] / ALIKE))
+            # A slit runs along a tree and back: all its edges have both their sides.
+            if 2 * (len(places) - 1) != piece.loop_offsets[k + 1] - begin[k]:
                 return True
     return False
-
-
-def _is_slit(z: NDArray[np.complex128]) -> bool:
-    """Whether a loop (k,) of length 1 runs along a tree and back: all k / 2 edges of the tree have both their sides."""
-    places = np.unique(np.round(z / ALIKE))
-    return 2 * (len(places) - 1) == len(z)

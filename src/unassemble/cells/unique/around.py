@@ -9,15 +9,13 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from ...topology import Polygons
 from ...topology.faces import joined
+from ...topology.numbering import connected
 from ..candidates.candidates import Candidates
-from ..candidates.widened import with_more
-from ..search.moves import Move
+from ..search.low_rank import Move
 
 Cell = tuple[int, ...]
 
@@ -42,12 +40,13 @@ class Around:
     labels: NDArray[np.bool_]  # (cells,) the answer
     z: NDArray[np.complex128]  # (n,)
     right_angles: list[RightAngle]
+    alike: list[tuple[RightAngle, RightAngle]]  # see :func:`_alike`
     agree: float  # relative difference of equal numbers
 
     @classmethod
     def of(cls, candidates: Candidates, cells: Polygons, z: NDArray[np.complex128], agree: float) -> Around:
         """All of an answer with some cells, counter-clockwise."""
-        number = {frozenset(cell): k for k, cell in enumerate(cycles(candidates.cells))}
+        number = {frozenset(cell): k for k, cell in enumerate(candidates.cells.cycles)}
         new: list[Cell] = []
 
         def named(cell: Cell) -> int:
@@ -57,41 +56,34 @@ class Around:
                 new.append(cell)
             return number[key]
 
-        own = [named(cell) for cell in cycles(cells)]
-        right_angles = [
-            RightAngle(apex, ends, named(cell), named(rest) if len(rest) > 2 else -1)
-            for apex, ends, cell, rest in _right_angles(candidates, cells, z, agree)
-        ]
+        cycles = cells.cycles
+        own = [named(cell) for cell in cycles]
+        apex, after, before = cells.vertices, cells.following, np.empty_like(cells.vertices)
+        before[cells.following_place] = apex
+        one, other = z[before] - z[apex], z[after] - z[apex]
+        right = np.abs((np.conj(one) * other).real) <= agree * np.abs(one) * np.abs(other)
+        right &= ~joined(candidates.n_vertices, candidates.edges, before, after)
+        owner = np.repeat(np.arange(cells.count), cells.size)[right].tolist()
+        right_angles = []
+        for k, h, *ends in zip(owner, *(some[right].tolist() for some in (apex, before, after)), strict=True):
+            rest = tuple(v for v in cycles[k] if v != h)
+            right_angles.append(RightAngle(h, (ends[0], ends[1]), own[k], named(rest) if len(rest) > 2 else -1))
+        alike = list(_alike(right_angles, z, agree))
         # Each may be one of the corners that right angles regrouped make.
-        for one, other in _alike(right_angles, z, agree):
-            for x, y in (*_crossed(one, other), *_turned_over(one, other)):
+        for one_, other_ in alike:
+            for x, y in (*_crossed(one_, other_), *_turned_over(one_, other_)):
                 if x != y:
-                    named((x, one.apex, y))
-        more = with_more(candidates, new)
+                    named((x, one_.apex, y))
+        more = candidates.with_more(new)
         labels = np.zeros(more.count, dtype=bool)
         labels[own] = True
-        return cls(more, labels, z, right_angles, agree)
-
-    @property
-    def supposed(self) -> NDArray[np.bool_]:
-        """(cells,) corners: their third sides are supposed to have vanished from the boundary."""
-        return self.candidates.corner
-
-    @property
-    def usual(self) -> NDArray[np.bool_]:
-        """(cells,) what may change along with one of these."""
-        return self.candidates.first | self.supposed | self.labels
-
-    @property
-    def reduced(self) -> list[Move]:
-        """Cells that give up a vertex at a right angle."""
-        return [tuple(sorted((angle.cell, angle.rest))) for angle in self.right_angles if angle.rest >= 0]
+        return cls(more, labels, z, right_angles, alike, agree)
 
     @property
     def regrouped(self) -> Iterator[Move]:
         """Two right angles at one vertex regrouped, where what they hold together can lie so."""
         edges = self.candidates.edges
-        for one, other in _alike(self.right_angles, self.z, self.agree):
+        for one, other in self.alike:
             old = {one.cell, other.cell}
             rest = {one.rest, other.rest} - {-1}
             part = self._parts(old, rest)
@@ -111,7 +103,7 @@ class Around:
         """
         loop = self._loops
         ends = []
-        for one, other in _alike(self.right_angles, self.z, self.agree):
+        for one, other in self.alike:
             sides = [loop.get(frozenset(angle.ends), -1) for angle in (one, other)]
             if one.rest == other.rest == -1 and min(sides) >= 0 and sides[0] != sides[1]:
                 ends.append((one, other))
@@ -134,19 +126,18 @@ class Around:
             np.sort(np.column_stack([cells.vertices, cells.following]), axis=1) @ [n, 1], return_counts=True
         )
         ends = np.column_stack(np.divmod(key[count == 1], n))
-        graph = sp.coo_array((np.ones(len(ends)), ends.T), shape=(n, n))
-        label = csgraph.connected_components(graph, directed=False)[1]
+        label = connected(n, *ends.T)[1]
         return {frozenset(pair): int(label[pair[0]]) for pair in ends.tolist()}
 
     @cached_property
     def _number(self) -> dict[frozenset[int], int]:
-        return {frozenset(cell): k for k, cell in enumerate(cycles(self.candidates.cells))}
+        return {frozenset(cell): k for k, cell in enumerate(self.candidates.cells.cycles)}
 
     @cached_property
     def _wedges(self) -> set[tuple[int, frozenset[int]]]:
         """Each vertex of a cell, and those before and after it."""
         cells = self.candidates.cells.chosen(self.labels, np.arange(len(self.z)))
-        return {(cell[k - 1], frozenset((cell[k - 2], cell[k]))) for cell in cycles(cells) for k in range(len(cell))}
+        return {(cell[k - 1], frozenset((cell[k - 2], cell[k]))) for cell in cells.cycles for k in range(len(cell))}
 
     def _parts(self, old: set[int], rest: set[int]) -> dict[tuple[int, int], int]:
         """For each side (tail, head) of a cell the part, connected by edges, that it belongs to without some cells."""
@@ -158,12 +149,8 @@ class Around:
         owner = np.repeat(np.arange(cells.count), cells.size)
         side, owner = side[kept[owner]], owner[kept[owner]]
         key, row = np.unique(side, return_inverse=True)
-        m = len(key)
-        graph = sp.coo_array((np.ones(len(row)), (row, m + owner)), shape=(m + cells.count, m + cells.count))
-        label = csgraph.connected_components(graph, directed=False)[1]
-        return dict(
-            zip(zip(*(part.tolist() for part in np.divmod(key, n)), strict=True), label[:m].tolist(), strict=True)
-        )
+        label = connected(len(key) + cells.count, row, len(key) + owner)[1]
+        return {(k // n, k % n): part for k, part in zip(key.tolist(), label.tolist(), strict=False)}
 
     def _may_lie(self, part: dict[tuple[int, int], int], h: int, x: int, y: int) -> bool:
         """Whether h-x and h-y can make a right angle: they belong to two parts, or do so where they are."""
@@ -207,25 +194,3 @@ def _alike(
             same = abs(ratio[i] / ratio[j] - 1) <= agree or abs(ratio[i] * ratio[j] - 1) <= agree
             if same and here[i].cell != here[j].cell:
                 yield here[i], here[j]
-
-
-def _right_angles(
-    candidates: Candidates, cells: Polygons, z: NDArray[np.complex128], agree: float
-) -> Iterator[tuple[int, tuple[int, int], Cell, Cell]]:
-    """Apex, ends, cell and what is left of it without the apex."""
-    following, owner = cells.following, np.repeat(np.arange(cells.count), cells.size)
-    previous = np.empty_like(following)
-    start = cells.offsets[owner]
-    previous = cells.vertices[start + (np.arange(len(start)) - start - 1) % cells.size[owner]]
-    one, other = z[previous] - z[cells.vertices], z[following] - z[cells.vertices]
-    right = np.abs((np.conj(one) * other).real) <= agree * np.abs(one) * np.abs(other)
-    right &= ~joined(candidates.n_vertices, candidates.edges, previous, following)
-    for k in np.flatnonzero(right).tolist():
-        cell = tuple(cells.vertices[cells.offsets[owner[k]] : cells.offsets[owner[k] + 1]].tolist())
-        apex = int(cells.vertices[k])
-        yield apex, (int(previous[k]), int(following[k])), cell, tuple(v for v in cell if v != apex)
-
-
-def cycles(cells: Polygons) -> list[Cell]:
-    """Vertices of each cell."""
-    return [tuple(cell.tolist()) for cell in np.split(cells.vertices, cells.offsets[1:-1])] if cells.count else []

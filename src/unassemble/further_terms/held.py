@@ -1,9 +1,10 @@
-"""A mesh of what was left, held against the whole matrix."""
+"""What all terms have in common: the row sums that show them, and a mesh held against the whole matrix."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +13,38 @@ from ..certify import Certificate, Terms, certify
 from ..certify_elements import certify_elements
 from ..matrix import OperatorMatrix
 from ..recovery import ConformingMesh, PlanarMesh
-from ..tolerances import CERTIFIED
+from ..tolerances import CERTIFIED, SIGMAS
 
 Plain = Callable[..., PlanarMesh]
+
+
+class RowSums:
+    """A 1: c L has none, s M the integrals of s times its basis functions."""
+
+    def __init__(self, matrix: OperatorMatrix):
+        whole = matrix.csr()
+        self.values: NDArray[np.float64] = np.asarray(whole.sum(axis=1)).ravel()
+        # about their errors
+        self.rounding: NDArray[np.float64] = 4 * np.finfo(float).eps * np.asarray(abs(whole).sum(axis=1)).ravel()
+
+    @cached_property
+    def there(self) -> NDArray[np.bool_]:
+        """(n,) those beyond rounding."""
+        return np.asarray(np.abs(self.values) > SIGMAS * self.rounding)
+
+    @property
+    def sign(self) -> int:
+        """Of all that are beyond rounding, if these are the most and have one sign; else 0.
+
+        Small triangles of graded meshes have integrals that may be lost.
+        """
+        signs = np.sign(self.values[self.there])
+        return int(signs[0]) if 2 * len(signs) > len(self.there) and np.ptp(signs) == 0 else 0
+
+    @property
+    def sizes(self) -> NDArray[np.float64]:
+        """(n,) at least those of rounding."""
+        return np.maximum(np.abs(self.values), self.rounding)
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +52,7 @@ class Held:
     """A matrix, and the tensor that is to be undone."""
 
     matrix: OperatorMatrix
-    tensor: tuple[float, float, float] | None
+    tensor: tuple[float, float, float] | None = None
 
     def with_terms(self, found: PlanarMesh, terms: Terms, operator: str, *notes: str) -> PlanarMesh:
         """The mesh of the Laplacian as that of the whole matrix, if it gives that back."""
@@ -59,8 +89,9 @@ class Held:
         return certify_elements(*given, found.cells, factors, rules, terms)
 
 
-def areas_of(mesh: PlanarMesh) -> NDArray[np.float64]:
-    """(m,) of all triangles, those of polygons too, as ``divided`` has them."""
-    a, b, c = mesh.points[mesh.divided()[0]].transpose(1, 2, 0)
-    (ux, uy), (wx, wy) = b - a, c - a
-    return np.asarray((ux * wy - uy * wx) / 2)
+def size_note(reaction: float) -> str:
+    """How lengths depend on s."""
+    return (
+        "the mesh has a size: if the factor of the mass matrix is s, lengths are those given here times "
+        f"sqrt({reaction:.12g} / s)"
+    )
