@@ -120,7 +120,7 @@ def test_an_accident_leaves_the_old_picture(tmp_path, monkeypatch):
 
 
 def test_no_display_and_no_pyplot_are_needed():
-    code = "import sys, unassemble.plot.picture, unassemble.plot; assert 'matplotlib' not in sys.modules"
+    code = "import sys, unassemble; unassemble.recover, unassemble.Recovery; assert 'matplotlib' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
     code = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"

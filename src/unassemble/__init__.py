@@ -23,29 +23,6 @@ if TYPE_CHECKING:
     from .pipeline import recover
     from .recovery import Body, ConformingMesh, PlanarMesh, Recovery, Structure, Surface
 
-# Imported on first use: the command line answers --help without loading scipy.
-_HOMES = {
-    "inspect_matrix": "inspection",
-    "recover": "pipeline",
-    **dict.fromkeys(("Body", "ConformingMesh", "PlanarMesh", "Recovery", "Structure", "Surface"), "outputs"),
-    **dict.fromkeys(
-        (
-            "FormatError",
-            "GeometryError",
-            "InputError",
-            "MatrixError",
-            "MatrixFileError",
-            "NotPlanarError",
-            "OutputError",
-            "RecoveryError",
-            "SolverError",
-            "TopologyError",
-            "UnassembleError",
-        ),
-        "errors",
-    ),
-}
-
 __all__ = [
     "Body",
     "ConformingMesh",
@@ -70,12 +47,20 @@ __all__ = [
 ]
 
 
+# Imported on first use: the command line answers --help without loading scipy. All others are errors.
+_HOMES = {
+    "inspect_matrix": "inspection",
+    "recover": "pipeline",
+    **dict.fromkeys(("Body", "ConformingMesh", "PlanarMesh", "Recovery", "Structure", "Surface"), "outputs"),
+}
+
+
 def __getattr__(name: str) -> object:
-    if name not in _HOMES:
+    if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    value = globals()[name] = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    value = globals()[name] = getattr(import_module(f".{_HOMES.get(name, 'errors')}", __name__), name)
     return value
 
 

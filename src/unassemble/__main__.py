@@ -1,7 +1,5 @@
 """Where ``unassemble`` and ``python -m unassemble`` begin; Ctrl-C is quiet from here on, while modules load too."""
 
-from __future__ import annotations
-
 import sys
 
 

@@ -28,16 +28,6 @@ class Budget:
     number in a column, a step of plain Python about a hundred. Nothing is measured: the same search spends the same
     on every machine.
 
-    Parameters
-    ----------
-    work : float
-        Units in all; infinite for a search that its caller bounds otherwise.
-
-    Attributes
-    ----------
-    spent : float
-        Units taken so far, those of shares included.
-
     Examples
     --------
     >>> budget = Budget(100)
@@ -48,8 +38,8 @@ class Budget:
     (True, False, 20.0)
     """
 
-    work: float
-    spent: float = 0.0
+    work: float  # units in all; infinite for a search that its caller bounds otherwise
+    spent: float = 0.0  # units taken so far, those of shares included
     parent: Budget | None = None
 
     @property

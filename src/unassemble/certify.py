@@ -3,8 +3,6 @@
 Knows nothing of how the mesh was found, and imports no solver.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,50 +18,26 @@ _DENSE = 400  # triangles of a piece whose equations are counted by their rank
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """What a matrix S (c L + s M) S has besides c L, and nothing else on its diagonal.
+    """What a matrix S (c L + s M) S has besides c L, and nothing else on its diagonal."""
 
-    Attributes
-    ----------
-    diagonal : (n,) float64
-        A_ii of the matrix.
-    reaction : float
-        s.
-    lumped : bool
-        Whether M is diagonal: a third of its area from each triangle to each of its corners.
-    scaling : (n,) float64 or None
-        S; the identity by default.
-    """
-
-    diagonal: NDArray[np.float64]
-    reaction: float = 0.0
-    lumped: bool = False
-    scaling: NDArray[np.float64] | None = None
+    diagonal: NDArray[np.float64]  # (n,) A_ii of the matrix
+    reaction: float = 0.0  # s
+    lumped: bool = False  # whether M is diagonal: a third of its area from each triangle to each of its corners
+    scaling: NDArray[np.float64] | None = None  # (n,) S; the identity by default
 
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """How well a mesh explains a matrix.
+    """How well a mesh explains a matrix."""
 
-    Attributes
-    ----------
-    backward_error : float
-        Largest difference between an off-diagonal entry and the re-assembled one, relative to the largest
-        off-diagonal entry of its row.
-    pairs : (k, 2) int64
-        Rows and columns of all entries of either, upper triangle; with further terms the diagonal as well.
-    misfits : (k,) float64
-        Their differences, relative in the same way.
-    differences : (k,) float64
-        Their differences, re-assembled minus given.
-    flipped : (f,) int64
-        Triangles that are flat or turned over: a mesh with any of them is not a planar one.
-    """
-
+    # largest difference between an off-diagonal entry and the re-assembled one, relative to the largest off-diagonal
+    # entry of its row
     backward_error: float
+    # (k, 2) rows and columns of all entries of either, upper triangle; with further terms the diagonal as well
     pairs: NDArray[np.int64]
-    misfits: NDArray[np.float64]
-    differences: NDArray[np.float64]
-    flipped: NDArray[np.int64]
+    misfits: NDArray[np.float64]  # (k,) their differences, relative in the same way
+    differences: NDArray[np.float64]  # (k,) re-assembled minus given
+    flipped: NDArray[np.int64]  # (f,) triangles that are flat or turned over: with any of them a mesh is not planar
 
     def worst(
         self, count: int = 10, *, noise: NDArray | None = None, first: NDArray | None = None
@@ -111,20 +85,44 @@ def certify(
         K; the identity by default.
     terms : Terms, optional
     """
-    key, value = _assemble(points, triangles, factor, tensor, terms)
-    return compared(len(points), edges, entries, key, value, _flipped(points, triangles), terms)
+    kxx, kxy, kyy = tensor or (1.0, 0.0, 1.0)
+    corners = [np.ascontiguousarray(column) for column in triangles.T]
+    at = [points[corner] for corner in corners]
+    (ux, uy), (wx, wy) = (at[1] - at[0]).T, (at[2] - at[0]).T
+    flipped = np.flatnonzero(~(ux * wy - uy * wx > 0))
+    # With side s_i facing corner i turned by a right angle, grad(phi_i) = s_i / (2 area), and the turned tensor is the
+    # adjugate of K: the entry is s_i' adj(K) s_j / (4 area), areas taken positive.
+    sides = [(b - a).T for a, b in (at[1:], at[2::-2], at[:2])]
+    ends, values = [], []
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a flat triangle certifies nothing
+        double = np.abs(sides[0][0] * sides[1][1] - sides[0][1] * sides[1][0])
+        weight = factor / (2 * double)
+        for i, j in ((0, 1), (1, 2), (2, 0), *(((0, 0), (1, 1), (2, 2)) if terms else ())):
+            (xi, yi), (xj, yj) = sides[i], sides[j]
+            product = kyy * (xi * xj) - kxy * (xi * yj + yi * xj) + kxx * (yi * yj)
+            ends.append((np.minimum(corners[i], corners[j]), np.maximum(corners[i], corners[j])))
+            value = weight * product
+            if terms is not None:  # int s phi_i phi_j is s area (1 + delta_ij) / 12
+                part = (6 if i == j else np.inf) if terms.lumped else (12 if i == j else 24)
+                value = value + terms.reaction / part * double
+            values.append(value)
+    rows, columns = (np.concatenate(part) for part in zip(*ends, strict=True))
+    return compared(len(points), edges, entries, (rows, columns), np.concatenate(values), flipped, terms)
 
 
 def compared(
     n: int,
     edges: NDArray,
     entries: NDArray,
-    key: NDArray,
-    value: NDArray,
+    places: tuple[NDArray, NDArray],
+    values: NDArray,
     flipped: NDArray,
     terms: Terms | None = None,
 ) -> Certificate:
-    """The entries of a mesh of n points, at increasing keys i n + j, against those of a matrix."""
+    """The entries of a mesh of n points, added up of values at rows i and columns j >= i, against those of a matrix."""
+    summed = sp.coo_array((values, places), shape=(n, n)).tocsr()
+    summed.sort_indices()
+    key, value = np.repeat(np.arange(n), np.diff(summed.indptr)) * n + summed.indices, summed.data
     if terms is not None and terms.scaling is not None:
         value = value * terms.scaling[key // n] * terms.scaling[key % n]
     given = edges[:, 0] * n + edges[:, 1]
@@ -156,51 +154,6 @@ def relative(difference: NDArray, reference: NDArray) -> NDArray[np.float64]:
     return np.where(np.isnan(ratio), np.inf, ratio)
 
 
-def _flipped(points: NDArray, triangles: NDArray) -> NDArray[np.int64]:
-    a, b, c = points[triangles].transpose(1, 2, 0)
-    (ux, uy), (wx, wy) = b - a, c - a
-    return np.flatnonzero(~(ux * wy - uy * wx > 0))
-
-
-def _assemble(
-    points: NDArray,
-    triangles: NDArray,
-    factor: NDArray,
-    tensor: tuple[float, float, float] | None,
-    terms: Terms | None,
-) -> tuple[NDArray, NDArray]:
-    """Off-diagonal entries: int K grad(phi_i) . grad(phi_j) over triangles, areas taken positive.
-
-    With further terms those on the diagonal too, and int s phi_i phi_j: s area (1 + delta_ij) / 12.
-
-    With side s_i facing corner i turned by a right angle, grad(phi_i) = s_i / (2 area), and the
-    turned tensor is the adjugate of K: the entry is s_i' adj(K) s_j / (4 area).
-    """
-    n = len(points)
-    kxx, kxy, kyy = tensor or (1.0, 0.0, 1.0)
-    corners = [np.ascontiguousarray(column) for column in triangles.T]
-    at = [points[corner] for corner in corners]
-    sides = [(b - a).T for a, b in (at[1:], at[2::-2], at[:2])]
-    ends, values = [], []
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a flat triangle certifies nothing
-        double = np.abs(sides[0][0] * sides[1][1] - sides[0][1] * sides[1][0])
-        weight = factor / (2 * double)
-        for i, j in ((0, 1), (1, 2), (2, 0), *(((0, 0), (1, 1), (2, 2)) if terms else ())):
-            (xi, yi), (xj, yj) = sides[i], sides[j]
-            product = kyy * (xi * xj) - kxy * (xi * yj + yi * xj) + kxx * (yi * yj)
-            ends.append((np.minimum(corners[i], corners[j]), np.maximum(corners[i], corners[j])))
-            values.append(weight * product if terms is None else weight * product + _share(terms, i == j) * double)
-    rows, columns = (np.concatenate(part) for part in zip(*ends, strict=True))
-    summed = sp.coo_array((np.concatenate(values), (rows, columns)), shape=(n, n)).tocsr()
-    summed.sort_indices()
-    return np.repeat(np.arange(n), np.diff(summed.indptr)) * n + summed.indices, summed.data
-
-
-def _share(terms: Terms, own: bool) -> float:
-    """What a triangle adds to an entry of s M, over twice its area."""
-    return terms.reaction / (6 if own else np.inf) if terms.lumped else terms.reaction / (12 if own else 24)
-
-
 def without_spare_equations(
     edges: NDArray, points: NDArray, triangles: NDArray, *, known_scale: bool
 ) -> NDArray[np.int64]:
@@ -211,18 +164,7 @@ def without_spare_equations(
     an entry are zeros that were supposed, and what they say of each other is no evidence: as many equations are left
     out as vanishing sides depend on each other.
 
-    Parameters
-    ----------
-    edges : (e, 2) int64
-        Pairs i < j of stored entries.
-    points : (n, 2) float64
-    triangles : (m, 3) int64
-    known_scale : bool
-        Whether c is given.
-
-    Returns
-    -------
-    (k,) int64
+    `edges` (e, 2) are the pairs i < j of stored entries; `known_scale` tells whether c is given. Returns (k,) rows.
     """
     n = len(points)
     ends = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2) @ [n, 1]
@@ -289,23 +231,9 @@ def chi_square_verdict(misfit: NDArray, freedom: int, sigma: float, *, repeats: 
     the largest misfit is tested as well. No misfit varies more than the noise itself, so that the normal tail, times
     the number of entries, bounds its p-value. Errors of rounding are spread evenly: there both p-values are too large.
 
-    Parameters
-    ----------
-    misfit : (k,) float64
-        Re-assembled minus given entries, each over the standard deviation of its noise.
-    freedom : int
-        Entries less fitted unknowns.
-    sigma : float
-        The standard deviation of typical entries.
-    repeats : float
-        How many entries share an error: of the sum of squares, and of the degrees of freedom, only one part in so many
-        counts.
-
-    Returns
-    -------
-    dict
-        ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``; ``largest`` misfit in standard deviations and its
-        ``largest_p_value``.
+    `misfit` (k,): re-assembled minus given entries, each over the standard deviation of its noise. `freedom`: entries
+    less fitted unknowns. `sigma`: the standard deviation of typical entries. `repeats`: how many entries share an
+    error: of the sum of squares, and of the degrees of freedom, only one part in so many counts.
     """
     with np.errstate(over="ignore"):
         statistic = float(np.sum(misfit**2)) / repeats

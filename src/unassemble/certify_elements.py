@@ -3,12 +3,9 @@
 Knows nothing of how the mesh was found, and imports no solver.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.special import roots_legendre
 
@@ -30,6 +27,11 @@ _TRIANGLE_RULES: dict[str, tuple[tuple[float, float], ...]] = {
         (0.12593918054482715259568394550018, 0.10128650732345633880098736191512),
         (0.13239415278850618073764938783315, 0.47014206410511508977044120951345),
     ),
+}
+
+_CORNERS = {
+    "triangle": np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]),
+    "quad": np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]),
 }
 
 
@@ -74,8 +76,8 @@ def certify_elements(
     for name, cells in blocks.items():
         base = "triangle" if name.startswith("triangle") else "quad"
         at, weights = _triangle_rule(rules[name]) if base == "triangle" else _gauss_rule(int(rules[name].split()[0]))
-        vertex = np.array([(0, 0), (1, 0), (0, 1)] if base == "triangle" else [(-1, -1), (1, -1), (1, 1), (-1, 1)])
-        (phi_s, phi_t), (corner_s, corner_t) = _slopes(name, at), _slopes(name, vertex)
+        _, phi_s, phi_t = _functions(name, at)
+        _, corner_s, corner_t = _functions(name, _CORNERS[base])
         a, b = np.triu_indices(cells.shape[1], 1 if terms is None else 0)
         for start in range(0, len(cells), _CELLS):
             some = cells[start : start + _CELLS]
@@ -99,11 +101,8 @@ def certify_elements(
                 value += terms.reaction * _masses(name, x, y)
             values.append(value.ravel())
         first += len(cells)
-    key = np.concatenate(keys)
-    summed = sp.coo_array((np.concatenate(values), (key // n, key % n)), shape=(n, n)).tocsr()
-    summed.sort_indices()
-    key = np.repeat(np.arange(n), np.diff(summed.indptr)) * n + summed.indices
-    return compared(n, edges, entries, key, summed.data, np.concatenate(flipped), terms)
+    places, flipped_cells = np.divmod(np.concatenate(keys), n), np.concatenate(flipped)
+    return compared(n, edges, entries, places, np.concatenate(values), flipped_cells, terms)
 
 
 def _gauss_rule(order: int) -> tuple[NDArray, NDArray]:
@@ -131,97 +130,31 @@ def _masses(name: str, x: NDArray, y: NDArray) -> NDArray:
     if name.startswith("triangle"):
         s, t = (at.T + 1) / 2
         at, weight = np.column_stack([s, (1 - s) * t]), weight / 4 * (1 - s)
-    along_s, along_t = _slopes(name, at)
-    value = _values(name, *at.T)
+    value, along_s, along_t = _functions(name, at)
     a, b = np.triu_indices(value.shape[1])
     determinant = (x @ along_s.T) * (y @ along_t.T) - (x @ along_t.T) * (y @ along_s.T)
     return (np.abs(determinant) * weight) @ (value[:, a] * value[:, b])
 
 
-def _values(name: str, s: NDArray, t: NDArray) -> NDArray:
-    """(q, k) shape functions at points of the reference cell."""
-    if name.startswith("triangle"):
-        u, sides = (1 - s - t, s, t), ((0, 1), (1, 2), (2, 0))
-        if name == "triangle":
-            value = list(u)
-        elif name == "triangle6":
-            value = [v * (2 * v - 1) for v in u] + [4 * u[i] * u[j] for i, j in sides]
-        else:
-            value = [v * (3 * v - 1) * (3 * v - 2) / 2 for v in u]
-            for i, j in sides:
-                value += [4.5 * u[i] * u[j] * (3 * u[i] - 1), 4.5 * u[i] * u[j] * (3 * u[j] - 1)]
-            value.append(27 * u[0] * u[1] * u[2])
-    elif name == "quad8":
-        value = [(1 + a * s) * (1 + b * t) * (a * s + b * t - 1) / 4 for a, b in [(-1, -1), (1, -1), (1, 1), (-1, 1)]]
-        value += [
-            (1 - s * s) * (1 + b * t) / 2 if a == 0 else (1 + a * s) * (1 - t * t) / 2
-            for a, b in [(0, -1), (1, 0), (0, 1), (-1, 0)]
-        ]
-    elif name == "quad":
-        value = [(1 + a * s) * (1 + b * t) / 4 for a, b in [(-1, -1), (1, -1), (1, 1), (-1, 1)]]
-    else:
-        along = [[v * (v - 1) / 2, 1 - v * v, v * (v + 1) / 2] for v in (s, t)]
-        places = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1), (1, 1)]
-        value = [along[0][i] * along[1][j] for i, j in places]
-    return np.column_stack(value)
+def _functions(name: str, at: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """(q, k) shape functions at points (q, 2) of the reference cell, and their derivatives along both coordinates.
 
-
-def _slopes(name: str, at: NDArray) -> tuple[NDArray, NDArray]:
-    """(q, k) derivatives of the shape functions along both reference coordinates."""
-    s, t = at[:, 0].astype(float), at[:, 1].astype(float)
-    one = np.ones_like(s)
-    if name.startswith("triangle"):
-        return _triangle_slopes(int(name[8:] or 3), (1 - s - t, s, t), ((-one, one, 0 * one), (-one, 0 * one, one)))
-    if name == "quad8":
-        return _serendipity_slopes(s, t)
-    return _lagrange_slopes(2 if name == "quad9" else 1, s, t)
-
-
-def _triangle_slopes(k: int, u: tuple[NDArray, ...], du: tuple[tuple[NDArray, ...], ...]) -> tuple[NDArray, NDArray]:
-    """From barycentric coordinates u and their derivatives."""
-    found = []
-    for d in du:
-        if k == 3:
-            found.append(np.column_stack(d))
-            continue
-        sides = ((0, 1), (1, 2), (2, 0))
-        if k == 6:  # u (2 u - 1) and 4 u v
-            corner = [(4 * u[i] - 1) * d[i] for i in range(3)]
-            side = [4 * (u[i] * d[j] + u[j] * d[i]) for i, j in sides]
-            found.append(np.column_stack(corner + side))
-            continue
-        # u (3 u - 1) (3 u - 2) / 2, then 9/2 u v (3 u - 1) next to u and 9/2 u v (3 v - 1) next to v, then 27 u v w
-        corner = [(27 * u[i] ** 2 - 18 * u[i] + 2) / 2 * d[i] for i in range(3)]
-        side = []
-        for i, j in sides:
-            side.append(4.5 * ((6 * u[i] - 1) * u[j] * d[i] + u[i] * (3 * u[i] - 1) * d[j]))
-            side.append(4.5 * ((6 * u[j] - 1) * u[i] * d[j] + u[j] * (3 * u[j] - 1) * d[i]))
-        inside = 27 * (d[0] * u[1] * u[2] + u[0] * d[1] * u[2] + u[0] * u[1] * d[2])
-        found.append(np.column_stack([*corner, *side, inside]))
-    return found[0], found[1]
-
-
-def _lagrange_slopes(degree: int, s: NDArray, t: NDArray) -> tuple[NDArray, NDArray]:
-    """Products of Lagrange polynomials in s and t."""
-    if degree == 1:
-        value, slope = [lambda x: (1 - x) / 2, lambda x: (1 + x) / 2], [lambda x: 0 * x - 0.5, lambda x: 0 * x + 0.5]
-        places = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    else:
-        value = [lambda x: x * (x - 1) / 2, lambda x: 1 - x * x, lambda x: x * (x + 1) / 2]
-        slope = [lambda x: x - 0.5, lambda x: -2 * x, lambda x: x + 0.5]
-        places = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1), (1, 1)]
+    Polynomials that are one in their own node and zero in the others. Triangles have all monomials up to a degree,
+    quadrilaterals all up to that degree in each direction, but for the highest one where no node is inside.
+    """
+    inside = {"triangle6": [1 / 2], "triangle10": [1 / 3, 2 / 3], "quad8": [1 / 2], "quad9": [1 / 2]}.get(name, [])
+    corner = _CORNERS[name.rstrip("0123456789")]
+    side = [(1 - x) * p + x * q for p, q in zip(corner, np.roll(corner, -1, axis=0), strict=True) for x in inside]
+    centre = [corner.mean(axis=0)] if name in ("triangle10", "quad9") else []
+    nodes, degree = np.array([*corner, *side, *centre]), len(inside) + 1
+    power = [(a, b) for a in range(degree + 1) for b in range(degree + 1)]
+    most = degree if len(corner) == 3 else 2 * degree - (name == "quad8")
+    a, b = np.array([one for one in power if sum(one) <= most]).T
+    # All coefficients are whole quarters.
+    C = np.rint(4 * np.linalg.inv(nodes[:, :1] ** a * nodes[:, 1:] ** b)) / 4
+    s, t = at[:, :1], at[:, 1:]
     return (
-        np.column_stack([slope[i](s) * value[j](t) for i, j in places]),
-        np.column_stack([value[i](s) * slope[j](t) for i, j in places]),
+        s**a * t**b @ C,
+        a * s ** np.maximum(a - 1, 0) * t**b @ C,
+        b * s**a * t ** np.maximum(b - 1, 0) @ C,
     )
-
-
-def _serendipity_slopes(s: NDArray, t: NDArray) -> tuple[NDArray, NDArray]:
-    """Of (1 + a s) (1 + b t) (a s + b t - 1) / 4 in corners (a, b), and of bubbles on sides."""
-    corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
-    along_s = [a * (1 + b * t) * (2 * a * s + b * t) / 4 for a, b in corners]
-    along_t = [b * (1 + a * s) * (a * s + 2 * b * t) / 4 for a, b in corners]
-    for a, b in [(0, -1), (1, 0), (0, 1), (-1, 0)]:
-        along_s.append(-s * (1 + b * t) if a == 0 else a * (1 - t * t) / 2)
-        along_t.append(b * (1 - s * s) / 2 if a == 0 else -t * (1 + a * s))
-    return np.column_stack(along_s), np.column_stack(along_t)

@@ -1,33 +1,23 @@
 """Whether edge lengths explain a matrix: the certificate of curved surfaces, which shares nothing with the solver."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .certify import Certificate, relative
+from .certify import Certificate, compared, relative
 from .tolerances import CERTIFIED
 
 
 @dataclass(frozen=True, eq=False)
 class MetricCertificate:
-    """How well edge lengths explain a matrix.
+    """How well edge lengths explain a matrix."""
 
-    Attributes
-    ----------
-    entries : Certificate
-        Of the off-diagonal entries; `flipped` are triangles whose sides do not meet.
-    diagonal : str
-        The diagonal matrix D of A = c L + D that comes nearest to the row sums: ``"zero"``, ``"constant"``, a multiple
-        of the identity, or ``"areas"``, a multiple of the lumped mass matrix of a single piece.
-    row_misfits : (n,) float64
-        Differences of the row sums from those of that D, relative to the largest off-diagonal entry of the row.
-    """
-
-    entries: Certificate
+    entries: Certificate  # of the off-diagonal entries; `flipped` are triangles whose sides do not meet
+    # the diagonal matrix D of A = c L + D that comes nearest to the row sums: "zero", "constant", a multiple of the
+    # identity, or "areas", a multiple of the lumped mass matrix of a single piece
     diagonal: str
+    # (n,) differences of the row sums from those of that D, relative to the largest off-diagonal entry of the row
     row_misfits: NDArray[np.float64]
 
 
@@ -69,14 +59,14 @@ def certify_metric(
         sums = np.stack([b * b + (c - a) * (c + a), c * c + (a - b) * (a + b), a * a + (b - c) * (b + c)], axis=1)
         assembled = np.bincount(row.ravel(), (-factor[:, None] * sums / (8 * area[:, None])).ravel(), len(key))
     covered = np.bincount(row.ravel(), minlength=len(key)) > 0
-    difference = np.where(covered, assembled, 0.0) - entries
+    found = compared(
+        n, edges, entries, (edges[:, 0], edges[:, 1]), np.where(covered, assembled, 0.0), np.flatnonzero(~inside)
+    )
     size = np.zeros(n)
     sums_of_rows = np.asarray(diagonal, np.float64)
     for end in edges.T:
         np.maximum.at(size, end, np.abs(entries))
         sums_of_rows = np.asarray(sums_of_rows + np.bincount(end, entries, n))
-    misfits = relative(difference, np.minimum(size[edges[:, 0]], size[edges[:, 1]]))
-    found = Certificate(float(misfits.max(initial=0.0)), edges, misfits, difference, np.flatnonzero(~inside))
     shapes = {"zero": np.zeros(n), "constant": np.ones(n)}
     if (factor == factor[0]).all():  # else each piece has a unit of area of its own
         shapes["areas"] = np.asarray(np.bincount(triangles.ravel(), np.repeat(area, 3), n))

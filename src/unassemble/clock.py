@@ -1,7 +1,5 @@
 """Time by stage."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Callable, Iterator

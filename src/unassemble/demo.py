@@ -1,10 +1,10 @@
 """The main job on two matrices that this library did not assemble, and on a small structure."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.io
@@ -19,44 +19,24 @@ from .recovery import Recovery
 from .report import write_report
 from .summary import summary
 
-_MISSING = "the demonstration needs {name}: pip install 'unassemble[demo]'"
-
 
 @dataclass(frozen=True, eq=False)
 class Specimen:
-    """A matrix with the mesh that it came from, kept aside for comparison.
-
-    Attributes
-    ----------
-    name, origin : str
-    matrix : (n, n) sparse
-    points : (n, 2) or (n, 3) float64
-        True positions of the matrix rows, or of the nodes of a structure.
-    anchors : tuple of (row, x, y, z)
-        Positions that are not kept aside.
-    """
+    """A matrix with the mesh that it came from, kept aside for comparison."""
 
     name: str
     origin: str
     matrix: sp.coo_array
-    points: NDArray[np.float64]
-    anchors: tuple[tuple[float, ...], ...] = ()
+    points: NDArray[np.float64]  # (n, 2) or (n, 3), true positions of the matrix rows, or of the nodes of a structure
+    anchors: tuple[tuple[float, ...], ...] = ()  # (row, x, y, z) of positions that are not kept aside
 
 
 def run(folder: str | Path = "demo-output", *, echo: Callable[[str], None] = lambda line: None) -> list[Recovery]:
     """Write, read and recover the matrices; meshes, reports and pictures go to `folder`.
 
-    Parameters
-    ----------
-    folder : path
-        Made where it does not exist.
-    echo : callable
-        Receives the text for the user, line by line or in blocks.
+    It is made where it does not exist. What there is to say goes to `echo`, line by line or in blocks.
 
-    Raises
-    ------
-    InputError
-        If a package that meshes or assembles is not installed, or the folder cannot be written into.
+    Raises InputError if a package that meshes or assembles is not installed, or the folder cannot be written into.
     """
     folder = made_folder(folder)
     recoveries = []
@@ -82,11 +62,7 @@ def run(folder: str | Path = "demo-output", *, echo: Callable[[str], None] = lam
 
 def unit_square() -> Specimen:
     """The Laplacian on an unstructured mesh of the unit square, as PyAMG's gallery has it."""
-    try:
-        from pyamg.gallery import load_example
-    except ImportError as error:
-        raise InputError(_MISSING.format(name="pyamg")) from error
-    data = load_example("unit_square")
+    data = _needed("pyamg.gallery", "pyamg").load_example("unit_square")
     matrix = sp.coo_array(data["A"])
     return Specimen("unit_square", "matrix and mesh from the gallery of PyAMG", matrix, data["vertices"][:, :2])
 
@@ -95,21 +71,13 @@ def lake(size: float = 0.055) -> Specimen:
     """A lake with islands: meshed by Netgen, assembled by scikit-fem, scaled, shifted and shuffled.
 
     The matrix is -2.5 L + D with random D, and its rows are in random order, so that neither scale, nor row sums,
-    nor numbering helps.
-
-    Parameters
-    ----------
-    size : float
-        Mesh size; the lake is 4 wide.
+    nor numbering helps. The lake is 4 wide, and `size` that of the mesh.
     """
-    try:
-        from skfem import Basis, ElementTriP1, MeshTri
-        from skfem.models import laplace
-    except ImportError as error:
-        raise InputError(_MISSING.format(name="scikit-fem")) from error
+    skfem = _needed("skfem", "scikit-fem")
+    laplace = _needed("skfem.models", "scikit-fem").laplace
     points, triangles = _lake_mesh(size)
-    mesh = MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(triangles.T))
-    stiffness = laplace.coo_data(Basis(mesh, ElementTriP1()))  # its conversion to a matrix would drop zeros
+    mesh = skfem.MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(triangles.T))
+    stiffness = laplace.coo_data(skfem.Basis(mesh, skfem.ElementTriP1()))  # its conversion to a matrix would drop zeros
     rng = np.random.default_rng(2002)
     place = rng.permutation(len(points))
     # Index by index: adding sparse matrices would drop zeros as well.
@@ -126,17 +94,14 @@ def lake(size: float = 0.055) -> Specimen:
     )
 
 
-def mast(levels: int = 9) -> Specimen:
+def mast() -> Specimen:
     """A lattice mast, as those of classic test matrices: three rows for each node, in random order of the nodes.
 
     A bar along e, of stiffness k, adds k e e^T to the blocks of its ends and takes it off those between them. The feet
-    are held, so that they and the bars that end there are not in the matrix.
-
-    Parameters
-    ----------
-    levels : int
-        Storeys; the mast is as wide below as two of them are high.
+    are held, so that they and the bars that end there are not in the matrix. The mast is as wide below as two of its
+    storeys are high.
     """
+    levels = 9  # storeys
     height, side = np.divmod(np.arange(4 * (levels + 1)), 4)
     turn = np.pi / 2 * (side + 0.5) + 0.02 * height
     width = np.sqrt(2) * (1 - 0.6 * height / levels)
@@ -163,13 +128,17 @@ def mast(levels: int = 9) -> Specimen:
     )
 
 
+def _needed(module: str, name: str) -> Any:
+    """A module of a package that comes with the demonstration."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise InputError(f"the demonstration needs {name}: pip install 'unassemble[demo]'") from error
+
+
 def _lake_mesh(size: float) -> tuple[NDArray, NDArray]:
     """Points (n, 2) and triangles (m, 3) of a shore and four islands, all closed splines."""
-    try:
-        from netgen.geom2d import SplineGeometry
-    except ImportError as error:
-        raise InputError(_MISSING.format(name="netgen-mesher")) from error
-    geometry = SplineGeometry()
+    geometry = _needed("netgen.geom2d", "netgen-mesher").SplineGeometry()
     angle = 2 * np.pi * np.arange(14) / 14
     radius = 1 + 0.16 * np.cos(2 * angle + 0.4) + 0.13 * np.sin(3 * angle) + 0.07 * np.cos(5 * angle + 1)
     _closed_curve(geometry, 2 * radius * np.cos(angle), 1.25 * radius * np.sin(angle), inside=1, outside=0)
@@ -188,15 +157,10 @@ def _lake_mesh(size: float) -> tuple[NDArray, NDArray]:
     return np.array(mesh.Coordinates()), mesh.Elements2D().NumPy()["nodes"][:, :3].astype(np.int64) - 1
 
 
-def _closed_curve(geometry: object, x: NDArray, y: NDArray, *, inside: int, outside: int) -> None:
+def _closed_curve(geometry: Any, x: NDArray, y: NDArray, *, inside: int, outside: int) -> None:
     """Quadratic splines through the midpoints of a control polygon, counter-clockwise."""
-    n = len(x)
-    corner = [geometry.AppendPoint(float(a), float(b)) for a, b in zip(x, y, strict=True)]  # type: ignore[attr-defined]
-    middle = [
-        geometry.AppendPoint(float(a), float(b))  # type: ignore[attr-defined]
-        for a, b in zip((x + np.roll(x, -1)) / 2, (y + np.roll(y, -1)) / 2, strict=True)
-    ]
-    for k in range(n):
-        geometry.Append(  # type: ignore[attr-defined]
-            ["spline3", middle[k - 1], corner[k], middle[k]], leftdomain=inside, rightdomain=outside
-        )
+    corner = [geometry.AppendPoint(float(a), float(b)) for a, b in zip(x, y, strict=True)]
+    halves = zip((x + np.roll(x, -1)) / 2, (y + np.roll(y, -1)) / 2, strict=True)
+    middle = [geometry.AppendPoint(float(a), float(b)) for a, b in halves]
+    for k in range(len(x)):
+        geometry.Append(["spline3", middle[k - 1], corner[k], middle[k]], leftdomain=inside, rightdomain=outside)

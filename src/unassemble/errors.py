@@ -1,7 +1,5 @@
 """Exceptions: each message says what is wrong, where, and what to try."""
 
-from __future__ import annotations
-
 
 class UnassembleError(Exception):
     """Base of every error that this library raises on purpose."""

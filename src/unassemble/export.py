@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .elements.surface import outer_nodes
 from .errors import FormatError, OutputError
 from .files import check_target, whole_file
 from .formats import MeshFormat, format_of
 from .recovery import PlanarMesh, Recovery, Surface
+from .structures.layouts import layout_named
 
 if TYPE_CHECKING:
     import meshio
@@ -28,15 +30,7 @@ UNIQUENESS = ("proved", "searched", "ambiguous", None)
 
 
 def check_output(path: str | os.PathLike[str]) -> None:
-    """Find out, before long work, whether a mesh can be saved as `path`.
-
-    Raises
-    ------
-    OutputError
-        If the extension is unknown or the file cannot be written.
-    FormatError
-        If the format can hold no mesh of ours.
-    """
+    """Raise OutputError, before long work, where a file cannot be written, or FormatError where it can hold no mesh."""
     if os.path.isdir(path):  # noqa: PTH112 - which takes any name, however long
         raise OutputError(f"cannot write {os.fspath(path)!r}: it is a folder, so name a file in it, such as mesh.vtu")
     format_of(path)
@@ -46,21 +40,11 @@ def check_output(path: str | os.PathLike[str]) -> None:
 def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
     """Write a recovered mesh, whole or not at all; the extension names the format.
 
-    ``.npz`` holds ``points``, cells (``triangles``, ``quads``, ``tetrahedra``, ``hexahedra``, ``mid_nodes``, ``lines``,
-    ``polygons_offsets`` and ``polygons_data``), ``eliminated_points`` if any, of surfaces ``edges``, ``edge_lengths``
-    and ``curvature``, and no ``points`` unless there are coordinates, ``areas`` in place of ``points`` for a mass
-    matrix, ``row_scaling`` where rows were scaled, ``component``, ``hinges``, ``scale``, ``node_status``, of
-    vector-valued matrices ``node_of_row`` and ``direction_of_row``, and what the mesh is worth: ``status``,
-    ``uniqueness`` and ``backward_error``.
-    Other formats are those of meshio (:mod:`unassemble.formats`); of these ``.vtu`` holds polygons, the others get
-    them divided into triangles. Those that hold point data have what the mesh is worth as such, see
-    :func:`to_meshio`; the rest have no place for it, which :func:`unassemble.formats.lacks_worth` says.
-
-    Parameters
-    ----------
-    recovery : Recovery
-    path : path
-        An old file is replaced.
+    ``.npz`` holds coordinates or lengths, cells, pieces, factors, what rows belong to, and what the mesh is worth, by
+    the keys that the manual lists. Other formats are those of meshio (:mod:`unassemble.formats`); of these ``.vtu``
+    holds polygons, the others get them divided into triangles. Those that hold point data have what the mesh is worth
+    as such, see :func:`to_meshio`; the rest have no place for it, which :func:`unassemble.formats.lacks_worth` says. An
+    old file is replaced.
 
     Raises
     ------
@@ -81,55 +65,21 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
 def arrays(recovery: Recovery) -> dict[str, Any]:
     """What the ``.npz`` holds, by key; what there is nothing of has no key."""
     content: dict[str, Any] = {} if without_points(recovery) else {"points": recovery.points}
-    for name in ("triangles", "quads", "tetrahedra", "hexahedra", "mid_nodes", "lines"):
-        cells = getattr(recovery, name, None)  # each kind of result has its own
-        if cells is not None and cells.size:
-            content[name] = cells
-    if isinstance(recovery, PlanarMesh):
-        content |= _planar_arrays(recovery)
-    if isinstance(recovery, Surface):
-        content |= {"edges": recovery.edges, "edge_lengths": recovery.edge_lengths, "curvature": recovery.curvature}
-        if recovery.length_deviations is not None:
-            content["length_deviations"] = recovery.length_deviations
-    content |= {"component": recovery.component, "hinges": recovery.hinges, "scale": recovery.scale}
-    content["node_status"] = recovery.node_status
-    if recovery.vector_valued:
-        content |= {"node_of_row": recovery.node_of_row, "direction_of_row": recovery.direction_of_row}
-    return content | worth(recovery)
-
-
-def _planar_arrays(mesh: PlanarMesh) -> dict[str, NDArray]:
-    """What some planar meshes have and others have not."""
-    content: dict[str, NDArray] = {}
-    if mesh.n_polygons:
-        content |= {"polygons_offsets": mesh.polygons_offsets, "polygons_data": mesh.polygons_data}
-    if len(mesh.eliminated_points):
-        content["eliminated_points"] = mesh.eliminated_points
-    if mesh.row_scaling is not None:
-        content["row_scaling"] = mesh.row_scaling
-    if mesh.areas is not None:
-        content["areas"] = mesh.areas
-    return content
-
-
-def worth(recovery: Recovery) -> dict[str, NDArray]:
-    """Status, uniqueness (empty where the mesh does not fit) and backward error, for the mesh file itself."""
-    return {
-        "status": np.array(recovery.status),
-        "uniqueness": np.array(recovery.uniqueness or ""),
-        "backward_error": np.array(recovery.backward_error),
+    for name in ("triangles", "quads", "tetrahedra", "hexahedra", "mid_nodes", "lines", "eliminated_points"):
+        found = getattr(recovery, name, None)  # each kind of result has its own
+        if found is not None and found.size:
+            content[name] = found
+    if recovery.n_polygons:
+        content |= {name: getattr(recovery, name) for name in ("polygons_offsets", "polygons_data")}
+    names = ["row_scaling", "areas", "edges", "edge_lengths", "curvature", "length_deviations", "component", "hinges"]
+    names += ["scale", "node_status", "node_of_row", "direction_of_row"]
+    content |= {name: found for name in names if (found := getattr(recovery, name, None)) is not None}
+    worth = {
+        "status": recovery.status,
+        "uniqueness": recovery.uniqueness or "",
+        "backward_error": recovery.backward_error,
     }
-
-
-def _worth_of_points(recovery: Recovery) -> dict[str, NDArray]:
-    """The same in numbers, one for each point, and the scale of its piece."""
-    same = {
-        "status": STATUS.index(recovery.status),
-        "uniqueness": UNIQUENESS.index(recovery.uniqueness),
-        "backward_error": float(recovery.backward_error),
-    }
-    scale = np.append(recovery.scale, np.nan)[recovery.component]
-    return {name: np.full(recovery.n_points, value) for name, value in same.items()} | {"scale": scale}
+    return content | worth
 
 
 def without_points(recovery: Recovery) -> bool:
@@ -143,26 +93,14 @@ def to_meshio(recovery: Recovery) -> meshio.Mesh:
     """The mesh for meshio, in space (z = 0), since most formats know no other points.
 
     Point data, all scalar: ``row`` of the matrix, ``component``, ``boundary`` (1 on the outside of the mesh, else 0),
-    and where present ``node_status``, ``standard_deviation_x`` and ``standard_deviation_y``. The same at every point,
-    since meshio's writers have no place for what belongs to a mesh as a whole: ``status`` and ``uniqueness``, by their
-    place in `STATUS` and `UNIQUENESS`, ``backward_error``, and ``scale``, that of the point's piece. Of vector-valued
-    matrices there are ``row_x``, ``row_y``, ``row_z``, and of rotations ``row_rx``, ``row_ry``, ``row_rz``, instead of
-    ``row``, with -1 for unknowns that the matrix lacks. Nodes without cells are cells of kind ``vertex``, so that they
-    show. Undivided cells are blocks of kind ``polygon``, one for each number of vertices.
+    and where present ``node_status`` and ``standard_deviation_x`` and so on. Of vector-valued matrices there are
+    ``row_x``, ``row_y``, ``row_z``, and of rotations ``row_rx`` and so on, instead of ``row``, with -1 for unknowns
+    that the matrix lacks. The same at every point, since meshio's writers have no place for what belongs to a mesh as a
+    whole: ``status`` and ``uniqueness``, by their place in `STATUS` and `UNIQUENESS`, ``backward_error``, and
+    ``scale``, that of the point's piece. Nodes without cells are cells of kind ``vertex``, so that they show. Undivided
+    cells are blocks of kind ``polygon``, one for each number of vertices.
     """
-    return _mesh(recovery, 3, _point_data(recovery) | _worth_of_points(recovery), polygons=True)
-
-
-def _mesh(recovery: Recovery, dimension: int, point_data: dict[str, NDArray], *, polygons: bool = False) -> meshio.Mesh:
-    import meshio
-
-    points = np.zeros((recovery.n_points, max(dimension, recovery.dim)))
-    points[:, : recovery.points.shape[1]] = recovery.points
-    if polygons and isinstance(recovery, PlanarMesh) and recovery.n_polygons:
-        blocks = [*recovery.cells.items(), *(("polygon", same) for same in _by_size(recovery))]
-    else:
-        blocks = list(_cells(recovery).items())
-    return meshio.Mesh(points, blocks, point_data=point_data)
+    return _mesh_for(recovery, MeshFormat("", polygons=True))
 
 
 def _cells(recovery: Recovery) -> dict[str, NDArray[np.int64]]:
@@ -174,16 +112,16 @@ def _cells(recovery: Recovery) -> dict[str, NDArray[np.int64]]:
     return {"vertex": np.flatnonzero(recovery.node_status == 0)[:, None]}
 
 
-def _by_size(recovery: PlanarMesh) -> list[NDArray[np.int64]]:
-    """Polygons as (m, k) arrays, one for each number of vertices."""
-    size = np.diff(recovery.polygons_offsets)
-    return [
-        recovery.polygons_data[recovery.polygons_offsets[:-1][size == k, None] + np.arange(k)] for k in np.unique(size)
-    ]
-
-
 def _point_data(recovery: Recovery) -> dict[str, NDArray]:
-    data: dict[str, NDArray] = _rows(recovery)
+    data: dict[str, NDArray] = {"row": np.arange(recovery.n_points)}
+    node, direction = recovery.node_of_row, recovery.direction_of_row
+    if node is not None and direction is not None:  # by direction, since a node has several rows
+        rows = np.full((direction.max() + 1, recovery.n_points), -1)
+        told = direction >= 0
+        rows[direction[told], node[told]] = np.flatnonzero(told)
+        layout = layout_named(recovery.operator)
+        names = "xyz" if layout is None else layout.names
+        data = {f"row_{name}": row for name, row in zip(names, rows, strict=False)}
     data |= {"component": recovery.component, "boundary": _boundary_flag(recovery)}
     if recovery.node_status.any():
         data["node_status"] = recovery.node_status.astype(np.int64)
@@ -192,30 +130,19 @@ def _point_data(recovery: Recovery) -> dict[str, NDArray]:
             data[f"standard_deviation_{name}"] = np.ascontiguousarray(column)
     if isinstance(recovery, Surface):
         data["curvature"] = recovery.curvature
-    return data
-
-
-def _rows(recovery: Recovery) -> dict[str, NDArray]:
-    """Matrix rows of each point, by direction where it has several."""
-    from .structures.layouts import layout_named
-
-    node, direction = recovery.node_of_row, recovery.direction_of_row
-    if node is None or direction is None:
-        return {"row": np.arange(recovery.n_points)}
-    rows = np.full((direction.max() + 1, recovery.n_points), -1)
-    told = direction >= 0
-    rows[direction[told], node[told]] = np.flatnonzero(told)
-    layout = layout_named(recovery.operator)
-    names = "xyz" if layout is None else layout.names
-    return {f"row_{name}": row for name, row in zip(names, rows, strict=False)}
+    worth = {
+        "status": STATUS.index(recovery.status),
+        "uniqueness": UNIQUENESS.index(recovery.uniqueness),
+        "backward_error": float(recovery.backward_error),
+    }
+    data |= {name: np.full(recovery.n_points, value) for name, value in worth.items()}
+    return data | {"scale": np.append(recovery.scale, np.nan)[recovery.component]}
 
 
 def _boundary_flag(recovery: Recovery) -> NDArray[np.int64]:
     flag = np.zeros(recovery.n_points, dtype=np.int64)
     flag[recovery.boundary] = 1
     if recovery.dim == 3 and not isinstance(recovery, Surface):
-        from .elements.surface import outer_nodes
-
         solid = dict(recovery.cells)
         flag[solid.pop("line", [])] = 1
         flag[outer_nodes(solid) if solid else []] = 1
@@ -247,25 +174,35 @@ def _check_content(recovery: Recovery, suffix: str, mesh_format: MeshFormat) -> 
 
 def _mesh_for(recovery: Recovery, mesh_format: MeshFormat) -> meshio.Mesh:
     """The mesh with exactly what the format can hold, so that meshio has nothing to drop."""
+    import meshio
+
     data: dict[str, NDArray] = {}
     if mesh_format.data == "all":
-        data = _point_data(recovery) | _worth_of_points(recovery)
+        data = _point_data(recovery)
     elif mesh_format.data == "boundary":
         data = {f"{mesh_format.name}:ref": _boundary_flag(recovery)}
-    mesh = _mesh(recovery, mesh_format.dimension, data, polygons=mesh_format.polygons)
+    points = np.zeros((recovery.n_points, max(mesh_format.dimension, recovery.dim)))
+    points[:, : recovery.points.shape[1]] = recovery.points
+    blocks = list(_cells(recovery).items())
+    if mesh_format.polygons and isinstance(recovery, PlanarMesh) and recovery.n_polygons:
+        corners, start, size = (
+            recovery.polygons_data,
+            recovery.polygons_offsets[:-1],
+            np.diff(recovery.polygons_offsets),
+        )
+        same = [("polygon", corners[start[size == k, None] + np.arange(k)]) for k in np.unique(size)]
+        blocks = [*recovery.cells.items(), *same]
+    mesh = meshio.Mesh(points, blocks, point_data=data)
     if not mesh_format.keeps_rows:  # points of no triangle have no place, and NaN would spoil bounding boxes
         mesh.points[np.isnan(mesh.points)] = 0
     if mesh_format.name == "nastran":
         mesh.points = _rounded(mesh.points, mesh_format.digits or 16)
     if mesh_format.name == "ply":  # readers other than meshio's know integers of at most 32 bits
-        mesh.point_data = {name: _short(values) for name, values in mesh.point_data.items()}
+        data = mesh.point_data
+        mesh.point_data = {k: v.astype(np.int32) if v.dtype.kind == "i" else v for k, v in data.items()}
         for block in mesh.cells:
-            block.data = _short(block.data)
+            block.data = block.data.astype(np.int32)
     return mesh
-
-
-def _short(values: NDArray) -> NDArray:
-    return values.astype(np.int32) if values.dtype.kind == "i" else values
 
 
 def _rounded(points: NDArray, digits: int) -> NDArray:
@@ -289,11 +226,8 @@ def _write_by_meshio(mesh: meshio.Mesh, draft: Path, suffix: str, mesh_format: M
     except (OSError, MemoryError):
         raise
     except Exception as error:  # its writers raise whatever they like
-        raise FormatError(f"the format {suffix} cannot hold this mesh, says meshio: {_sentence(error)}") from error
+        why = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+        raise FormatError(f"the format {suffix} cannot hold this mesh, says meshio: {why}") from error
     finally:
         if said.getvalue():
             _log.debug("meshio: %s", " ".join(said.getvalue().split()))
-
-
-def _sentence(error: Any) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split())[:300]

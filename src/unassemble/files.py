@@ -1,7 +1,5 @@
 """Files that are written whole or not at all."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,26 +9,17 @@ from tempfile import TemporaryDirectory
 from .errors import OutputError
 
 _DRAFT = ".unassemble-"
+PICTURES = (".png", ".svg", ".pdf")
 
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str], suffix: str) -> Iterator[Path]:
-    """Where to write a draft of `path`; it takes its place only if the block ends well.
+    """Where to write a draft of `path`, whose name ends with `suffix`; it takes its place only if the block ends well.
 
-    The draft lies in a folder of its own beside the target, so that side files of a writer vanish with it and
-    the last step is a rename within one file system. An old file stays as it is until then.
+    The draft lies in a folder of its own beside the target, a link being followed, so that side files of a writer
+    vanish with it and the last step is a rename within one file system. An old file stays as it is until then.
 
-    Parameters
-    ----------
-    path : path
-        The target; a link is followed.
-    suffix : str
-        What the draft's name ends with: writers look at it.
-
-    Raises
-    ------
-    OutputError
-        If the system refuses to write.
+    Raises OutputError if the system refuses to write.
     """
     try:
         target = Path(path).resolve()
@@ -44,13 +33,7 @@ def whole_file(path: str | os.PathLike[str], suffix: str) -> Iterator[Path]:
 
 
 def made_folder(path: str | os.PathLike[str]) -> Path:
-    """A folder to write into, made where it does not exist.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be made, or nothing can be written there.
-    """
+    """A folder to write into, made where it does not exist; raises OutputError where it cannot be."""
     name, folder = os.fspath(path), Path(path)
     try:
         if folder.exists() and not folder.is_dir():
@@ -64,12 +47,9 @@ def made_folder(path: str | os.PathLike[str]) -> Path:
 
 
 def check_target(path: str | os.PathLike[str]) -> None:
-    """Find out, before long work, whether a file can be written.
+    """Raise OutputError, before long work, where a file cannot be written.
 
-    Raises
-    ------
-    OutputError
-        If the folder is missing or closed to us, or something other than a file of ours has the name.
+    Its folder is missing or closed to us, or something other than a file of ours has the name.
     """
     name = os.fspath(path)
     try:
@@ -86,6 +66,13 @@ def check_target(path: str | os.PathLike[str]) -> None:
             pass  # permissions are best judged by trying
     except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: a loop of links
         raise OutputError(f"cannot write {name!r}: {_reason(error)}") from error
+
+
+def check_plot(path: str | os.PathLike[str]) -> None:
+    """Raise OutputError, before long work, where a picture cannot be written, or its extension is another one."""
+    if Path(path).suffix.lower() not in PICTURES:
+        raise OutputError(f"a picture is a {' or '.join(PICTURES)} file, not {os.fspath(path)!r}")
+    check_target(path)
 
 
 def _reason(error: BaseException) -> str:

@@ -1,7 +1,5 @@
 """Mesh formats by extension: what each can hold, and how meshio is told to write it."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -25,78 +23,43 @@ _LINES = frozenset({"line"})
 
 @dataclass(frozen=True)
 class MeshFormat:
-    """How a mesh goes into one file format.
+    """How a mesh goes into one file format."""
 
-    Attributes
-    ----------
-    name : str
-        The format's name in meshio; empty for our own ``.npz``.
-    dimension : {2, 3}
-        Coordinates of each point of a planar mesh. Where the format attaches meaning to it, that has 2.
-    cells : frozenset of str
-        Kinds of cells, by meshio's names, that it holds in meshio's hands; ``"vertex"`` for bare points.
-    polygons : bool
-        Whether it holds cells of any number of vertices.
-    data : {"all", "boundary", "none"}
-        Point data that it takes along; ``"boundary"``: one integer label, which marks the boundary.
-    undetermined : bool
-        Whether it can hold points without coordinates (NaN). Readers of text formats mostly do not know that word.
-    keeps_rows : bool
-        Whether points have numbers at all; otherwise each triangle repeats its corners.
-    digits : int or None
-        Significant digits that coordinates keep, None for all.
-    options : mapping
-        For meshio's writer.
-    needs : str
-        A package that meshio needs for it and does not bring along.
-    cannot : str
-        Why the format can hold no mesh of ours; empty where it can.
-    """
-
-    name: str
-    dimension: int = 3
-    cells: frozenset[str] = _ALL
-    polygons: bool = False
-    data: str = "all"
-    undetermined: bool = False
-    keeps_rows: bool = True
-    digits: int | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
-    needs: str = ""
-    cannot: str = ""
+    name: str  # in meshio; empty for our own ``.npz``
+    dimension: int = 3  # coordinates of each point of a planar mesh: 2 where the format attaches meaning to it
+    cells: frozenset[str] = _ALL  # kinds, by meshio's names, that it holds in meshio's hands; "vertex" for bare points
+    polygons: bool = False  # whether it holds cells of any number of vertices
+    data: str = "all"  # point data that it takes along; "none", or "boundary": one integer label, which marks that
+    undetermined: bool = False  # whether it can hold NaN for coordinates: readers of text mostly do not know that word
+    keeps_rows: bool = True  # whether points have numbers at all; otherwise each triangle repeats its corners
+    digits: int | None = None  # significant ones that coordinates keep, None for all
+    options: Mapping[str, Any] = field(default_factory=dict)  # for meshio's writer
+    needs: str = ""  # a package that meshio needs for it and does not bring along
+    cannot: str = ""  # why the format can hold no mesh of ours
 
 
-_TWO_FILES = "it is two files that belong together"
 _NOT_COMPRESSED = "meshio writes it without compressing: write {} and compress that"
-
-# XML inside the one file: heavy data in a side file could not be renamed into place together with it.
-# (meshio imports h5py even then.)
-_XDMF = MeshFormat("xdmf", cells=_EVERY | _LINES, undetermined=True, options={"data_format": "XML"}, needs="h5py")
-_EXODUS = MeshFormat("exodus", cells=_EVERY | _LINES, dimension=2, undetermined=True, needs="netCDF4")
-# Eleven significant digits are what the sixteen columns of a field hold at any sign and exponent.
-_NASTRAN = MeshFormat("nastran", cells=_ALL | _HALFWAY | _LINES | {"quad9"}, data="none", digits=11)
-# meshio turns the nodes of quadratic cells when it writes this one, and not when it reads.
-_PERMAS = MeshFormat("permas", cells=_ALL | _LINES, data="none")
-_NETGEN = MeshFormat("netgen", cells=_ALL | _HALFWAY | _LINES, data="none")
-_TECPLOT = MeshFormat("tecplot", dimension=2, cells=_CELLS)
-_TETGEN = MeshFormat("tetgen", cannot=_TWO_FILES)
-_UGRID = MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True)
-_UGRID_SINGLE = MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True, digits=7)
+_SVG_OPTIONS = {"float_fmt": ".12g", "image_width": None}
 
 FORMATS: Mapping[str, MeshFormat] = {
     ".npz": MeshFormat("", dimension=2, undetermined=True),
     ".avs": MeshFormat("avsucd", cells=_ALL | _LINES),
-    ".bdf": _NASTRAN,
+    # Eleven significant digits are what the sixteen columns of a field hold at any sign and exponent.
+    **dict.fromkeys(
+        (".bdf", ".fem", ".nas"),
+        MeshFormat("nastran", cells=_ALL | _HALFWAY | _LINES | {"quad9"}, data="none", digits=11),
+    ),
     ".cgns": MeshFormat("cgns", cells=frozenset({"tetra"}), data="none", needs="h5py"),
-    ".dat": _TECPLOT,
-    ".dato": _PERMAS,
-    ".dato.gz": MeshFormat("permas", cannot=_NOT_COMPRESSED.format(".dato")),
-    ".e": _EXODUS,
-    ".ele": _TETGEN,
-    ".ex2": _EXODUS,
-    ".exo": _EXODUS,
+    **dict.fromkeys((".dat", ".tec"), MeshFormat("tecplot", dimension=2, cells=_CELLS)),
+    # meshio turns the nodes of quadratic cells when it writes this one, and not when it reads.
+    **dict.fromkeys((".dato", ".post"), MeshFormat("permas", cells=_ALL | _LINES, data="none")),
+    **{f"{one}.gz": MeshFormat("permas", cannot=_NOT_COMPRESSED.format(one)) for one in (".dato", ".post")},
+    **dict.fromkeys(
+        (".e", ".ex2", ".exo"),
+        MeshFormat("exodus", cells=_EVERY | _LINES, dimension=2, undetermined=True, needs="netCDF4"),
+    ),
+    **dict.fromkeys((".ele", ".node"), MeshFormat("tetgen", cannot="it is two files that belong together")),
     ".f3grid": MeshFormat("flac3d", cells=_SOLID, data="none"),
-    ".fem": _NASTRAN,
     ".h5m": MeshFormat("h5m", cells=frozenset({"triangle", "tetra"}), undetermined=True, needs="h5py"),
     ".hmf": MeshFormat("hmf", cells=_EVERY | _LINES, undetermined=True, needs="h5py"),
     ".inp": MeshFormat("abaqus", cells=_CELLS | _HALFWAY | _LINES | {"quad9"}, data="none"),
@@ -105,62 +68,53 @@ FORMATS: Mapping[str, MeshFormat] = {
     ".mesh": MeshFormat("medit", dimension=2, cells=_CELLS | _LINES, data="boundary"),
     ".meshb": MeshFormat("medit", dimension=2, cells=_CELLS | _LINES, data="boundary", undetermined=True),
     ".msh": MeshFormat("gmsh", cells=_EVERY, undetermined=True),  # Gmsh, not ANSYS, which shares the extension
-    ".nas": _NASTRAN,
-    ".node": _TETGEN,
     ".obj": MeshFormat("obj", cells=_FLAT, data="none"),
     ".off": MeshFormat("off", cells=_TRIANGLES, data="none"),
     ".ply": MeshFormat("ply", cells=_FLAT | _LINES | {"vertex"}, undetermined=True),
-    ".post": _PERMAS,
-    ".post.gz": MeshFormat("permas", cannot=_NOT_COMPRESSED.format(".post")),
     ".stl": MeshFormat("stl", cells=_TRIANGLES, data="none", keeps_rows=False),
     ".su2": MeshFormat("su2", dimension=2, cells=_CELLS, data="none"),
-    ".svg": MeshFormat(
-        "svg",
-        dimension=2,
-        cells=_FLAT,
-        data="none",
-        keeps_rows=False,
-        options={"float_fmt": ".12g", "image_width": None},
-    ),
-    ".tec": _TECPLOT,
+    ".svg": MeshFormat("svg", dimension=2, cells=_FLAT, data="none", keeps_rows=False, options=_SVG_OPTIONS),
     ".ugrid": MeshFormat("ugrid", cells=_CELLS, data="none", digits=7),
-    # Binary variants of UGRID are told by a second extension: byte order, Fortran records, size of numbers.
-    **{f".{kind}.ugrid": _UGRID for kind in ("b8l", "b8", "lb8l", "lb8", "r8", "lr8")},
-    **{f".{kind}.ugrid": _UGRID_SINGLE for kind in ("b4", "lb4", "r4", "lr4")},
-    ".vol": _NETGEN,
-    ".vol.gz": _NETGEN,
+    # Binary variants are told by a second extension: byte order, Fortran records, size of numbers.
+    **dict.fromkeys(
+        (".b8l.ugrid", ".b8.ugrid", ".lb8l.ugrid", ".lb8.ugrid", ".r8.ugrid", ".lr8.ugrid"),
+        MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True),
+    ),
+    **dict.fromkeys(
+        (".b4.ugrid", ".lb4.ugrid", ".r4.ugrid", ".lr4.ugrid"),
+        MeshFormat("ugrid", cells=_CELLS, data="none", undetermined=True, digits=7),
+    ),
+    **dict.fromkeys((".vol", ".vol.gz"), MeshFormat("netgen", cells=_ALL | _HALFWAY | _LINES, data="none")),
     ".vtk": MeshFormat("vtk", cells=_EVERY | _LINES, undetermined=True),
     ".vtu": MeshFormat("vtu", cells=_EVERY | _LINES, polygons=True, undetermined=True),
     ".wkt": MeshFormat("wkt", cells=_TRIANGLES, data="none", keeps_rows=False),
-    ".xdmf": _XDMF,
+    # XML inside the one file: heavy data in a side file could not be renamed into place together with it.
+    # (meshio imports h5py even then.)
+    **dict.fromkeys(
+        (".xdmf", ".xmf"),
+        MeshFormat("xdmf", cells=_EVERY | _LINES, undetermined=True, options={"data_format": "XML"}, needs="h5py"),
+    ),
     ".xml": MeshFormat("dolfin-xml", dimension=2, cells=frozenset({"triangle", "tetra"}), data="none"),
-    ".xmf": _XDMF,
 }
-
-
-def _unknown(path: str) -> str:
-    """The sentence about an extension that no format has: the nearest ones, and where all stand."""
-    suffix = PurePath(path).suffix.lower()
-    what = f"no mesh format has the extension {suffix!r}" if suffix else "it has no extension, which names the format"
-    near = [known for known in get_close_matches(suffix, FORMATS, n=3, cutoff=0.7) if not FORMATS[known].cannot]
-    which = f"did you mean {' or '.join(near)}?" if near else "use .npz, .vtu, .msh, .obj or .stl, for instance"
-    return f"cannot write {path!r}: {what}; {which} (the list is on the page 'Command line and files' of the manual)"
 
 
 def format_of(path: str | os.PathLike[str]) -> tuple[str, MeshFormat]:
     """Extension and format that a file name asks for; upper and lower case are alike.
 
-    Raises
-    ------
-    OutputError
-        If the extension is unknown, or its writer not installed.
-    FormatError
-        If the format has no place for any mesh of ours.
+    Raises OutputError if the extension is unknown, or its writer not installed; FormatError if the format has no place
+    for any mesh of ours.
     """
     name = PurePath(path).name.lower()
     fitting = [suffix for suffix in FORMATS if name.endswith(suffix) and name != suffix]
     if not fitting:
-        raise OutputError(_unknown(os.fspath(path)))
+        suffix = PurePath(path).suffix.lower()
+        what = f"no mesh format has the extension {suffix!r}" if suffix else "it has no extension, to name the format"
+        near = [known for known in get_close_matches(suffix, FORMATS, n=3, cutoff=0.7) if not FORMATS[known].cannot]
+        which = f"did you mean {' or '.join(near)}?" if near else "use .npz, .vtu, .msh, .obj or .stl, for instance"
+        raise OutputError(
+            f"cannot write {os.fspath(path)!r}: {what}; {which} (the list is on the page 'Command line and files' of "
+            "the manual)"
+        )
     suffix = max(fitting, key=len)
     mesh_format = FORMATS[suffix]
     if mesh_format.cannot:

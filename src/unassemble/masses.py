@@ -3,7 +3,7 @@
 The stiffness matrix of the plane does not change with the size of the mesh, and that of a body in space only together
 with its modulus. The mass matrix int rho phi_i phi_j does: on a mesh t times as large it is t^d times as large. So it
 tells rho where the size is known (by anchors), and the size where rho is: 1, as of programs that know no density. It is
-assembled here on the mesh as written, by closed forms and quadrature of its own, and held against the matrix as given.
+assembled here on the mesh as written and held against the matrix as given.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.special import roots_legendre
 
+from .elements import KINDS, assembled, exact_rule, mass
 from .errors import GeometryError, InputError, MatrixError, RecoveryError
 from .matrix import as_csr, is_file, read_matrix
 from .matrix.digits import Digits
@@ -24,38 +24,18 @@ from .recovery import Body, PlanarMesh, Recovery
 from .tolerances import AGREED, ALIKE, CERTIFIED, HARDLY_ANY, SUMMED
 from .words import sentences
 
-_SIMPLICES = ("triangle", "tetra")
-_SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-_CORNERS = {"quad": _SQUARE, "hexahedron": tuple((*corner, u) for u in (-1, 1) for corner in _SQUARE)}
-
 
 def weighed(
-    recover: Callable[[Any], Recovery], stiffness: Any, mass: Any, anchors: Sequence[tuple[Any, ...]]
+    recover: Callable[[Any], Recovery], stiffness: Any, masses: Any, anchors: Sequence[tuple[Any, ...]]
 ) -> Recovery:
-    """The mesh of a stiffness matrix with its density, or in the size in which the density is 1.
+    """The mesh of a stiffness matrix, by `recover`, with its density, or in the size in which the density is 1.
 
-    Parameters
-    ----------
-    recover : callable
-        From a stiffness matrix to its mesh.
-    stiffness : (N, N) sparse matrix or array, or ndarray
-    mass : the same, or path
-        Consistent; or lumped, each diagonal entry the sum of a row of the consistent one.
-    anchors : sequence of (row, x, y) or (row, x, y, z)
-        Two and more tell the size; one stays where it is.
-
-    Raises
-    ------
-    InputError
-        If the matrices differ in size.
-    MatrixError
-        If one is no square matrix of finite numbers.
-    GeometryError
-        If this is not the mass matrix of the mesh with one density, or masses of such meshes are not read.
-    RecoveryError
-        As `recover` does.
+    The mass matrix is consistent, or lumped: each diagonal entry the sum of a row of the consistent one. Of anchors two
+    and more tell the size; one stays where it is. InputError if the matrices differ in size, MatrixError if one is no
+    square matrix of finite numbers, GeometryError if this is not the mass matrix of the mesh with one density, or
+    masses of such meshes are not read, RecoveryError as of `recover`.
     """
-    A, given = as_csr(stiffness), read_matrix(mass) if is_file(mass) else mass
+    A, given = as_csr(stiffness), read_matrix(masses) if is_file(masses) else masses
     try:
         M = as_csr(given)
     except MatrixError as error:
@@ -65,9 +45,11 @@ def weighed(
         raise InputError(f"the matrix and its mass matrix differ in size: they are {sizes}")
     if not (np.isrealobj(M.data) and (M.diagonal() > 0).all()):
         raise GeometryError("`mass` is no mass matrix: not all of its diagonal entries are positive numbers")
+    one, other = A.tocoo(), M.tocoo()
+    place = np.concatenate([one.row, other.row]), np.concatenate([one.col, other.col])
     found: Recovery | None
-    try:
-        found = recover(_with_zeros(A, M))
+    try:  # with zeros for sides of triangles that face right angles, which have an entry in M only
+        found = recover(sp.csr_array((np.concatenate([one.data, 0 * other.data]), place), shape=A.shape))
     except RecoveryError:
         found = None
     if found is None or not found.certified:
@@ -108,13 +90,6 @@ def weighed(
     return replace(found, density=density, warnings=notes, reason=sentences([found.reason.split(". ")[0], said]))
 
 
-def _with_zeros(A: sp.csr_array, M: sp.csr_array) -> sp.csr_array:
-    """A with an explicit zero in each place of M where it has no entry: sides of triangles that face right angles."""
-    one, other = A.tocoo(), M.tocoo()
-    place = np.concatenate([one.row, other.row]), np.concatenate([one.col, other.col])
-    return sp.csr_array(sp.coo_array((np.concatenate([one.data, 0 * other.data]), place), shape=A.shape))
-
-
 def _whole(A: sp.csr_array, found: Recovery) -> NDArray[np.bool_]:
     """(N,) rows of nodes all of whose cells the mesh has, with positions that are determined.
 
@@ -139,20 +114,15 @@ def _assembled(found: Recovery, lumped: bool) -> sp.csr_array:
             "the stiffness matrix leaves cells undivided, and `mass` does not tell into which triangles: it is lumped, "
             "or that of another mesh"
         )
-    other = [kind for kind in cells if kind not in (*_SIMPLICES, *_CORNERS)]
+    other = [kind for kind in cells if KINDS[kind].quadratic] if isinstance(found, PlanarMesh | Body) else []
     if other or not (cells and isinstance(found, PlanarMesh | Body)):
         raise GeometryError(
             f"mass matrices are read beside those of linear elements on cells that are known, not of {found.operator}"
             + (f" on cells of the kind {other[0]}" if other else "")
         )
-    n, rows, columns, values = found.n_points, [], [], []
+    n, scalar = found.n_points, sp.csr_array((found.n_points,) * 2)
     for kind, nodes in cells.items():
-        k = nodes.shape[1]
-        rows.append(np.repeat(nodes, k, axis=1).ravel())
-        columns.append(np.tile(nodes, k).ravel())
-        values.append(_of_cells(kind, found.points[nodes]).ravel())
-    place = np.concatenate(rows), np.concatenate(columns)
-    scalar = sp.csr_array(sp.coo_array((np.concatenate(values), place), shape=(n, n)))
+        scalar = scalar + assembled(mass(found.points, nodes, KINDS[kind], exact_rule(KINDS[kind], 1)), nodes, n)
     if lumped:
         scalar = sp.csr_array(sp.diags_array(scalar.sum(axis=1)))
     if found.node_of_row is None or found.direction_of_row is None:
@@ -163,24 +133,6 @@ def _assembled(found: Recovery, lumped: bool) -> sp.csr_array:
         choose = sp.csr_array((np.ones(len(own)), (own, found.node_of_row[own])), shape=(N, n))
         total = total + choose @ scalar @ choose.T
     return sp.csr_array(total)
-
-
-def _of_cells(kind: str, corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m, k, k) mass matrices of cells with corners (m, k, d)."""
-    m, k, d = corners.shape
-    if kind in _SIMPLICES:
-        volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / (2 if d == 2 else 6)
-        return volume[:, None, None] * (1 + np.eye(k)) / ((d + 1) * (d + 2))
-    signs = np.array(_CORNERS[kind], dtype=float)
-    x, weight = roots_legendre(3)  # exact: products of shape functions and determinants have degree 4 in each direction
-    total = np.zeros((m, k, k))
-    for q in np.ndindex(*(3,) * d):
-        factors = (1 + signs * x[list(q)]) / 2
-        shape = factors.prod(axis=1)
-        slopes = np.stack([signs[:, a] / 2 * np.delete(factors, a, axis=1).prod(axis=1) for a in range(d)])
-        measure = np.abs(np.linalg.det(slopes @ corners)) * weight[list(q)].prod()
-        total += measure[:, None, None] * np.outer(shape, shape)
-    return total
 
 
 def _misfit(again: sp.csr_array, M: sp.csr_array, whole: NDArray[np.bool_]) -> float:

@@ -34,8 +34,7 @@ def modes_of(recovery: Recovery) -> NDArray[np.float64]:
     node, direction = recovery.node_of_row, recovery.direction_of_row
     if node is None or direction is None:
         raise InputError("a scalar matrix has no rigid-body modes: its near-null space is that of the constants")
-    layout = layout_named(recovery.operator)
-    return rigid_body_modes(recovery.points, node, direction, layout)
+    return rigid_body_modes(recovery.points, node, direction, layout_named(recovery.operator))
 
 
 def rigid_body_modes(

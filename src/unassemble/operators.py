@@ -1,9 +1,9 @@
 """Which operator a matrix belongs to, where that is not said."""
 
-from __future__ import annotations
-
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeGuard
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,13 +11,23 @@ import scipy.sparse as sp
 from .errors import GeometryError, InputError, RecoveryError
 from .matrix import OperatorMatrix
 from .matrix.digits import Digits
+from .nodes import Numbering
+from .nodes.orders import ORDERS
+from .nodes.rounded import Rounding, with_exact_sums
+from .nodes.unknowns import (
+    MORE_THAN_STIFFNESS,
+    find_numbering,
+    given_numbering,
+    nodes_of_pattern,
+    numbering_at_sight,
+    regular_numbering,
+)
+from .structures import Beam, StructuralNumbering, find_structure, given_structure, truss_numbering
+from .structures.beams import MOST, find_beam
+from .structures.layouts import SPACE
+from .structures.recognise import directions_with_gaps
 from .tolerances import CANCELLED
 from .topology import components
-
-if TYPE_CHECKING:
-    from .nodes import Numbering
-    from .nodes.rounded import Rounding
-    from .structures import Beam, StructuralNumbering
 
 
 @dataclass(frozen=True)
@@ -32,8 +42,6 @@ class VectorReading:
     @property
     def name(self) -> str:
         """What the matrix is then, to follow "the matrix is"."""
-        from .structures import StructuralNumbering
-
         found = self.numbering
         if isinstance(found, StructuralNumbering):
             return f"that of a {found.layout.name} with {found.block_size} unknowns per node"
@@ -46,26 +54,11 @@ class VectorReading:
 
 
 def asked_for(matrix: OperatorMatrix, block_size: int | None, numbering: Any) -> VectorReading:
-    """Find the nodes of a matrix that is said to be vector-valued.
+    """Find the nodes of a matrix that is said to be vector-valued; options are those of :func:`unassemble.recover`.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    block_size : int, optional
-    numbering : {None, "interleaved", "by component"} or (node_of_row, direction_of_row)
-
-    Raises
-    ------
-    InputError
-        For numberings that do not fit the matrix.
-    RecoveryError
-        If no numbering makes rows annihilate translations.
+    Raises InputError for numberings that do not fit the matrix; RecoveryError if no numbering makes rows annihilate
+    translations.
     """
-    from .nodes.orders import ORDERS
-    from .nodes.unknowns import find_numbering, given_numbering, regular_numbering
-    from .structures import find_structure, given_structure, truss_numbering
-    from .structures.layouts import SPACE
-
     beam = _beam(matrix) if numbering is None and block_size is None else None
     if beam is not None:
         return VectorReading(beam, "")
@@ -109,43 +102,41 @@ def vector_valued(matrix: OperatorMatrix) -> VectorReading | None:
         return VectorReading(beam, "its rows form one line of nodes, whose blocks are those of members that bend")
     if matrix.n < 3 or len(matrix.edges) <= 3 * matrix.n - 6:
         return None
-    from .nodes.unknowns import numbering_at_sight
-    from .structures import StructuralNumbering, find_structure
-
-    whole, rounding = _exact(matrix)
-    crowded = "the graph has more edges than a planar one can have"
-    found = find_structure(whole) or numbering_at_sight(whole)
-    if not (isinstance(found, StructuralNumbering) or _convinces(found)):
-        return _truss(whole, rounding, crowded)
-    return VectorReading(found, f"{crowded}, and {_evidence(found)}", rounding)
+    return _by_nodes(matrix, numbering_at_sight, "the graph has more edges than a planar one can have")
 
 
 def second_reading(matrix: OperatorMatrix) -> VectorReading | None:
     """Read a matrix as vector-valued after it turned out not to be a planar mesh; None where little speaks for it."""
-    from .nodes.unknowns import find_numbering
-    from .structures import find_structure
-
     # Every unknown of an elastic body has a stiffness. Sums by direction vanish: entries of one sign couple none.
     one_sign = matrix.entries.min(initial=0.0) >= 0 or matrix.entries.max(initial=0.0) <= 0
     if not matrix.diagonal.all() or (one_sign and len(components(matrix.n, matrix.edges)) == 1):
         return None
+    return _by_nodes(matrix, find_numbering, "it is no planar mesh")
+
+
+def _by_nodes(
+    matrix: OperatorMatrix, find: Callable[[sp.csr_array], Numbering | None], because: str
+) -> VectorReading | None:
+    """A structure; or nodes whose rows annihilate constants, as those of scalar matrices never do; or a truss."""
     whole, rounding = _exact(matrix)
-    structure = find_structure(whole)
-    if structure is not None:
-        return VectorReading(structure, f"it is no planar mesh, and {_evidence(structure)}", rounding)
-    try:
-        found = find_numbering(whole)
-    except RecoveryError:
-        found = None
-    if not _convinces(found):
-        return _truss(whole, rounding, "it is no planar mesh")
-    return VectorReading(found, f"it is no planar mesh, and {_evidence(found)}", rounding)
+    found: Numbering | StructuralNumbering | None = find_structure(whole)
+    if found is None:
+        with suppress(RecoveryError):
+            found = find(whole)
+    if isinstance(found, StructuralNumbering) or (found is not None and found.sound):
+        order = {"pattern": "in no regular order"}.get(found.kind, found.kind)
+        shown = f"{order}, whose sums by direction vanish in {100 * found.share:.0f} % of the cases"
+    else:
+        found = truss_numbering(whole, allowed=rounding.spread if rounding else CANCELLED)
+        if found is None:
+            return None
+        shown = f"{found.kind}, whose blocks are those of bars"
+    nodes = f"its rows form {found.n_nodes} nodes with {found.block_size} unknowns each, {shown}"
+    return VectorReading(found, f"{because}, and {nodes}", rounding)
 
 
 def about_translations(matrix: OperatorMatrix) -> str:
     """Why a matrix that is no planar mesh is no stiffness matrix either though its rows form nodes; empty if not so."""
-    from .nodes.unknowns import MORE_THAN_STIFFNESS, nodes_of_pattern
-
     nodes, rounded = nodes_of_pattern(matrix.csr()), Digits.of(matrix.csr().data)
     if nodes is None:
         return ""
@@ -158,39 +149,11 @@ def about_translations(matrix: OperatorMatrix) -> str:
 
 def _beam(matrix: OperatorMatrix) -> Beam | None:
     """The matrix of a straight beam, whose graph may be planar; costs next to nothing where rows have more entries."""
-    from .structures.beams import MOST, find_beam
-
     full = np.bincount(matrix.edges[matrix.entries != 0].ravel(), minlength=1)
     return find_beam(matrix.csr()) if full.max() <= MOST else None
 
 
 def _exact(matrix: OperatorMatrix) -> tuple[sp.csr_array, Rounding | None]:
     """The matrix to look at, and the rounding of entries with few digits."""
-    from .nodes.rounded import with_exact_sums
-    from .structures.recognise import directions_with_gaps
-
     whole = matrix.csr()
     return with_exact_sums(whole, directions_with_gaps(whole))
-
-
-def _truss(whole: sp.csr_array, rounding: Rounding | None, reason: str) -> VectorReading | None:
-    from .structures import truss_numbering
-
-    found = truss_numbering(whole, allowed=rounding.spread if rounding else CANCELLED)
-    if found is None:
-        return None
-    bars = f"{found.n_nodes} nodes with {found.block_size} unknowns each, {found.kind}, whose blocks are those of bars"
-    return VectorReading(found, f"{reason}, and its rows form {bars}", rounding)
-
-
-def _convinces(found: Numbering | None) -> TypeGuard[Numbering]:
-    """Whether rows annihilate constants, as those of scalar matrices never do, and nodes look like such."""
-    return found is not None and found.sound
-
-
-def _evidence(found: Numbering | StructuralNumbering) -> str:
-    order = {"pattern": "in no regular order"}.get(found.kind, found.kind)
-    return (
-        f"its rows form {found.n_nodes} nodes with {found.block_size} unknowns each, {order}, whose sums by direction "
-        f"vanish in {100 * found.share:.0f} % of the cases"
-    )

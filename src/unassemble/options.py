@@ -3,9 +3,7 @@
 Each is checked when it is made, before any work: what is refused here has no meaning for any matrix.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,9 +13,6 @@ from numpy.typing import NDArray
 from .errors import GeometryError, InputError
 from .reductions import ConstantTensor
 from .tolerances import SUMMED
-
-OPERATORS = ("auto", "laplacian", "elasticity", "surface")
-METHODS = ("conformal", "angles")
 
 Direction = tuple[int, int, float]
 
@@ -32,7 +27,7 @@ class OperatorOptions:
     cells: bool = True
 
     def __post_init__(self) -> None:
-        _known("operator", self.operator, OPERATORS)
+        _known("operator", self.operator, ("auto", "laplacian", "elasticity", "surface"))
         _whole("block_size", self.block_size)
         if self.operator in ("laplacian", "surface") and self.names_nodes:
             raise InputError(
@@ -47,15 +42,19 @@ class OperatorOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class FrameOptions:
-    """What is known of the true positions and axes; as in :func:`unassemble.recover`."""
+    """What is known of the true positions and axes; as in :func:`unassemble.recover`.
 
-    anchors: tuple[tuple[Any, ...], ...] = ()
-    tensor: tuple[float, float, float] | None = None
+    Anchors and the tensor are given as there, and held as tuples of (row, x, y) or (row, x, y, z), and as the type that
+    undoes it.
+    """
+
+    anchors: Any = None
+    tensor: Any = None
     direction: Direction | None = None
     handed: str | None = None
 
     def __post_init__(self) -> None:
-        self._check_anchors()
+        object.__setattr__(self, "anchors", _listed_anchors(self.anchors))
         self._check_direction()
         if self.handed is not None:
             _known("handed", self.handed, ("left", "right"))
@@ -64,26 +63,20 @@ class FrameOptions:
             raise InputError("`handed` needs a line to refer to: give `direction`, or two `anchors`, as well")
         if self.tensor is None:
             return
-        if not _are_numbers(self.tensor, 3):
-            raise InputError(f"`tensor` is three numbers, kxx, kxy and kyy, not {self.tensor!r}")
-        ConstantTensor(*self.tensor)  # refuses what is not positive definite
-        if not (self._spans_plane() or (line and self.handed)):
+        try:
+            object.__setattr__(self, "tensor", ConstantTensor(*map(float, self.tensor)))
+        except (TypeError, ValueError) as error:
+            raise InputError(f"`tensor` is three numbers, kxx, kxy and kyy, not {self.tensor!r}") from error
+        places = np.array([place[:2] for _, *place in self.anchors])
+        spanned = len(places) > 2
+        if spanned:
+            places /= np.abs(places).max()  # so that nothing overflows
+            spanned = np.linalg.matrix_rank(places - places[0], tol=SUMMED * np.ptp(places)) == 2
+        if not (spanned or (line and self.handed)):
             raise InputError(
                 "`tensor` can be undone only with a known orientation: give three `anchors` that are not in line, or "
                 "`direction` and `handed`"
             )
-
-    def _check_anchors(self) -> None:
-        rows = [row for row, *_ in self.anchors]
-        places = [tuple(place) for _, *place in self.anchors]
-        if min(rows, default=0) < 0:
-            raise InputError(f"row {min(rows)} of `anchors` is not in the matrix: its rows count from 0")
-        if len(set(rows)) < len(rows):
-            raise InputError(f"row {next(row for row in rows if rows.count(row) > 1)} is anchored twice")
-        if not all(np.isfinite(place).all() for place in places):
-            raise InputError("a coordinate in `anchors` is not a finite number")
-        if len(set(places)) < len(places):
-            raise InputError("two `anchors` have the same position: different rows are different points")
 
     def _check_direction(self) -> None:
         if self.direction is None:
@@ -97,14 +90,7 @@ class FrameOptions:
             raise InputError("`direction` is (row, row, degrees), with whole rows that differ and a finite angle")
         if len(self.anchors) > 1:
             raise InputError("`direction` and two or more `anchors` fix the same freedom: give one of them")
-
-    def _spans_plane(self) -> bool:
-        """Whether the anchors are not all in line."""
-        places = np.array([place[:2] for _, *place in self.anchors])
-        if len(places) < 3:
-            return False
-        places /= np.abs(places).max()  # so that nothing overflows
-        return bool(np.linalg.matrix_rank(places - places[0], tol=SUMMED * np.ptp(places)) == 2)
+        object.__setattr__(self, "direction", (int(first), int(second), float(degrees)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,11 +106,14 @@ class ScalarOptions:
     threads: int | None = None
 
     def __post_init__(self) -> None:
-        _known("method", self.method, METHODS)
+        _known("method", self.method, ("conformal", "angles"))
         _whole("threads", self.threads)
-        if not (_number("scale", self.scale) or self.scale is None):
+        for name, value in (("scale", self.scale), ("noise", self.noise)):
+            if value is not None and not _is_number(value):
+                raise InputError(f"`{name}` is a number, not {value!r}")
+        if self.scale is not None and not (self.scale and np.isfinite(self.scale)):
             raise InputError(f"`scale` is a finite nonzero number, not {self.scale}")
-        if self.noise is not None and not (_number("noise", self.noise) and self.noise > 0):
+        if self.noise is not None and not (self.noise > 0 and np.isfinite(self.noise)):
             raise InputError(f"`noise` is a positive standard deviation, not {self.noise}")
 
     def check_scale(self, entries: NDArray[np.float64]) -> None:
@@ -142,30 +131,30 @@ class ScalarOptions:
         return self.refine and self.method == "conformal"
 
 
-def listed_anchors(anchors: Any) -> tuple[tuple[Any, ...], ...]:
-    """Anchors as (row, x, y) or (row, x, y, z), rows as int where they are whole; arrays are taken row by row.
-
-    A mapping has rows as keys and positions as values.
-
-    Raises
-    ------
-    InputError
-    """
+def _listed_anchors(anchors: Any) -> tuple[tuple[Any, ...], ...]:
+    """Anchors as (row, x, y) or (row, x, y, z); a mapping has rows as keys and positions as values."""
+    listed = []
     try:
         if isinstance(anchors, Mapping):
             anchors = [(row, *place) for row, place in anchors.items()]
-        return tuple(_anchor(one) for one in (() if anchors is None else anchors))
+        for row, *place in () if anchors is None else anchors:
+            if isinstance(row, (str, bytes)) or int(row) != row or len(place) not in (2, 3):
+                raise ValueError(row)
+            listed.append((int(row), *map(float, place)))
     except (TypeError, ValueError, IndexError, OverflowError) as error:
         raise InputError(
             "`anchors` are (row, x, y), in space (row, x, y, z), or a mapping of rows to positions, with whole rows"
         ) from error
-
-
-def _anchor(one: Any) -> tuple[Any, ...]:
-    row, *place = one
-    if isinstance(row, (str, bytes)) or int(row) != row or len(place) not in (2, 3):
-        raise ValueError(row)
-    return int(row), *map(float, place)
+    rows, places = [row for row, *_ in listed], {tuple(place) for _, *place in listed}
+    if min(rows, default=0) < 0:
+        raise InputError(f"row {min(rows)} of `anchors` is not in the matrix: its rows count from 0")
+    if len(set(rows)) < len(rows):
+        raise InputError(f"row {next(row for row in rows if rows.count(row) > 1)} is anchored twice")
+    if not all(np.isfinite(place).all() for place in places):
+        raise InputError("a coordinate in `anchors` is not a finite number")
+    if len(places) < len(rows):
+        raise InputError("two `anchors` have the same position: different rows are different points")
+    return tuple(listed)
 
 
 def _known(name: str, value: str, words: tuple[str, ...]) -> None:
@@ -178,16 +167,5 @@ def _whole(name: str, value: Any) -> None:
         raise InputError(f"`{name}` is a whole number, not {value!r}")
 
 
-def _number(name: str, value: Any) -> bool:
-    """Whether an option is finite and not zero; anything but numbers and None is refused."""
-    if value is not None and not _is_number(value):
-        raise InputError(f"`{name}` is a number, not {value!r}")
-    return bool(value and np.isfinite(value))
-
-
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-
-
-def _are_numbers(values: Any, count: int) -> bool:
-    return isinstance(values, Iterable) and len(found := list(values)) == count and all(map(_is_number, found))

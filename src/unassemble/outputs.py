@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from .export import save, to_meshio
 from .modes import modes_of
-from .quiet import quiet_libraries
+from .progress import quiet_libraries
 from .recovery import Body, ConformingMesh, PlanarMesh, Recovery, Structure, Surface
 from .report import build_report, write_report
 from .summary import one_line, summary, table
@@ -29,12 +29,9 @@ def plot(recovery: Recovery, path: str | PathLike[str] | None = None, *, ax: Axe
 
 
 def report(recovery: Recovery, path: str | PathLike[str] | None = None) -> dict[str, Any]:
-    """All that there is to say; see :func:`unassemble.report.build_report`. Written as ``.json`` where a path is given.
+    """All that there is to say; see :func:`unassemble.report.build_report`.
 
-    Raises
-    ------
-    OutputError
-        If the extension is not ``.json``, or the file cannot be written.
+    Written as ``.json`` where a path is given; raises OutputError where that cannot be.
     """
     found = build_report(recovery)
     if path is not None:

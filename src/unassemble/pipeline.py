@@ -1,7 +1,5 @@
 """The door: options, file, checks, and which operator's recovery a matrix is for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -17,11 +15,11 @@ from .errors import GeometryError, InputError, RecoveryError
 from .linalg import threads as thread_limit
 from .masses import weighed
 from .matrix import OperatorMatrix, check_matrix, is_file, read_matrix
+from .metric import could_be_planar, flattened, perhaps_planar, realised, recover_surface, unless_planar
 from .operators import VectorReading, asked_for, second_reading, vector_valued
-from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions, listed_anchors
+from .options import Direction, FrameOptions, OperatorOptions, ScalarOptions
 from .outputs import PlanarMesh, Recovery, Surface
-from .progress import StageDisplay
-from .quiet import quiet_libraries
+from .progress import StageDisplay, quiet_libraries
 from .readings import ScalarReadings
 from .scalar.placement import Placement
 from .tolerances import LARGEST_NOISE, ROUNDED
@@ -145,7 +143,7 @@ def recover(
     ('certified', 2, 1.0)
     """
     about = OperatorOptions(operator=operator, block_size=block_size, numbering=numbering, cells=cells)
-    frame = FrameOptions(anchors=listed_anchors(anchors), tensor=tensor, direction=direction, handed=handed)
+    frame = FrameOptions(anchors=anchors, tensor=tensor, direction=direction, handed=handed)
     planar = ScalarOptions(
         method="conformal" if method is None else method,
         refine=refine,
@@ -203,10 +201,7 @@ class _Task:
     def _as_asked(self) -> Recovery:
         """As the operator that is named; else as the one that the graph shows, or else the first that fits."""
         if self.about.names_nodes:
-            self._refuse_scalar_options()
-            with self.clock("numbering"):
-                reading = asked_for(self.matrix, self.about.block_size, self.about.numbering)
-            return self._as_vector(reading)
+            return self._as_vector()
         if self.about.operator == "surface":
             return self._as_surface()
         if self.about.operator == "laplacian":
@@ -231,21 +226,14 @@ class _Task:
 
     @cached_property
     def _readings(self) -> ScalarReadings:
-        return self._readings_with(self.frame.anchors)
-
-    def _readings_with(self, anchors: Sequence[Any]) -> ScalarReadings:
-        frame = self.frame
         self.planar.check_scale(self.matrix.entries)
-        placement = Placement.checked(self.matrix.n, anchors, frame.tensor, frame.direction, frame.handed)
-        return ScalarReadings(self.matrix, placement, self.clock, self.planar)
+        return ScalarReadings(self.matrix, Placement.of(self.matrix.n, self.frame), self.clock, self.planar)
 
     def _first_that_fits(self) -> Recovery:
         """A planar mesh; or a surface in space; or nodes of several unknowns where no rows, or fewer, belong to these.
 
         A straight beam's rows, for one, fall apart into planar graphs.
         """
-        from .metric import unless_planar
-
         try:
             found = self._readings.likeliest()
         except RecoveryError as error:
@@ -279,28 +267,24 @@ class _Task:
 
     def _as_surface(self) -> Surface:
         """A surface in space, with coordinates on demand; a flat one with those of the planar mesh that it is."""
-        from .metric import flattened, perhaps_planar, realised
-
-        found: Surface | GeometryError
+        found: Surface | None = None
         try:
             found = self._lengths()
         except GeometryError as error:
-            found = error
-        if isinstance(found, GeometryError) or perhaps_planar(found):
+            failure = error
+        if found is None or perhaps_planar(found):
             with suppress(RecoveryError):
-                planar = self._readings_with(()).likeliest()
+                planar = self._readings.likeliest()
                 triangles = planar.divided()[0]
-                if planar.certified and (isinstance(found, GeometryError) or len(triangles) < len(found.triangles)):
+                if planar.certified and (found is None or len(triangles) < len(found.triangles)):
                     found = self._lengths(triangles)  # holes of three edges, that were taken for triangles
-                found = found if isinstance(found, GeometryError) else flattened(found, planar)
-        if isinstance(found, GeometryError):
-            raise found
+                found = None if found is None else flattened(found, planar)
+        if found is None:
+            raise failure
         return realised(found, self.clock) if self.realise and found.dim == 3 else found
 
     def _as_certified_surface(self) -> Surface | None:
         """The matrix as that of a surface that is bent, if it is one without doubt."""
-        from .metric import could_be_planar, realised
-
         if np.ptp(self.matrix.entries) <= ROUNDED * self.matrix.row_size.max():
             return None  # the Laplacian of a graph, most likely
         try:
@@ -313,8 +297,6 @@ class _Task:
         return realised(chosen, self.clock) if self.realise else chosen
 
     def _lengths(self, triangles: NDArray[np.int64] | None = None) -> Surface:
-        from .metric import recover_surface
-
         fit = ("scale", "noise", "standard_deviations")
         unfit = [name for name in self.given if name not in fit] + ["anchors"] * bool(self.frame.anchors)
         if unfit:
@@ -324,19 +306,19 @@ class _Task:
         self.planar.check_scale(self.matrix.entries)
         return recover_surface(self.matrix, self.clock, self.planar, triangles)
 
-    def _as_vector(self, reading: VectorReading) -> Recovery:
-        from .vector import recover_vector
+    def _as_vector(self, reading: VectorReading | None = None) -> Recovery:
+        """As read, or else as options say."""
+        from .vector import recover_vector  # loads elasticity
 
-        self._refuse_scalar_options()
-        clock, anchors, cells = self.clock, self.frame.anchors, self.about.cells
-        try:
-            return recover_vector(self.matrix, reading, clock, anchors=anchors, cells=cells)
-        except GeometryError as error:
-            raise GeometryError(f"the matrix is {reading.name}, but {error}") from error
-
-    def _refuse_scalar_options(self) -> None:
         if self.given:
             raise InputError(
                 f"`{self.given[0]}` is for scalar matrices, and this one is read as vector-valued: leave it out, or "
                 "choose `operator='laplacian'`"
             )
+        if reading is None:
+            with self.clock("numbering"):
+                reading = asked_for(self.matrix, self.about.block_size, self.about.numbering)
+        try:
+            return recover_vector(self.matrix, reading, self.clock, anchors=self.frame.anchors, cells=self.about.cells)
+        except GeometryError as error:
+            raise GeometryError(f"the matrix is {reading.name}, but {error}") from error

@@ -1,12 +1,12 @@
-"""The stage that long work is in, on a terminal."""
-
-from __future__ import annotations
+"""What a user sees of long work: the stage that it is in, and no warnings of other libraries."""
 
 import sys
 import threading
 import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from shutil import get_terminal_size
-from types import TracebackType
 from typing import IO, Self
 
 _SENTENCES = {
@@ -34,15 +34,8 @@ class StageDisplay:
 
     It appears only if the stream is a terminal and the work takes longer than a moment, and vanishes at the end.
 
-    Parameters
-    ----------
-    stream : text stream, optional
-        Standard error by default.
-    enabled : bool
-    wanted : bool
-        Whether it was asked for, and is shown on a stream that is no terminal as well, as in a notebook.
-    delay, interval : float
-        Seconds before the line appears, and between its updates.
+    The stream is standard error by default. Where the line is `wanted` it is shown on a stream that is no terminal as
+    well, as in a notebook. `delay` and `interval` are seconds before it appears, and between its updates.
     """
 
     def __init__(
@@ -60,10 +53,9 @@ class StageDisplay:
         self._stage = ""
         self._start = time.time()
         self._done = threading.Event()
+        shown = enabled and (wanted or self._stream.isatty())
         # A thread, because stages may spend minutes in compiled code that calls nobody.
-        self._thread = (
-            threading.Thread(target=self._show, daemon=True) if enabled and (wanted or self._stream.isatty()) else None
-        )
+        self._thread = threading.Thread(target=self._show, daemon=True) if shown else None
 
     def __call__(self, stage: str) -> None:
         """Tell that a stage begins."""
@@ -74,9 +66,7 @@ class StageDisplay:
             self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._done.set()
         if self._thread:
             self._thread.join()
@@ -95,3 +85,11 @@ class StageDisplay:
                 line.set_description_str(self._stage or "working")
                 if self._done.wait(self._interval):
                     return
+
+
+@contextmanager
+def quiet_libraries() -> Iterator[None]:
+    """Warnings that come from other modules than this package's are not shown; its own are faults, and are."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module=r"(?!unassemble\b)")
+        yield

@@ -1,7 +1,5 @@
 """What a scalar matrix may be that of, from the likeliest on: the first that fits is the answer."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -84,10 +82,7 @@ class ScalarReadings:
     def likeliest(self) -> PlanarMesh:
         """The mesh of the first reading that fits, or else of the first that comes near.
 
-        Raises
-        ------
-        RecoveryError
-            If there is none.
+        Raises RecoveryError if there is none.
         """
         if self.options.method != "conformal":
             return self._plain(self.matrix)

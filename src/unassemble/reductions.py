@@ -6,8 +6,6 @@ Laplacian mesh comes back up to a rotation and reflection, which do not commute 
 applied.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,10 +18,7 @@ from .errors import InputError
 class ConstantTensor:
     """Symmetric positive definite K.
 
-    Raises
-    ------
-    InputError
-        If K is not finite and positive definite.
+    Raises InputError if K is not finite and positive definite.
     """
 
     kxx: float

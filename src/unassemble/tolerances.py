@@ -4,8 +4,6 @@ Sections by subject. A number that follows from machine epsilon and sizes is com
 of the caller is a field of a frozen options type: neither belongs here.
 """
 
-from __future__ import annotations
-
 # Entries.
 
 LAST_DIGITS = 1e-14

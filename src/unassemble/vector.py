@@ -8,79 +8,50 @@ from typing import Any
 import numpy as np
 
 from .clock import Clock
-from .elasticity.description import Request
 from .elasticity.recover import serve_body
 from .errors import RecoveryError
 from .matrix import OperatorMatrix
-from .nodes import Numbering
+from .nodes import Numbering, Request
 from .nodes.nodal import nodal_matrix
 from .operators import VectorReading
 from .recovery import Recovery
 from .structures import Beam, StructuralNumbering, serve_beam, serve_structure
-from .structures.bars import bars_of
 from .structures.layouts import PINNED
-from .structures.trusses import serve_truss
+from .structures.trusses import bars_of, serve_truss
 from .tolerances import CANCELLED
 
 
 def recover_vector(
-    matrix: OperatorMatrix,
-    reading: VectorReading,
-    clock: Clock,
-    *,
-    anchors: Sequence[Any] | None,
-    cells: bool,
+    matrix: OperatorMatrix, reading: VectorReading, clock: Clock, *, anchors: Sequence[Any] | None, cells: bool
 ) -> Recovery:
-    """Recover a vector-valued matrix whose numbering is known.
+    """Recover a vector-valued matrix whose numbering is known; see :class:`.nodes.anchoring.Request`.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    reading : VectorReading
-    clock : Clock
-    anchors : sequence of (row, x, y) or (row, x, y, z), optional
-    cells : bool
-        Look for elements too, not only where nothing else confirms positions.
-
-    Raises
-    ------
-    InputError
-        For anchors that do not fit.
-    RecoveryError
-        If no piece is determined.
+    InputError for anchors that do not fit, RecoveryError if no piece is determined.
     """
-    numbering, choice = reading.numbering, reading.why
+    numbering, rounding = reading.numbering, reading.rounding
+    request = Request(matrix, clock, anchors, cells, reading.why, rounding)
     if isinstance(numbering, Beam):
-        return serve_beam(matrix, numbering, clock, anchors=anchors, choice=choice)
+        return serve_beam(numbering, request)
     if isinstance(numbering, StructuralNumbering):
-        return serve_structure(matrix, numbering, clock, anchors=anchors, choice=choice, cells=cells)
+        return serve_structure(numbering, request)
     with clock("numbering"):
-        rounding = reading.rounding
         whole = rounding.exact if rounding else matrix.csr()
         nodal = nodal_matrix(whole, numbering)
     bars = bars_of(nodal, rounding.spread if rounding else CANCELLED)
     if bars is not None:
-        return serve_truss(matrix, nodal, numbering, bars, clock, anchors=anchors, choice=choice, rounding=rounding)
+        return serve_truss(nodal, numbering, bars, request)
     del whole  # of a large body, memory that the long work can use
     try:
-        body = serve_body(matrix, nodal, numbering, clock, Request(anchors, cells, choice, rounding))
+        body = serve_body(nodal, numbering, request)
     except RecoveryError:
-        other = _by_rotations(matrix, numbering, clock, anchors, choice, cells=cells)
+        other = _by_rotations(numbering, request)
         if other is None:
             raise
         return other
-    return body if body.certified else _by_rotations(matrix, numbering, clock, anchors, choice, cells=cells) or body
+    return body if body.certified else _by_rotations(numbering, request) or body
 
 
-def _by_rotations(
-    matrix: OperatorMatrix,
-    numbering: Numbering,
-    clock: Clock,
-    anchors: Sequence[Any] | None,
-    choice: str,
-    *,
-    cells: bool,
-) -> Recovery | None:
+def _by_rotations(numbering: Numbering, request: Request) -> Recovery | None:
     """Nodes in space by rigid rotations alone, of any material and element; None where these certify nothing."""
     if numbering.block_size != PINNED.dim:
         return None
@@ -89,7 +60,7 @@ def _by_rotations(
         direction = np.where(numbering.unnamed, -1, direction)
     same = StructuralNumbering(PINNED, numbering.node_of_row, direction, numbering.kind, numbering.share)
     try:
-        found = serve_structure(matrix, same, clock, anchors=anchors, choice=choice, cells=cells)
+        found = serve_structure(same, request)
     except RecoveryError:
         return None
     return found if found.certified else None

@@ -7,16 +7,7 @@ from dataclasses import dataclass
 
 
 def count_of(number: int, noun: str, plural: str | None = None) -> str:
-    """A number with its noun: ``1 row``, ``2 rows``, ``1,200 vertices``.
-
-    Parameters
-    ----------
-    number : int
-    noun : str
-        In the singular.
-    plural : str, optional
-        The noun with an s by default.
-    """
+    """A number with its noun: ``1 row``, ``2 rows``, ``1,200 vertices``; the plural has an s by default."""
     return f"{number:,} {noun if number == 1 else plural or noun + 's'}"
 
 
@@ -25,17 +16,12 @@ def words_of(rows: Iterable[int]) -> str:
     return ", ".join(map(str, rows))
 
 
-def sentences(parts: Iterable[str], most: int = 2) -> str:
-    """The first few of some sentences, the important ones first: ``one thing. Another thing``.
+def sentences(parts: Iterable[str]) -> str:
+    """The first two of some sentences, the important ones first: ``one thing. Another thing``.
 
-    Parameters
-    ----------
-    parts : iterable of str
-        Each without its full stop, and beginning small; empty ones are left out.
-    most : int
-        How many a message may have.
+    Each comes without its full stop, and beginning small; empty ones are left out.
     """
-    chosen = [part for part in parts if part][:most]
+    chosen = [part for part in parts if part][:2]
     return ". ".join(part if k == 0 else part[:1].upper() + part[1:] for k, part in enumerate(chosen))
 
 
@@ -46,15 +32,7 @@ WITHOUT_SUPPORTS = "assemble the matrix without supports, if that can be done"
 
 @dataclass(frozen=True)
 class Reason:
-    """Why an answer has its status.
-
-    Attributes
-    ----------
-    text : str
-        At most two sentences.
-    advice : str
-        What to do next; empty where there is nothing to do.
-    """
+    """Why an answer has its status, in two sentences at most, and what to do next, where there is anything to do."""
 
     text: str
     advice: str = ""

@@ -181,4 +181,4 @@ def recover_elasticity(matrix, *, block_size=None, numbering=None, cells=True, p
     whole, rounding = with_exact_sums(checked.csr())
     numbering = numbering or find_numbering(whole, block_size)
     with mock.patch.dict(PATCH, {} if patch is None else {2: patch, 3: patch}):
-        return serve_body(checked, nodal_matrix(whole, numbering), numbering, clock, Request(None, cells, "", rounding))
+        return serve_body(nodal_matrix(whole, numbering), numbering, Request(checked, clock, None, cells, "", rounding))

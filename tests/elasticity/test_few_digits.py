@@ -73,6 +73,17 @@ def test_gaps_in_the_order_where_rollers_are(kind, counts, zeros, order):
     assert truth.split == 0
 
 
+def test_nodes_that_only_elements_could_show_are_not_certified():
+    """Elements do not re-assemble to rounded entries, and nothing else says which rows are one node's there."""
+    shape = box("tri-p2", (6, 7), perturb=0.2)
+    body = permuted_nodes(stiffness("tri-p2", shape, lam=1.5, mu=lambda x: 1 + x[1] + x[0] * x[1]), seed=4)
+    case = given(body, "roller", "interleaved", "dropped")
+    found = recover(rounded(case.matrix, "8 digits"), operator="elasticity")
+    assert not found.certified
+    assert found.reason.startswith("which rows belong to one node was inferred")
+    assert judged(found, case).error < 1e-4
+
+
 def test_the_given_matrix_stays_as_it_is():
     case = given(permuted_nodes(stiffness("tri-p1", box("tri-p1", (6, 7)))), "roller", "by component", "stored")
     matrix = rounded(case.matrix, "6 digits")

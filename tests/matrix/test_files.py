@@ -69,6 +69,7 @@ def tar() -> bytes:
 VALID = {
     "A.mtx": market(),
     "A.mtx.gz": gzipped(market()),
+    "A.mtx.gz.gz": gzipped(gzipped(market())),
     "A.npz": npz(),
     "A.npz.gz": gzipped(npz()),
     "A.mat": mat(),
@@ -187,7 +188,6 @@ def _forbidden(*_: Any, **__: Any) -> None:
         (pickle.dumps(A, 0), "pickle"),
         (tar(), "tar archive"),
         (gzipped(tar()), "tar archive"),
-        (gzipped(gzipped(market())), "twice"),
         (gzipped(b""), "is empty"),
         (gzipped(b"hello"), "'hello'"),
         (bz2.compress(market()), "bzip2"),
@@ -200,8 +200,8 @@ def _forbidden(*_: Any, **__: Any) -> None:
         (gzipped(market())[:15], "truncated"),
         (gzipped(market())[:30] + b"\xff\xff" + gzipped(market())[32:], "damaged"),
         (gzipped(market())[:-8] + bytes(8), "damaged"),
-        (b"\x1f\x8b", "gzip"),
-        (b"\x1f\x8bnot gzip at all", "gzip"),
+        (b"\x1f\x8b", "damaged"),
+        (b"\x1f\x8bnot gzip at all", "damaged"),
     ],
 )
 def test_foreign_and_damaged_files(content: bytes, words: tuple[str, ...] | str, tmp_path: Path, refused) -> None:

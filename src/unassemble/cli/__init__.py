@@ -1,14 +1,11 @@
 """The command line. Only click is imported at start; the rest when a command needs it."""
 
-from __future__ import annotations
-
 import click
 
 from .._version import __version__
 from .commands import demo, inspect, modes, paper, recover
-from .spelling import as_typed, flags_of
-from .status import CommandLine
-from .values import spelled_out
+from .options import spelled_out
+from .status import CommandLine, as_typed, flags_of
 
 __all__ = ["as_typed", "flags_of", "main", "spelled_out"]
 
@@ -35,8 +32,5 @@ def main() -> None:
     """All commands."""
 
 
-main.add_command(recover)
-main.add_command(inspect)
-main.add_command(modes)
-main.add_command(demo)
-main.add_command(paper)
+for command in (recover, inspect, modes, demo, paper):
+    main.add_command(command)

@@ -1,36 +1,33 @@
 """The commands: ``unassemble recover``, ``inspect``, ``modes``, ``demo`` and ``paper``."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import click
 
-from .options import check_files, matrix_options, nodes_options, recovered, spelled_numbering, target
+from .options import (
+    OPERATORS,
+    Numbers,
+    OptionalTolerance,
+    check_files,
+    folder_options,
+    matrix_options,
+    recovered,
+    recovery_options,
+    target,
+)
 from .status import Exit, outcome, say
-from .values import Numbers, OptionalTolerance
 
 
 @click.command(cls=OptionalTolerance)
 @matrix_options
-@nodes_options
+@recovery_options
 @click.argument("out", metavar="[OUT]", required=False)
 @click.option("-o", "--output", metavar="OUT", help="The mesh: .npz, or any format of meshio.")
-@click.option(
-    "--operator",
-    type=click.Choice(["auto", "laplacian", "elasticity", "surface"]),
-    default="auto",
-    show_default=True,
-)
+@click.option("--operator", type=click.Choice(OPERATORS), default="auto", show_default=True)
 @click.option("--method", type=click.Choice(["conformal", "angles"]), help="The default picks the best.")
 @click.option("--no-refine", is_flag=True, help="Leave out the polish.")
 @click.option("--scale", type=float, metavar="C", help="The factor c is known.")
-@click.option(
-    "--noise",
-    type=float,
-    metavar="SIGMA",
-    help="Standard deviation of the entries; the certificate becomes a chi-square test.",
-)
+@click.option("--noise", type=float, metavar="SIGMA", help="Standard deviation of the entries, for a chi-square test.")
 @click.option(
     "--anchor",
     "anchors",
@@ -53,10 +50,7 @@ from .values import Numbers, OptionalTolerance
 )
 @click.option("--triangulate", is_flag=True, help="Divide cells that the matrix leaves undivided.")
 @click.option("--standard-deviations", is_flag=True, help="Error bars of the coordinates.")
-@click.option("--report", metavar="FILE", help="Write a report: .json.")
 @click.option("--plot", metavar="FILE", help="Write a picture: .png, .svg or .pdf.")
-@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads of the linear algebra libraries.")
-@click.option("--quiet", is_flag=True, help="Print nothing but errors.")
 def recover(
     matrix: str, out: str | None, output: str | None, report: str | None, plot: str | None, quiet: bool, **options: Any
 ) -> int:
@@ -71,11 +65,10 @@ def recover(
     """
     unnamed = out is None and output is None
     out = target(matrix, out, output)
-    options["numbering"] = spelled_numbering(options["numbering"])
     options["refine"] = not options.pop("no_refine")
     from ..export import check_output, without_points
+    from ..files import check_plot
     from ..formats import lacks_worth
-    from ..plot.canvas import check_plot
     from ..progress import StageDisplay
     from ..report import check_report, write_report
 
@@ -116,13 +109,10 @@ def inspect(matrix: str, variable: str | None, drop_zeros: float | None, as_json
 
 @click.command(cls=OptionalTolerance)
 @matrix_options
-@nodes_options
+@recovery_options
 @click.option("-o", "--output", "out", metavar="OUT", required=True, help="The modes: .npy, or dense Matrix Market.")
 @click.option("--petsc", metavar="FILE", help="Write the coordinates too, as a PETSc Vec in binary format.")
 @click.option("--amgcl", metavar="FILE", help="Write the coordinates too, as AMGCL reads them: Matrix Market.")
-@click.option("--report", metavar="FILE", help="Write a report: .json.")
-@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads of the linear algebra libraries.")
-@click.option("--quiet", is_flag=True, help="Print nothing but errors.")
 def modes(
     matrix: str, out: str, petsc: str | None, amgcl: str | None, report: str | None, quiet: bool, **options: Any
 ) -> int:
@@ -130,7 +120,6 @@ def modes(
 
     One row per row of MATRIX, in its order; translations, then rotations: 3 columns in the plane, 6 in space.
     """
-    options["numbering"] = spelled_numbering(options["numbering"])
     from ..files import check_target
     from ..modes import check_modes, save_amgcl_coordinates, save_modes, save_petsc_vec
     from ..progress import StageDisplay
@@ -153,8 +142,7 @@ def modes(
 
 
 @click.command()
-@click.option("-o", "--output", "folder", metavar="DIR", default="demo-output", show_default=True)
-@click.option("--debug", is_flag=True, expose_value=False, help="Show tracebacks and details.")
+@folder_options("demo-output")
 def demo(folder: str) -> int:
     """Recover two matrices that this library did not assemble, and a lattice mast.
 
@@ -167,8 +155,7 @@ def demo(folder: str) -> int:
 
 
 @click.command()
-@click.option("-o", "--output", "folder", metavar="DIR", default="paper-output", show_default=True)
-@click.option("--debug", is_flag=True, expose_value=False, help="Show tracebacks and details.")
+@folder_options("paper-output")
 def paper(folder: str) -> int:
     """Regenerate Figures 2 to 12 of the 2002 paper.
 

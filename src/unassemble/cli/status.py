@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import sys
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -15,10 +16,37 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from ..errors import InputError, OutputError, RecoveryError, UnassembleError
-from .spelling import as_typed
 
 if TYPE_CHECKING:
     from ..recovery import Recovery
+
+
+_ARGUMENT = re.compile(r"`(\w+)(?:=([^`]*))?`")
+
+
+def flags_of(command: click.Command) -> dict[str, str]:
+    """Flags of a command by the names of the library's arguments."""
+    return {p.name: p.opts[0] for p in command.params if isinstance(p, click.Option) and p.name}
+
+
+def as_typed(text: str, commands: Iterable[click.Command]) -> str:
+    """A message with flags in place of the library's arguments: ```noise=1e-6``` becomes ``--noise 1e-6``.
+
+    The command in use is the first one; an argument that only another one has is said to be that one's. What none of
+    them has stays as it is.
+    """
+    text = text.replace("`report()`", "the `report`").replace("`inspect_matrix`", "'unassemble inspect'")
+    known = [(command.name, flags_of(command)) for command in commands]
+
+    def typed(match: re.Match[str]) -> str:
+        name, value = match.groups()
+        for k, (command, flags) in enumerate(known):
+            if name in flags:
+                words = f"{flags[name]} {value.strip(chr(39))}" if value not in (None, "True") else flags[name]
+                return words if k == 0 else f"{words} (an option of {command})"
+        return match[0]
+
+    return _ARGUMENT.sub(typed, text)
 
 
 class Exit(IntEnum):
@@ -32,24 +60,12 @@ class Exit(IntEnum):
     INTERRUPTED = 130
 
 
-# From click 8.2 on, a command without arguments raises the help text.
-_HELP = getattr(click.exceptions, "NoArgsIsHelpError", ())
-
-
 class CommandLine(click.Group):
     """A group of commands that return their exit status."""
 
     debug = False  # whether tracebacks and details are wanted
 
-    def main(
-        self,
-        args: Sequence[str] | None = None,
-        prog_name: str | None = None,
-        complete_var: str | None = None,
-        standalone_mode: bool = True,
-        windows_expand_args: bool = True,
-        **extra: Any,
-    ) -> NoReturn:
+    def main(self, args: Sequence[str] | None = None, *more: Any, **named: Any) -> NoReturn:
         """Run a command and leave with its status."""
         given = self.with_command(list(sys.argv[1:] if args is None else args))
         debug = self.debug = "--debug" in given
@@ -59,13 +75,14 @@ class CommandLine(click.Group):
             with warnings.catch_warnings():
                 if not debug:  # what matters to a user is in the report
                     warnings.simplefilter("ignore")
-                status = super().main(given, prog_name, complete_var, standalone_mode=False, **extra)
+                status = super().main(given, *more, **{**named, "standalone_mode": False})
         except BaseException as error:
             status, sentence = verdict(error)
             if debug and not isinstance(error, (SystemExit, click.exceptions.ClickException)):
                 traceback.print_exception(error)
             if sentence:
-                click.echo(f"unassemble: {as_typed(sentence, self.in_use(given))}", err=True)
+                in_use = sorted(self.commands.values(), key=lambda command: command.name != next(iter(given), None))
+                click.echo(f"unassemble: {as_typed(sentence, in_use)}", err=True)
         sys.exit(status or Exit.CERTIFIED)
 
     def with_command(self, words: list[str]) -> list[str]:
@@ -74,39 +91,36 @@ class CommandLine(click.Group):
         named = first != "" and not first.startswith("-") and (Path(first).suffix or Path(first).exists())
         return ["recover", *words] if (first == "-" or named) and first not in self.commands else words
 
-    def in_use(self, words: Sequence[str]) -> list[click.Command]:
-        """All commands, the one that is called first."""
-        return sorted(self.commands.values(), key=lambda command: command.name != next(iter(words), None))
-
 
 def verdict(error: BaseException) -> tuple[int, str]:
     """Exit status and sentence for whatever ended a command."""
+    status: int = Exit.BUG
     match error:
         case SystemExit():
             return (error.code if isinstance(error.code, int) else Exit.BUG), ""
-        case click.exceptions.Abort() if not isinstance(error.__cause__, EOFError):
-            return Exit.INTERRUPTED, "interrupted"
-        case KeyboardInterrupt():
-            return Exit.INTERRUPTED, "interrupted"
-        case click.exceptions.ClickException() if isinstance(error, _HELP):
+        case KeyboardInterrupt() | click.exceptions.Abort() if not isinstance(error.__cause__, EOFError):
+            status, sentence = Exit.INTERRUPTED, "interrupted"
+        case click.exceptions.NoArgsIsHelpError():
             return Exit.USAGE, error.format_message()
         case click.exceptions.ClickException():
-            return Exit.USAGE, _one_line(error.format_message())
+            status, sentence = Exit.USAGE, error.format_message()
         case InputError():
-            return Exit.USAGE, _one_line(str(error))
+            status, sentence = Exit.USAGE, str(error)
         case RecoveryError():
-            return Exit.NOTHING, _one_line(str(error))
+            status, sentence = Exit.NOTHING, str(error)
         case UnassembleError():
-            return Exit.BUG, _one_line(str(error))
-        case OSError():
-            return Exit.USAGE, _one_line(system_sentence(error))
+            sentence = str(error)
+        case OSError():  # without its number
+            sentence = (error.strerror or str(error)).lower()
+            named = isinstance(error.filename, (str, bytes))
+            status, sentence = Exit.USAGE, f"{os.fsdecode(error.filename)!r}: {sentence}" if named else sentence
         case MemoryError():
-            return Exit.BUG, "there is not enough memory for a matrix of this size"
+            sentence = "there is not enough memory for a matrix of this size"
         case _:
             cause = error.__cause__ if isinstance(error, click.exceptions.Abort) and error.__cause__ else error
-            return Exit.BUG, f"internal error, please report it ({_one_line(f'{type(cause).__name__}: {cause}')}); " + (
-                "--debug shows where"
-            )
+            said = " ".join(f"{type(cause).__name__}: {cause}".split())
+            sentence = f"internal error, please report it ({said}); --debug shows where"
+    return status, " ".join(sentence.split())
 
 
 def outcome(recovery: Recovery, written: Sequence[str | None], *, quiet: bool, lacking: str = "") -> int:
@@ -125,20 +139,8 @@ def outcome(recovery: Recovery, written: Sequence[str | None], *, quiet: bool, l
     return Exit.CERTIFIED if recovery.certified else Exit.UNCERTIFIED
 
 
-def system_sentence(error: OSError) -> str:
-    """What the system refused, without its number."""
-    why = (error.strerror or str(error)).lower()
-    return f"{os.fsdecode(error.filename)!r}: {why}" if isinstance(error.filename, (str, bytes)) else why
-
-
 def say(text: str) -> None:
-    """Print a result; a reader that has gone away is no failure of ours.
-
-    Raises
-    ------
-    OutputError
-        If standard output cannot take it, a full disk for one.
-    """
+    """Print a result; a reader that has gone away is no failure of ours, and a full disk an OutputError."""
     try:
         click.echo(text)
         if sys.stdout is not None:  # it may be closed
@@ -148,7 +150,3 @@ def say(text: str) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
         raise OutputError(f"cannot write to standard output: {(error.strerror or str(error)).lower()}") from error
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())

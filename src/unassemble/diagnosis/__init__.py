@@ -1,9 +1,8 @@
 """What a scalar matrix is, read off its graph and its sums without solving anything: one answer for everybody."""
 
-from .answers import explained, judged
 from .kinds import PLANAR, Diagnosis
 from .mass import mass_matrix, refuse_masses
-from .scalar import diagnosed, further_terms
+from .scalar import diagnosed, explained, further_terms, judged
 from .structural import indefinite
 
 __all__ = [

@@ -6,8 +6,6 @@ pairs, of six for quadratic triangles, and so on. Neighbouring cells share the n
 tetrahedra have no such pairs inside of a mesh; of the latter nearly every pair lies in a clique of four.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass
 
@@ -49,7 +47,7 @@ class Cells:
     # to how many others, in the mean, the common neighbours of a pair are coupled among these: two, where the cells
     # around an edge are tetrahedra and close a ring, or less where they do not; some more by chance
     around: float
-    twins: float  # share of rows with the neighbours of another row: several unknowns of one node
+    twins: float  # share of rows with the neighbours of another row, and coupled to it: several unknowns of one node
 
     @property
     def tetrahedral(self) -> bool:
@@ -57,11 +55,9 @@ class Cells:
         return mostly(self.in_fours) and self.around <= 3  # products of matrices, and dense graphs, have 5 and more
 
 
-def cells_of(n: int, edges: NDArray[np.int64], most: int = 1500) -> Cells:
-    """Look at some pairs of a graph, all near to each other.
-
-    `edges` (e, 2): pairs i < j, at least one; `most`: pairs to look at, in a part of four times as many rows.
-    """
+def cells_of(n: int, edges: NDArray[np.int64]) -> Cells:
+    """Look at some pairs i < j of a graph, of which there is at least one, all near to each other."""
+    most = 1500  # pairs to look at, in a part of four times as many rows
     graph = sp.csr_array((np.ones(len(edges), np.int32), edges.T), shape=(n, n))
     graph = graph + graph.T
     rows = csgraph.breadth_first_order(graph, int(edges[0, 0]), directed=False, return_predecessors=False)[: 4 * most]
@@ -74,8 +70,7 @@ def cells_of(n: int, edges: NDArray[np.int64], most: int = 1500) -> Cells:
     others = [set(near.indices[a:b].tolist()) for a, b in zip(near.indptr[:-1], near.indptr[1:], strict=True)]
     found: Counter[int] = Counter()
     cells: set[frozenset[int]] = set()
-    fours = threes = 0
-    around = 0.0
+    fours = threes = around = 0.0
     for i, j in pairs.tolist():
         common = others[i] & others[j]
         threes += bool(common)
@@ -87,35 +82,16 @@ def cells_of(n: int, edges: NDArray[np.int64], most: int = 1500) -> Cells:
             cells.add(frozenset(common | {i, j}))
     size, count = found.most_common(1)[0] if found else (0, 0)
     told = count >= MOST * found.total() and count >= _OFTEN * len(pairs)
-    return Cells(
-        size if told else 0,
-        _shared([cell for cell in cells if len(cell) == size]) if told else 0,
-        count / len(pairs),
-        fours / len(pairs),
-        threes / len(pairs),
-        around / len(pairs),
-        _twins(near),
-    )
-
-
-def _twins(graph: sp.csr_array) -> float:
-    """Share of rows that are coupled to the same rows as another one, and to each other."""
-    keys = np.random.default_rng(0).integers(2**40, size=graph.shape[0])
-    key = graph @ keys + keys  # of equal neighbourhoods equal; and exact, in integers
-    _, which, count = np.unique(key, return_inverse=True, return_counts=True)
-    return float((count[which] > 1).mean())
-
-
-def _shared(cells: list[frozenset[int]]) -> int:
-    """The most nodes that two cells have in common."""
-    at: dict[int, list[int]] = {}
-    for k, cell in enumerate(cells):
-        for node in cell:
-            at.setdefault(node, []).append(k)
-    most = Counter(
-        (a, b) for touching in at.values() for k, a in enumerate(touching[:30]) for b in touching[k + 1 : 30]
-    )
-    return max(most.values(), default=0)
+    shared = 0
+    if told:
+        alike = [sorted(cell) for cell in cells if len(cell) == size]
+        held = sp.csr_array((np.ones(size * len(alike)), np.ravel(alike), size * np.arange(len(alike) + 1)))
+        shared = int((held @ held.T - size * sp.eye_array(len(alike))).max())
+    keys = np.random.default_rng(0).integers(2**40, size=near.shape[0])
+    key = near @ keys + keys  # of equal neighbourhoods equal; and exact, in integers
+    _, which, alone = np.unique(key, return_inverse=True, return_counts=True)
+    often, fours, threes, around = (one / len(pairs) for one in (count, fours, threes, around))
+    return Cells(size if told else 0, shared, often, fours, threes, around, float((alone[which] > 1).mean()))
 
 
 def often(share: float) -> bool:

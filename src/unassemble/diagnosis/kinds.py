@@ -1,7 +1,5 @@
 """The kinds of scalar matrix that are told apart, and what to do with each."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -9,10 +7,9 @@ from ..words import sentences
 
 PLANAR, UNKNOWN = "laplacian", "unknown"
 
+_IN_SPACE = "scalar matrices of meshes in space are not read yet, but elasticity matrices of such meshes are"
 UNREAD: Mapping[str, str] = {
-    "tetrahedra": "scalar matrices of meshes in space are not read yet, but elasticity matrices of such meshes are",
-    "hexahedra": "scalar matrices of meshes in space are not read yet, but elasticity matrices of such meshes are",
-    "grid in space": "scalar matrices of meshes in space are not read yet, but elasticity matrices of such meshes are",
+    **dict.fromkeys(("tetrahedra", "hexahedra", "grid in space"), _IN_SPACE),
     "mass": "pass the stiffness matrix of the same mesh: a mass matrix tells sizes of cells, and no shape",
     "graph": "a graph has no coordinates: a layout of the graph may draw it",
     "segments": "the length of each segment is the reciprocal of its entry, with nothing left to solve",
@@ -31,25 +28,15 @@ LENGTHS = "the length of each segment is six times its entry, over the density, 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What a scalar matrix is.
+    """What a scalar matrix is."""
 
-    Attributes
-    ----------
-    kind : str
-        ``"laplacian"`` (linear triangles in the plane), ``"quadrilaterals"``, ``"quadratic"``, ``"cubic"``,
-        ``"tetrahedra"``, ``"hexahedra"``, ``"grid in space"``, ``"surface"`` (triangles, but not in the plane),
-        ``"segments"``, ``"mass"``, ``"graph"`` or ``"unknown"``.
-    name : str
-        The same in words, to follow "the matrix is".
-    evidence : tuple of str
-        What speaks for it, the strongest first.
-    advice : str
-        What to do next; empty where recovery is. Of cells that are read: what to do where the entries fit none.
-    """
-
+    #: ``"laplacian"`` (linear triangles in the plane), ``"quadrilaterals"``, ``"quadratic"``, ``"cubic"``,
+    #: ``"tetrahedra"``, ``"hexahedra"``, ``"grid in space"``, ``"surface"`` (triangles, but not in the plane),
+    #: ``"segments"``, ``"mass"``, ``"graph"`` or ``"unknown"``.
     kind: str
-    name: str
-    evidence: tuple[str, ...] = ()
+    name: str  #: The same in words, to follow "the matrix is".
+    evidence: tuple[str, ...] = ()  #: What speaks for it, the strongest first.
+    #: What to do next; empty where recovery is. Of cells that are read, what to do where the entries fit none.
     advice: str = ""
 
     @property

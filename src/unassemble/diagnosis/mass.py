@@ -10,9 +10,7 @@ A. J. Wathen, Realistic eigenvalue bounds for the Galerkin mass matrix, IMA J. N
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -46,12 +44,7 @@ _OR_HELD = ", or the stiffness matrix of a body of a few nodes that is held all 
 
 
 def refuse_masses(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) -> None:
-    """Raise an error that names a mass matrix which recovery does not read; as :func:`mass_matrix`.
-
-    Raises
-    ------
-    GeometryError
-    """
+    """Raise a GeometryError that names a mass matrix which recovery does not read; as :func:`mass_matrix`."""
     mass = mass_matrix(matrix, planar=planar, exact=exact)
     if mass is not None and mass.unread:
         raise GeometryError(mass.sentence())
@@ -68,115 +61,91 @@ def mass_matrix(matrix: OperatorMatrix, *, planar: bool, exact: bool = False) ->
     sign, nothing = np.sign(matrix.diagonal[np.abs(matrix.diagonal).argmax()]), ROUNDED * np.abs(matrix.entries).max()
     if planar and len(matrix.edges) <= 3 * matrix.n and (sign * matrix.entries < -nothing).any():
         return None
-    if not exact and _is_lumped(matrix):
+    root = np.sqrt(np.abs(matrix.diagonal))[matrix.edges].prod(axis=1)
+    if not exact and (np.abs(matrix.entries) <= LAST_DIGITS * root).all():  # functions are orthogonal: Crouzeix-Raviart
         return Diagnosis("mass", "a lumped mass matrix", ("all but its diagonal is rounding",), UNREAD["mass"])
-    masses = _Masses.of(matrix)
-    if masses is None:
+    # Diagonal entries of one sign, made positive, without the rows of zeros: unknowns without a mass, or points inside
+    # of a mesh whose boundary has one. Rows of stiffnesses may add up to zero.
+    nothing = ROUNDED * np.abs(matrix.diagonal).max()
+    used = np.abs(matrix.diagonal) > nothing
+    if not used.any() or np.ptp(np.sign(matrix.diagonal[used])):
         return None
-    if masses.simplices:
-        name, kind, ratios = masses.simplices
+    whole = sign * matrix.csr()
+    whole.data[np.abs(whole.data) <= nothing] = 0
+    whole.eliminate_zeros()
+    M = whole[used][:, used]
+    if not M.shape[0] < M.nnz == whole.nnz or M.shape[0] <= 2:
+        return None
+    without = () if used.all() else (f"{count_of(int((~used).sum()), 'row is', 'rows are')} zero",)
+    if simplices := _simplices(M):
+        name, kind, ratios = simplices
         advice = LENGTHS if kind.dim == 1 else "" if planar and kind == KINDS["triangle"] else UNREAD["mass"]
         parts = " or ".join(str(Fraction(ratio).limit_denominator(1000)) for ratio in ratios)
         sums = f"every row adds up to {parts} times its diagonal entry"
-        return Diagnosis("mass", f"a mass matrix of {name}", (sums, *masses.without), advice)
-    crowded = masses.M.nnz > 7 * masses.M.shape[0] - 12  # twice 3 n - 6, and the diagonal
-    bounds = masses.bounds if not exact and (crowded or not planar) else None
-    if bounds is None or _beside_stiffness(matrix):
+        return Diagnosis("mass", f"a mass matrix of {name}", (sums, *without), advice)
+    crowded = M.nnz > 7 * M.shape[0] - 12  # twice 3 n - 6, and the diagonal
+    bounds = _bounds(M) if not exact and (crowded or not planar) else None
+    # Rows may form straight triangles of second or third order, where more than their mass is there.
+    less = None if bounds is None else less_mass(matrix)
+    more = less is not None and bool(np.abs(less.matrix.entries).max() > ALIKE * np.abs(matrix.entries).max())
+    if bounds is None or more:
         return None
     shown = (
         f"scaled to identity blocks its least eigenvalue is {bounds[0]:.2g}, where those of stiffnesses near zero",
         f"its couplings add up in one vector, to a largest eigenvalue of {bounds[1]:.2g}, as under a translation",
     )
-    return Diagnosis("mass", f"a consistent mass matrix{masses.unknowns}", (*shown, *masses.without), UNREAD["mass"])
+    return Diagnosis("mass", f"a consistent mass matrix{_unknowns(M)}", (*shown, *without), UNREAD["mass"])
 
 
-def _beside_stiffness(matrix: OperatorMatrix) -> bool:
-    """Whether rows form straight triangles of second or third order, and more than their mass is there."""
-    less = less_mass(matrix)
-    return less is not None and bool(np.abs(less.matrix.entries).max() > ALIKE * np.abs(matrix.entries).max())
+def _simplices(M: sp.csr_array) -> tuple[str, Kind, list[float]] | None:
+    """The straight elements whose mass matrix this is, and what rows add up to, over their diagonal entries.
+
+    The area of a cell is a factor of its whole mass matrix: what a row of some kind of node, a corner say, adds up
+    to over its diagonal entry is the same on all cells, and so on all meshes.
+    """
+    diagonal = M.diagonal()
+    share = M.sum(axis=1) / diagonal
+    for name, kind in _SIMPLICES.items():
+        ratios = np.unique(mass_sums(kind).round(10)).tolist()
+        apart = np.abs(share[:, None] - ratios) <= SUMMED * abs(M).sum(axis=1)[:, None] / diagonal[:, None]
+        if apart.any(axis=1).all() and apart.any(axis=0).all():
+            return name, kind, ratios
+    return None
 
 
-def _is_lumped(matrix: OperatorMatrix) -> bool:
-    """Whether nothing but rounding stands beside the diagonal, as where functions are orthogonal (Crouzeix-Raviart)."""
-    root = np.sqrt(np.abs(matrix.diagonal))
-    return bool((np.abs(matrix.entries) <= LAST_DIGITS * root[matrix.edges[:, 0]] * root[matrix.edges[:, 1]]).all())
-
-
-@dataclass(frozen=True, eq=False)
-class _Masses:
-    """A matrix with diagonal entries of one sign, made positive, without the rows of zeros."""
-
-    M: sp.csr_array  # (k, k)
-    n_massless: int  # rows of zeros: unknowns without a mass, or points inside of a mesh whose boundary has one
-
-    @classmethod
-    def of(cls, matrix: OperatorMatrix) -> _Masses | None:
-        """Those of a matrix, if it may be one of masses at all: rows of stiffnesses may add up to zero."""
-        nothing = ROUNDED * np.abs(matrix.diagonal).max()
-        used = np.abs(matrix.diagonal) > nothing
-        if not used.any() or np.ptp(np.sign(matrix.diagonal[used])):
-            return None
-        whole = np.sign(matrix.diagonal[used][0]) * matrix.csr()
-        whole.data[np.abs(whole.data) <= nothing] = 0
-        whole.eliminate_zeros()
-        M = whole[used][:, used]
-        return cls(M, int((~used).sum())) if M.shape[0] < M.nnz == whole.nnz and M.shape[0] > 2 else None
-
-    @property
-    def without(self) -> tuple[str, ...]:
-        """The sentence on rows of zeros."""
-        return (f"{count_of(self.n_massless, 'row is', 'rows are')} zero",) if self.n_massless else ()
-
-    @cached_property
-    def simplices(self) -> tuple[str, Kind, list[float]] | None:
-        """The straight elements whose mass matrix this is, and what rows add up to, over their diagonal entries.
-
-        The area of a cell is a factor of its whole mass matrix: what a row of some kind of node, a corner say, adds up
-        to over its diagonal entry is the same on all cells, and so on all meshes.
-        """
-        diagonal = self.M.diagonal()
-        share = self.M.sum(axis=1) / diagonal
-        for name, kind in _SIMPLICES.items():
-            ratios = np.unique(mass_sums(kind).round(10)).tolist()
-            apart = np.abs(share[:, None] - ratios) <= SUMMED * abs(self.M).sum(axis=1)[:, None] / diagonal[:, None]
-            if apart.any(axis=1).all() and apart.any(axis=0).all():
-                return name, kind, ratios
+def _bounds(M: sp.csr_array) -> tuple[float, float] | None:
+    """Least and largest eigenvalue, scaled to identity blocks; None for other matrices than those of masses."""
+    root = sp.diags_array(1 / np.sqrt(M.diagonal()))
+    scaled = (root @ M @ root).tocsr()
+    couplings = scaled - sp.eye_array(scaled.shape[0])
+    if not couplings.maximum(0).sum() > LITTLE * abs(couplings).sum():
+        return None  # on a graph with two colours, a grid's, the signs of one colour may be turned
+    together, all_of_them = _extreme(couplings, "LA"), _extreme(abs(couplings), "LA")
+    if together is None or all_of_them is None:
         return None
+    # The share of masses is 0.94 and more; that of as much stiffness beside them 0.8. Biquadratic and triquadratic
+    # elements have couplings of both signs, and equal weights come to 0.97 of the largest eigenvalue instead.
+    constant = M.sum() / M.diagonal().sum()
+    if together < NEARLY_ALL * all_of_them and constant < NEARLY_ALL * (1 + together):
+        return None
+    # Masses of beams have 0.08, of hexahedra 1/8, of quadrilaterals 1/4, of triangles and tetrahedra 1/2.
+    least = _extreme(scaled, "SA", _blocks(scaled))
+    return None if least is None or least < HARDLY_ANY else (least, 1 + together)
 
-    @cached_property
-    def bounds(self) -> tuple[float, float] | None:
-        """Least and largest eigenvalue, scaled to identity blocks; None for other matrices than those of masses."""
-        root = sp.diags_array(1 / np.sqrt(self.M.diagonal()))
-        scaled = (root @ self.M @ root).tocsr()
-        couplings = scaled - sp.eye_array(scaled.shape[0])
-        if not couplings.maximum(0).sum() > LITTLE * abs(couplings).sum():
-            return None  # on a graph with two colours, a grid's, the signs of one colour may be turned
-        together, all_of_them = _extreme(couplings, "LA"), _extreme(abs(couplings), "LA")
-        if together is None or all_of_them is None:
-            return None
-        # The share of masses is 0.94 and more; that of as much stiffness beside them 0.8. Biquadratic and triquadratic
-        # elements have couplings of both signs, and equal weights come to 0.97 of the largest eigenvalue instead.
-        constant = self.M.sum() / self.M.diagonal().sum()
-        if together < NEARLY_ALL * all_of_them and constant < NEARLY_ALL * (1 + together):
-            return None
-        # Masses of beams have 0.08, of hexahedra 1/8, of quadrilaterals 1/4, of triangles and tetrahedra 1/2.
-        least = _extreme(scaled, "SA", _blocks(scaled))
-        return None if least is None or least < HARDLY_ANY else (least, 1 + together)
 
-    @property
-    def unknowns(self) -> str:
-        """Of which elements, or of how many unknowns per node, as far as the graph shows that."""
-        upper = sp.triu(self.M, 1).tocoo()
-        edges = np.column_stack([upper.row, upper.col]).astype(np.int64)
-        cells = cells_of(self.M.shape[0], edges)
-        n_parts = len(components(self.M.shape[0], edges))
-        if (cells.nodes, cells.shared) in CELLS and n_parts == 1:
-            return f" of {CELLS[cells.nodes, cells.shared][1]}, with little stiffness at most"
-        several = n_parts > 1 or often(cells.twins) or nodes_of_pattern(self.M) is not None
-        if not several:
-            return ", or another matrix of inner products, since no cells show in its graph"
-        # Stiffnesses of a body that is held all around keep as far from zero while it has a few dozen nodes.
-        return " of several unknowns per node" + (_OR_HELD if self.M.shape[0] < 150 else "")
+def _unknowns(M: sp.csr_array) -> str:
+    """Of which elements, or of how many unknowns per node, as far as the graph shows that."""
+    upper = sp.triu(M, 1).tocoo()
+    edges = np.column_stack([upper.row, upper.col]).astype(np.int64)
+    cells = cells_of(M.shape[0], edges)
+    n_parts = len(components(M.shape[0], edges))
+    if (cells.nodes, cells.shared) in CELLS and n_parts == 1:
+        return f" of {CELLS[cells.nodes, cells.shared][1]}, with little stiffness at most"
+    several = n_parts > 1 or often(cells.twins) or nodes_of_pattern(M) is not None
+    if not several:
+        return ", or another matrix of inner products, since no cells show in its graph"
+    # Stiffnesses of a body that is held all around keep as far from zero while it has a few dozen nodes.
+    return " of several unknowns per node" + (_OR_HELD if M.shape[0] < 150 else "")
 
 
 def _blocks(scaled: sp.csr_array) -> sp.csc_array:

@@ -1,16 +1,18 @@
-"""From a checked matrix to what it is: its sums say which operator, its graph which cells."""
+"""From a checked matrix to what it is: its sums say which operator, its graph which cells; and so recovery says it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import GeometryError, NotPlanarError, RecoveryError
 from ..matrix import OperatorMatrix
-from ..tolerances import MOST, ROUNDED, SMALL, SUMMED
-from ..words import count_of
-from .cliques import CELLS, Cells, cells_of, mostly, often
+from ..recovery import ConformingMesh, PlanarMesh
+from ..tolerances import CERTIFIED, MOST, ROUNDED, SMALL
+from ..words import count_of, sentences
+from .cliques import CELLS, cells_of, mostly, often
 from .kinds import CONSTANT, KEEP_ALL, PLANAR, TERMS, UNKNOWN, UNREAD, WITHOUT_MASS, Diagnosis
 from .mass import mass_matrix
 from .structural import saddle_point, seeming
@@ -35,11 +37,9 @@ class Sums:
     @classmethod
     def of(cls, matrix: OperatorMatrix) -> Sums:
         """Those of a matrix."""
-        ends, twice = matrix.edges.ravel(), np.repeat(matrix.entries, 2)
-        size = np.bincount(ends, np.abs(twice), matrix.n)
-        sums = matrix.diagonal + np.bincount(ends, twice, matrix.n)
-        alone = size == 0
-        zero = (np.abs(sums) <= SUMMED * (size + np.abs(matrix.diagonal))) & ~alone
+        size = np.bincount(matrix.edges.ravel(), np.repeat(np.abs(matrix.entries), 2), matrix.n)
+        sums, alone = matrix.row_sums, size == 0
+        zero = matrix.adds_up & ~alone
         penalised = (SMALL * np.abs(matrix.diagonal) > size) & ~alone
         rest = ~(zero | alone | penalised)
         signs = np.unique(np.sign(sums[rest]))
@@ -70,11 +70,11 @@ class Sums:
         said = []
         if self.identity.any() and self.zero.any():
             rows = count_of(int(self.identity.sum()), "row is that", "rows are those")
-            which = f"of the identity, as of unknowns with Dirichlet conditions (row {_first(self.identity)})"
+            which = f"of the identity, as of unknowns with Dirichlet conditions (row {self.identity.argmax()})"
             said.append(f"{rows} {which}")
         if self.penalised.any():
             rows = count_of(int(self.penalised.sum()), "diagonal entry is", "diagonal entries are")
-            said.append(f"{rows} a penalty, as for Dirichlet conditions (row {_first(self.penalised)})")
+            said.append(f"{rows} a penalty, as for Dirichlet conditions (row {self.penalised.argmax()})")
         if self.zero[used].all():
             said.append("all rows add up to zero")
         elif (self.zero | self.penalised)[used].all():
@@ -83,7 +83,7 @@ class Sums:
             added = "where a mass matrix or a diagonal was added"
             cause = "next to unknowns that were eliminated" if self.eliminated else added
             rows = f"{int(self.rest.sum()):,} of {int(used.sum()):,} rows do not add up to zero"
-            said.append(f"{rows}, as {cause} (row {_first(self.rest)})")
+            said.append(f"{rows}, as {cause} (row {self.rest.argmax()})")
         else:
             one = f"all sums are {'positive' if self.sign > 0 else 'negative'}" if self.sign else "sums have both signs"
             said.append(f"no row adds up to zero, and {one}")
@@ -108,12 +108,13 @@ def diagnosed(matrix: OperatorMatrix, *, planar: bool) -> Diagnosis:
         return Diagnosis(PLANAR, LINEAR + further_terms(matrix), sums.evidence)
     # Rows of stiffnesses have a diagonal, and some sums are zero or of one sign; blocks form cliques as cells do.
     saddle = saddle_point(matrix)
-    if saddle or not (sums.zero.any() or sums.sign):
-        return _unknown(matrix, sums, saddle)
-    return _by_cells(matrix, sums)
+    if not saddle and (sums.zero.any() or sums.sign) and (found := _by_cells(matrix, sums)) is not None:
+        return found
+    said, advice = ("neither its graph nor its sums show one", *sums.evidence), saddle or seeming(matrix) or TERMS
+    return Diagnosis(UNKNOWN, "no scalar matrix of a kind that is known", said, advice)
 
 
-def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
+def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis | None:
     """A matrix whose graph is not planar, by the cells that its graph shows, or entries where it lacks zeros."""
     used = matrix.edges[matrix.entries != 0] if matrix.entries.any() else matrix.edges
     for edges in (matrix.edges, used):  # zeros that are stored show cells better than where they are left out
@@ -133,32 +134,19 @@ def _by_cells(matrix: OperatorMatrix, sums: Sums) -> Diagnosis:
             shown = f"{cells.in_threes:.0%} of the coupled pairs of rows lie in triangles, few in a clique of four"
             name = f"{operator} of linear elements on triangles, on a surface that cannot be laid flat"
             return _of_kind("surface", name, shown, sums)
-        if _is_grid(matrix.n, edges, cells):
+        grid = not cells.in_threes and 2 * len(edges) >= 3.5 * matrix.n
+        if grid and np.bincount(edges.ravel(), minlength=matrix.n).max() == 6:
             shown = "no three rows are coupled to each other, and most rows are coupled to six"
             return _of_kind("grid in space", "that of a grid in space, a seven-point stencil", shown, sums)
     if (matrix.entries <= 0).all() and (sums.zero | sums.alone | sums.positive).all():
         more = "" if (sums.zero | sums.alone).all() else ", plus a diagonal"
         shown = f"no off-diagonal entry is positive, rows add up to zero{' or more' if more else ''}, and no cells show"
         return _of_kind("graph", f"the Laplacian of a graph with weights{more}", shown, sums)
-    return _unknown(matrix, sums)
-
-
-def _unknown(matrix: OperatorMatrix, sums: Sums, seems: str = "") -> Diagnosis:
-    return Diagnosis(
-        UNKNOWN,
-        "no scalar matrix of a kind that is known",
-        ("neither its graph nor its sums show one", *sums.evidence),
-        seems or seeming(matrix) or TERMS,
-    )
+    return None
 
 
 def _of_kind(kind: str, name: str, shown: str, sums: Sums) -> Diagnosis:
     return Diagnosis(kind, name, (shown, *sums.evidence), UNREAD.get(kind, sums.remedy))
-
-
-def where_nothing_fits(found: Diagnosis, matrix: OperatorMatrix) -> str:
-    """What to do about a matrix whose graph is that of cells which are read, while no mesh has its entries."""
-    return found.advice or (TERMS if Sums.of(matrix).rest.any() else CONSTANT)
 
 
 def further_terms(matrix: OperatorMatrix) -> str:
@@ -178,10 +166,43 @@ def further_terms(matrix: OperatorMatrix) -> str:
     return ", plus a diagonal, or with rows and columns scaled" if scaled else ", plus a diagonal"
 
 
-def _is_grid(n: int, edges: NDArray[np.int64], cells: Cells) -> bool:
-    degree = np.bincount(edges.ravel(), minlength=n)
-    return bool(not cells.in_threes and degree.max() == 6 and 2 * len(edges) >= 3.5 * n)
+def _where_nothing_fits(found: Diagnosis, matrix: OperatorMatrix) -> str:
+    """What to do about a matrix whose graph is that of cells which are read, while no mesh has its entries."""
+    return found.advice or (TERMS if Sums.of(matrix).rest.any() else CONSTANT)
 
 
-def _first(rows: NDArray[np.bool_]) -> int:
-    return int(rows.argmax())
+def explained(error: RecoveryError, matrix: OperatorMatrix) -> RecoveryError:
+    """An error of recovery, with what the matrix is in place of what its graph is not."""
+    planar = not isinstance(error, NotPlanarError)
+    found = mass_matrix(matrix, planar=False) or diagnosed(matrix, planar=planar)
+    if isinstance(error, NotPlanarError):
+        begun = "the graph of the matrix is not planar"
+        if found.kind == UNKNOWN:
+            said = sentences([begun + (f": {error.why}" if error.why else ""), found.advice])
+        elif found.unread:
+            said = found.sentence(f"{begun}, for this is")
+        else:
+            like = replace(found, advice=_where_nothing_fits(found, matrix))
+            said = like.sentence(f"{begun}, and no mesh that was found has these entries, though the graph is that of")
+        return NotPlanarError(said, error.why)
+    said = found.sentence("no planar mesh has these entries: they are those of")
+    return GeometryError(said) if found.unread else error
+
+
+def judged(mesh: PlanarMesh, matrix: OperatorMatrix) -> PlanarMesh:
+    """A mesh that does not fit, or proves nothing, with what the matrix is as the reason, where that shows.
+
+    Raises a GeometryError if the matrix is a mass matrix, or one of segments on a line, so that the mesh means nothing.
+    """
+    if mesh.status != "uncertified":
+        return mesh
+    linear = not isinstance(mesh, ConformingMesh)
+    found = mass_matrix(matrix, planar=False) or diagnosed(matrix, planar=linear)
+    if found.kind in ("mass", "segments"):
+        raise GeometryError(found.sentence())
+    if not found.unread:
+        if linear or mesh.chi_square is not None or mesh.backward_error <= CERTIFIED:
+            return mesh
+        advice = _where_nothing_fits(found, matrix)
+        return replace(mesh, reason=sentences([mesh.reason, *found.evidence[-1:]]), advice=advice)
+    return replace(mesh, reason=sentences([f"the matrix is {found.name}", *found.evidence]), advice=found.advice)

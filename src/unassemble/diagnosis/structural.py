@@ -1,7 +1,5 @@
 """What a matrix that is neither a mesh nor nodes of several unknowns seems to be: definite or not, tied, uneven."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..matrix import OperatorMatrix
@@ -45,41 +43,30 @@ def indefinite(matrix: OperatorMatrix) -> str:
 
 def seeming(matrix: OperatorMatrix) -> str:
     """What the matrix seems to be, and what is missing; empty where nothing shows."""
-    return indefinite(matrix) or _condensed(matrix) or about_translations(matrix) or _tied(matrix) or _uneven(matrix)
-
-
-def _condensed(matrix: OperatorMatrix) -> str:
-    """That all rows are coupled to all."""
-    if np.count_nonzero(matrix.entries) < matrix.n * (matrix.n - 1) / 2:
-        return ""
-    return (
-        "every row is coupled to every other, as where other unknowns were condensed: each feels the supports then, so "
-        "that rows do not annihilate translations, which is what tells positions"
-    )
-
-
-def _tied(matrix: OperatorMatrix) -> str:
-    """That some rows are coupled to many more than others."""
+    if said := indefinite(matrix):
+        return said
+    if np.count_nonzero(matrix.entries) >= matrix.n * (matrix.n - 1) / 2:
+        return (
+            "every row is coupled to every other, as where other unknowns were condensed: each feels the supports "
+            "then, so that rows do not annihilate translations, which is what tells positions"
+        )
+    if said := about_translations(matrix):
+        return said
     degree = np.bincount(matrix.edges[matrix.entries != 0].ravel(), minlength=matrix.n)
     usual = int(max(np.median(degree), 1))
     hubs = np.flatnonzero(LITTLE * degree > usual)  # those of the widest nodes of meshes have three times as many
-    if not len(hubs):
-        return ""
-    rows = words_of(hubs[:3].tolist()) + (", ..." if len(hubs) > 3 else "")
-    return (
-        f"{count_of(len(hubs), 'row is', 'rows are')} coupled to {degree[hubs].min()} others and more, and half of "
-        f"all rows to {usual} at most (rows {rows}): constraints or rigid parts leave such"
-    )
-
-
-def _uneven(matrix: OperatorMatrix) -> str:
-    """That unknowns seem to be displacements and rotations, in different units."""
+    if len(hubs):
+        rows = words_of(hubs[:3].tolist()) + (", ..." if len(hubs) > 3 else "")
+        return (
+            f"{count_of(len(hubs), 'row is', 'rows are')} coupled to {degree[hubs].min()} others and more, and half of "
+            f"all rows to {usual} at most (rows {rows}): constraints or rigid parts leave such"
+        )
     positive = np.mean(matrix.entries[matrix.entries != 0] > 0) if matrix.entries.any() else 0.0
     own = matrix.diagonal[matrix.diagonal != 0]
-    if not (len(own) and own.min() > 0 and LITTLE < positive < 1 - LITTLE and SMALL * own.max() > own.min()):
-        return ""
-    return (
-        f"entries have both signs, and diagonals differ by a factor of {own.max() / own.min():.0e}, as where unknowns "
-        "are displacements and rotations: perhaps a structure, of which it does not show which rows belong to one "
-        f"node, so that you may {GIVE_NUMBERING}"
-    )
+    if len(own) and own.min() > 0 and LITTLE < positive < 1 - LITTLE and SMALL * own.max() > own.min():
+        return (
+            f"entries have both signs, and diagonals differ by a factor of {own.max() / own.min():.0e}, as where "
+            "unknowns are displacements and rotations: perhaps a structure, of which it does not show which rows "
+            f"belong to one node, so that you may {GIVE_NUMBERING}"
+        )
+    return ""

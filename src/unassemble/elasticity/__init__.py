@@ -1,6 +1,6 @@
 """Vector-valued matrices: node positions from the linear identities of isotropic elasticity."""
 
-from .description import Request
+from ..nodes import Request
 from .recover import serve_body
 
 __all__ = [

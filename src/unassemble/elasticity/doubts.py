@@ -1,7 +1,8 @@
-"""What is not sure about nodes, and which of them elements show to be right all the same."""
+"""What is not sure about nodes, which of them elements show to be right all the same, and what is said of it."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +11,9 @@ from numpy.typing import NDArray
 
 from ..nodes.nodal import NodalMatrix, determined
 from ..nodes.numbering import Numbering
+from ..words import count_of
 from .materials.cells import Cells
-from .nullspace.solution import Solution
+from .nullspace.placing import Solution
 
 
 def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
@@ -21,7 +23,7 @@ def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
     doubtful = np.zeros(nodal.n, dtype=bool)
     doubtful[numbering.node_of_row[numbering.open_row]] = True
     doubtful &= (nodal.row_of < 0).any(axis=1)
-    return replace(nodal, doubtful=doubtful) if doubtful.any() else nodal
+    return replace(nodal, doubtful=doubtful)
 
 
 def unconfirmed(
@@ -36,9 +38,7 @@ def unconfirmed(
     confirmed: NDArray[np.bool_] = np.zeros(nodal.n, dtype=bool)
     if shown is not None:
         confirmed = np.asarray((shown | (nodal.row_of < 0)).all(axis=1))
-    if numbering.likely:
-        return determined(points) & ~confirmed
-    return np.zeros(nodal.n, dtype=bool) if nodal.doubtful is None else nodal.doubtful & ~confirmed
+    return (determined(points) if numbering.likely else nodal.doubtful) & ~confirmed
 
 
 def unborne(nodal: NodalMatrix, solution: Solution, found: Cells) -> NDArray[np.bool_]:
@@ -88,3 +88,64 @@ def guessed_directions(numbering: Numbering, loose: NDArray[np.bool_]) -> NDArra
     if numbering.kind == "pattern":  # no order tells which row of a whole node is which
         whole[:] = False
     return np.asarray(loose[numbering.node_of_row] & (numbering.unnamed | ~whole[numbering.node_of_row]))
+
+
+def about_cells(found: Cells) -> Iterator[str]:
+    """What there is to say of the elements."""
+    if not found.recognised:
+        yield (
+            "no elements were recognised: looked for are triangles and quadrilaterals, tetrahedra and hexahedra, of "
+            "one kind throughout, or linear triangles beside quadrilaterals"
+        )
+    elif not found.certified:
+        yield (
+            "the elements were read off the graph and are not certified: no material was found with which they "
+            "re-assemble to the matrix"
+        )
+
+
+def about_nodes(
+    nodal: NodalMatrix,
+    loose: NDArray[np.bool_],
+    withheld: NDArray[np.bool_],
+    hanging: NDArray[np.bool_],
+    lone: NDArray[np.bool_],
+) -> Iterator[str]:
+    """Why nodes have no coordinates: `loose`.
+
+    No cell confirms those `withheld`; others rest on an assumption that nothing confirms, `hanging`, or on identities
+    that no others would contradict, `lone`.
+    """
+    sprung = loose & (nodal.size == 0) & (nodal.row_of >= 0).any(axis=1)
+    rest = loose & ~withheld & ~hanging & ~lone & ~sprung
+    them = "it" if rest.sum() == 1 else "them"
+    for some, is_, are, said in (
+        (sprung, "hangs", "hang", "on springs, or on nothing, and have no position: no linear field knows a spring"),
+        (withheld, "has", "have", "rows that no element shows to be theirs. Since it was inferred which rows make up a "
+         "node, no coordinates are given there"),
+        (hanging & ~withheld, "is", "are", "determined only if nodes that lack a direction lie in planes across it, "
+         "which neither another equation nor an element confirms. No coordinates are given there"),
+        (lone, "is", "are", "determined by identities that no others check, nor an element. No coordinates are given "
+         "there"),
+        (rest, "is", "are", f"not determined: rows coupled to {them} lack entries, as next to eliminated unknowns, or "
+         "belong to other axes, as at inclined supports, and no equation that holds for every element and material is "
+         "left of these"),
+    ):  # fmt: skip
+        if some.any():
+            yield f"{count_of(int(some.sum()), f'node {is_}', f'nodes {are}')} {said}"
+
+
+def about_assumptions(solution: Solution, guessed: int) -> Iterator[str]:
+    """What was assumed, beside the identities, to determine positions, and directions of rows that were guessed."""
+    if solution.planes:
+        yield "nodes that lack a direction were taken to lie in planes across it, which fits, to determine others"
+    if solution.straight:
+        yield (
+            "the body is homogeneous and held all around, where the identities leave an affine map free that the "
+            "elements determined"
+        )
+    if guessed:
+        yield (
+            f"which directions {count_of(guessed, 'row', 'rows')} of nodes without coordinates belong to is not "
+            "proven: `direction_of_row` is -1 there, and rigid-body modes are zero"
+        )

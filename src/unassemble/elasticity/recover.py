@@ -2,49 +2,52 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..clock import Clock
+from ..elements.kinds import KINDS
+from ..elements.surface import boundary_loops
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
-from ..matrix import OperatorMatrix
-from ..nodes.anchoring import checked_anchors
-from ..nodes.nodal import NodalMatrix, nodal_matrix, uncoupled
+from ..nodes.anchoring import Request, anchored, near_enough
+from ..nodes.nodal import NodalMatrix, determined, nodal_matrix, uncoupled
 from ..nodes.numbering import Numbering
+from ..nodes.rounded import known_to
 from ..recovery import Body
-from .description import Request, described
-from .doubts import with_doubts
+from ..tolerances import ALIKE, LAST_DIGITS
+from ..words import Reason
+from .doubts import about_assumptions, about_cells, about_nodes, guessed_directions, unborne, unconfirmed, with_doubts
+from .materials.cells import Cells, recognise_cells
 from .nullspace.certificate import residuals
+from .nullspace.identities import lame_ratio, poisson_ratio
+from .nullspace.placing import Solution, checked, without_springs
 from .positions import solve
-from .springs import without_springs
-from .verdict import about_made_up_nodes, about_open_rows, no_positions
+from .verdict import (
+    NOTHING_CHECKED,
+    NOTHING_SHOWN,
+    RESTS_ON_PLANES,
+    about_made_up_nodes,
+    about_open_rows,
+    hidden,
+    no_positions,
+    of_few_digits,
+    verdict,
+)
 
 
-def serve_body(
-    matrix: OperatorMatrix,
-    nodal: NodalMatrix,
-    numbering: Numbering,
-    clock: Clock,
-    request: Request,
-) -> Body:
-    """Recover a solid body whose numbering is known.
-
-    Raises
-    ------
-    InputError
-        For anchors that do not fit.
-    RecoveryError
-        If no piece is determined.
-    """
+def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Body:
+    """Recover a solid body; InputError for anchors that do not fit, RecoveryError if no piece is determined."""
     if uncoupled(nodal):
         raise GeometryError(
             "the directions are not coupled, as those of a vector Laplacian: these are scalar matrices side by side, "
             "which `operator='laplacian'` recovers"
         )
-    known = checked_anchors(request.anchors, numbering.node_of_row, numbering.block_size)  # before the long work
-    with clock("null space"), blas_threads(1):
+    request.held(numbering.node_of_row, numbering.block_size)  # anchors that do not fit, before the long work
+    with request.clock("null space"), blas_threads(1):
         nodal = with_doubts(without_springs(nodal), numbering)
         try:
             solution = solve(nodal)
@@ -56,10 +59,151 @@ def serve_body(
         if why:
             raise GeometryError(no_positions(why))
 
+    return _described(nodal, numbering, solution, request)
+
+
+def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, request: Request) -> Body:
+    """The body, with its certificate, material and cells, and the sentences that go with them."""
+    cells, rounding = request.cells, request.rounding
+
     def placed_again(matrix: sp.csr_array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         other = with_doubts(without_springs(nodal_matrix(matrix, numbering)), numbering)
         with blas_threads(1):
             again = solve(other)
         return again.points, residuals(other, again.valid, again.points)
 
-    return described(matrix, nodal, numbering, solution, clock, request, known, placed_again)
+    with request.clock("certify"):
+        misfits = residuals(nodal, solution.valid, solution.points)
+        error = float(np.abs(misfits).max()) if len(misfits) else float("nan")
+        near = not error >= max(ALIKE, rounding.spread if rounding else 0.0)  # NaN where only elements can tell
+        ratio = _lame_ratio(nodal, solution) if near else None
+    found = Cells()
+    if (cells or solution.straight or solution.hanging is not None) and near:
+        with request.clock("cells"):
+            found = recognise_cells(nodal, solution.points, ratio)
+    status, reason = verdict(nodal, solution, error, found, numbering)
+    alone = status == "certified" and not found.certified
+    lone = determined(solution.points) & ~checked(nodal, solution) if alone else np.zeros(nodal.n, dtype=bool)
+    if lone.any() and not cells:  # only elements can confirm them
+        return _described(nodal, numbering, solution, replace(request, cells=True))
+    if alone and not (determined(solution.points) & ~lone).any():
+        status, reason, lone = "uncertified", NOTHING_CHECKED, np.zeros_like(lone)
+    bar = None
+    if rounding and near and not any(solution.freedoms):
+        with request.clock("certify"):
+            bar = known_to(solution.points, solution.component, misfits, rounding, placed_again, sized=False)
+        status, reason = of_few_digits(nodal, solution, error, numbering, rounding, bar)
+    elif rounding:
+        reason = hidden(reason, rounding)
+    withheld = np.zeros(nodal.n, dtype=bool)
+    if status == "certified" and (found.certified or numbering.open_row is not None or not numbering.incomplete):
+        withheld = unconfirmed(nodal, numbering, solution.points, found.shown)
+    hanging = unborne(nodal, solution, found)
+    if hanging.any() and (hanging | withheld | ~determined(solution.points)).all():
+        status, reason = "uncertified", RESTS_ON_PLANES
+        hanging = np.zeros(nodal.n, dtype=bool)  # said of all of them
+    kept = ~(withheld | hanging | lone)
+    placed = np.where(kept[:, None], solution.points, np.nan)
+    shown = found.among(kept)
+    loose = ~determined(placed)
+    component = np.where(loose, -1, solution.component)
+    if status == "certified" and loose.all():
+        status, reason = "uncertified", NOTHING_SHOWN
+    if status == "certified" and _flat(placed, component):
+        status, reason = "uncertified", Reason("the points lie in one line or plane, and no solid body does")
+    held = request.held(numbering.node_of_row, nodal.dim)
+    points, factor, notes = anchored(placed, component, len(solution.evidence), held)
+    status, reason = near_enough(status, reason, points, placed, component, factor, 1.0)  # mean edges have length one
+    lame, scale = _in_units(shown, component, factor, nodal.dim)
+    if np.isnan(factor).any():
+        notes.append("the sign of the scale is free: with a mesh its point reflection fits the matrix as well")
+    guessed = guessed_directions(numbering, loose)
+    return Body(
+        **_cell_fields(shown),
+        points=points,
+        component=component,
+        scale=scale,
+        node_status=loose.astype(np.int8),
+        status=status,
+        uniqueness="searched" if status == "certified" else None,
+        reason=reason.text,
+        advice=reason.advice,
+        operator="elasticity",
+        backward_error=found.backward_error if found.certified else error,
+        position_error=bar.error if bar and bar.explained else None,
+        timings=request.clock.timings,
+        warnings=(
+            *request.matrix.warnings,
+            *solution.warnings,
+            *(about_cells(shown) if cells else ()),
+            *about_nodes(nodal, loose, withheld, hanging, lone),
+            *about_assumptions(solution, int(guessed.sum())),
+            *notes,
+        ),
+        node_of_row=numbering.node_of_row,
+        direction_of_row=np.where(guessed, -1, numbering.direction_of_row),
+        numbering=numbering.kind,
+        choice=request.choice,
+        poisson_ratio=None if ratio is None else poisson_ratio(ratio),
+        lame=lame,
+        evidence=solution.evidence,
+    )
+
+
+def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
+    """The number lambda / mu as boundary terms have it, and as the elements that told axes do; None if they differ.
+
+    None too where more than translation and scale is free, since boundary terms go with the points.
+    """
+    if any(solution.freedoms):
+        return None
+    told = list(solution.straight)
+    if len(solution.straight) < len(solution.evidence):
+        read = lame_ratio(nodal, solution.valid, solution.points)
+        if read is None:
+            return None
+        told.append(read)
+    return told[0] if np.ptp([poisson_ratio(one) for one in told]) < ALIKE else None
+
+
+def _flat(points: NDArray[np.float64], component: NDArray[np.int64]) -> bool:
+    """Whether the nodes of a piece do not span space, so that no element there has a volume."""
+    d = points.shape[1]
+    for piece in np.unique(component[component >= 0]):
+        x = points[component == piece]
+        spread = np.linalg.eigvalsh(np.cov(x.T, bias=True)) if len(x) > d else np.zeros(d)
+        if spread[0] <= LAST_DIGITS * max(spread[-1], 1.0):  # mean edges have length one
+            return True
+    return False
+
+
+_FIELD = {"triangle": "triangles", "quad": "quads", "tetra": "tetrahedra", "hexahedron": "hexahedra"}
+
+
+def _cell_fields(found: Cells) -> dict[str, Any]:
+    """Corners of the cells by their name in a Body, their further nodes, and in the plane their boundary."""
+    fields = {}
+    for name, cells in found.blocks.items():
+        kind = KINDS[name]
+        fields[_FIELD[kind.base]] = np.ascontiguousarray(cells[:, : kind.corners])
+        if kind.quadratic:
+            fields["mid_nodes"] = np.ascontiguousarray(cells[:, kind.corners :])
+    if any(KINDS[name].dim == 2 for name in found.blocks):
+        fields["boundary"], fields["boundary_offsets"] = boundary_loops(found.blocks)
+    return fields
+
+
+def _in_units(found: Cells, component: NDArray, factor: NDArray, d: int) -> tuple[NDArray, NDArray]:
+    """Lame coefficients of the cells, and the mean shear modulus of each piece, for the size that it was given.
+
+    Entries go like the modulus times length to the power d - 2.
+    """
+    scale = np.full(len(factor), np.nan)
+    if not found.certified:
+        return np.empty((0, 2)), scale
+    piece = component[np.concatenate([cells[:, 0] for cells in found.blocks.values()])]
+    lame = found.lame / np.where(np.isnan(factor), 1.0, np.abs(factor))[piece, None] ** (d - 2)
+    count = np.bincount(piece, minlength=len(factor))
+    some = count > 0
+    scale[some] = np.bincount(piece, lame[:, 1], len(factor))[some] / count[some]
+    return lame, scale

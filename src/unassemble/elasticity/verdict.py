@@ -6,17 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from ..nodes.nodal import NodalMatrix, without_trace
 from ..nodes.numbering import Numbering
-from ..nodes.redrawn import Known
-from ..nodes.rounded import Rounding
+from ..nodes.rounded import Known, Rounding
 from ..nodes.shape import SOFT
 from ..tolerances import CERTIFIED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of, sentences
 from .materials.cells import Cells
-from .nullspace.solution import Solution
+from .nullspace.placing import Solution
 
 _MAGNIFIED = 2e-7  # residual over gap up to which they do; errors measured are a fiftieth of it at most
 NOTHING_SHOWN = Reason(
@@ -75,7 +73,7 @@ def of_few_digits(
 ) -> tuple[str, Reason]:
     """Status and reason where the entries are rounded, which is an error bar: how well positions are known."""
     objection = _to_positions(nodal, solution, numbering, exact=False) or _to_identities(nodal, solution, numbering)
-    if objection.text:
+    if objection:
         return "uncertified", hidden(objection, rounding)
     if np.isnan(error):
         return "uncertified", NOTHING_LEFT
@@ -105,26 +103,16 @@ _FREEDOMS = {
 def verdict(
     nodal: NodalMatrix, solution: Solution, error: float, found: Cells, numbering: Numbering
 ) -> tuple[str, Reason]:
-    """Status and reason.
-
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    solution : Solution
-    error : float
-        Largest residual of a valid identity.
-    found : Cells
-    numbering : Numbering
-    """
+    """Status and reason, by the largest residual of a valid identity and the cells that were found."""
     objection = _to_positions(nodal, solution, numbering)
-    if objection.text:
+    if objection:
         return "uncertified", objection
     if found.certified and found.backward_error <= CERTIFIED:
-        count = count_of(found.n_cells, "element")
+        count = count_of(sum(map(len, found.blocks.values())), "element")
         return "certified", Reason(f"the matrix re-assembled on the {count} is the given one")
     nearly = _softest(solution)
     objection = _to_identities(nodal, solution, numbering)
-    if objection.text:
+    if objection:
         return "uncertified", objection
     if np.isnan(error):
         return "uncertified", NOTHING_LEFT
@@ -143,8 +131,8 @@ def _softest(solution: Solution) -> float:
     return min((one.gap for one in solution.evidence if one.gap > 0), default=1.0)
 
 
-def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, *, exact: bool = True) -> Reason:
-    """Why positions may be wrong whatever elements say; without words where nothing is to be said.
+def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, *, exact: bool = True) -> Reason | None:
+    """Why positions may be wrong whatever elements say; None where nothing is to be said.
 
     Entries that are rounded have no `exact` null vector.
     """
@@ -173,11 +161,11 @@ def _to_positions(nodal: NodalMatrix, solution: Solution, numbering: Numbering, 
             "rows between them lack entries, or belong to other axes, as at inclined supports, or to other nodes",
             advice=GIVE_NUMBERING,
         )
-    return Reason("")
+    return None
 
 
-def _to_identities(nodal: NodalMatrix, solution: Solution, numbering: Numbering) -> Reason:
-    """Why identities alone, without elements that re-assemble, certify nothing; without words where they do."""
+def _to_identities(nodal: NodalMatrix, solution: Solution, numbering: Numbering) -> Reason | None:
+    """Why identities alone, without elements that re-assemble, certify nothing; None where they do."""
     if solution.straight:
         return Reason(
             "elements told the axes of a homogeneous body, but re-assembled on them the matrix is not the given one"
@@ -190,13 +178,12 @@ def _to_identities(nodal: NodalMatrix, solution: Solution, numbering: Numbering)
             advice=GIVE_NUMBERING,
         )
     odd = _came_apart(nodal)
-    return Reason(f"{_lacking(odd)}: its rows belong to other nodes", GIVE_NUMBERING) if odd else Reason("")
+    return Reason(f"{_lacking(odd)}: its rows belong to other nodes", GIVE_NUMBERING) if odd else None
 
 
 def _came_apart(nodal: NodalMatrix) -> int:
     """How many nodes lack directions without a trace, doubtful ones aside, which get no coordinates."""
-    apart: NDArray[np.bool_] = np.asarray(without_trace(nodal).any(axis=1))
-    return int(np.count_nonzero(apart if nodal.doubtful is None else apart & ~nodal.doubtful))
+    return int(np.count_nonzero(without_trace(nodal).any(axis=1) & ~nodal.doubtful))
 
 
 def _lacking(odd: int) -> str:

@@ -7,9 +7,18 @@ element matrices and candidates.
 from .candidates import candidates
 from .cliques import Graph
 from .kinds import KINDS
-from .matrices import assembled, elasticity, laplacian, mass
 from .ordering import ordered, ordered_boxes
-from .reference import exact_rule, planar_rules, reference_nodes, rules, shape_functions, shape_gradients
+from .reference import (
+    assembled,
+    elasticity,
+    exact_rule,
+    mass,
+    planar_rules,
+    reference_nodes,
+    rules,
+    shape_functions,
+    shape_gradients,
+)
 from .surface import outer_facets, outer_nodes
 
 __all__ = [
@@ -19,7 +28,6 @@ __all__ = [
     "candidates",
     "elasticity",
     "exact_rule",
-    "laplacian",
     "mass",
     "ordered",
     "ordered_boxes",

@@ -12,23 +12,20 @@ from ..tolerances import ALIKE
 
 
 class Graph:
-    """Neighbours of nodes, with fast answers to "are these two coupled?".
-
-    Parameters
-    ----------
-    pattern : (n, n) sparse
-        Symmetric; the diagonal does not matter.
-    """
+    """Neighbours of nodes, with fast answers to "are these two coupled?", from a symmetric pattern (n, n)."""
 
     def __init__(self, pattern: sp.csr_array):
-        coo = pattern.tocoo()
+        coo = pattern.sorted_indices().tocoo()
         off = coo.row != coo.col
-        order = np.lexsort((coo.col[off], coo.row[off]))
-        self.n = pattern.shape[0]
-        self.row = coo.row[off][order].astype(np.int64)
-        self.col = coo.col[off][order].astype(np.int64)
+        self.n, self.row, self.col = pattern.shape[0], coo.row[off].astype(np.int64), coo.col[off].astype(np.int64)
         self.start = np.searchsorted(self.row, np.arange(self.n + 1))
         self._key = self.row * self.n + self.col
+
+    @classmethod
+    def of(cls, n: int, i: NDArray, j: NDArray) -> Graph:
+        """The graph of n nodes in which i and j, (k,) each, are neighbours."""
+        ends = np.concatenate([i, j]), np.concatenate([j, i])
+        return cls(sp.csr_array((np.ones(2 * len(i), np.int8), ends), shape=(n, n)))
 
     def coupled(self, i: NDArray, j: NDArray) -> NDArray[np.bool_]:
         """(k,) whether i and j are neighbours."""
@@ -44,11 +41,6 @@ class Graph:
         place = np.repeat(np.arange(len(nodes)), count)
         offset = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
         return place, self.col[self.start[nodes[place]] + offset]
-
-    def only(self, pairs: NDArray[np.bool_]) -> Graph:
-        """The graph of some of the pairs `row`, `col`, both ways."""
-        entries = (np.ones(int(pairs.sum()), np.int8), (self.row[pairs], self.col[pairs]))
-        return Graph(sp.csr_array(entries, shape=(self.n, self.n)))
 
     def closed(self) -> sp.csr_array:
         """Pattern of ones, with the diagonal."""
@@ -109,8 +101,8 @@ def shared_cliques(graph: Graph, k: int) -> NDArray[np.int64]:
 def straight_simplices(graph: Graph, points: NDArray[np.float64]) -> NDArray[np.int64]:
     """(m, 6 or 10) corners and middles of simplices whose sides have a node in the middle; nodes increasing.
 
-    For quadratic triangles of one material: there the entries between a corner and the middle of the side facing
-    it vanish, so that the six nodes are no clique; but all middles are coupled.
+    In quadratic triangles of one material the entries between a corner and the middle of the side facing it vanish, so
+    that the six nodes are no clique; but all middles are coupled.
     """
     d = points.shape[1]
     known = np.flatnonzero(np.isfinite(points).all(axis=1))
@@ -121,15 +113,9 @@ def straight_simplices(graph: Graph, points: NDArray[np.float64]) -> NDArray[np.
     middle = known[nearest]
     side = (away < ALIKE * length) & graph.coupled(i, middle) & graph.coupled(j, middle)
     i, j, middle = i[side], j[side], middle[side]
-    corners = simplices(Graph(_symmetric(i, j, graph.n)), d)
+    corners = simplices(Graph.of(graph.n, i, j), d)
     key = i * graph.n + j  # increasing, as the graph's rows are
     a, b = np.triu_indices(d + 1, 1)
     middles = middle[np.searchsorted(key, corners[:, a] * graph.n + corners[:, b])]
     whole = graph.cliques(middles)
     return np.sort(np.column_stack([corners[whole], middles[whole]]), axis=1)
-
-
-def _symmetric(i: NDArray, j: NDArray, n: int) -> sp.csr_array:
-    """Pattern of pairs both ways."""
-    pair = np.concatenate([i, j]), np.concatenate([j, i])
-    return sp.csr_array((np.ones(2 * len(i)), pair), shape=(n, n))

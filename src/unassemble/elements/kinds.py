@@ -14,25 +14,13 @@ _SIDES = ((0, 3, 4, 7), (1, 2, 5, 6), (0, 1, 4, 5), (2, 3, 6, 7), (0, 1, 2, 3), 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of cell.
+    """A kind of cell."""
 
-    Attributes
-    ----------
-    name : str
-        meshio's.
-    base : {"triangle", "quad", "tetra", "hexahedron"}
-        The linear cell on the same corners.
-    dim : {2, 3}
-    corners : int
-    between : tuple of tuples of int
-        For each further node, in meshio's order, the corners that it lies in the middle of where sides are straight;
-        a corner counts as often as it is named.
-    """
-
-    name: str
-    base: str
+    name: str  # meshio's
+    base: str  # the linear cell on the same corners
     dim: int
     corners: int
+    # further nodes in meshio's order: the corners, counted as often as named, that each is the middle of
     between: tuple[tuple[int, ...], ...] = ()
 
     @property
@@ -77,13 +65,3 @@ KINDS = {
         Kind("hexahedron27", "hexahedron", 3, 8, (*_HEXAHEDRON, *_SIDES, tuple(range(8)))),
     )
 }
-
-
-def kind_of(base: str, nodes: int) -> Kind:
-    """The kind on the corners of `base` that has so many nodes."""
-    return next(kind for kind in KINDS.values() if kind.base == base and kind.nodes == nodes)
-
-
-def sides(base: str) -> tuple[tuple[int, ...], ...]:
-    """Pairs of corners that are the edges of a linear cell."""
-    return {"triangle": _TRIANGLE, "quad": _QUAD, "tetra": _TETRA, "hexahedron": _HEXAHEDRON}[base]

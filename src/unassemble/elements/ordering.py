@@ -21,7 +21,9 @@ def ordered(sets: NDArray[np.int64], points: NDArray[np.float64], kind: Kind) ->
     Corners are the nodes farthest out, seen after the linear map that makes the cell round. Where that leaves
     further nodes off the middles of straight sides, the nodes that are no middles of others are tried as corners.
     """
-    cells, misfit = _arranged(sets, _outermost(sets, points, kind.corners), points, kind)
+    far, outermost = np.linalg.norm(_rounded(points[sets]), axis=2), np.zeros(sets.shape, dtype=bool)
+    np.put_along_axis(outermost, np.argsort(-far, axis=1, kind="stable")[:, : kind.corners], True, axis=1)
+    cells, misfit = _arranged(sets, outermost, points, kind)
     if kind.quadratic and (misfit > ALIKE).any():
         poor = np.flatnonzero(misfit > ALIKE)
         corners = _no_middles(sets[poor], points, kind.corners)
@@ -30,14 +32,6 @@ def ordered(sets: NDArray[np.int64], points: NDArray[np.float64], kind: Kind) ->
         better = second < misfit[again]
         cells[again[better]] = other[better]
     return cells[cells[:, 0] >= 0]
-
-
-def _outermost(sets: NDArray, points: NDArray, corners: int) -> NDArray[np.bool_]:
-    """(m, k) the nodes of each set that are farthest out."""
-    far = np.linalg.norm(_rounded(points[sets]), axis=2)
-    chosen = np.zeros(sets.shape, dtype=bool)
-    np.put_along_axis(chosen, np.argsort(-far, axis=1, kind="stable")[:, :corners], True, axis=1)
-    return chosen
 
 
 def _no_middles(sets: NDArray, points: NDArray, corners: int) -> NDArray[np.bool_]:
@@ -59,10 +53,7 @@ def _no_middles(sets: NDArray, points: NDArray, corners: int) -> NDArray[np.bool
 def _arranged(
     sets: NDArray, corners: NDArray[np.bool_], points: NDArray, kind: Kind
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Cells on given corners, and the largest distance of a further node from the middle of its corners.
-
-    Relative to the size of the cell; cells that are flat begin with -1.
-    """
+    """Cells on given corners, -1 first if flat, and how far a node is from the middle of its corners, over the size."""
     m = len(sets)
     frame = sets[corners].reshape(m, kind.corners)
     frame = _oriented(frame, points) if kind.simplex else ordered_boxes(frame, points)

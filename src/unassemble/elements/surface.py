@@ -91,10 +91,14 @@ def outer_nodes(blocks: Blocks) -> NDArray[np.int64]:
     return np.unique(np.concatenate(nodes))
 
 
-def _labels(sets: NDArray[np.int64]) -> NDArray[np.uint64]:
-    """(m,) a number for each set (m, k), the sum of random ones of its members: sorted several times faster."""
+def _labels(sets: NDArray[np.int64], times: NDArray[np.uint64] | int = 1) -> NDArray[np.uint64]:
+    """(m,) a number for each set (m, k), the sum of random ones of its members: sorted several times faster.
+
+    With odd numbers of `times` for each place, (k,), it is one for each order of the members.
+    """
     n = int(sets.max(initial=-1)) + 1
-    return np.asarray(np.random.default_rng(0).integers(0, 2**63, n, dtype=np.uint64)[sets].sum(axis=1))
+    random = np.random.default_rng(0).integers(0, 2**63, n, dtype=np.uint64)
+    return np.asarray((random[sets] * np.asarray(times, dtype=np.uint64)).sum(axis=1))
 
 
 def among(sets: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -105,11 +109,8 @@ def among(sets: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.bool
 
 def _repeated(label: NDArray) -> NDArray[np.bool_]:
     """(m,) labels that occur more than once."""
-    order = np.argsort(label)
-    same = label[order[1:]] == label[order[:-1]]
-    several = np.zeros(len(label), dtype=bool)
-    several[order[1:][same]] = several[order[:-1][same]] = True
-    return several
+    _, which, count = np.unique(label, return_inverse=True, return_counts=True)
+    return count[which] > 1
 
 
 def tiles(blocks: Blocks) -> bool:
@@ -128,25 +129,16 @@ def contested(base: str, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 def _bounding_twice(facets: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(f,) facets that occur more than once, seen from the same side."""
-    if facets.shape[1] > 2:  # start with the least node: the order of the others then tells the side, as an edge's does
-        start = facets.argmin(axis=1)[:, None]
-        facets = np.take_along_axis(facets, (start + np.arange(facets.shape[1])) % facets.shape[1], axis=1)
-    order = np.lexsort(facets.T)
-    same = (facets[order[1:]] == facets[order[:-1]]).all(axis=1)
-    double = np.zeros(len(facets), dtype=bool)
-    double[order[1:][same]] = double[order[:-1][same]] = True
-    return double
+    r = facets.shape[1]
+    if r > 2:  # start with the least node: the order of the others then tells the side, as an edge's does
+        facets = np.take_along_axis(facets, (facets.argmin(axis=1)[:, None] + np.arange(r)) % r, axis=1)
+    return _repeated(_labels(facets, 2 * np.arange(r, dtype=np.uint64) + np.uint64(1)))
 
 
 def boundary_loops(blocks: Blocks) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Directed boundary edges of planar cells loop by loop, and where each loop begins.
+    """(b, 2) directed boundary edges of planar cells loop by loop, and (loops + 1,) where each loop begins.
 
     Where loops touch in a vertex they are taken apart, or joined, as the order of the cells has it.
-
-    Returns
-    -------
-    boundary : (b, 2) int64
-    offsets : (loops + 1,) int64
     """
     (edges,) = outer_facets(blocks)
     if not len(edges):

@@ -1,9 +1,7 @@
 """What an inspection counts."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from contextlib import suppress
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -14,15 +12,19 @@ from scipy.sparse import csgraph
 from ..conforming.affine import typical_misfit
 from ..conforming.parts import parts_of
 from ..conforming.recover import shown_cells
-from ..conforming.roles import Cells
 from ..errors import GeometryError, RecoveryError, TopologyError
 from ..further_terms import less_mass
 from ..matrix import OperatorMatrix
+from ..metric.mesh import SurfaceMesh
+from ..nodes.nodal import nodal_matrix, uncoupled
 from ..operators import VectorReading
 from ..planar.conformal import estimate_scale
-from ..recovery import ELEMENT_NAMES as _NAMES
+from ..recovery import ELEMENT_NAMES
+from ..structures import StructuralNumbering
+from ..structures.trusses import bars_of
 from ..tolerances import ROUNDED, SUMMED
 from ..topology import Piece, Topology
+from ..topology.manifold import Cycles, surface_readings
 from ..words import kind_text
 
 _LIKE = 0.3  # misfit of cells that are nearly affine; of other matrices with rows that form cells it is nearer to 1
@@ -32,7 +34,6 @@ def matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
     """Of any matrix."""
     degree = np.bincount(matrix.edges.ravel(), minlength=matrix.n)
     size = matrix.row_size
-    sums = matrix.diagonal + np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n)
     graph = sp.csr_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
     n_isolated = int(np.count_nonzero(degree == 0))
     smaller = np.minimum(size[matrix.edges[:, 0]], size[matrix.edges[:, 1]])
@@ -43,65 +44,42 @@ def matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
         "n_connected": int(csgraph.connected_components(graph, directed=False)[0]) - n_isolated,
         "n_isolated": n_isolated,
         "n_vanished": int(np.count_nonzero(np.abs(matrix.entries) <= ROUNDED * smaller)),
-        "n_zero_sums": int(np.count_nonzero((np.abs(sums) <= SUMMED * size) & (degree > 0))),
+        "n_zero_sums": int(np.count_nonzero((np.abs(matrix.row_sums) <= SUMMED * size) & (degree > 0))),
         "warnings": matrix.warnings,
     }
 
 
 def nodes_facts(matrix: OperatorMatrix, vector: VectorReading) -> dict[str, Any]:
     """Of a vector-valued matrix."""
-    from ..nodes.nodal import nodal_matrix, uncoupled
-    from ..structures import StructuralNumbering
-    from ..structures.bars import bars_of
-
     found = vector.numbering
-    shown = {"name": vector.name, "evidence": (vector.why,)}
+    shown = {"name": vector.name, "evidence": (vector.why,), "block_size": found.block_size, "n_nodes": found.n_nodes}
     if isinstance(found, StructuralNumbering):
-        return shown | {
-            "block_size": found.block_size,
-            "n_nodes": found.n_nodes,
-            "numbering": found.kind,
-            "structure": found.layout.name,
-        }
+        return shown | {"numbering": found.kind, "structure": found.layout.name}
     nodal = nodal_matrix(matrix.csr(), found)
-    return shown | {
-        "block_size": found.block_size,
-        "n_nodes": found.n_nodes,
-        "numbering": vector.order,
-        "coupled": not uncoupled(nodal),
-        "structure": "" if uncoupled(nodal) or bars_of(nodal) is None else "truss",
-    }
+    structure = "" if uncoupled(nodal) or bars_of(nodal) is None else "truss"
+    return shown | {"numbering": vector.order, "coupled": not uncoupled(nodal), "structure": structure}
 
 
 def element_facts(matrix: OperatorMatrix) -> dict[str, Any]:
     """Of a scalar matrix whose rows form cells of other elements than linear triangles; empty where they form none."""
-    for whole, cells in _readings(matrix):
+    read = [(matrix, cells) for cells in islice(shown_cells(matrix), 1)]
+    read += [(less.matrix, less.cells)] if (less := less_mass(matrix)) is not None else []
+    for whole, cells in read:  # without a mass term, and with one
         with suppress(TopologyError):
-            if typical_misfit(whole, cells.blocks) <= _LIKE:
-                return _of_cells(cells)
+            if typical_misfit(whole, cells.blocks) > _LIKE:
+                continue
+            parts = parts_of(cells)
+            names = [ELEMENT_NAMES[kind.name] for kind in cells.blocks]
+            return {
+                "element": names[0] if len(names) == 1 else "mixed",
+                "n_triangles": sum(len(some) for kind, some in cells.blocks.items() if kind.simplex),
+                "n_quads": sum(len(some) for kind, some in cells.blocks.items() if not kind.simplex),
+                "n_holes": sum(part.n_holes for part in parts),
+                "n_boundary_edges": sum(len(part.piece.boundary) for part in parts),
+                "n_pieces": len(parts),
+                "cells_from": "graph" if cells.told else "entries",
+            }
     return {}
-
-
-def _readings(matrix: OperatorMatrix) -> Iterator[tuple[OperatorMatrix, Cells]]:
-    """Without a mass term, and with one."""
-    if (cells := next(shown_cells(matrix), None)) is not None:
-        yield matrix, cells
-    if (less := less_mass(matrix)) is not None:
-        yield less.matrix, less.cells
-
-
-def _of_cells(cells: Cells) -> dict[str, Any]:
-    parts = parts_of(cells)
-    names = [_NAMES[kind.name] for kind in cells.blocks]
-    return {
-        "element": names[0] if len(names) == 1 else "mixed",
-        "n_triangles": sum(len(some) for kind, some in cells.blocks.items() if kind.simplex),
-        "n_quads": sum(len(some) for kind, some in cells.blocks.items() if not kind.simplex),
-        "n_holes": sum(part.n_holes for part in parts),
-        "n_boundary_edges": sum(len(part.piece.boundary) for part in parts),
-        "n_pieces": len(parts),
-        "cells_from": "graph" if cells.told else "entries",
-    }
 
 
 def mesh_facts(matrix: OperatorMatrix, topology: Topology) -> dict[str, Any]:
@@ -141,9 +119,6 @@ def _scale_of(piece: Piece, weights: NDArray) -> tuple[float, int | None]:
 
 def surface_facts(matrix: OperatorMatrix) -> dict[str, Any]:
     """Of a graph that is that of a surface with handles or cross-caps, or without a boundary; else empty."""
-    from ..metric.mesh import SurfaceMesh
-    from ..topology.manifold import Cycles, surface_readings
-
     cycles = Cycles.of(matrix.n, matrix.edges)
     try:
         mesh = SurfaceMesh.of(cycles, next(surface_readings(cycles)))

@@ -1,8 +1,6 @@
 """What a matrix is, and what can be recovered from it, without recovering it."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -13,12 +11,12 @@ from ..diagnosis import PLANAR, Diagnosis, diagnosed, further_terms, indefinite,
 from ..errors import NotPlanarError, RecoveryError
 from ..matrix import OperatorMatrix, load
 from ..operators import VectorReading, second_reading, vector_valued
-from ..quiet import quiet_libraries
+from ..progress import quiet_libraries
 from ..tolerances import MOST
 from ..topology import Topology, components, located, require_planar, surfaces
 from ..words import count_of
 from .facts import element_facts, matrix_facts, mesh_facts, nodes_facts, surface_facts
-from .text import element_text, lines_of, mesh_text
+from .text import ELEMENTS, lines_of, mesh_text
 
 _IF = "if the entries agree, which recovery tells"
 _IF_WHOLE = f"if enough rows are whole, away from supports, and {_IF[3:]}"
@@ -27,108 +25,51 @@ _NO_CELLS = "the graph of the matrix is planar, but no cell shows in it, nor do 
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """Facts about a matrix that passed the checks at the door.
+    """Facts about a matrix that passed the checks at the door."""
 
-    Attributes
-    ----------
-    n_rows, n_edges : int
-        Order; stored off-diagonal entries, each with its transpose counted once.
-    asymmetry : float
-        Largest difference between an entry and its transpose, relative to the largest off-diagonal entry of the rows.
-    n_connected : int
-        Connected pieces of the graph, isolated rows not counted.
-    n_isolated : int
-        Rows without an off-diagonal entry.
-    n_vanished : int
-        Off-diagonal entries stored as zero, or of at most 1e-12 relative to their rows.
-    n_zero_sums : int
-        Rows that sum to zero, relative to their largest off-diagonal entry; isolated ones not counted.
-    planar : bool
-        Whether the graph is that of a planar mesh, as far as that is known.
-    obstacle : str
-        Why no mesh is recognised; empty where one is.
-    n_triangles, n_faces, n_holes, n_boundary_edges : int
-        Triangles; all cells and the regions between boundary loops; bounded ones of those; edges on the boundary.
-    n_pieces, n_hinges : int
-        Edge-connected pieces, and vertices that join them.
-    n_bare_edges, n_undetermined : int
-        Edges and rows of no cell.
-    scale : (n_pieces,) float64
-        Estimates of c, right to some ten per cent.
-    mixed_signs : tuple of int
-        Rows, the first in each piece, in which c would have the other sign than in most of the piece.
-    warnings : tuple of str
-    block_size : int
-        Unknowns per node, 1 for a scalar matrix.
-    n_nodes : int
-        Nodes of a vector-valued matrix, else 0.
-    numbering : str
-        How its unknowns stand; empty for a scalar matrix.
-    coupled : bool
-        Whether its directions are coupled.
-    structure : str
-        ``"truss"``, or the kind of structure whose nodes have rotations too; empty for others.
-    n_polygons : int
-        Cells of more than three vertices, whose diagonals have no entry.
-    n_vanished_sides : int
-        Sides of the boundary that face a right angle and have no entry; counted among its edges.
-    cells_from : {"graph", "entries", ""}
-        What the cells were taken from: cycles of three edges are cells, unless edges are left over and the entries
-        suggest others. These are what :func:`unassemble.recover` begins with; it solves, holds the result against the
-        entries, and changes cells where that asks for it. Empty where there is no mesh.
-    kind : str
-        ``"vector-valued"``, or as in :class:`unassemble.diagnosis.Diagnosis`.
-    name : str
-        The same in words.
-    evidence : tuple of str
-        What speaks for it, the strongest first.
-    advice : str
-        What to do next; empty where recovery is.
-    surface : str
-        What kind of surface the graph is that of, where that is none in the plane.
-    element : str
-        Of scalar matrices whose rows form cells of other elements than linear triangles: ``"P2"``, ``"Q1"``, ...
-    n_quads : int
-        Quadrilaterals, beside `n_triangles`; the number of cells of such a mesh is that of both.
-    further : str
-        Of scalar matrices: what was added to the Laplacian, or done to it, as row sums tell; begins with a comma.
-    """
-
-    n_rows: int
-    n_edges: int
+    n_rows: int  #: Order.
+    n_edges: int  #: Stored off-diagonal entries, each with its transpose counted once.
+    #: Largest difference between an entry and its transpose, relative to the largest off-diagonal entry of the rows.
     asymmetry: float
-    n_connected: int
-    n_isolated: int
-    n_vanished: int
-    n_zero_sums: int
-    warnings: tuple[str, ...]
-    planar: bool = True
-    obstacle: str = ""
-    n_triangles: int = 0
-    n_faces: int = 0
-    n_holes: int = 0
-    n_boundary_edges: int = 0
-    n_pieces: int = 0
-    n_hinges: int = 0
-    n_bare_edges: int = 0
-    n_undetermined: int = 0
-    scale: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    n_connected: int  #: Connected pieces of the graph, isolated rows not counted.
+    n_isolated: int  #: Rows without an off-diagonal entry.
+    n_vanished: int  #: Off-diagonal entries stored as zero, or of at most 1e-12 relative to their rows.
+    n_zero_sums: int  #: Rows that sum to zero, relative to their largest off-diagonal entry; isolated ones not counted.
+    warnings: tuple[str, ...]  #: What was changed as the matrix was checked.
+    planar: bool = True  #: Whether the graph is that of a planar mesh, as far as that is known.
+    obstacle: str = ""  #: Why no mesh is recognised; empty where one is.
+    n_triangles: int = 0  #: Triangles among the cells.
+    n_faces: int = 0  #: All cells, and the regions between boundary loops.
+    n_holes: int = 0  #: Bounded ones of these regions.
+    n_boundary_edges: int = 0  #: Edges on the boundary.
+    n_pieces: int = 0  #: Edge-connected ones.
+    n_hinges: int = 0  #: Vertices that join them.
+    n_bare_edges: int = 0  #: Edges of no cell.
+    n_undetermined: int = 0  #: Rows of no cell.
+    scale: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))  #: (n_pieces,) c, to some ten per cent.
+    #: Rows, the first in each piece, in which c would have the other sign than in most.
     mixed_signs: tuple[int, ...] = ()
-    block_size: int = 1
-    n_nodes: int = 0
-    numbering: str = ""
-    coupled: bool = True
-    structure: str = ""
-    n_polygons: int = 0
+    block_size: int = 1  #: Unknowns per node, 1 for a scalar matrix.
+    n_nodes: int = 0  #: Nodes of a vector-valued matrix.
+    numbering: str = ""  #: How its unknowns stand.
+    coupled: bool = True  #: Whether its directions are coupled.
+    structure: str = ""  #: ``"truss"``, or the kind of structure whose nodes have rotations too; empty for others.
+    n_polygons: int = 0  #: Cells of more than three vertices, whose diagonals have no entry.
+    #: Sides of the boundary that face a right angle and have no entry; counted among its edges.
     n_vanished_sides: int = 0
+    #: ``"graph"``, cycles of three edges are cells; or ``"entries"``, if edges are left over and the entries suggest
+    #: others. :func:`unassemble.recover` begins with these; it holds the result against the entries, and changes cells
+    #: where that asks for it. Empty where there is no mesh.
     cells_from: str = ""
-    kind: str = "vector-valued"
-    name: str = ""
-    evidence: tuple[str, ...] = ()
-    advice: str = ""
-    surface: str = ""
+    kind: str = "vector-valued"  #: That, or as in :class:`unassemble.diagnosis.Diagnosis`.
+    name: str = ""  #: The same in words.
+    evidence: tuple[str, ...] = ()  #: What speaks for it, the strongest first.
+    advice: str = ""  #: What to do next; empty where recovery is.
+    surface: str = ""  #: What kind of surface the graph is that of, where that is none in the plane.
+    #: Of scalar matrices whose rows form cells of other elements than linear triangles ``"P2"``, ``"Q1"``, ...
     element: str = ""
-    n_quads: int = 0
+    n_quads: int = 0  #: Quadrilaterals, beside `n_triangles`.
+    #: Of scalar matrices, what was added to the Laplacian, or done to it, as row sums tell; begins with a comma.
     further: str = ""
 
     @property
@@ -142,7 +83,7 @@ class Inspection:
             kind = "elasticity, if the material is isotropic" if self.coupled else "laplacian in each direction"
             return f"vector-valued, {self.block_size} components, {self.numbering}: {kind}"
         if self.element:
-            return f"laplacian, {element_text(self)}{self.further}"
+            return f"laplacian, {ELEMENTS[self.element]}{self.further}"
         if self.surface:
             sphere = self.surface.startswith("closed, 0 handles")  # whose graph is planar
             other = "; or of a mesh in the plane whose outline has three edges" if sphere else ""
@@ -234,58 +175,45 @@ def inspect_matrix(A: Any, *, variable: str | None = None, drop_zeros: float | N
 
 
 def _inspected(matrix: OperatorMatrix) -> Inspection:
-    facts = matrix_facts(matrix)
+    def of(shown: dict[str, Any], found: Diagnosis | None = None, *, planar: bool = False) -> Inspection:
+        """With what a diagnosis says, of a scalar matrix that is read."""
+        read_as = asdict(found or diagnosed(matrix, planar=planar))
+        further = further_terms(matrix) if found is None else ""
+        return Inspection(**matrix_facts(matrix), **read_as, further=further, planar=planar, **shown)
+
+    def of_nodes(vector: VectorReading) -> Inspection:
+        read_as = nodes_facts(matrix, vector)
+        read_as["evidence"] += (said,) if (said := indefinite(matrix)) else ()  # where recovery fails it says so
+        return Inspection(**matrix_facts(matrix), **read_as, planar=False, obstacle=vector.why)
+
     mass = mass_matrix(matrix, planar=True)
     if mass is not None and mass.unread:
-        return _masses(facts, mass)
-    crowded = len(matrix.edges) > 3 * matrix.n
-    if crowded and (shown := element_facts(matrix)):
-        return Inspection(**facts, **_diagnosis(matrix, planar=False), planar=False, **shown)
-    vector = vector_valued(matrix)
-    if vector is not None:
-        return _vector_valued(matrix, facts, vector)
+        return of({"obstacle": mass.name}, mass)
+    if len(matrix.edges) > 3 * matrix.n and (shown := element_facts(matrix)):
+        return of(shown)
+    if (vector := vector_valued(matrix)) is not None:
+        return of_nodes(vector)
     topology = surfaces(matrix.n, matrix.edges)
     read = matrix
     if not topology.pieces and (curved := surface_facts(matrix)):
-        return Inspection(**facts, **_diagnosis(matrix, planar=False), planar=False, **curved)
+        return of(curved)
     if _left_over(matrix, topology):
         read, topology = guessed(matrix, topology)
     if not topology.pieces or _left_over(read, topology):
         error = _not_planar(matrix)
         if error or not topology.pieces:
-            planar = error is None
             if shown := element_facts(matrix):
-                return Inspection(**facts, **_diagnosis(matrix, planar=planar), planar=planar, **shown)
-            vector = second_reading(matrix)  # as recovery does
-            if vector is not None:
-                return _vector_valued(matrix, facts, vector)
-            read_as = _diagnosis(matrix, planar=planar)
-            return Inspection(**facts, **read_as, planar=planar, obstacle=str(error or _NO_CELLS))
+                return of(shown, planar=error is None)
+            if (vector := second_reading(matrix)) is not None:  # as recovery does
+                return of_nodes(vector)
+            return of({"obstacle": str(error or _NO_CELLS)}, planar=error is None)
     found = mesh_facts(read, topology)
     if found["mixed_signs"] or found["n_undetermined"] > MOST * matrix.n:  # as in recovery where no mesh fits
         if (mass := mass_matrix(matrix, planar=False)) is not None:
-            return _masses(facts, mass)
+            return of({"obstacle": mass.name}, mass)
         if (vector := second_reading(matrix)) is not None:
-            return _vector_valued(matrix, facts, vector)
-    return Inspection(**facts, **found, **_diagnosis(matrix, planar=True))
-
-
-def _masses(facts: dict[str, Any], mass: Diagnosis) -> Inspection:
-    return Inspection(**facts, **_named(mass), planar=False, obstacle=mass.name)
-
-
-def _vector_valued(matrix: OperatorMatrix, facts: dict[str, Any], vector: VectorReading) -> Inspection:
-    read_as = nodes_facts(matrix, vector)
-    read_as["evidence"] += (said,) if (said := indefinite(matrix)) else ()  # where recovery fails it says so
-    return Inspection(**facts, **read_as, planar=False, obstacle=vector.why)
-
-
-def _diagnosis(matrix: OperatorMatrix, *, planar: bool) -> dict[str, Any]:
-    return {**_named(diagnosed(matrix, planar=planar)), "further": further_terms(matrix)}
-
-
-def _named(found: Diagnosis) -> dict[str, Any]:
-    return {"kind": found.kind, "name": found.name, "evidence": found.evidence, "advice": found.advice}
+            return of_nodes(vector)
+    return of(found, planar=True)
 
 
 def _not_planar(matrix: OperatorMatrix) -> RecoveryError | None:

@@ -15,64 +15,36 @@ if TYPE_CHECKING:
 
 def lines_of(facts: Inspection) -> list[tuple[str, str]]:
     """Names and values, in the order in which they are shown."""
+    above = count_of(facts.n_edges, "off-diagonal entry", "off-diagonal entries")
+    off = "rounding" if facts.asymmetry <= ROUNDED else f"{facts.asymmetry:.1e}"
+    isolated = f", and {count_of(facts.n_isolated, 'isolated row')}" if facts.n_isolated else ""
+    gone = f"{count_of(facts.n_vanished, 'of these is', 'of these are')} zero up to rounding"
+    used, zero = facts.n_rows - facts.n_isolated, facts.n_zero_sums
     lines = [
-        ("matrix", f"{count_of(facts.n_rows, 'row')}, {_above(facts.n_edges)} above the diagonal"),
-        ("symmetry", _symmetry(facts.asymmetry)),
-        ("graph", _graph(facts)),
-        ("vanished", _vanished(facts.n_vanished)),
-        ("row sums", _row_sums(facts)),
+        ("matrix", f"{count_of(facts.n_rows, 'row')}, {above} above the diagonal"),
+        ("symmetry", f"symmetric up to {off}" if facts.asymmetry else "symmetric"),
+        ("graph", f"{count_of(facts.n_connected, 'connected piece')}{isolated}"),
+        ("vanished", gone if facts.n_vanished else "none of these"),
+        ("row sums", "zero" if zero == used else f"zero in {zero:,} of {used:,} rows only" if zero else "not zero"),
         ("surface", facts.surface) if facts.surface else ("planar", _planar(facts)),
     ]
     if facts.n_nodes:
         nodes = f"{count_of(facts.n_nodes, 'node')} with {facts.block_size} unknowns each, {facts.numbering}"
         lines.append(("nodes", nodes))
+    pieces = f"{facts.n_pieces:,}" + (f", joined by {count_of(facts.n_hinges, 'hinge')}" if facts.n_hinges else "")
+    holes = [("holes", f"{facts.n_holes:,}"), ("pieces", pieces)]
     if facts.surface:
-        lines += [("mesh", mesh_text(facts)), ("pieces", _pieces(facts))]
+        lines += [("mesh", mesh_text(facts)), ("pieces", pieces)]
     elif facts.element:
-        lines += [
-            ("element", f"{facts.element}, {element_text(facts)}"),
-            ("mesh", f"{mesh_text(facts)}, {count_of(facts.n_boundary_edges, 'side')} on the boundary"),
-            ("holes", f"{facts.n_holes:,}"),
-            ("pieces", f"{facts.n_pieces:,}"),
-        ]
+        sides = f"{count_of(facts.n_boundary_edges, 'side')} on the boundary"
+        lines += [("element", f"{facts.element}, {ELEMENTS[facts.element]}"), ("mesh", f"{mesh_text(facts)}, {sides}")]
+        lines += holes
     elif not facts.obstacle:
-        lines += [
-            ("mesh", _mesh(facts)),
-            ("cells", _cells(facts)),
-            ("holes", f"{facts.n_holes:,}"),
-            ("pieces", _pieces(facts)),
-        ]
-        lines.append(("scale c", _scale(facts)))
+        lines += [("mesh", _mesh(facts)), ("cells", _cells(facts)), *holes, ("scale c", _scale(facts))]
     lines.append(("operator", facts.operator))
     lines += [("evidence", one) for one in facts.evidence]
     lines.append(("recoverable", facts.recoverable))
     return lines + [("note", warning) for warning in facts.warnings]
-
-
-def _above(number: int) -> str:
-    return count_of(number, "off-diagonal entry", "off-diagonal entries")
-
-
-def _symmetry(asymmetry: float) -> str:
-    if not asymmetry:
-        return "symmetric"
-    return "symmetric up to rounding" if asymmetry <= ROUNDED else f"symmetric up to {asymmetry:.1e}"
-
-
-def _vanished(number: int) -> str:
-    return count_of(number, "of these is", "of these are") + " zero up to rounding" if number else "none of these"
-
-
-def _graph(facts: Inspection) -> str:
-    isolated = f", and {count_of(facts.n_isolated, 'isolated row')}" if facts.n_isolated else ""
-    return f"{count_of(facts.n_connected, 'connected piece')}{isolated}"
-
-
-def _row_sums(facts: Inspection) -> str:
-    used = facts.n_rows - facts.n_isolated
-    if facts.n_zero_sums == used:
-        return "zero"
-    return f"zero in {facts.n_zero_sums:,} of {used:,} rows only" if facts.n_zero_sums else "not zero"
 
 
 def _planar(facts: Inspection) -> str:
@@ -82,9 +54,7 @@ def _planar(facts: Inspection) -> str:
         return "no, but rows that are all coupled to each other form cells"
     if facts.kind == "mass":
         return "not looked for, since the matrix has no shape"
-    if facts.n_nodes:
-        return "not looked for, since the rows form nodes of several unknowns"
-    return "no"
+    return "not looked for, since the rows form nodes of several unknowns" if facts.n_nodes else "no"
 
 
 def mesh_text(facts: Inspection) -> str:
@@ -100,7 +70,7 @@ def mesh_text(facts: Inspection) -> str:
     return ("likely " if likely else "") + " and ".join(cells)
 
 
-_ELEMENTS = {
+ELEMENTS = {
     "P2": "quadratic triangles",
     "P3": "cubic triangles",
     "Q1": "bilinear quadrilaterals",
@@ -108,11 +78,6 @@ _ELEMENTS = {
     "S2": "serendipity quadrilaterals of eight nodes",
     "mixed": "linear triangles and bilinear quadrilaterals",
 }
-
-
-def element_text(facts: Inspection) -> str:
-    """The element of a scalar matrix in words."""
-    return _ELEMENTS[facts.element]
 
 
 def _cells(facts: Inspection) -> str:
@@ -135,10 +100,6 @@ def _mesh(facts: Inspection) -> str:
     if facts.n_bare_edges:
         text += f"; {count_of(facts.n_bare_edges, 'edge')} of no cell"
     return text + (f"; {count_of(facts.n_undetermined, 'row')} of no cell" if facts.n_undetermined else "")
-
-
-def _pieces(facts: Inspection) -> str:
-    return f"{facts.n_pieces:,}" + (f", joined by {count_of(facts.n_hinges, 'hinge')}" if facts.n_hinges else "")
 
 
 def _scale(facts: Inspection) -> str:

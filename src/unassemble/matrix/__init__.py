@@ -1,6 +1,7 @@
 """From a file or a scipy matrix to a clean symmetric operator."""
 
-from .check import as_csr, check_matrix
+from .canonical import as_csr
+from .check import check_matrix
 from .digits import Digits
 from .operator import OperatorMatrix
 from .read import is_file, load, read_matrix

@@ -1,7 +1,5 @@
 """One form for every sparse matrix: compressed rows, sorted, duplicates summed, explicit zeros kept."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -13,30 +11,24 @@ from ..words import count_of
 
 
 def canonical(A: Any) -> sp.csr_array:
-    """Bring a sparse matrix into compressed rows without losing its structure.
+    """Bring a scipy sparse matrix of numbers into compressed rows without losing its structure.
 
     Explicit zeros stay, those in the blocks of ``bsr`` included; only in the diagonal storage (``dia``) are
     they left out, where they cannot be told from padding. Duplicates are summed, in floating point. The
-    argument is not changed; arrays may be shared with it.
+    argument is not changed; arrays may be shared with it. The result is of dtype float64, complex128 or bool, with
+    columns increasing within each row.
 
-    Parameters
-    ----------
-    A : scipy sparse matrix or array, two-dimensional, of numbers
-
-    Returns
-    -------
-    csr_array
-        Of dtype float64, complex128 or bool, columns increasing within each row.
-
-    Raises
-    ------
-    MatrixError
-        If the index arrays contradict the shape, or there are far more rows than entries.
+    Raises MatrixError if the index arrays contradict the shape, or there are far more rows than entries.
     """
-    problem = inconsistency(A)
-    if problem:
+    if problem := inconsistency(A):
         raise MatrixError(f"the sparse matrix is damaged: {problem}; build it anew from rows, columns and values")
-    refuse_mostly_empty(A.shape[0], A.nnz)
+    n, n_stored = A.shape[0], A.nnz
+    if n > 100 * (n_stored + 10):  # a wrong header rather than a mesh, for which no memory is spent
+        raise MatrixError(
+            f"at least {n - n_stored} of the {n} rows have no off-diagonal entry (only "
+            f"{count_of(n_stored, 'entry is', 'entries are')} stored), so that this is no matrix of a mesh: check its "
+            "size, or leave the empty rows out"
+        )
     with np.errstate(over="ignore"):  # a long double beyond the range becomes infinite, and is found as such
         csr = sp.csr_array(A.astype(working_dtype(A.dtype), copy=False))
     csr.prune()
@@ -46,20 +38,53 @@ def canonical(A: Any) -> sp.csr_array:
     return csr
 
 
-def refuse_mostly_empty(n: int, n_stored: int) -> None:
-    """Raise before memory is spent on rows that cannot belong to a mesh.
+def as_csr(A: Any) -> sp.csr_array:
+    """A square matrix of finite numbers, sparse or dense, in compressed rows; see :func:`canonical`.
 
-    Raises
-    ------
-    MatrixError
-        If n is beyond 100 (n_stored + 10).
+    Raises MatrixError if it is none.
     """
-    if n > 100 * (n_stored + 10):  # a wrong header rather than a mesh
+    kind = f"an object of type {type(A).__name__}"
+    if not sp.issparse(A):
+        try:
+            A = np.asarray(A)
+        except Exception as error:  # foreign types convert with any exception they like
+            raise MatrixError(f"{kind} cannot be taken for a matrix ({error})") from error
+        if A.dtype.kind not in "biufc":
+            raise MatrixError(
+                f"{kind} (as an array: {A.dtype}) is not a matrix of numbers: "
+                "pass a scipy sparse matrix, a numpy array or a path"
+            )
+    if A.ndim != 2:
+        raise MatrixError(f"a matrix has two dimensions, not {A.ndim}")
+    rows, columns = A.shape
+    if rows != columns:
+        raise MatrixError(f"the matrix is not square: it has {count_of(rows, 'row')} and {count_of(columns, 'column')}")
+    if rows == 0:
+        raise MatrixError("the matrix is empty: it has 0 rows")
+    if A.dtype.kind == "b":
         raise MatrixError(
-            f"at least {n - n_stored} of the {n} rows have no off-diagonal entry (only "
-            f"{count_of(n_stored, 'entry is', 'entries are')} stored), so that this is no matrix of a mesh: check its "
-            "size, or leave the empty rows out"
+            "the matrix has a pattern only (its type is bool) and no numbers: the shape of the mesh is in the "
+            "numbers, so pass the matrix with its values"
         )
+    if A.dtype.kind not in "iufc":
+        raise MatrixError(f"the entries of the matrix are of type {A.dtype}, not numbers: convert them to float64")
+    csr = canonical(A if sp.issparse(A) else _stored(A))
+    finite = np.isfinite(csr.data)
+    if not finite.all():
+        i, j = place(csr, int(np.argmin(finite)))
+        more = int(len(finite) - np.count_nonzero(finite) - 1)
+        others = f" (and {count_of(more, 'more entry is', 'more entries are')} not finite)" if more else ""
+        raise MatrixError(
+            f"the entry at row {i}, column {j} is {csr[i, j]}{others}: every entry must be a finite number"
+        )
+    return csr
+
+
+def _stored(dense: NDArray) -> sp.coo_array:
+    """What is not zero."""
+    at = np.nonzero(dense)
+    with np.errstate(over="ignore"):  # as in :func:`canonical`; scipy knows no long doubles
+        return sp.coo_array((dense[at].astype(working_dtype(dense.dtype), copy=False), at), shape=dense.shape)
 
 
 def entry_rows(csr: sp.csr_array) -> NDArray:
@@ -77,21 +102,13 @@ def inconsistency(A: Any) -> str | None:
 
     Compiled code trusts these arrays: a wrong one reads or writes outside its memory.
     """
-    if A.format == "coo":
-        return _coordinates(A)
-    if A.format in ("csr", "csc", "bsr"):
-        return _compressed(A)
-    return None
-
-
-def _coordinates(A: Any) -> str | None:
-    if not len(A.row) == len(A.col) == len(A.data):
-        return f"it has {len(A.row)} row indices, {len(A.col)} column indices and {len(A.data)} values"
-    return _range(A.row, A.shape[0], "row") or _range(A.col, A.shape[1], "column")
-
-
-def _compressed(A: Any) -> str | None:
     rows, columns = A.shape
+    if A.format == "coo":
+        if not len(A.row) == len(A.col) == len(A.data):
+            return f"it has {len(A.row)} row indices, {len(A.col)} column indices and {len(A.data)} values"
+        return _outside(A.row, rows, "row") or _outside(A.col, columns, "column")
+    if A.format not in ("csr", "csc", "bsr"):
+        return None
     if A.format == "bsr":
         rows, columns = rows // A.blocksize[0], columns // A.blocksize[1]
     major, minor, what = (columns, rows, "row") if A.format == "csc" else (rows, columns, "column")
@@ -102,10 +119,10 @@ def _compressed(A: Any) -> str | None:
     n_stored = A.indptr[-1]
     if n_stored > min(len(A.indices), len(A.data)):
         return f"it announces {n_stored} entries and holds {min(len(A.indices), len(A.data))}"
-    return _range(A.indices[:n_stored], minor, what)
+    return _outside(A.indices[:n_stored], minor, what)
 
 
-def _range(index: NDArray, bound: int, what: str) -> str | None:
+def _outside(index: NDArray, bound: int, what: str) -> str | None:
     if len(index) and (index.min() < 0 or index.max() >= bound):
         worst = index.min() if index.min() < 0 else index.max()
         return f"the {what} index {worst} is outside 0..{bound - 1}"
@@ -114,6 +131,4 @@ def _range(index: NDArray, bound: int, what: str) -> str | None:
 
 def working_dtype(dtype: np.dtype) -> type:
     """The type that entries of another one are converted to: bool, float64 or complex128."""
-    if dtype.kind == "b":
-        return np.bool_
-    return np.complex128 if dtype.kind == "c" else np.float64
+    return {"b": np.bool_, "c": np.complex128}.get(dtype.kind, np.float64)

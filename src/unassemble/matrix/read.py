@@ -1,15 +1,12 @@
 """Files with a sparse matrix: open, see what they are, hand them to their reader."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import os
 import re
 import sys
-import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import IO, Any, BinaryIO
 
@@ -17,20 +14,24 @@ import scipy.sparse as sp
 
 from ..errors import InputError, MatrixFileError, UnassembleError
 from ..formats import FORMATS
+from .binary import read_mat, read_mat4, read_mat73, read_npy, read_npz
 from .canonical import canonical, inconsistency
 from .check import check_matrix
-from .market import read_market
-from .mat import read_mat, read_mat4, read_mat73
-from .npz import read_npy, read_npz
 from .operator import OperatorMatrix
 from .signatures import HEAD, foreign, kind_of
-from .triplets import read_triplets
+from .text import read_market, read_triplets
 
-_FORMATS = {"market": "Matrix Market", "npz": ".npz", "npy": ".npy", "triplets": "lines of row, column and entry"}
-
-
-_READERS = {"market": read_market, "npz": read_npz, "npy": read_npy, "triplets": read_triplets}
-_MATLAB = {"mat": read_mat, "mat4": read_mat4, "hdf5": read_mat73}
+_READERS: dict[str, tuple[str, Callable[[BinaryIO, str], Any]]] = {
+    "market": ("Matrix Market", read_market),
+    "npz": (".npz", read_npz),
+    "npy": (".npy", read_npy),
+    "triplets": ("lines of row, column and entry", read_triplets),
+}
+_MATLAB: dict[str, Callable[[BinaryIO, str, str | None], Any]] = {
+    "mat": read_mat,
+    "mat4": read_mat4,
+    "hdf5": read_mat73,
+}
 
 
 def read_matrix(source: str | os.PathLike[str] | IO[Any], *, variable: str | None = None) -> sp.csr_array:
@@ -39,18 +40,9 @@ def read_matrix(source: str | os.PathLike[str] | IO[Any], *, variable: str | Non
     Explicit zeros of the file are kept as structure; zeros of dense arrays and of scipy's diagonal storage, which
     cannot be told from padding, are not. Duplicates are summed. Pickles are never loaded.
 
-    Parameters
-    ----------
-    source : path, "-" or file
-        ``"-"`` is standard input. Matrix Market may be compressed by gzip, also on standard input.
-    variable : str, optional
-        Name of the variable in a ``.mat`` file, such as ``"A"`` or ``"Problem.A"``.
-
-    Returns
-    -------
-    csr_array
-        Of dtype float64, or complex128 or bool where the file says so, columns increasing within each row.
-        Neither square nor finite of necessity: see :func:`unassemble.matrix.check_matrix`.
+    `source` is a path, ``"-"`` for standard input, or an open file; text may be compressed by gzip. `variable` is the
+    name of one in a ``.mat`` file, such as ``"A"`` or ``"Problem.A"``. The result is of dtype float64, or complex128 or
+    bool where the file says so, and neither square nor finite of necessity: see :func:`unassemble.matrix.check_matrix`.
 
     Raises
     ------
@@ -78,52 +70,37 @@ def read_matrix(source: str | os.PathLike[str] | IO[Any], *, variable: str | Non
 
 
 def _read(stream: Any, name: str, variable: str | None) -> Any:
-    kind = kind_of(_head(stream))
+    head = stream.read(HEAD)
+    stream.seek(0)
+    kind = kind_of(head)
     if kind == "gzip":
-        return _read_gzip(stream, name, variable)
+        with gzip.GzipFile(fileobj=stream, mode="rb") as unpacked:
+            return _read(unpacked, name, variable)
     suffix = next((one for one, held in FORMATS.items() if held.name and name.lower().endswith(one)), "")
     if kind is None or (kind == "hdf5" and suffix):
-        raise MatrixFileError(f"{name} {foreign(_head(stream), suffix)}")
+        raise MatrixFileError(f"{name} {foreign(head, suffix)}")
     if kind in _MATLAB:
         return _MATLAB[kind](stream, name, variable)
+    what, reader = _READERS[kind]
     if variable is not None:
-        raise InputError(f"{name} is {_FORMATS[kind]}, and only .mat files have variables: leave out `variable`")
-    return _READERS[kind](stream, name)
-
-
-def _read_gzip(stream: BinaryIO, name: str, variable: str | None) -> Any:
-    try:
-        with gzip.GzipFile(fileobj=stream) as unpacked:
-            kind = kind_of(_head(unpacked))
-            if kind == "gzip":
-                raise MatrixFileError(f"{name} is compressed twice: unpack it once")
-            if kind in ("market", "triplets", None):  # read, or refused, as it is unpacked
-                return _read(unpacked, name, variable)
-            return _read(io.BytesIO(unpacked.read()), name, variable)
-    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-        raise MatrixFileError(f"{name} is a truncated or damaged gzip file: write or download it again") from error
-
-
-def _head(stream: Any) -> bytes:
-    """The first bytes of a stream that can be rewound."""
-    head: bytes = stream.read(HEAD)
-    stream.seek(0)
-    return head
+        raise InputError(f"{name} is {what}, and only .mat files have variables: leave out `variable`")
+    return reader(stream, name)
 
 
 @contextmanager
 def _opened(source: Any) -> Iterator[tuple[BinaryIO, str]]:
     """A binary stream that can be rewound, and its name for messages."""
-    if isinstance(source, str) and source == "-":
-        yield _rewindable(_standard_input(), "standard input"), "standard input"
-    elif hasattr(source, "read"):
-        name = getattr(source, "name", None)
-        name = name if isinstance(name, str) else "the file"  # a pipe has a number
-        yield _rewindable(source, name), name
-    else:
-        with _open_path(source) as stream:
-            name = os.fsdecode(source)
-            yield _rewindable(stream, name), name
+    with ExitStack() as stack:
+        if isinstance(source, str) and source == "-":
+            if sys.stdin is None or sys.stdin.closed:
+                raise MatrixFileError("standard input is closed: pipe a Matrix Market file into it")
+            stream, name = getattr(sys.stdin, "buffer", sys.stdin), "standard input"
+        elif hasattr(source, "read"):
+            name = getattr(source, "name", "the file")
+            stream, name = source, name if isinstance(name, str) else "the file"  # a pipe has a number
+        else:
+            stream, name = stack.enter_context(_open_path(source)), os.fsdecode(source)
+        yield _rewindable(stream, name), name
 
 
 def _open_path(path: Any) -> BinaryIO:
@@ -144,46 +121,26 @@ def _open_path(path: Any) -> BinaryIO:
         raise MatrixFileError(f"{name!r} cannot be opened ({getattr(error, 'strerror', None) or error})") from error
 
 
-def _standard_input() -> Any:
-    if sys.stdin is None or sys.stdin.closed:
-        raise MatrixFileError("standard input is closed: pipe a Matrix Market file into it")
-    return getattr(sys.stdin, "buffer", sys.stdin)
-
-
 def _rewindable(stream: Any, name: str) -> BinaryIO:
     """The stream itself, or a copy in memory of a pipe, of text, or of a file that was read from before."""
     try:
         if not isinstance(stream, io.TextIOBase) and stream.seekable() and stream.tell() == 0:
             return stream
-        head = _as_bytes(stream.read(HEAD))
-        if kind_of(head) is None and len(head) == HEAD:  # refuse an endless device before reading on
-            raise MatrixFileError(f"{name} {foreign(head)}")
-        return io.BytesIO(head + _as_bytes(stream.read()))
+        head = stream.read(HEAD)
+        text = isinstance(head, str)
+        begun = head.encode("utf-8", "replace") if text else head or b""
+        if kind_of(begun) is None and len(begun) >= HEAD:  # refuse an endless device before reading on
+            raise MatrixFileError(f"{name} {foreign(begun)}")
+        rest = stream.read()
+        return io.BytesIO(begun + (rest.encode("utf-8", "replace") if text else rest or b""))
     except (OSError, ValueError) as error:
         raise MatrixFileError(f"{name} cannot be read ({getattr(error, 'strerror', None) or error})") from error
-
-
-def _as_bytes(content: str | bytes | None) -> bytes:
-    return content.encode("utf-8", "replace") if isinstance(content, str) else content or b""
 
 
 def load(source: Any, *, variable: str | None = None, drop_zeros: float | None = None) -> OperatorMatrix:
     """Read a matrix where `source` names a file, and check it.
 
-    Parameters
-    ----------
-    source : path, "-", open file, scipy sparse matrix or array, or array_like
-    variable : str, optional
-        See :func:`read_matrix`.
-    drop_zeros : float, optional
-        See :func:`check_matrix`.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or an option is out of range.
-    MatrixError
-        If the matrix fails a check.
+    Options and errors are those of :func:`read_matrix` and :func:`check_matrix`.
     """
     matrix = read_matrix(source, variable=variable) if is_file(source) else source
     return check_matrix(matrix, drop_zeros=drop_zeros)

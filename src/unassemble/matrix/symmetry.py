@@ -1,7 +1,5 @@
 """Both triangles of a matrix become one weighted graph, or the pair that forbids it is named."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,156 +26,17 @@ class Triangles:
 
 def triangles(A: sp.csr_array) -> Triangles:
     """Pair every stored entry with its transpose."""
-    T = A.T.tocsr()
-    n_stored = A.nnz
+    n_stored, T = A.nnz, A.T.tocsr()
     if not (np.array_equal(A.indptr, T.indptr) and np.array_equal(A.indices, T.indices)):
-        A = _with_transposed_pattern(A)
+        # Addition of sparse matrices would drop the zeros: summing duplicate coordinates does not.
+        rows, data = entry_rows(A), np.concatenate([A.data, np.zeros(A.nnz)])
+        places = np.concatenate([rows, A.indices]), np.concatenate([A.indices, rows])
+        A = sp.coo_array((data, places), shape=A.shape).tocsr()
         T = A.T.tocsr()
     rows = entry_rows(A)
     above = A.indices > rows
-    edges = np.empty((np.count_nonzero(above), 2), dtype=np.int64)
-    edges[:, 0] = rows[above]
-    edges[:, 1] = A.indices[above]
+    edges = np.column_stack([rows[above], A.indices[above]]).astype(np.int64)
     return Triangles(edges, A.data[above], T.data[above], A.nnz - n_stored)
-
-
-def symmetric_entries(
-    A: sp.csr_array, pairs: Triangles, noise: float | None
-) -> tuple[NDArray[np.float64], float, tuple[str, ...]]:
-    """Average both triangles where they differ at rounding level, or by a convection.
-
-    Returns
-    -------
-    entries : (e,) float64
-    asymmetry : float
-        Largest difference relative to the largest off-diagonal entry of the two rows.
-    warnings : tuple of str
-        What was added or averaged, but for differences as rounding leaves them in nearly every matrix.
-
-    Raises
-    ------
-    MatrixError
-        Naming the pair that differs most.
-    """
-    differing = np.flatnonzero(pairs.upper != pairs.lower)
-    warnings = _one_sided_warning(pairs)
-    if not len(differing):
-        return pairs.upper, 0.0, warnings
-    i, j = pairs.edges[differing].T
-    upper, lower = pairs.upper[differing], pairs.lower[differing]
-    row = row_sizes(A.shape[0], pairs.edges, np.maximum(np.abs(pairs.upper), np.abs(pairs.lower)))
-    size = np.maximum(row[i], row[j])
-    with np.errstate(over="ignore", under="ignore"):  # an infinite difference is one too large
-        difference = np.abs(upper - lower)
-        tolerance = np.maximum(SUMMED * size, SIGMAS * (noise or 0.0))
-        relative = difference / size
-    if (difference > tolerance).any():
-        turning = _turning(A, pairs)
-        if turning:
-            return 0.5 * pairs.upper + 0.5 * pairs.lower, 0.0, (*warnings, turning)
-        worst = int(np.argmax(np.where(difference > tolerance, difference, -1.0)))
-        raise _not_symmetric(A, pairs, int(i[worst]), int(j[worst]), noise)
-    entries = pairs.upper.copy()
-    entries[differing] += 0.5 * (lower - upper)
-    worst = int(np.argmax(relative))
-    if relative[worst] <= ROUNDED:
-        return entries, float(relative[worst]), warnings
-    average = (
-        f"{count_of(len(differing), 'entry was', 'entries were')} averaged with the transpose: they differ by up to "
-        f"{relative[worst]:.1e} of the largest off-diagonal entry of the rows ({i[worst]} and {j[worst]})"
-    )
-    return entries, float(relative[worst]), (*warnings, average)
-
-
-def _turning(A: sp.csr_array, pairs: Triangles) -> str:
-    """That the antisymmetric part is a convection without flow through the boundary; empty where it is none.
-
-    Its rows then add up to zero, since constants are not carried anywhere, and the symmetric part is the rest of the
-    operator: int v b . grad(u) changes its sign as u and v change places.
-    """
-    if pairs.one_sided:
-        return ""
-    with np.errstate(over="ignore", invalid="ignore"):
-        part = 0.5 * pairs.upper - 0.5 * pairs.lower
-        i, j = pairs.edges.T
-        n = A.shape[0]
-        sums = np.bincount(i, part, n) - np.bincount(j, part, n)
-        size = row_sizes(n, pairs.edges, np.abs(part))
-        if not (np.abs(sums) <= SUMMED * np.maximum(size, ROUNDED * size.max())).all():
-            return ""
-    return (
-        "the matrix is not symmetric, and its symmetric part was taken: the rows of the antisymmetric part add up to "
-        "zero, as those of a convection do"
-    )
-
-
-def _with_transposed_pattern(A: sp.csr_array) -> sp.csr_array:
-    """A with an explicit zero wherever only the transposed entry is stored."""
-    # Addition of sparse matrices would drop the zeros: summing duplicate coordinates does not.
-    rows = entry_rows(A)
-    data = np.concatenate([A.data, np.zeros(A.nnz)])
-    places = np.concatenate([rows, A.indices]), np.concatenate([A.indices, rows])
-    return sp.coo_array((data, places), shape=A.shape).tocsr()
-
-
-def _one_sided_warning(pairs: Triangles) -> tuple[str, ...]:
-    if not pairs.one_sided:
-        return ()
-    count, its = ("1 entry is", "its") if pairs.one_sided == 1 else (f"{pairs.one_sided} entries are", "their")
-    return (f"{count} stored on one side of the diagonal only; {its} place on the other was added to the structure",)
-
-
-def _not_symmetric(A: sp.csr_array, pairs: Triangles, i: int, j: int, noise: float | None) -> MatrixError:
-    if pairs.one_sided == len(pairs.edges):
-        rows = entry_rows(A)
-        for which, held in (("upper", (A.indices >= rows).all()), ("lower", (A.indices <= rows).all())):
-            if held:
-                return _one_triangle(A, which, *((i, j) if which == "upper" else (j, i)))
-    identity = _rows_of_identity(A)
-    if identity.any():
-        k, first = int(identity.sum()), int(identity.argmax())
-        return MatrixError(
-            f"the matrix is not symmetric: {count_of(k, 'row is that', 'rows are those')} of the identity, first row "
-            f"{first}, while other rows still use these unknowns, as where Dirichlet conditions were put into rows "
-            "only. Take these rows and columns out, or put zeros into the columns as well"
-        )
-    with np.errstate(over="ignore"):
-        unlike = np.abs(pairs.upper - pairs.lower) > SUMMED * np.maximum(np.abs(pairs.upper), np.abs(pairs.lower))
-    here, there = _shown(A, i, j), _shown(A, j, i)
-    if unlike.mean() > MOST and not pairs.one_sided:
-        return MatrixError(
-            f"the matrix is not symmetric: {unlike.mean():.0%} of all entries differ from their transposes, as where "
-            f"convection or another first derivative was added (row {i}, column {j} is {here}, and row {j}, column "
-            f"{i} is {there}). Assemble the matrix without that term"
-        )
-    remedy = "" if noise is not None else " (if the entries are measured, give their `noise`)"
-    return MatrixError(
-        f"the matrix is not symmetric, most at row {i}, column {j}: that entry is {here} and its transpose, row {j}, "
-        f"column {i}, is {there}. Both must be the same number{remedy}, or differ by a convection, whose rows add up "
-        "to zero"
-    )
-
-
-def _rows_of_identity(A: sp.csr_array) -> NDArray[np.bool_]:
-    """(n,) rows with nothing but a diagonal entry, whose columns hold more than that."""
-    off = (A.indices != entry_rows(A)) & (A.data != 0)
-    in_row = np.bincount(entry_rows(A)[off], minlength=A.shape[0])
-    in_column = np.bincount(A.indices[off], minlength=A.shape[0])
-    return np.asarray((in_row == 0) & (in_column > 0) & (A.diagonal() != 0))
-
-
-def _one_triangle(A: sp.csr_array, which: str, i: int, j: int) -> MatrixError:
-    return MatrixError(
-        f"the matrix is not symmetric because only its {which} triangle is stored (row {i}, column {j} is "
-        f"{_shown(A, i, j)}, its transpose is not stored): store the other one as well, or write 'symmetric' in the "
-        "first line of a Matrix Market file"
-    )
-
-
-def _shown(A: sp.csr_array, i: int, j: int) -> str:
-    start, end = A.indptr[i], A.indptr[i + 1]
-    k = start + np.searchsorted(A.indices[start:end], j)
-    return repr(float(A.data[k])) if k < end and A.indices[k] == j else "not stored"
 
 
 def from_columns(diagonal: NDArray, pairs: Triangles) -> tuple[Triangles, NDArray[np.bool_] | None, tuple[str, ...]]:
@@ -203,3 +62,105 @@ def from_columns(diagonal: NDArray, pairs: Triangles) -> tuple[Triangles, NDArra
         "where a boundary condition was put in: entries were taken from the columns"
     )
     return replace(pairs, upper=upper, lower=lower, one_sided=0), replaced, (warning,)
+
+
+def symmetric_entries(
+    A: sp.csr_array, pairs: Triangles, noise: float | None
+) -> tuple[NDArray[np.float64], float, tuple[str, ...]]:
+    """Average both triangles where they differ at rounding level, or by a convection.
+
+    Returns (e,) entries; the largest difference relative to the largest off-diagonal entry of the two rows; and in
+    sentences what was added or averaged, but for differences as rounding leaves them in nearly every matrix.
+
+    Raises MatrixError naming the pair that differs most.
+    """
+    warnings: tuple[str, ...] = ()
+    if pairs.one_sided:
+        count, its = ("1 entry is", "its") if pairs.one_sided == 1 else (f"{pairs.one_sided} entries are", "their")
+        added = f"{its} place on the other was added to the structure"
+        warnings = (f"{count} stored on one side of the diagonal only; {added}",)
+    differing = np.flatnonzero(pairs.upper != pairs.lower)
+    if not len(differing):
+        return pairs.upper, 0.0, warnings
+    i, j = pairs.edges[differing].T
+    upper, lower = pairs.upper[differing], pairs.lower[differing]
+    row = row_sizes(A.shape[0], pairs.edges, np.maximum(np.abs(pairs.upper), np.abs(pairs.lower)))
+    size = np.maximum(row[i], row[j])
+    with np.errstate(over="ignore", under="ignore"):  # an infinite difference is one too large
+        difference = np.abs(upper - lower)
+        tolerance = np.maximum(SUMMED * size, SIGMAS * (noise or 0.0))
+        relative = difference / size
+    if (difference > tolerance).any():
+        if not _turns(A.shape[0], pairs):
+            worst = int(np.argmax(np.where(difference > tolerance, difference, -1.0)))
+            raise _not_symmetric(A, pairs, int(i[worst]), int(j[worst]), noise)
+        turning = (
+            "the matrix is not symmetric, and its symmetric part was taken: the rows of the antisymmetric part add up "
+            "to zero, as those of a convection do"
+        )
+        return 0.5 * pairs.upper + 0.5 * pairs.lower, 0.0, (*warnings, turning)
+    entries = pairs.upper.copy()
+    entries[differing] += 0.5 * (lower - upper)
+    worst = int(np.argmax(relative))
+    if relative[worst] > ROUNDED:
+        warnings += (
+            f"{count_of(len(differing), 'entry was', 'entries were')} averaged with the transpose: they differ by up "
+            f"to {relative[worst]:.1e} of the largest off-diagonal entry of the rows ({i[worst]} and {j[worst]})",
+        )
+    return entries, float(relative[worst]), warnings
+
+
+def _turns(n: int, pairs: Triangles) -> bool:
+    """Whether the antisymmetric part is a convection without flow through the boundary.
+
+    Its rows then add up to zero, since constants are not carried anywhere, and the symmetric part is the rest of the
+    operator: int v b . grad(u) changes its sign as u and v change places.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        part = 0.5 * pairs.upper - 0.5 * pairs.lower
+        i, j = pairs.edges.T
+        sums = np.bincount(i, part, n) - np.bincount(j, part, n)
+        size = row_sizes(n, pairs.edges, np.abs(part))
+        return not pairs.one_sided and bool((np.abs(sums) <= SUMMED * np.maximum(size, ROUNDED * size.max())).all())
+
+
+def _not_symmetric(A: sp.csr_array, pairs: Triangles, i: int, j: int, noise: float | None) -> MatrixError:
+    rows = entry_rows(A)
+    if pairs.one_sided == len(pairs.edges):
+        for which, held in (("upper", (A.indices >= rows).all()), ("lower", (A.indices <= rows).all())):
+            if held:
+                i, j = (i, j) if which == "upper" else (j, i)
+                return MatrixError(
+                    f"the matrix is not symmetric because only its {which} triangle is stored (row {i}, column {j} is "
+                    f"{_shown(A, i, j)}, its transpose is not stored): store the other one as well, or write "
+                    "'symmetric' in the first line of a Matrix Market file"
+                )
+    off = (A.indices != rows) & (A.data != 0)
+    in_row, in_column = (np.bincount(ends[off], minlength=A.shape[0]) for ends in (rows, A.indices))
+    identity = (in_row == 0) & (in_column > 0) & (A.diagonal() != 0)
+    if identity.any():
+        return MatrixError(
+            f"the matrix is not symmetric: {count_of(int(identity.sum()), 'row is that', 'rows are those')} of the "
+            f"identity, first row {identity.argmax()}, while other rows still use these unknowns, as where Dirichlet "
+            "conditions were put into rows only. Take these rows and columns out, or put zeros into the columns as well"
+        )
+    with np.errstate(over="ignore"):
+        unlike = np.abs(pairs.upper - pairs.lower) > SUMMED * np.maximum(np.abs(pairs.upper), np.abs(pairs.lower))
+    here, there = _shown(A, i, j), _shown(A, j, i)
+    if unlike.mean() > MOST and not pairs.one_sided:
+        return MatrixError(
+            f"the matrix is not symmetric: {unlike.mean():.0%} of all entries differ from their transposes, as where "
+            f"convection or another first derivative was added (row {i}, column {j} is {here}, and row {j}, column "
+            f"{i} is {there}). Assemble the matrix without that term"
+        )
+    remedy = "" if noise is not None else " (if the entries are measured, give their `noise`)"
+    return MatrixError(
+        f"the matrix is not symmetric, most at row {i}, column {j}: that entry is {here} and its transpose, row {j}, "
+        f"column {i}, is {there}. Both must be the same number{remedy}, or differ by a convection, whose rows add up "
+        "to zero"
+    )
+
+
+def _shown(A: sp.csr_array, i: int, j: int) -> str:
+    stored = j in A.indices[A.indptr[i] : A.indptr[i + 1]]
+    return repr(float(A[i, j])) if stored else "not stored"

@@ -1,5 +1,6 @@
 """From rows to nodes: which rows are one node's, and what bodies and structures have in common from there on."""
 
+from .anchoring import Request
 from .grouping import by_first_row
 from .nodal import nodal_matrix
 from .numbering import Numbering
@@ -10,6 +11,7 @@ from .unknowns import find_numbering, given_numbering
 __all__ = [
     "SOFT",
     "Numbering",
+    "Request",
     "by_first_row",
     "find_numbering",
     "given_numbering",

@@ -1,60 +1,67 @@
-"""Known positions: one fixes the translation of its piece, two its size and sign."""
+"""What is asked for beside the matrix; known positions: one fixes the translation of its piece, two size and sign."""
 
 from __future__ import annotations
 
 import operator
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clock import Clock
 from ..errors import InputError
+from ..matrix import OperatorMatrix
 from ..tolerances import ALIKE, SUMMED
 from ..words import Reason
+from .rounded import Rounding
 
 Anchors = tuple[NDArray[np.int64], NDArray[np.float64]]
 
 
-def checked_anchors(anchors: Sequence[Any] | None, node_of_row: NDArray[np.int64], d: int) -> Anchors:
-    """Nodes (k,) and known positions (k, d) of anchors (row, x, y) or (row, x, y, z).
+@dataclass(frozen=True)
+class Request:
+    """What is asked for, and what is known beside the matrix."""
 
-    Raises
-    ------
-    InputError
-        For rows that do not exist or belong to one node, and positions of another dimension.
-    """
-    anchors = list(anchors or ())
-    try:
-        rows = [operator.index(one[0]) for one in anchors]
-        places = [tuple(float(x) for x in one[1:]) for one in anchors]
-    except (TypeError, ValueError, IndexError) as error:
-        raise InputError("anchors are a row, a whole number, and coordinates") from error
-    for row, place in zip(rows, places, strict=True):
-        if not 0 <= row < len(node_of_row):
-            raise InputError(f"row {row} is not in the matrix: its rows count from 0 to {len(node_of_row) - 1}")
-        if len(place) != d or not np.isfinite(place).all():
-            raise InputError(f"the anchor of row {row} needs {d} finite coordinates: the matrix belongs to {d}D")
-    nodes = node_of_row[rows] if rows else np.empty(0, np.int64)
-    for k, node in enumerate(nodes):
-        if node in nodes[:k]:
-            other = rows[int(np.argmax(nodes[:k] == node))]
-            raise InputError(f"rows {other} and {rows[k]} belong to one node: anchor one of them")
-    return np.asarray(nodes), np.asarray(places, dtype=np.float64).reshape(-1, d)
+    matrix: OperatorMatrix
+    clock: Clock
+    anchors: Sequence[Any] | None = None  # (row, x, y) or (row, x, y, z)
+    cells: bool = True  # look for elements too, not only where nothing else confirms positions
+    choice: str = ""  # why the matrix was taken for what it is
+    rounding: Rounding | None = None  # of the entries, where they have few digits
+
+    def held(self, node_of_row: NDArray[np.int64], d: int) -> Anchors:
+        """Nodes (k,) and known positions (k, d) of the anchors.
+
+        InputError for rows that do not exist or belong to one node, and positions of another dimension.
+        """
+        anchors = list(self.anchors or ())
+        try:
+            rows = [operator.index(one[0]) for one in anchors]
+            places = [tuple(float(x) for x in one[1:]) for one in anchors]
+        except (TypeError, ValueError, IndexError) as error:
+            raise InputError("anchors are a row, a whole number, and coordinates") from error
+        for row, place in zip(rows, places, strict=True):
+            if not 0 <= row < len(node_of_row):
+                raise InputError(f"row {row} is not in the matrix: its rows count from 0 to {len(node_of_row) - 1}")
+            if len(place) != d or not np.isfinite(place).all():
+                raise InputError(f"the anchor of row {row} needs {d} finite coordinates: the matrix belongs to {d}D")
+        nodes = node_of_row[rows] if rows else np.empty(0, np.int64)
+        for k, node in enumerate(nodes):
+            if node in nodes[:k]:
+                other = rows[int(np.argmax(nodes[:k] == node))]
+                raise InputError(f"rows {other} and {rows[k]} belong to one node: anchor one of them")
+        return np.asarray(nodes), np.asarray(places, dtype=np.float64).reshape(-1, d)
 
 
 def anchored(
     points: NDArray[np.float64], component: NDArray[np.int64], n_pieces: int, anchors: Anchors, *, sized: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
-    """Move pieces to their anchors; the axes are the matrix's own and stay, and so does the size if pieces are `sized`.
+    """Move pieces to their anchors; axes stay, and so does the size if pieces are `sized`. With the factor and notes.
 
-    Returns
-    -------
-    points : (n, d) float64
-    factor : (n_pieces,) float64
-        By which each piece was enlarged; negative where it was reflected in a point, NaN where the size is by
-        convention.
-    notes : list of str
+    The factor, (n_pieces,), is that by which each piece was enlarged; negative where it was reflected in a point, NaN
+    where the size is by convention.
     """
     nodes, places = anchors
     points, factor, notes = points.copy(), np.full(n_pieces, 1.0 if sized else np.nan), []
@@ -81,34 +88,27 @@ def anchored(
     return points, factor, notes
 
 
-def digits_lost(
-    points: NDArray[np.float64], before: NDArray[np.float64], component: NDArray[np.int64], factor: NDArray[np.float64]
-) -> float:
-    """Largest error that moving a mesh far from the origin has left in its coordinates, in mean edge lengths.
-
-    Parameters
-    ----------
-    points, before : (n, d) float64
-        Of :func:`anchored`, and what it moved, whose mean edge length is 1.
-    component, factor
-        Of :func:`anchored`.
-    """
-    worst = 0.0
-    for piece, size in enumerate(np.where(np.isnan(factor), 1.0, factor)):
-        body = component == piece
-        if not body.any():
-            continue
-        shape = size * before[body]
-        shift = np.median(points[body] - shape, axis=0)  # these differences round to the shift: they hide the errors
-        worst = max(worst, float(np.abs((points[body] - shift) - shape).max() / abs(size)))
-    return worst
-
-
-def near_enough(status: str, reason: Reason, lost: float) -> tuple[str, Reason]:
+def near_enough(
+    status: str,
+    reason: Reason,
+    points: NDArray[np.float64],
+    before: NDArray[np.float64],
+    component: NDArray[np.int64],
+    factor: NDArray[np.float64],
+    edge: float,
+) -> tuple[str, Reason]:
     """Status and reason; what was certified is not if its coordinates lost more digits than entries would bear.
 
-    `lost` is that of :func:`digits_lost`.
+    Moving a mesh far from the origin loses them. `points`, (n, d), and `factor` are those of :func:`anchored`, `before`
+    what it moved, whose mean `edge` is given.
     """
+    lost = 0.0
+    for piece, size in enumerate(np.where(np.isnan(factor), 1.0, factor)):
+        body = component == piece
+        if body.any():
+            shape = size * before[body]
+            shift = np.median(points[body] - shape, axis=0)  # differences that round to the shift: they hide the errors
+            lost = max(lost, float(np.abs((points[body] - shift) - shape).max() / abs(size)) / edge)
     if status != "certified" or lost <= SUMMED:
         return status, reason
     return "uncertified", Reason.of(

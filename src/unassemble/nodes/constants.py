@@ -13,9 +13,7 @@ PENALTY = 1e3  # a diagonal entry this many times the rest of its row is a penal
 
 def uncoupled_rows(matrix: sp.csr_array) -> NDArray[np.bool_]:
     """(N,) rows without an entry off the diagonal, as those of the identity."""
-    off = matrix.copy()
-    off.setdiag(0)
-    return np.asarray(abs(off).sum(axis=1)).ravel() == 0
+    return row_sizes(matrix) == 0
 
 
 def row_sizes(matrix: sp.csr_array) -> NDArray[np.float64]:
@@ -38,11 +36,10 @@ def without_penalties(matrix: sp.csr_array) -> sp.csr_array:
     own, penalised = matrix.diagonal(), with_penalty(matrix, row_sizes(matrix))
     if not penalised.any():
         return matrix
-    given = matrix.tocoo()
-    entries = np.where((given.row == given.col) & penalised[given.row], 0.0, given.data)
-    left = np.bincount(given.row, np.where(given.row == given.col, 0.0, entries), len(own))
-    entries[given.row == given.col] = np.where(penalised, -left, own)[given.row[given.row == given.col]]
-    return sp.csr_array((entries, (given.row, given.col)), shape=matrix.shape)
+    whole = matrix.copy()
+    whole.setdiag(0)
+    whole.setdiag(np.where(penalised, -np.asarray(whole.sum(axis=1)).ravel(), own))
+    return whole
 
 
 def adding_up(matrix: sp.csr_array, size: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -62,8 +59,7 @@ def annihilated_share(
     live = ~identity
     if not live.any():
         return 0.0
-    ones = np.zeros((len(direction), d))
-    ones[np.flatnonzero(live), direction[live]] = 1
+    ones = np.eye(d)[direction] * live[:, None]
     size = row_sizes(matrix)[live]
     zero = np.abs(matrix @ ones)[live] <= CANCELLED * size[:, None]
     own = zero[np.arange(len(size)), direction[live]]
@@ -84,13 +80,6 @@ def proven_directions(
     directions add up to zero whatever is missing. In such sums a row of that direction cannot be missed, and one of
     another direction would not be borne. Where planes with one direction taken out meet, no sum of two directions
     vanishes; that of the third does not tell which of the two a row is.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric.
-    direction, group : (N,) int64
-    d : int
     """
     own = np.eye(d, dtype=bool)[direction]
     size = row_sizes(matrix)
@@ -118,25 +107,16 @@ def unaccounted(
 ) -> NDArray[np.bool_]:
     """(n, d) directions that nodes lack although all rows coupled to them annihilate constants of that direction.
 
-    A penalty on the diagonal is no trace.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-    node, direction : (N,) int64
-    d : int
-    live : (N,) bool, optional
-        Rows that count, all where not given; those of the identity do not.
+    Of rows that are `live`, (N,), if these are given: those of the identity do not count. A penalty is no trace.
     """
-    order, n = len(node), int(node.max()) + 1
+    order = len(node)
     live = np.ones(order, dtype=bool) if live is None else live
-    labels = np.zeros((order, d))
-    labels[np.flatnonzero(live), direction[live]] = 1
+    labels = np.eye(d)[direction] * live[:, None]
     size = np.asarray(abs(matrix).sum(axis=1)).ravel()
     missing = (np.abs(matrix @ labels) > CANCELLED * size[:, None]) & live[:, None]
     missing[np.arange(order), direction] &= ~with_penalty(matrix, row_sizes(matrix))
-    pattern = sp.csr_array((np.ones(matrix.nnz, np.int8), matrix.indices, matrix.indptr), shape=matrix.shape)
-    onto = sp.csr_array((np.ones(order, np.int32), (node, np.arange(order))), shape=(n, order))
-    missed = onto @ (pattern.astype(np.int32) @ missing.astype(np.int32))
+    pattern = sp.csr_array((np.ones(matrix.nnz, np.int32), matrix.indices, matrix.indptr), shape=matrix.shape)
+    onto = sp.csr_array((np.ones(order, np.int32), (node, np.arange(order))))
+    missed = onto @ (pattern @ missing.astype(np.int32))
     present = (onto @ labels) > 0
     return np.asarray(~present & (missed == 0) & present.any(axis=1)[:, None])

@@ -9,11 +9,13 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 
-def same_pattern(matrix: sp.csr_array, identity: NDArray[np.bool_] | None = None) -> NDArray[np.int64]:
-    """(N,) group of each row, numbered by first row: rows whose stored entries stand in the same columns.
+def pattern_of(matrix: sp.csr_array) -> sp.csr_array:
+    """(N, N) ones where entries are stored, in single precision."""
+    return sp.csr_array((np.ones(matrix.nnz, np.float32), matrix.indices, matrix.indptr), shape=matrix.shape)
 
-    Rows of the `identity`, (N,), are groups by themselves.
-    """
+
+def same_pattern(matrix: sp.csr_array, identity: NDArray[np.bool_] | None = None) -> NDArray[np.int64]:
+    """(N,) group of each row, by first row: those of the same columns; rows of the `identity` are groups alone."""
     key = np.random.default_rng(0).integers(1, 2**62, matrix.shape[1], dtype=np.uint64)
     pattern = sp.csr_array((np.ones(matrix.nnz, np.uint64), matrix.indices, matrix.indptr), shape=matrix.shape)
     code = pattern @ key  # sums wrap around, which does no harm
@@ -25,9 +27,7 @@ def same_pattern(matrix: sp.csr_array, identity: NDArray[np.bool_] | None = None
 def by_first_row(label: NDArray) -> NDArray[np.int64]:
     """Renumber labels by the first row that carries them."""
     _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
-    rank = np.empty(len(first), dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return rank[inverse]
+    return np.argsort(np.argsort(first))[inverse]
 
 
 def joined(first: NDArray[np.int64], second: NDArray[np.int64], n: int) -> NDArray[np.int64]:
@@ -44,11 +44,11 @@ def by_direction(label: NDArray[np.int64], direction: NDArray[np.int64], d: int)
 
 
 def without_doubles(
-    label: NDArray[np.int64], node: NDArray[np.int64], direction: NDArray[np.int64], d: int
+    label: NDArray[np.int64], direction: NDArray[np.int64], d: int
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """(N,) labels as nodes, and which rows would make one with two rows of a direction: these keep their `node`."""
+    """(N,) labels as nodes, but that rows are alone which would make one with two rows of a direction; and these."""
     torn = np.asarray((by_direction(label, direction, d) > 1).any(axis=1))[label]
-    return by_first_row(np.where(torn, len(label) + node, label)), torn
+    return by_first_row(np.where(torn, len(label) + np.arange(len(label)), label)), torn
 
 
 def coupled_in_common(matrix: sp.csr_array, node: NDArray[np.int64]) -> float:

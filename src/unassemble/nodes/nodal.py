@@ -15,50 +15,19 @@ from .numbering import Numbering
 
 @dataclass(frozen=True, eq=False)
 class NodalMatrix:
-    """Square blocks of order d, one per pair of coupled nodes, in CSR form.
+    """Square blocks of order d, one per pair of coupled nodes, in CSR form: columns increase, each node is its own.
 
-    Attributes
-    ----------
-    indptr, indices : int32
-        Graph of the nodes, columns increasing, every node coupled to itself.
-    data : (nnz, d, d) float64
-        ``data[k, c, b]`` is A^{cb}_ij; unknowns that the matrix lacks have zeros. A diagonal entry with a penalty is
-        replaced by what makes its row annihilate constants, which is what assembly put there if the row is whole.
-    row_of : (n, d) int64
-        Matrix row of each unknown, -1 where there is none.
-    size : (n,) float64
-        Mean absolute sum of a node's off-diagonal blocks, the unit in which its equations are measured.
-    penalised : (n, d) bool
-        Unknowns with a penalty on the diagonal.
-    doubtful : (n,) bool, optional
-        Nodes whose rows, or directions, may be others; see :mod:`~unassemble.elasticity.doubts`.
+    A diagonal entry with a penalty is replaced by what makes its row annihilate constants, which is what assembly put
+    there if the row is whole.
     """
 
     indptr: NDArray[np.int32]
     indices: NDArray[np.int32]
-    data: NDArray[np.float64]
-    row_of: NDArray[np.int64]
-    size: NDArray[np.float64]
-    penalised: NDArray[np.bool_]
-    doubtful: NDArray[np.bool_] | None = None
-
-    @classmethod
-    def of(cls, indptr: NDArray, indices: NDArray, data: NDArray, row_of: NDArray[np.int64]) -> NodalMatrix:
-        """From blocks in BSR form, every node coupled to itself."""
-        n, d = row_of.shape
-        indptr = indptr.astype(np.int32)
-        indices, data = indices[: indptr[-1]].astype(np.int32), data[: indptr[-1]].copy()
-        own = np.repeat(np.arange(n), np.diff(indptr)) == indices
-        off = np.abs(data).sum(axis=(1, 2)) / d**2
-        off[own] = 0
-        size = np.add.reduceat(off, indptr[:-1])
-        diagonal = np.diagonal(data, axis1=1, axis2=2)[own]
-        penalised = (np.abs(diagonal) > PENALTY * size[:, None]) & (size > 0)[:, None]
-        node, direction = np.nonzero(penalised)
-        place = np.flatnonzero(own)[node]
-        data[place, direction, direction] = 0  # before the rest is added up: it would be lost beside the penalty
-        data[place, direction, direction] = -np.add.reduceat(data, indptr[:-1])[node, direction, direction]
-        return cls(indptr, indices, data, row_of, size, penalised)
+    data: NDArray[np.float64]  # (nnz, d, d), ``data[k, c, b]`` is A^{cb}_ij; zero where the matrix lacks unknowns
+    row_of: NDArray[np.int64]  # (n, d) of the matrix, -1 where there is none
+    size: NDArray[np.float64]  # (n,) mean absolute sum of a node's off-diagonal blocks, the unit of its equations
+    penalised: NDArray[np.bool_]  # (n, d) unknowns with a penalty on the diagonal
+    doubtful: NDArray[np.bool_]  # (n,) nodes whose rows, or directions, may be others
 
     @property
     def n(self) -> int:
@@ -86,10 +55,7 @@ class NodalMatrix:
 
 
 def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
-    """Gather the unknowns of each node into blocks.
-
-    Unknowns whose row and column are those of the identity are left out, as if they had been eliminated.
-    """
+    """Gather the unknowns of each node into blocks; those of rows of the identity are left out, as if eliminated."""
     n, d = numbering.n_nodes, numbering.block_size
     place = numbering.node_of_row * d + numbering.direction_of_row
     row_of = np.full(n * d, -1, dtype=np.int64)
@@ -97,21 +63,27 @@ def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
     row_of[place[live]] = np.flatnonzero(live)
     coo = matrix.tocoo()
     keep = live[coo.row] & live[coo.col]
-    diagonal = np.arange(n) * d
-    entries = sp.coo_array(
-        (
-            np.concatenate([coo.data[keep], np.zeros(n)]),
-            (np.concatenate([place[coo.row[keep]], diagonal]), np.concatenate([place[coo.col[keep]], diagonal])),
-        ),
-        shape=(n * d, n * d),
-    )
+    diagonal = np.arange(n) * d  # so that every node is coupled to itself
+    ends = np.concatenate([place[coo.row[keep]], diagonal]), np.concatenate([place[coo.col[keep]], diagonal])
+    entries = sp.coo_array((np.concatenate([coo.data[keep], np.zeros(n)]), ends), shape=(n * d, n * d))
     blocks = entries.tocsr().tobsr(blocksize=(d, d))
     blocks.sort_indices()
-    return NodalMatrix.of(blocks.indptr, blocks.indices, blocks.data, row_of.reshape(n, d))
+    indptr = blocks.indptr.astype(np.int32)
+    indices, data = blocks.indices[: indptr[-1]].astype(np.int32), blocks.data[: indptr[-1]].copy()
+    own = np.repeat(np.arange(n), np.diff(indptr)) == indices
+    off = np.abs(data).sum(axis=(1, 2)) / d**2
+    off[own] = 0
+    size = np.add.reduceat(off, indptr[:-1])
+    penalised = (np.abs(np.diagonal(data, axis1=1, axis2=2)[own]) > PENALTY * size[:, None]) & (size > 0)[:, None]
+    node, direction = np.nonzero(penalised)
+    at = np.flatnonzero(own)[node]
+    data[at, direction, direction] = 0  # before the rest is added up: it would be lost beside the penalty
+    data[at, direction, direction] = -np.add.reduceat(data, indptr[:-1])[node, direction, direction]
+    return NodalMatrix(indptr, indices, data, row_of.reshape(n, d), size, penalised, np.zeros(n, dtype=bool))
 
 
 def valid_pairs(nodal: NodalMatrix) -> NDArray[np.bool_]:
-    """Which rows of which blocks hold every coefficient that assembly gave them.
+    """(n, d, d) rows of blocks that hold every coefficient that assembly gave them, by components of row and columns.
 
     Row i of A^{cb} annihilates constants, unless a coupled unknown of component b was taken away or the
     diagonal was changed. The converse fails on regular meshes, where what is missing can add up to zero (two
@@ -119,11 +91,6 @@ def valid_pairs(nodal: NodalMatrix) -> NDArray[np.bool_]:
     the same unknowns, and a neighbour that is known to lack the direction spoils it. So does what they miss of another
     direction, if no neighbour is known to lack that: a whole node was taken away, whose entries add up to zero in
     meshes that are the same all along an axis. A penalty on the diagonal explains itself and spoils its own row only.
-
-    Returns
-    -------
-    (n, d, d) bool
-        Component c of the row, component b of the columns.
     """
     present: NDArray[np.bool_] = nodal.row_of >= 0
     zero, penalty = annihilating(nodal), nodal.penalised[:, None, :] & np.eye(nodal.dim, dtype=bool)
@@ -135,12 +102,6 @@ def valid_pairs(nodal: NodalMatrix) -> NDArray[np.bool_]:
     return np.asarray(valid & sure[:, None, :])
 
 
-def linked(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(nnz,) pairs of nodes, the first of which has a row that touches the other; valid (n, d, d) or (n, d, d, d)."""
-    pairs = valid if valid.ndim == 3 else np.asarray(valid.any(axis=3))
-    return np.asarray((np.abs(nodal.data) * pairs[nodal.node]).max(axis=(1, 2)) > 0)
-
-
 def eliminated(nodal: NodalMatrix) -> NDArray[np.bool_]:
     """(n, d) unknowns that were taken out of nodes of which others are left."""
     present = nodal.row_of >= 0
@@ -148,15 +109,9 @@ def eliminated(nodal: NodalMatrix) -> NDArray[np.bool_]:
 
 
 def surrounded(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(n,) nodes whose neighbours are all there, though some may lack a direction.
+    """(n,) nodes whose neighbours are all there, though some may lack a direction; by :func:`valid_pairs`.
 
     The rows show it in those directions that none of them lacks; there has to be one.
-
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    valid : (n, d, d) bool
-        See :func:`valid_pairs`.
     """
     present = nodal.row_of >= 0
     lacking = nodal.graph @ eliminated(nodal).astype(float) > 0

@@ -16,52 +16,24 @@ from .orders import ORDERS, Reading
 
 @dataclass(frozen=True, eq=False)
 class Numbering:
-    """Nodes and directions of the rows of a vector-valued matrix.
-
-    Attributes
-    ----------
-    block_size : int
-        Unknowns per node, 2 or 3.
-    node_of_row : (N,) int64
-        Nodes are numbered by their first row.
-    direction_of_row : (N,) int64
-    identity_row : (N,) bool
-        Rows that couple to nothing: unknowns replaced by the identity.
-    kind : {"interleaved", "by component", "pattern", "given"}
-    share : float
-        Share of the pairs (row, direction) whose entries add up to zero, among rows that couple.
-    common : float
-        How far the rows of a node couple to the same nodes: 1 if all do.
-    odd : int
-        Nodes that lack a direction without a trace, no row near them missing it: their rows belong together, and it
-        did not show. In an order without gaps, those whose rows cannot be one node's.
-    open_row : (N,) bool, optional
-        Where the unknowns stand in order: rows that may belong to one node with others of them, which neither pattern
-        nor order decides.
-    unnamed : (N,) bool, optional
-        Rows whose direction nothing proves.
-    """
+    """Nodes and directions of the N rows of a vector-valued matrix."""
 
     block_size: int
-    node_of_row: NDArray[np.int64]
+    node_of_row: NDArray[np.int64]  # numbered by their first row
     direction_of_row: NDArray[np.int64]
-    identity_row: NDArray[np.bool_]
-    kind: str
-    share: float
-    common: float
+    identity_row: NDArray[np.bool_]  # those that couple to nothing: unknowns replaced by the identity
+    kind: str  # "interleaved", "by component", "pattern" or "given"
+    share: float  # of the pairs (row, direction) whose entries add up to zero, among rows that couple
+    common: float  # how far the rows of a node couple to the same nodes: 1 if all do
+    # nodes that lack a direction without a trace; in an order without gaps, those whose rows cannot be one node's
     odd: int = 0
-    open_row: NDArray[np.bool_] | None = None
-    unnamed: NDArray[np.bool_] | None = None
+    open_row: NDArray[np.bool_] | None = None  # by component: rows of which neither pattern nor order tells the node
+    unnamed: NDArray[np.bool_] | None = None  # rows whose direction nothing proves
 
     @property
     def incomplete(self) -> bool:
         """Whether some node lacks rows."""
         return len(self.node_of_row) != self.block_size * self.n_nodes
-
-    @property
-    def has_whole_node(self) -> bool:
-        """Whether some node has a row for every direction."""
-        return int(np.bincount(self.node_of_row).max()) == self.block_size
 
     @property
     def inferred(self) -> bool:
@@ -81,7 +53,7 @@ class Numbering:
     @property
     def quality(self) -> float:
         """Rows add up to zero, those of a node couple to the same nodes, and most nodes have all their directions."""
-        if not self.has_whole_node:
+        if int(np.bincount(self.node_of_row).max()) < self.block_size:  # no node has a row for every direction
             return 0.0
         filled = len(self.node_of_row) / (self.n_nodes * self.block_size)
         return self.share * self.common * filled * (1 - self.odd / self.n_nodes)
@@ -98,22 +70,12 @@ class Numbering:
         """Whether its nodes look like nodes, however few of their rows annihilate constants."""
         return self.share > HARDLY_ANY and self.quality > MOST * self.share
 
-    @property
-    def settled(self) -> bool:
-        """Whether nodes of so many directions show, and none lacks one without a trace: no other number need be tried.
 
-        They show where all rows of each couple to the same nodes, or nearly all do, sums vanish in most rows and hardly
-        a node lacks any.
-        """
-        shows = self.common == 1 or (self.share >= MOST and self.quality > NEARLY_ALL * self.share)
-        return self.sound and shows and not self.odd
-
-
-def measured(matrix: sp.csr_array, reading: Reading, d: int, kind: str) -> Numbering:
-    """A numbering that was searched for, and what speaks for it."""
+def measured(matrix: sp.csr_array, reading: Reading, d: int, kind: str, *, searched: bool = True) -> Numbering:
+    """A numbering and what speaks for it; of one that was `searched` for more is asked."""
     node, direction = reading.node, reading.direction
     identity = uncoupled_rows(matrix)
-    share = annihilated_share(matrix, identity, direction, d, searched=True)
+    share = annihilated_share(matrix, identity, direction, d, searched=searched)
     common = coupled_in_common(matrix, node)
-    odd = int(unaccounted(matrix, node, direction, d, ~identity).any(axis=1).sum())
+    odd = int(unaccounted(matrix, node, direction, d, ~identity).any(axis=1).sum()) if searched else 0
     return Numbering(d, node, direction, identity, kind, share, common, odd, reading.open_row, reading.unnamed)

@@ -44,15 +44,8 @@ def directions_by_component(
     """(N,) directions that increase; None where no cuts between them show.
 
     A row that annihilates constants direction by direction does so up to each cut: sums over its first columns vanish
-    there. Each row votes for all places between two of its columns where they do.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Columns increasing in each row.
-    d : int
-    rounding : float or (N,) float64
-        Of its size: what entries of a row add up to that make up zero.
+    there, but for `rounding`, relative to its size. Each row votes for all places between two of its columns where they
+    do; columns increase in each row.
     """
     order = matrix.shape[0]
     least = rounding * np.add.reduceat(np.abs(matrix.data), matrix.indptr[:-1])
@@ -104,14 +97,6 @@ def nodes_in_runs(
 
     Where patterns change only because entries that vanished are not stored, one of two runs lacks, without a trace, the
     direction of the row with which the other meets it. These go together.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-    group : (N,) int64
-        Rows that couple to the same unknowns.
-    direction : (N,) int64
-    d : int
     """
     node = np.concatenate([[0], np.cumsum((np.diff(group) != 0) | (np.diff(direction) <= 0))])
     while True:
@@ -127,23 +112,10 @@ def nodes_in_runs(
 def nodes_by_component(
     group: NDArray[np.int64], direction: NDArray[np.int64], d: int
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Nodes of rows that stand direction by direction: rows of one pattern, as far as the order decides.
+    """(N,) nodes of rows that stand direction by direction: rows of one pattern, as far as the order decides.
 
-    A direction of which a group has as many rows as of any other has one for each node of the group; rows of the other
-    directions are paired with these.
-
-    Parameters
-    ----------
-    group : (N,) int64
-        Rows that couple to the same unknowns; several nodes may do so.
-    direction : (N,) int64
-    d : int
-
-    Returns
-    -------
-    node : (N,) int64
-    open_row : (N,) bool
-        Rows that may belong to one node with others of their group.
+    A direction of which a `group` has as many rows as of any other has one for each node of the group; rows of the
+    other directions are paired with these. With (N,) rows that may be one node's with others of their group.
     """
     count = by_direction(group, direction, d)
     leading = (count == count.max(axis=1, keepdims=True))[group]
@@ -155,7 +127,7 @@ def nodes_by_component(
         second.append(s)
         alone[np.setdiff1d(rows_c, r)] = True
     label = joined(np.concatenate(first), np.concatenate(second), len(group))
-    node, torn = without_doubles(label, np.arange(len(group)), direction, d)
+    node, torn = without_doubles(label, direction, d)
     unsettled = np.bincount(group, alone | torn)[group] > 0
     return node, unsettled & (np.bincount(node)[node] < d)
 

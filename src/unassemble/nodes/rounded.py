@@ -3,20 +3,30 @@
 What belongs to translations is known beforehand: away from supports the entries of a row and a direction add up to
 zero. Where they do up to the rounding of each, the sum is taken off the largest of them. Then a
 row that a support touched stands out as clearly as in a matrix of full precision.
+
+How far positions may be off is seen by what other rounding does to them: entries as far off as rounding may have left
+them are drawn anew, and positions are found from these as from those given (a parametric bootstrap; Efron and
+Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6). So errors that cancel do, and those that a weak equation
+magnifies are seen where it does. That holds if rounding is all that entries are off by: the misfits that they leave
+then are as large as the changes that drawing anew brings to them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
 import scipy.sparse as sp
+import scipy.stats
 from numpy.typing import NDArray
 
+from ..budget import REDRAWN
+from ..errors import GeometryError
 from ..matrix.digits import Digits
-from ..tolerances import ALIKE, CANCELLED, HARDLY_ANY, LAST_DIGITS, SIGMAS
+from ..tolerances import ALIKE, CANCELLED, CONFIDENCE, HARDLY_ANY, LAST_DIGITS, NOISY, SIGMAS
+from .nodal import determined
 from .orders import ORDERS, regular
 from .searching import directions_in_order, live_part
 
@@ -25,33 +35,15 @@ _LAYOUTS = {3: (3, 2, 1), 2: (2,), 6: (3,), 4: (2,)}  # unknowns of a node, and 
 
 @dataclass(frozen=True, eq=False)
 class Rounding:
-    """What the entries of a matrix were rounded to.
+    """What the entries of a matrix were rounded to."""
 
-    Attributes
-    ----------
-    name : str
-        Digits, decimals or single precision; see :class:`~unassemble.matrix.digits.Digits`.
-    level : float
-        How far entries may be off, relative to their size, as half of the rows have it.
-    exact : (N, N) sparse
-        The matrix, with exact sums.
-    unit : (N, N) sparse
-        Of the last place of each entry, with the entry's sign.
-    number : (nnz,) int64
-        Entries that are the same number, but for the sign: these were rounded alike.
-    direction : (N,) int64
-        Of each row; -1 where not known.
-    zero : (N, b) bool
-        Rows and directions that add up to zero, but for rounding.
-    """
-
-    name: str
-    level: float
-    exact: sp.csr_array
-    unit: sp.csr_array
-    number: NDArray[np.int64]
-    direction: NDArray[np.int64]
-    zero: NDArray[np.bool_]
+    name: str  # digits, decimals or single precision
+    level: float  # how far entries may be off, relative to their size, as half of the rows have it
+    exact: sp.csr_array  # the matrix, with exact sums
+    unit: sp.csr_array  # of the last place of each entry, with the entry's sign
+    number: NDArray[np.int64]  # (nnz,) entries that are the same number, but for the sign: these were rounded alike
+    direction: NDArray[np.int64]  # of each row; -1 where not known
+    zero: NDArray[np.bool_]  # (N, b) rows and directions that add up to zero, but for rounding
 
     @property
     def spread(self) -> float:
@@ -146,3 +138,60 @@ def _without_sums(matrix: sp.csr_array, direction: NDArray[np.int64], zero: NDAr
     last = last[direction[entry.col[last]] >= 0]
     entry.data[last] -= excess[entry.row[last], direction[entry.col[last]]]
     return sp.csr_array(entry)
+
+
+@dataclass(frozen=True)
+class Known:
+    """How well positions are known."""
+
+    error: float  # largest of a node, relative to the diameter of its piece; infinite where one may get lost
+    explained: bool = True  # whether rounding explains the misfits, so that the error is all that there is
+
+
+def known_to(
+    points: NDArray[np.float64],
+    component: NDArray[np.int64],
+    misfits: NDArray[np.float64],
+    rounding: Rounding,
+    place: Callable[[sp.csr_array], tuple[NDArray[np.float64], NDArray[np.float64]]],
+    *,
+    sized: bool,
+) -> Known:
+    """Find positions anew, with other rounding.
+
+    `place` finds points and their misfits (m,) from a matrix that may have been rounded to the given one; `sized` says
+    whether the matrix tells size and sign.
+    """
+    pieces = [np.flatnonzero(component == one) for one in range(component.max(initial=-1) + 1)]
+    moved, changes = np.zeros(len(points)), np.zeros((REDRAWN, len(misfits)))
+    try:
+        for seed in range(REDRAWN):
+            other, left = place(rounding.redrawn(seed))
+            if not determined(other)[component >= 0].all() or len(left) != len(misfits):
+                return Known(float("inf"))
+            for piece in pieces:  # in the same place, relative to the diameter
+                x, y = (one[piece] - one[piece].mean(axis=0) for one in (points, other))
+                factor = 1.0 if sized else (x * y).sum() / (y * y).sum()
+                moved[piece] += np.square(x - factor * y).sum(axis=1) / np.square(np.ptp(x, axis=0)).sum()
+            mirrored = not sized and np.nansum(points * other) < 0
+            changes[seed] = (-left if mirrored else left) - misfits
+    except GeometryError:
+        return Known(float("inf"))
+    return Known(SIGMAS * float(np.sqrt(moved.max(initial=0.0) / REDRAWN)), _explained(misfits, changes))
+
+
+def _explained(misfits: NDArray[np.float64], changes: NDArray[np.float64]) -> bool:
+    """Whether misfits (m,) are no larger than changes (k, m) of them, by an F test, or as arithmetic leaves them.
+
+    Misfits depend on each other: that of few degrees of freedom shows by changes that are alike or opposite.
+    """
+    if (np.abs(misfits) <= LAST_DIGITS).all():  # as in regular meshes, whatever the numbers are
+        return True
+    products, draws = changes @ changes.T, len(changes)
+    size = np.trace(products) / draws
+    if not size > 0:
+        return False
+    alike = (np.square(products).sum() - np.square(products.diagonal()).sum()) / (draws * (draws - 1))
+    freedom = max(1.0, size**2 / alike)
+    bound = scipy.stats.f.isf(CONFIDENCE, freedom, draws * freedom)
+    return bool(misfits @ misfits <= size * max(NOISY**2, bound))

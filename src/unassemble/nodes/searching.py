@@ -17,11 +17,9 @@ from numpy.typing import NDArray
 from ..budget import LARGE, Budget
 from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST, NEARLY_ALL
 from .constants import adding_up, proven_directions, row_sizes, unaccounted, uncoupled_rows, with_penalty
-from .equilibrium import spread_directions
+from .directions import spread_directions, with_least_sums
 from .filling import filled, filled_by_direction
-from .grouping import by_direction, by_first_row, same_pattern
-from .least_sums import with_least_sums
-from .likeness import pattern_of
+from .grouping import by_direction, by_first_row, pattern_of, same_pattern, without_doubles
 from .numbering import Numbering, measured
 from .orders import Reading, directions_by_component, nodes_by_component, nodes_in_runs
 
@@ -29,22 +27,18 @@ _WORK = 2e10  # for directions: half a minute or so
 
 
 def searched(matrix: sp.csr_array, sizes: tuple[int, ...], *, as_stored: bool = False) -> list[Numbering]:
-    """Numberings that were found, up to the first that leaves no doubt.
+    """Numberings with so many unknowns per node that were found, up to the first that leaves no doubt.
 
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric.
-    sizes : tuple of int
-        Block sizes to try.
-    as_stored : bool
-        Whether to believe only what entries as they are stored show, in one of the usual orders.
+    `as_stored` believes only what entries as they are stored show, in one of the usual orders.
     """
     live, inner = live_part(matrix)
     found: list[Numbering] = []
     for kind, d, reading in _readings(inner, sizes, as_stored):
-        found.append(measured(matrix, _of_all_rows(reading, live, matrix.shape[0]), d, kind))
-        if found[-1].settled and found[-1] is max(found, key=lambda one: one.quality):
+        one = measured(matrix, _of_all_rows(reading, live, matrix.shape[0]), d, kind)
+        found.append(one)
+        # Rows of each node couple to the same nodes, or nearly all do, most sums vanish and hardly a node lacks any.
+        shows = one.common == 1 or (one.share >= MOST and one.quality > NEARLY_ALL * one.share)
+        if one.sound and shows and not one.odd and one is max(found, key=lambda one: one.quality):
             break
     return found
 
@@ -64,8 +58,9 @@ def directions_in_order(
     if direction is not None:
         yield direction
     group = same_pattern(inner)
-    if _shows_runs(group, d) and inner.diagonal().all():
-        direction = spread_directions(inner, group, d, _of_runs(group, d))
+    known = _of_runs(group, d)
+    if np.mean(known >= 0) > 0.5 and inner.diagonal().all():
+        direction = spread_directions(inner, group, d, known)
         yield with_least_sums(inner, group, direction, d, Budget(_WORK))
 
 
@@ -77,20 +72,9 @@ def live_part(matrix: sp.csr_array) -> tuple[NDArray[np.int64], sp.csr_array]:
     return live, inner
 
 
-def _runs(group: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(N,) runs of neighbouring rows of one group."""
-    return np.concatenate([[0], np.cumsum(np.diff(group) != 0)])
-
-
-def _shows_runs(group: NDArray[np.int64], d: int) -> bool:
-    """Whether most rows stand in runs of d rows of one group, as those of nodes do."""
-    run = _runs(group)
-    return bool(2 * np.count_nonzero(np.bincount(run)[run] == d) > len(run))
-
-
 def _of_runs(group: NDArray[np.int64], d: int) -> NDArray[np.int64]:
-    """(N,) directions of rows in runs of d rows of one group, -1 for all others."""
-    run = _runs(group)
+    """(N,) directions of rows in runs of d neighbouring rows of one group, as those of nodes are; -1 for all others."""
+    run = np.concatenate([[0], np.cumsum(np.diff(group) != 0)])
     return np.where(np.bincount(run)[run] == d, np.arange(len(run)) - np.searchsorted(run, run), -1)
 
 
@@ -113,7 +97,8 @@ def _readings(inner: sp.csr_array, sizes: tuple[int, ...], as_stored: bool) -> I
         whole = filled(inner) if put_back else inner
         group = same_pattern(whole)
         for d in sizes:
-            if kind == "interleaved" and not (put_back or (large and not as_stored) or _shows_runs(group, d)):
+            shown = put_back or (large and not as_stored) or np.mean(_of_runs(group, d) >= 0) > 0.5
+            if kind == "interleaved" and not shown:
                 continue
             reading = _by_equilibrium(inner, whole, d, kind)
             if reading is not None:
@@ -168,7 +153,7 @@ def _by_equilibrium(inner: sp.csr_array, whole: sp.csr_array, d: int, kind: str)
     if kind == "interleaved":
         node, open_row = nodes_in_runs(inner, group, direction, d), None
     else:
-        node, open_row = _of_patterns(group, direction, d)
+        node, open_row = without_doubles(group, direction, d)
         if _even(inner, group, direction, d) <= MOST:
             return None
     return Reading(node, direction, open_row, ~proven_directions(whole, direction, group, d))
@@ -183,23 +168,12 @@ def _annihilated(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> 
 
 
 def _even(matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], d: int) -> float:
-    """Share of rows whose pattern has as many rows in each direction, where all of them add up to zero.
-
-    Two directions of three taken for one annihilate translations as well.
-    """
+    """Share of whole rows whose pattern has as many in each direction: two of three taken for one annihilate, too."""
     size = row_sizes(matrix)
     adds_up = adding_up(matrix, size) | with_penalty(matrix, size)
     count = by_direction(group, direction, d)
     whole = (np.bincount(group, ~adds_up) == 0)[group]
     return float((count == count[:, :1]).all(axis=1)[group[whole]].mean()) if whole.any() else 0.0
-
-
-def _of_patterns(
-    group: NDArray[np.int64], direction: NDArray[np.int64], d: int
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Nodes of rows of one pattern, and rows that are left by themselves since their pattern has several of some."""
-    several = np.asarray((by_direction(group, direction, d) > 1).any(axis=1))[group]
-    return by_first_row(np.where(several, len(group) + np.arange(len(group)), group)), several
 
 
 def _of_all_rows(reading: Reading, live: NDArray[np.int64], order: int) -> Reading:

@@ -20,34 +20,17 @@ _FEW = 0.25  # share of nodes that may be loose although rows of their own are v
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Coordinates of one piece.
+    """Coordinates of one piece."""
 
-    Attributes
-    ----------
-    points : (n, d) float64
-        Centred, of norm one; NaN where loose: of nodes that can move while the others stay.
-    dimension : int
-        Of the null space, translations counted, loose nodes left out; that of the translations where no field is exact.
-    freedom : {"", "axes", "affine"}
-        What remains beyond translation and scale.
-    exact : bool
-        Whether the field is a null field, not only the best one.
-    null : int
-        Fields that count as null fields, those of loose nodes among them.
-    """
-
+    # (n, d) centred, of norm one; NaN where loose: of nodes that can move while the others stay
     points: NDArray[np.float64]
-    dimension: int
-    freedom: str
-    exact: bool
-    null: int
+    dimension: int  # of the null space without loose nodes; that of the translations where no field is exact
+    freedom: str  # beyond translation and scale: "", "axes" or "affine"
+    exact: bool  # whether the field is a null field, not only the best one
+    null: int  # fields that count as null fields, those of loose nodes among them
 
 
-def shape(
-    fields: NDArray[np.float64],
-    values: NDArray[np.float64],
-    told: NDArray[np.bool_],
-) -> Shape:
+def shape(fields: NDArray[np.float64], values: NDArray[np.float64], told: NDArray[np.bool_]) -> Shape:
     """Find the coordinates among the least singular fields.
 
     Parameters
@@ -81,7 +64,9 @@ def shape(
             null, loose, count = shared, apart, some
             break
     kept = null[~loose]
-    moving = _without_translations(kept)
+    u, s, _ = svd((kept - kept.mean(axis=0)).reshape(-1, kept.shape[2]), full_matrices=False)
+    others = kept.shape[2] - d  # in slender bodies rounding leaves more of the translations
+    moving = u[:, :others][:, s[:others] > ALIKE].reshape(len(kept), d, -1)
     dimension = d + moving.shape[2] if exact else d
     points = np.full((n, d), np.nan)
     points[~loose], freedom = _choose(moving, exact=bool(exact))
@@ -105,24 +90,11 @@ def set_aside(null: NDArray, common: int) -> tuple[NDArray, NDArray[np.bool_]]:
             loose = np.abs(own).max(axis=(1, 2)) > CANCELLED
             if np.count_nonzero(~loose) * null.shape[1] < common:  # too few are left to carry what they share
                 break
-            return _orthonormal(np.einsum("nak,lk->nal", null, v[:common]), ~loose), loose
+            fields = np.einsum("nak,lk->nal", null, v[:common])
+            shared = np.zeros_like(fields)  # orthonormal over the others
+            shared[~loose] = np.linalg.qr(fields[~loose].reshape(-1, common))[0].reshape(-1, *fields.shape[1:])
+            return shared, loose
     return null, np.zeros(n, dtype=bool)
-
-
-def _orthonormal(fields: NDArray, kept: NDArray[np.bool_]) -> NDArray:
-    """Fields orthonormal over the kept nodes, zero at the others."""
-    q = np.linalg.qr(fields[kept].reshape(-1, fields.shape[2]))[0]
-    full = np.zeros_like(fields)
-    full[kept] = q.reshape(-1, *fields.shape[1:])
-    return full
-
-
-def _without_translations(fields: NDArray) -> NDArray:
-    """Orthonormal basis of the centred fields, d fewer: in slender bodies rounding leaves more of the translations."""
-    n, d, k = fields.shape
-    centred = (fields - fields.mean(axis=0)).reshape(n * d, k)
-    u, s, _ = svd(centred, full_matrices=False)
-    return u[:, : k - d][:, s[: k - d] > ALIKE].reshape(n, d, -1)
 
 
 def _choose(moving: NDArray, *, exact: bool) -> tuple[NDArray, str]:
@@ -155,14 +127,7 @@ def _flat(points: NDArray) -> bool:
 
 
 def in_gauge(points: NDArray, graph: sp.csr_array) -> NDArray[np.float64]:
-    """Centroid at the origin, mean edge length 1, and of the two point reflections that with positive third moments.
-
-    Parameters
-    ----------
-    points : (n, d) float64
-        NaN rows are left out.
-    graph : (n, n) sparse
-    """
+    """Centroid at the origin, mean edge length 1, and of the two point reflections that with positive third moments."""
     pairs = sp.triu(graph, 1).tocoo()
     length = np.linalg.norm(points[pairs.row] - points[pairs.col], axis=1)
     mean = np.nanmean(length) if np.isfinite(length).any() else 1.0

@@ -16,11 +16,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError, RecoveryError
-from ..tolerances import NEARLY_ALL
-from .constants import annihilated_share, uncoupled_rows
+from ..tolerances import MOST, NEARLY_ALL
+from .constants import uncoupled_rows
 from .grouping import by_first_row, coupled_in_common, made_up, same_pattern
-from .numbering import Numbering
-from .orders import ORDERS, regular
+from .numbering import Numbering, measured
+from .orders import ORDERS, Reading, regular
 from .searching import same_cuts, searched
 
 MORE_THAN_STIFFNESS = (
@@ -92,20 +92,10 @@ def nodes_of_pattern(matrix: sp.csr_array) -> tuple[int, int] | None:
 
 
 def regular_numbering(matrix: sp.csr_array, kind: str, block_size: int | None = None) -> Numbering:
-    """The numbering of unknowns in an order that the caller knows.
+    """The numbering of unknowns in an order that the caller knows, "interleaved" or "by component".
 
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-    kind : {"interleaved", "by component"}
-    block_size : int, optional
-
-    Raises
-    ------
-    InputError
-        If the order of the matrix is no multiple of the block size.
-    RecoveryError
-        If the rows of this numbering do not annihilate translations.
+    InputError if the order of the matrix is no multiple of the block size; RecoveryError if the rows of this numbering
+    do not annihilate translations.
     """
     order = matrix.shape[0]
     sizes = [d for d in _sizes(block_size) if order % d == 0]
@@ -157,28 +147,19 @@ def _with_gaps(matrix: sp.csr_array, regular: Numbering, sizes: tuple[int, ...])
     if regular.kind == "by component" and not impossible and same_cuts(matrix, regular):
         return regular
     for one in searched(matrix, sizes, as_stored=True):
-        if one.common == 1 and not one.odd and (impossible or _contradicts(one, regular)):
+        unlike = (one.direction_of_row != regular.direction_of_row) & ~regular.identity_row  # which has any
+        contradicts = (unlike if one.unnamed is None else unlike & ~one.unnamed).any()  # by sums that prove
+        if one.common == 1 and not one.odd and (impossible or contradicts):
             return one
     return replace(regular, odd=impossible)
 
 
-def _contradicts(one: Numbering, other: Numbering) -> bool:
-    """Whether a direction that sums prove is another one there; rows of the identity have any."""
-    unlike = (one.direction_of_row != other.direction_of_row) & ~other.identity_row
-    return bool((unlike if one.unnamed is None else unlike & ~one.unnamed).any())
-
-
 def _regular(matrix: sp.csr_array, d: int, kind: str, *, checked: bool = True) -> Numbering | None:
     """One of the two numberings that need no search, if order and pattern allow it."""
-    order = matrix.shape[0]
-    if order % d:
+    if matrix.shape[0] % d:
         return None
-    node, direction = regular(order, d, kind)
-    common = coupled_in_common(matrix, node)
-    if checked and common < 0.6:
-        return None
-    identity = uncoupled_rows(matrix)
-    return Numbering(d, node, direction, identity, kind, annihilated_share(matrix, identity, direction, d), common)
+    one = measured(matrix, Reading(*regular(matrix.shape[0], d, kind)), d, kind, searched=False)
+    return None if checked and one.common < MOST else one
 
 
 def given_numbering(matrix: sp.csr_array, node_of_row: NDArray, direction_of_row: NDArray) -> Numbering:
@@ -199,7 +180,4 @@ def given_numbering(matrix: sp.csr_array, node_of_row: NDArray, direction_of_row
     node = by_first_row(node)
     if len(np.unique(node * d + direction)) < order:
         raise InputError("two rows have the same node and direction")
-    identity = uncoupled_rows(matrix)
-    share = annihilated_share(matrix, identity, direction, d, searched=True)
-    common = coupled_in_common(matrix, node)
-    return Numbering(d, node, direction, identity, "given", share, common)
+    return measured(matrix, Reading(node, direction), d, "given")

@@ -1,10 +1,9 @@
 """Pictures of recovered meshes, drawn without a display."""
 
-from .canvas import check_plot
-from .comparison import align, largest_error, plot_comparison
-from .layout import laid_out
+from ..files import check_plot
+from .canvas import laid_out
 from .mesh import outer_loops
-from .picture import plot_recovery
+from .picture import align, largest_error, plot_comparison, plot_recovery
 
 __all__ = [
     "align",

@@ -1,22 +1,20 @@
 """Bodies and structures as pictures: outer surfaces, shaded, planar cells, shells and members, or bare nodes."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ..elements.surface import outer_facets, planar_outlines
 from ..recovery import Body, ConformingMesh, Recovery, Structure, Surface
 from . import style
-from .canvas import panel
-from .layout import apart
-from .mesh import line_handle
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .canvas import apart, panel
+from .mesh import draw_lines, extent, line_handle
 
 # Looking down on the body from the front and the right; z points up.
 _ACROSS = np.array([0.80, 0.60, 0.0])
@@ -28,12 +26,12 @@ def plot_body(recovery: Recovery, ax: Axes | None = None) -> tuple[Figure, list[
     """A body or structure, pieces side by side, and handles for the legend."""
     flat, depth = _projected(recovery.points)
     flat = apart(flat, recovery.component)
-    known = np.isfinite(flat).all(axis=1)
-    shown = flat[known] if known.any() else np.array([[0.0, 0.0], [1.0, 1.0]])
-    figure, ax = panel(np.stack([shown.min(axis=0), shown.max(axis=0)]), ax)
+    known = np.asarray(np.isfinite(flat).all(axis=1))
+    figure, ax = panel(extent(flat, known), ax)
     handles: list[Artist] = []
     if not recovery.n_cells:
-        ax.plot(*shown.T, "o", markersize=float(np.clip(120 / np.sqrt(len(shown)), 1, 4)), color=style.EDGE)
+        size = float(np.clip(120 / np.sqrt(max(known.sum(), 1)), 1, 4))
+        ax.plot(*flat[known].T, "o", markersize=size, color=style.EDGE)
         handles.append(line_handle(style.EDGE, "nodes; no elements were recognised", width=3))
     faces = _faces(recovery)
     if faces:
@@ -47,10 +45,10 @@ def plot_body(recovery: Recovery, ax: Axes | None = None) -> tuple[Figure, list[
         handles.append(line_handle(colour, label))
     if isinstance(recovery, Structure) and len(recovery.lines):
         order = np.argsort(depth[recovery.lines].mean(axis=1), kind="stable")
-        _draw_lines(ax, flat[recovery.lines[order]], float(np.clip(60 / np.sqrt(len(order)), 0.3, 1.6)))
+        draw_lines(ax, flat[recovery.lines[order]], style.OUTER, float(np.clip(60 / np.sqrt(len(order)), 0.3, 1.6)))
         handles.append(line_handle(style.OUTER, "members"))
     elif len(recovery.boundary):
-        _draw_lines(ax, flat[recovery.boundary], 1.2)
+        draw_lines(ax, flat[recovery.boundary], style.OUTER, 1.2)
     return figure, handles
 
 
@@ -64,8 +62,6 @@ def _projected(points: NDArray) -> tuple[NDArray, NDArray]:
 
 def _faces(recovery: Recovery) -> list[NDArray]:
     """Polygons of nodes (m, k) to be filled; of bodies in space the outer facets that face the eye."""
-    from ..elements.surface import outer_facets, planar_outlines
-
     cells = {kind: cells for kind, cells in recovery.cells.items() if kind != "line"}
     if not isinstance(recovery, (Body, ConformingMesh)):
         return list(cells.values())
@@ -84,9 +80,6 @@ def _normals(corners: NDArray) -> NDArray:
 
 def _draw_faces(ax: Axes, recovery: Recovery, faces: list[NDArray], flat: NDArray, depth: NDArray) -> None:
     """The farthest first."""
-    from matplotlib.collections import PolyCollection
-    from matplotlib.colors import to_rgb
-
     order = np.argsort(np.concatenate([depth[some].mean(axis=1) for some in faces]), kind="stable")
     polygons = [polygon for some in faces for polygon in flat[some]]
     large = len(order) > style.MOST_VECTOR
@@ -99,21 +92,6 @@ def _draw_faces(ax: Axes, recovery: Recovery, faces: list[NDArray], flat: NDArra
         shade = 0.3 + 0.7 * np.clip(normals[order] @ _LIGHT, 0, 1)[:, None]
         colours = shade * np.array(to_rgb(style.FILL)) + (1 - shade) * np.array(to_rgb(style.EDGE))
         edge = "face" if large else style.OUTER
-    ax.add_collection(
-        PolyCollection(
-            [polygons[k] for k in order],
-            facecolors=colours,
-            edgecolors=edge,
-            linewidths=float(np.clip(40 / np.sqrt(max(len(order), 1)), 0.1, 0.6)),
-            rasterized=large,
-        ),
-        autolim=False,
-    )
-
-
-def _draw_lines(ax: Axes, ends: NDArray, width: float) -> None:
-    """Straight lines (m, 2, 2)."""
-    from matplotlib.collections import LineCollection
-
-    lines = LineCollection(list(ends), colors=style.OUTER, linewidths=width, rasterized=len(ends) > style.MOST_VECTOR)
-    ax.add_collection(lines, autolim=False)
+    width = float(np.clip(40 / np.sqrt(max(len(order), 1)), 0.1, 0.6))
+    drawn: dict[str, Any] = {"facecolors": colours, "edgecolors": edge, "linewidths": width, "rasterized": large}
+    ax.add_collection(PolyCollection([polygons[k] for k in order], **drawn), autolim=False)

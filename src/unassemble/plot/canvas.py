@@ -1,62 +1,35 @@
-"""Figures without pyplot: size, header, footer, and writing them."""
-
-from __future__ import annotations
+"""Figures without pyplot: size, where pieces are drawn, header, footer, and writing them."""
 
 import os
 from collections.abc import Sequence
 from pathlib import PurePath
-from typing import TYPE_CHECKING
 
+import matplotlib
 import numpy as np
+import scipy.sparse as sp
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from scipy.sparse import csgraph
 
-from ..errors import OutputError
-from ..files import check_target, whole_file
+from ..files import check_plot, whole_file
+from ..recovery import PlanarMesh
 from . import style
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-# Without the date, the same mesh gives the same file.
-_METADATA: dict[str, dict[str, None]] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-
-
-def check_plot(path: str | os.PathLike[str]) -> None:
-    """Find out, before long work, whether a picture can be written.
-
-    Raises
-    ------
-    OutputError
-        If the extension is not ``.png``, ``.svg`` or ``.pdf``, or the file cannot be written.
-    """
-    if PurePath(path).suffix.lower() not in _METADATA:
-        raise OutputError(f"a picture is a {' or '.join(_METADATA)} file, not {os.fspath(path)!r}")
-    check_target(path)
 
 
 def write_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a figure, whole or not at all, in the format that the extension names."""
-    import matplotlib
-
+    """Write a figure, whole or not at all; without the date, so that the same mesh gives the same file."""
     check_plot(path)
     suffix = PurePath(path).suffix.lower()
+    metadata = dict.fromkeys({".svg": ["Date"], ".pdf": ["CreationDate"]}.get(suffix, []))
     with whole_file(path, suffix) as draft, matplotlib.rc_context({"svg.hashsalt": "unassemble"}):
-        figure.savefig(draft, format=suffix[1:], dpi=style.DPI, metadata=_METADATA[suffix])
+        figure.savefig(draft, format=suffix[1:], dpi=style.DPI, metadata=metadata)
 
 
 def panels(extents: Sequence[NDArray]) -> tuple[Figure, list[Axes]]:
-    """A figure with one box beside the other, all to one scale.
-
-    Parameters
-    ----------
-    extents : sequence of (2, 2) float64
-        Lower left and upper right corner of what each panel will show.
-    """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
+    """A figure with one box beside the other, all to one scale, for what each extent (2, 2) encloses."""
     sizes = np.array([high - low for low, high in extents])
     sizes = np.maximum(sizes, 1e-3 * max(float(sizes.max()), 1e-300))
     gap = style.PAGE.margin * 2 * (len(extents) - 1)
@@ -107,17 +80,40 @@ def footer(figure: Figure, handles: Sequence[Artist]) -> None:
     """A legend in one row at the bottom."""
     if handles:
         width, _ = figure.get_size_inches()
-        legend = figure.legend(
-            handles=list(handles),
-            loc="lower left",
-            bbox_to_anchor=(style.PAGE.margin / width, 0),
-            ncols=len(handles),
-            frameon=False,
-            fontsize=8.5,
-            borderaxespad=0.4,
-            borderpad=0,
-            handlelength=1.6,
-            columnspacing=1.8,
-        )
-        for text in legend.get_texts():
-            text.set_color(style.TEXT)
+        more = {"bbox_to_anchor": (style.PAGE.margin / width, 0), "ncols": len(handles), "labelcolor": style.TEXT}
+        gaps = {"borderaxespad": 0.4, "borderpad": 0, "handlelength": 1.6, "columnspacing": 1.8}
+        figure.legend(handles=handles, loc="lower left", frameon=False, fontsize=8.5, **more, **gaps)
+
+
+def laid_out(mesh: PlanarMesh) -> NDArray[np.float64]:
+    """(n, 2) points of a mesh for the eye; what hangs together, by edges or in hinges, stays together."""
+    triangles = mesh.divided()[0]
+    sides = (triangles[:, [0, 0]].ravel(), triangles[:, 1:].ravel())
+    graph = sp.coo_array((np.ones(len(sides[0]), np.int8), sides), shape=(mesh.n_points,) * 2)
+    label = csgraph.connected_components(graph, directed=False)[1]
+    used = np.unique(triangles)
+    part = np.full(mesh.n_points, -1)
+    part[used] = np.unique(label[used], return_inverse=True)[1]
+    return apart(mesh.points, part)
+
+
+def apart(points: NDArray[np.float64], part: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(n, 2) points, one part beside the other if the boxes around any two overlap, as by their own frames they may.
+
+    Parts are numbered by `part`, (n,), which is negative for points of none.
+    """
+    count = int(part.max(initial=-1)) + 1
+    if count < 2:
+        return points
+    used = (part >= 0) & np.isfinite(points).all(axis=1)
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(low, part[used], points[used])
+    np.maximum.at(high, part[used], points[used])
+    meet = np.all((low[:, None] < high) & (high[:, None] > low), axis=2)
+    if not np.triu(meet, 1).any():
+        return points
+    size = np.maximum(high - low, 0)
+    row, column = np.divmod(np.arange(count), int(np.ceil(np.sqrt(count))))
+    corner = np.column_stack([column, -row]) * (1.06 * size.max(axis=0))
+    shift = (corner - np.where(size > 0, low, 0))[part]
+    return points + np.where(part[:, None] >= 0, shift, 0)

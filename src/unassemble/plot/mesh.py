@@ -1,38 +1,27 @@
 """The mesh itself on an axes: fill, edges, boundary loops, marks."""
 
-from __future__ import annotations
-
+from collections.abc import Iterable
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 from numpy.typing import NDArray
 
+from ..recovery import PlanarMesh
 from ..words import count_of
 from . import style
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.lines import Line2D
-
-    from ..recovery import PlanarMesh
-
 
 def draw_mesh(ax: Axes, mesh: PlanarMesh, points: NDArray, outer: NDArray) -> list[Line2D]:
-    """Draw a mesh; handles for a legend come back.
+    """Draw a mesh with its points at `points` (n, 2), on an axes with its limits set; handles for a legend come back.
 
-    Parameters
-    ----------
-    ax : Axes
-        With its limits set.
-    mesh : PlanarMesh
-    points : (n, 2) float64
-        Where its points are drawn.
-    outer : (loops,) bool
-        Which loops bound a piece from outside, see :func:`outer_loops`.
+    `outer`, (loops,) bool: which loops bound a piece from outside, see :func:`outer_loops`.
     """
-    from matplotlib.collections import LineCollection
-
     triangles, outline = mesh.divided()
     tail, head = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
     # Neighbours run along their edge in opposite directions; boundary edges come by themselves.
@@ -43,69 +32,48 @@ def draw_mesh(ax: Axes, mesh: PlanarMesh, points: NDArray, outer: NDArray) -> li
     rings = [points[mesh.boundary[a:b, 0]] for a, b in pairwise(mesh.boundary_offsets)]
     _fill(ax, rings)
     width = _line_width(ax, start, stop)
-    lines = LineCollection(
-        np.stack([start, stop], axis=1),  # type: ignore[arg-type]
-        colors=style.EDGE,
-        linewidths=width,
-        capstyle="round",
-        rasterized=len(start) > style.MOST_VECTOR,
-    )
-    ax.add_collection(lines, autolim=False)
+    draw_lines(ax, np.stack([start, stop], axis=1), style.EDGE, width, capstyle="round")
     for is_outer, colour in ((False, style.HOLE), (True, style.OUTER)):
         chosen = [np.vstack([ring, ring[:1]]) for ring, flag in zip(rings, outer, strict=True) if flag == is_outer]
-        ax.add_collection(
-            LineCollection(chosen, colors=colour, linewidths=np.clip(3 * width, 0.9, 1.4), joinstyle="round"),
-            autolim=False,
-        )
+        draw_lines(ax, chosen, colour, float(np.clip(3 * width, 0.9, 1.4)), joinstyle="round")
     n_holes = int(np.count_nonzero(~outer))
-    return [line_handle(style.OUTER, "outer boundary")] + (
-        [line_handle(style.HOLE, count_of(n_holes, "hole"))] if n_holes else []
-    )
+    holes = [line_handle(style.HOLE, count_of(n_holes, "hole"))] if n_holes else []
+    return [line_handle(style.OUTER, "outer boundary"), *holes]
+
+
+def draw_lines(ax: Axes, lines: Iterable[NDArray], colour: str, width: float, **more: Any) -> None:
+    """Lines through points (k, 2) each."""
+    lines = list(lines)
+    many = len(lines) > style.MOST_VECTOR
+    drawn = LineCollection(lines, colors=colour, linewidths=width, rasterized=many, **more)
+    ax.add_collection(drawn, autolim=False)
 
 
 def draw_hinges(ax: Axes, points: NDArray) -> list[Line2D]:
     """Mark vertices (k, 2) that join pieces."""
     if not len(points):
         return []
+    edge = {"markeredgecolor": style.OUTER, "markeredgewidth": 0.7}
     label = count_of(len(points), "hinge")
-    return ax.plot(
-        *points.T,
-        linestyle="none",
-        marker="D",
-        markersize=5.5,
-        zorder=5,
-        color=style.HINGE,
-        markeredgecolor=style.OUTER,
-        markeredgewidth=0.7,
-        label=label,
-    )
+    return ax.plot(*points.T, "D", markersize=5.5, zorder=5, color=style.HINGE, label=label, **edge)  # type: ignore[arg-type]
 
 
 def draw_worst(ax: Axes, points: NDArray, pairs: NDArray) -> list[Line2D]:
     """Mark the entries of the matrix that fit worst, as edges with a ring around."""
-    from matplotlib.collections import LineCollection
-
     ends = points[pairs]
     ends = ends[np.isfinite(ends).all(axis=(1, 2))] if len(pairs) else np.empty((0, 2, 2))
     if not len(ends):
         return []
-    lines = LineCollection(list(ends), colors=style.WORST, linewidths=1.8, capstyle="round", zorder=6)
-    ax.add_collection(lines, autolim=False)
-    x, y = _apart(ends.mean(axis=1), 0.03 * float(np.ptp(ax.get_xlim()))).T
-    ax.plot(x, y, "o", markersize=17, fillstyle="none", color=style.WORST, markeredgewidth=1.1, zorder=6)
+    draw_lines(ax, ends, style.WORST, 1.8, capstyle="round", zorder=6)
+    middle = ends.mean(axis=1)
+    near = np.linalg.norm(middle[:, None] - middle, axis=2) < 0.03 * np.ptp(ax.get_xlim())
+    middle = middle[~np.tril(near, -1).any(axis=1)]  # neighbours share a ring
+    ax.plot(*middle.T, "o", markersize=17, fillstyle="none", color=style.WORST, markeredgewidth=1.1, zorder=6)
     return [line_handle(style.WORST, "entries that fit worst", width=2.2)]
-
-
-def _apart(points: NDArray, distance: float) -> NDArray:
-    """Those of a few points that are not near an earlier one: neighbours share a ring."""
-    gap = np.linalg.norm(points[:, None] - points[None], axis=2)
-    return points[~np.tril(gap < distance, -1).any(axis=1)]
 
 
 def line_handle(colour: str, label: str, width: float = 1.6) -> Line2D:
     """A short line for a legend."""
-    from matplotlib.lines import Line2D
-
     return Line2D([], [], color=colour, linewidth=width, label=label)
 
 
@@ -127,9 +95,6 @@ def outer_loops(mesh: PlanarMesh) -> NDArray[np.bool_]:
 
 def _fill(ax: Axes, rings: list[NDArray]) -> None:
     """The domain as one path: holes run the other way round and stay empty."""
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path
-
     vertices = np.concatenate([np.vstack([ring, ring[:1]]) for ring in rings])
     codes = np.full(len(vertices), Path.LINETO, dtype=np.uint8)
     ends = np.cumsum([len(ring) + 1 for ring in rings])

@@ -1,29 +1,24 @@
-"""A recovered mesh as a picture."""
-
-from __future__ import annotations
+"""A recovered mesh as a picture, alone or beside the true one."""
 
 import os
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
 
 from ..clock import Clock
-from ..errors import FormatError
+from ..errors import FormatError, InputError
+from ..files import check_plot
 from ..metric import realised
 from ..recovery import Body, ConformingMesh, Mechanical, PlanarMesh, Recovery, Surface
 from ..summary import counted_cells, scale_text
 from ..words import count_of
 from . import style
 from .body import plot_body
-from .canvas import check_plot, footer, header, panel, write_figure
-from .layout import laid_out
+from .canvas import footer, header, laid_out, panel, panels, write_figure
 from .mesh import draw_hinges, draw_mesh, draw_worst, extent, outer_loops
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None, *, ax: Axes | None = None) -> Figure:
@@ -33,13 +28,8 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     the outer surface is drawn, shaded. Surfaces that have edge lengths only are drawn in coordinates that come near
     these; the header says how near.
 
-    Parameters
-    ----------
-    recovery : Recovery
-    path : path, optional
-        Write the picture there, whole or not at all: ``.png``, ``.svg`` or ``.pdf``.
-    ax : Axes, optional
-        Draw there, without heading and legend, and return the figure that it belongs to.
+    Where a `path` is given, the picture is written there, whole or not at all: ``.png``, ``.svg`` or ``.pdf``.
+    On an `ax` it is drawn without heading and legend, and the figure that this belongs to is returned.
 
     Raises
     ------
@@ -55,30 +45,23 @@ def plot_recovery(recovery: Recovery, path: str | os.PathLike[str] | None = None
     if isinstance(recovery, Surface) and recovery.realisation is None:
         recovery = realised(recovery, Clock(), starts=1)  # edge lengths cannot be drawn
     if isinstance(recovery, PlanarMesh) and not isinstance(recovery, ConformingMesh):
-        figure, handles = planar_mesh(recovery, ax)
+        points = laid_out(recovery)
+        figure, drawn = panel(extent(points, recovery.component >= 0), ax)
+        handles: list[Artist] = [*draw_mesh(drawn, recovery, points, outer_loops(recovery))]
+        handles += draw_hinges(drawn, points[recovery.hinges])
+        handles += [] if recovery.certified else draw_worst(drawn, points, recovery.worst_entries)
     else:
         figure, handles = plot_body(recovery, ax)
     if ax is None:
         about = "edge lengths " if isinstance(recovery, Surface) and recovery.dim == 3 else ""
-        header(figure, about + recovery.status, details(recovery), style.STATUS.get(recovery.status, style.TEXT))
+        header(figure, about + recovery.status, _details(recovery), style.STATUS.get(recovery.status, style.TEXT))
         footer(figure, handles)
     if path is not None:
         write_figure(figure, path)
     return figure
 
 
-def planar_mesh(mesh: PlanarMesh, ax: Axes | None = None) -> tuple[Figure, Sequence[Artist]]:
-    """A planar mesh, and handles for the legend."""
-    points = laid_out(mesh)
-    figure, ax = panel(extent(points, mesh.component >= 0), ax)
-    handles = draw_mesh(ax, mesh, points, outer_loops(mesh))
-    handles += draw_hinges(ax, points[mesh.hinges])
-    if not mesh.certified:
-        handles += draw_worst(ax, points, mesh.worst_entries)
-    return figure, handles
-
-
-def details(recovery: Recovery) -> str:
+def _details(recovery: Recovery) -> str:
     """Sizes, factor and certificate in one line."""
     parts = [count_of(recovery.n_points, "point"), *counted_cells(recovery)]
     if recovery.n_components > 1:
@@ -94,3 +77,61 @@ def details(recovery: Recovery) -> str:
         parts.append(f"Poisson's ratio {recovery.poisson_ratio:.6g}")
     parts.append(f"backward error {recovery.backward_error:.1e}")
     return "  ·  ".join(parts)
+
+
+def plot_comparison(true_points: ArrayLike, recovery: Recovery, path: str | os.PathLike[str] | None = None) -> Figure:
+    """Draw the true mesh beside the recovered one, each piece moved by the best similarity or reflection.
+
+    Row i of `true_points`, (n, 2) array_like, belongs to matrix row i; `path` is as in :func:`plot_recovery`.
+
+    Raises
+    ------
+    InputError
+        If `true_points` has another shape, or `recovery` is no planar mesh.
+    OutputError
+        If the file cannot be written.
+    """
+    if path is not None:
+        check_plot(path)
+    truth = np.asarray(true_points, dtype=np.float64)
+    if not isinstance(recovery, PlanarMesh):
+        raise InputError("only planar meshes are drawn beside the true ones")
+    if truth.shape != recovery.points.shape:
+        raise InputError(f"the true points have the shape {truth.shape}, the recovered {recovery.points.shape}")
+    aligned = align(recovery.points, truth, recovery.component)
+    figure, axes = panels([extent(truth, recovery.component >= 0)] * 2)
+    outer = outer_loops(recovery)  # in the frame in which cells are counter-clockwise
+    handles = []
+    for ax, points, name in zip(axes, (truth, aligned), ("true", "recovered"), strict=True):
+        handles = draw_mesh(ax, recovery, points, outer)
+        ax.set_title(name, color=style.TEXT, size=9.5, style="italic", pad=3)
+    headline = f"{recovery.status}, largest error {largest_error(aligned, truth):.1e} of the diameter"
+    sizes = [count_of(recovery.n_points, "point"), *counted_cells(recovery)]
+    said = "  ·  ".join([*sizes, f"backward error {recovery.backward_error:.1e}"])
+    header(figure, headline, said, style.STATUS.get(recovery.status, style.TEXT))
+    footer(figure, handles)
+    if path is not None:
+        write_figure(figure, path)
+    return figure
+
+
+def align(points: NDArray, truth: NDArray, component: NDArray) -> NDArray[np.float64]:
+    """Move each piece onto the true points by least squares over similarities, mirror images included."""
+    aligned = np.array(points)
+    for label in np.unique(component[component >= 0]):
+        rows = component == label
+        source, target = points[rows] @ [1, 1j], truth[rows] @ [1, 1j]
+        centre = target.mean()
+        source, target = source - source.mean(), target - centre
+        size = float(np.vdot(source, source).real) or 1.0
+        images = [np.vdot(s, target) / size * s for s in (source, source.conj())]
+        best = min(images, key=lambda image: float(np.linalg.norm(image - target))) + centre
+        aligned[rows] = np.column_stack([best.real, best.imag])
+    return aligned
+
+
+def largest_error(aligned: NDArray, truth: NDArray) -> float:
+    """Largest distance between points, relative to the diagonal of the box around the true ones."""
+    rows = np.isfinite(aligned).all(axis=1)
+    distance = np.linalg.norm(aligned[rows] - truth[rows], axis=1)
+    return float(distance.max() / np.linalg.norm(np.ptp(truth[rows], axis=0)))

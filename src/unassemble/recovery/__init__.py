@@ -4,9 +4,7 @@ Files, reports, pictures and near-null spaces are made of a result from above, i
 """
 
 from .base import ELEMENT_NAMES, Recovery
-from .mechanical import Body, Evidence, Mechanical, Structure
-from .planar import ConformingMesh, PlanarMesh
-from .surface import Surface
+from .kinds import Body, ConformingMesh, Evidence, Mechanical, PlanarMesh, Structure, Surface
 
 __all__ = [
     "ELEMENT_NAMES",

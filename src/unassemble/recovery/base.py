@@ -22,87 +22,57 @@ def none_of(*columns: int) -> Callable[[], NDArray[np.int64]]:
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Recovery:
-    """What was recovered from a matrix: the part that all kinds of answer share.
+    """What was recovered from a matrix: the part that all kinds of answer share."""
 
-    Attributes
-    ----------
-    points : (n, 2) or (n, 3) float64
-        Coordinates; row i belongs to matrix row i, or to node i of a vector-valued matrix, whose nodes are numbered
-        by their first row. NaN where the matrix determines none.
-    triangles : (m, 3) int64
-        Cells, rows of `points`, counter-clockwise in the plane.
-    component : (n,) int64
-        Edge-connected piece of each point, the lowest of those that share it; -1 for points of no cell.
-    hinges : (k,) int64
-        Vertices shared by several pieces.
-    scale : (number of pieces,) float64
-        The factor c of each piece in A = c L + D. For elasticity the mean shear modulus of the piece's cells, on the
-        mesh as it is given here; NaN where no cells are recognised.
-    boundary : (b, 2) int64
-        Directed boundary edges of planar cells with the mesh on their left, loop by loop in running order.
-    boundary_offsets : (loops + 1,) int64
-        Loop k is ``boundary[boundary_offsets[k]:boundary_offsets[k + 1]]``.
-    node_status : (n,) int8
-        0 determined, 1 not determined by the matrix, 2 plausible: a position that entries do not determine.
-    status : {"certified", "ambiguous", "uncertified"}
-        Whether the mesh gives the matrix back, and no other mesh is known that does.
-    uniqueness : {"proved", "searched", "ambiguous", None}
-        Of other meshes that fit: none can, a search found none, there is one; None where this one does not fit.
-    reason, advice : str
-        Why, in one sentence or two; what to do next, where the mesh is not certified.
-    operator : str
-        ``"laplacian"``, or ``"anisotropic laplacian"`` where a tensor was undone; ``"mass"``; ``"elasticity"``;
-        ``"frame or shell"``, ``"plane frame"``, ``"plate"`` or ``"beam"`` where nodes have rotations too; ``"truss"``;
-        ``"structure"`` where they have displacements only and elements are of any kind; ``"surface laplacian"``.
-    reaction : float
-        The factor s of the mass matrix in the operator, 0 if none.
-    density : float or None
-        Beside a mass matrix: mass over area or volume, on the mesh as it is given here; 1 where the mesh is in the size
-        that makes it so.
-    backward_error : float
-        Largest difference between an off-diagonal entry and the re-assembled one, relative to the largest
-        off-diagonal entry of its row. For elasticity whose cells are not recognised the largest residual of a valid
-        identity, relative to the size of its row.
-    timings : mapping of str to float
-        Seconds by stage.
-    warnings : tuple of str
-    worst_entries : (k, 2) int64
-        Rows and columns of the entries that fit worst, worst first, suspects before others; empty where all fit.
-    worst_misfits : (k,) float64
-        Their misfit, as in `backward_error`.
-    node_of_row, direction_of_row : (N,) int64 or None
-        Vector-valued matrices: node and direction of each matrix row.
-    numbering : str
-        Vector-valued matrices: how the unknowns stand, ``"interleaved"``, ``"by component"``, ``"pattern"`` (in no
-        order, found by the pattern) or ``"given"``.
-    choice : str
-        Why the matrix was taken for this operator's, where that was not asked for.
-    """
-
+    #: (n, 2) or (n, 3) coordinates; row i belongs to matrix row i, or to node i of a vector-valued matrix, whose nodes
+    #: are numbered by their first row. NaN where the matrix determines none.
     points: NDArray[np.float64]
+    #: (m, 3) cells, rows of `points`, counter-clockwise in the plane.
     triangles: NDArray[np.int64] = field(default_factory=none_of(3))
+    #: (n,) edge-connected piece of each point, the lowest of those that share it; -1 for points of no cell.
     component: NDArray[np.int64]
-    hinges: NDArray[np.int64] = field(default_factory=none_of())
+    hinges: NDArray[np.int64] = field(default_factory=none_of())  #: (k,) vertices shared by several pieces.
+    #: (number of pieces,) the factor c of each piece in A = c L + D. For elasticity the mean shear modulus of the
+    #: piece's cells, on the mesh as it is given here; NaN where no cells are recognised.
     scale: NDArray[np.float64]
+    #: (b, 2) directed boundary edges of planar cells with the mesh on their left, loop by loop in running order.
     boundary: NDArray[np.int64] = field(default_factory=none_of(2))
+    #: (loops + 1,) loop k is ``boundary[boundary_offsets[k]:boundary_offsets[k + 1]]``.
     boundary_offsets: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
+    #: (n,) 0 determined, 1 not determined by the matrix, 2 plausible, a position that entries do not determine.
     node_status: NDArray[np.int8]
+    #: ``"certified"``, ``"ambiguous"`` or ``"uncertified"``, whether the mesh gives the matrix back, and no other mesh
+    #: is known that does.
     status: str
+    #: Of other meshes that fit ``"proved"``, none can; ``"searched"``, a search found none; ``"ambiguous"``, there is
+    #: one; None where this one does not fit.
     uniqueness: str | None = None
-    reason: str
-    advice: str = ""
+    reason: str  #: Why, in one sentence or two.
+    advice: str = ""  #: What to do next, where the mesh is not certified.
+    #: ``"laplacian"``, or ``"anisotropic laplacian"`` where a tensor was undone; ``"mass"``; ``"elasticity"``;
+    #: ``"frame or shell"``, ``"plane frame"``, ``"plate"`` or ``"beam"`` where nodes have rotations too; ``"truss"``;
+    #: ``"structure"`` where they have displacements only and elements are of any kind; ``"surface laplacian"``.
     operator: str
-    reaction: float = 0.0
+    reaction: float = 0.0  #: The factor s of the mass matrix in the operator, 0 if none.
+    #: Beside a mass matrix, mass over area or volume, on the mesh as it is given here; 1 where the mesh is in the size
+    #: that makes it so.
     density: float | None = None
+    #: Largest difference between an off-diagonal entry and the re-assembled one, relative to the largest off-diagonal
+    #: entry of its row. For elasticity whose cells are not recognised the largest residual of a valid identity,
+    #: relative to the size of its row.
     backward_error: float
-    timings: Mapping[str, float] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    timings: Mapping[str, float] = field(default_factory=dict)  #: Seconds by stage.
+    warnings: tuple[str, ...] = ()  #: What was changed, guessed or left open.
+    #: (k, 2) rows and columns of the entries that fit worst, worst first, suspects before others; empty where all fit.
     worst_entries: NDArray[np.int64] = field(default_factory=none_of(2))
+    #: (k,) their misfit, as in `backward_error`.
     worst_misfits: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    node_of_row: NDArray[np.int64] | None = None
-    direction_of_row: NDArray[np.int64] | None = None
+    node_of_row: NDArray[np.int64] | None = None  #: (N,) node of each matrix row, if it is vector-valued.
+    direction_of_row: NDArray[np.int64] | None = None  #: (N,) and its direction.
+    #: Of vector-valued matrices, how the unknowns stand, ``"interleaved"``, ``"by component"``, ``"pattern"`` (in no
+    #: order, found by the pattern) or ``"given"``.
     numbering: str = ""
-    choice: str = ""
+    choice: str = ""  #: Why the matrix was taken for this operator's, where that was not asked for.
 
     # Put here by :mod:`unassemble.outputs`.
     report: ClassVar[Callable[..., dict[str, Any]]]
@@ -146,6 +116,7 @@ class Recovery:
     def element(self) -> str | None:
         """``P1`` to ``P3``, ``Q1``, ``Q2`` or ``S2`` (serendipity), or ``mixed``; None where it is not known."""
         kinds = {ELEMENT_NAMES[kind] for kind in self.cells if kind in ELEMENT_NAMES}
+        kinds |= {"P1"} if self.n_polygons else set()  # one stands for triangles
         return "mixed" if len(kinds) > 1 else next(iter(kinds), None)
 
     @property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..options import Direction
+from ..options import Direction, FrameOptions
 from ..planar.frame import Similarity, canonical_frame, collinear, fit_similarity
 from ..planar.hinges import groups, join
 from ..reductions import ConstantTensor
@@ -22,10 +21,7 @@ Anchor = tuple[int, float, float]
 
 @dataclass(frozen=True)
 class Placement:
-    """What is known of the true frame.
-
-    Raises InputError for values that contradict each other or themselves.
-    """
+    """What is known of the true frame."""
 
     anchors: tuple[Anchor, ...] = ()  # tuple of (row, x, y)
     tensor: ConstantTensor | None = None
@@ -46,50 +42,19 @@ class Placement:
         return "anisotropic laplacian" if self.tensor else "laplacian"
 
     @classmethod
-    def checked(
-        cls,
-        n: int,
-        anchors: Sequence[Anchor] | None,
-        tensor: tuple[float, float, float] | None,
-        direction: Direction | None,
-        handed: str | None,
-    ) -> Placement:
-        """Validate what a caller gives for a matrix of order n."""
-        for one in anchors or ():
-            if np.ndim(one) == 1 and len(one) == 4:
+    def of(cls, n: int, frame: FrameOptions) -> Placement:
+        """What options say of a mesh in the plane whose matrix has order n."""
+        rows = [row for row, *_ in frame.anchors]
+        for row, *place in frame.anchors:
+            if len(place) == 3:
                 raise InputError(
-                    f"the anchor of row {one[0]} has three coordinates, and this matrix belongs to a mesh in the "
-                    "plane: leave out the third"
+                    f"the anchor of row {row} has three coordinates, and this matrix belongs to a mesh in the plane: "
+                    "leave out the third"
                 )
-        try:
-            placed = tuple((operator.index(row), float(x), float(y)) for row, x, y in anchors or ())
-        except (TypeError, ValueError) as error:
-            raise InputError("`anchors` of a mesh in the plane are triples (row, x, y), with whole rows") from error
-        try:
-            if direction is not None:
-                first, second, degrees = direction
-                direction = operator.index(first), operator.index(second), float(degrees)
-        except (TypeError, ValueError) as error:
-            raise InputError("`direction` is a triple (row, row, degrees), with whole rows") from error
-        rows = [row for row, _, _ in placed]
-        for row in rows + list(map(int, direction[:2] if direction else ())):
+        for row in rows + list(frame.direction[:2] if frame.direction else ()):
             if not 0 <= row < n:
                 raise InputError(f"row {row} is not in the matrix: its rows count from 0 to {n - 1}")
-        if len(set(rows)) < len(rows):
-            raise InputError(f"row {next(r for r in rows if rows.count(r) > 1)} is anchored twice")
-        if not np.isfinite([t[1:] for t in placed]).all():
-            raise InputError("an anchor's coordinates are not finite numbers")
-        if len({t[1:] for t in placed}) < len(placed):
-            raise InputError("two anchors have the same position: different rows are different points")
-        if direction and (direction[0] == direction[1] or not np.isfinite(direction[2])):
-            raise InputError("`direction` needs two different rows and a finite angle")
-        if handed not in (None, "left", "right"):
-            raise InputError(f"`handed` is 'left' or 'right', not {handed!r}")
-        if direction and len(placed) > 1:
-            raise InputError("`direction` and two or more anchors fix the same freedom: give one of them")
-        if handed and not direction and len(placed) < 2:
-            raise InputError("`handed` needs a line to refer to: give `direction` or two anchors as well")
-        return cls(placed, ConstantTensor(*tensor) if tensor is not None else None, direction, handed)
+        return cls(frame.anchors, frame.tensor, frame.direction, frame.handed)
 
     def origins(self, topology: Topology) -> NDArray[np.complex128]:
         """(number of pieces,) points that positions of each piece are found relative to; of joined pieces the same.

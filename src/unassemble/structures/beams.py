@@ -11,22 +11,19 @@ supports spoil are not needed. Stretching and torsion are chains of springs besi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..clock import Clock
-from ..matrix import OperatorMatrix
-from ..nodes.anchoring import anchored, checked_anchors
+from ..nodes.anchoring import Request
 from ..recovery import Evidence, Structure
 from ..tolerances import ALIKE, CERTIFIED
-from ..words import count_of
+from ..words import Reason, count_of
+from .answer import answer, covered
 from .layouts import PLANE
-from .placed import covered
+from .placed import Placed
 from .recognise import StructuralNumbering
 from .straight import entries_at
 
@@ -35,50 +32,24 @@ MOST = 5  # entries of a bending row off the diagonal: four of the neighbours, o
 
 @dataclass(frozen=True, eq=False)
 class Beam(StructuralNumbering):
-    """Rows of a straight beam: directions 1 (deflection) and 2 (rotation); 0 for one chain of springs, -1 for several.
+    """Rows of a straight beam: directions 1 (deflection), 2 (rotation), 0 (one chain of springs) or -1 (several)."""
 
-    Attributes
-    ----------
-    members : (m, 2) int64
-        Nodes.
-    steps : (m,) float64
-        x of the second node less that of the first.
-    """
-
-    members: NDArray[np.int64]
-    steps: NDArray[np.float64]
-
-
-class _Blocks(NamedTuple):
-    """(m,) rows w_i, t_i, w_j, t_j of members, and x_j - x_i."""
-
-    w: NDArray[np.int64]
-    t: NDArray[np.int64]
-    other_w: NDArray[np.int64]
-    other_t: NDArray[np.int64]
-    step: NDArray[np.float64]
+    members: NDArray[np.int64]  # (m, 2) nodes
+    steps: NDArray[np.float64]  # (m,) x of the second node less that of the first
 
 
 def find_beam(matrix: sp.csr_array) -> Beam | None:
-    """Recognise the rows of one straight beam, in any order; None for all other matrices.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        Symmetric.
-    """
+    """Recognise the rows of one straight beam, in any order, of a symmetric matrix (N, N); None if they are not so."""
     order = matrix.shape[0]
-    off = matrix - sp.diags_array(matrix.diagonal())
+    off = sp.csr_array(matrix - sp.diags_array(matrix.diagonal()))
     off.eliminate_zeros()
     if order < 4 or np.diff(off.indptr).max(initial=0) > MOST or (matrix.diagonal() <= 0).any():
         return None
-    blocks = _members(sp.csr_array(off))
-    deflections = np.unique(np.concatenate([blocks.w, blocks.other_w]))
-    partner = np.full(order, -1)
-    for w, t in ((blocks.w, blocks.t), (blocks.other_w, blocks.other_t)):
-        partner[w] = t
-        if (partner[w] != t).any():
-            return None  # one deflection with two rotations
+    w, t, steps = _members(off)
+    deflections, partner = np.unique(w), np.full(order, -1)
+    partner[w] = t
+    if (partner[w] != t).any():
+        return None  # one deflection with two rotations
     rotations = partner[deflections]
     node = np.full(order, -1)
     node[deflections] = node[rotations] = np.arange(len(deflections))
@@ -86,20 +57,19 @@ def find_beam(matrix: sp.csr_array) -> Beam | None:
     direction[rotations], direction[deflections] = 2, 1
     if not len(deflections) or len(np.unique(rotations)) < len(rotations) or np.isin(rotations, deflections).any():
         return None
-    members, steps = np.column_stack([node[blocks.w], node[blocks.other_w]]), blocks.step
-    members, steps = _with_ends(sp.csr_array(off), node, direction, members, steps)
+    members, steps = _with_ends(off, node, direction, node[w], steps)
     n = int(node.max()) + 1
-    if len(members) != n - 1 or _components(n, members)[0] != 1:
+    x = _along(n, members, steps)
+    if len(members) != n - 1 or np.isnan(x).any():
         return None
-    count, label = _components(order, np.column_stack(off.nonzero()))
+    count, label = sp.csgraph.connected_components(off, directed=False)
     bending = np.unique(label[node >= 0])
     if len(bending) > 1 or (node[label == bending[0]] < 0).any():
         return None
-    line = np.argsort(_along(n, members, steps))
+    line = np.argsort(x)
     chains = [np.flatnonzero(label == one) for one in range(count) if one != bending[0]]
-    for chain in chains:
-        if not _beside(sp.csr_array(off), chain, line, node):
-            return None
+    if not all(_beside(off, chain, line, node) for chain in chains):
+        return None
     if len(chains) == 1:
         direction[chains[0]] = 0
     renamed = np.unique(node, return_index=True)[1].argsort().argsort()  # by the first row of each
@@ -107,8 +77,8 @@ def find_beam(matrix: sp.csr_array) -> Beam | None:
     return Beam(PLANE, renamed[node], direction, "pattern", share, members=renamed[members], steps=steps)
 
 
-def _members(off: sp.csr_array) -> _Blocks:
-    """Members whose blocks are whole, each once."""
+def _members(off: sp.csr_array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Deflections (m, 2) and rotations (m, 2) of members whose blocks are whole, each once, and x_j - x_i (m,)."""
     order, width = off.shape[0], MOST
     count = np.diff(off.indptr)
     row = np.repeat(np.arange(order), count)
@@ -127,7 +97,8 @@ def _members(off: sp.csr_array) -> _Blocks:
     good &= np.abs(left + right) <= ALIKE * np.abs(right)
     good &= np.abs(1.5 * corner * -least[:, None] - right**2) <= ALIKE * right**2
     k, which = np.nonzero(good)
-    return _Blocks(w[k], lower[k, which], other_w[k], upper[k, which], -2 * right[k, which] / least[k])
+    ends = np.column_stack([w[k], other_w[k]]), np.column_stack([lower[k, which], upper[k, which]])
+    return *ends, -2 * right[k, which] / least[k]
 
 
 def _with_ends(
@@ -152,32 +123,23 @@ def _with_ends(
 
 
 def _along(n: int, members: NDArray[np.int64], steps: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) positions along the beam, the first node's zero."""
+    """(n,) positions along the beam, the first node's zero; NaN where nothing ties them to it."""
     tree = sp.csr_array((steps, members.T), shape=(n, n))
     both = sp.csr_array(tree - tree.T)
     order, before = sp.csgraph.breadth_first_order(abs(both), 0, directed=False)
-    x = np.zeros(n)
+    x = np.full(n, np.nan)
+    x[0] = 0
     for k in order[1:]:
         x[k] = x[before[k]] + both[before[k], k]
     return x
-
-
-def _components(n: int, pairs: NDArray) -> tuple[int, NDArray[np.int64]]:
-    graph = sp.csr_array((np.ones(len(pairs)), pairs.T), shape=(n, n))
-    count, label = sp.csgraph.connected_components(graph, directed=False)
-    return int(count), label.astype(np.int64)
 
 
 def _beside(off: sp.csr_array, chain: NDArray[np.int64], line: NDArray[np.int64], node: NDArray[np.int64]) -> bool:
     """Give the rows of a chain of springs the nodes next to which they are numbered; False if it is no such chain."""
     part = sp.csr_array(off[chain][:, chain])
     degree = np.diff(part.indptr)
-    if (
-        len(chain) > len(line)
-        or degree.max(initial=0) > 2
-        or degree.sum() != 2 * len(chain) - 2
-        or (part.data > 0).any()
-    ):
+    in_line = degree.max(initial=0) <= 2 and degree.sum() == 2 * len(chain) - 2
+    if len(chain) > len(line) or not in_line or (part.data > 0).any():
         return False
     path = chain[sp.csgraph.breadth_first_order(part, int(np.argmin(degree)), directed=False)[0]]
     rows = np.arange(len(node))
@@ -189,51 +151,42 @@ def _beside(off: sp.csr_array, chain: NDArray[np.int64], line: NDArray[np.int64]
     return True
 
 
-def serve_beam(
-    matrix: OperatorMatrix, beam: Beam, clock: Clock, *, anchors: Sequence[Any] | None, choice: str
-) -> Structure:
-    """Positions along a straight beam, in true units of length, and its members.
+def serve_beam(beam: Beam, request: Request) -> Structure:
+    """Positions along a straight beam, in true units of length, and its members; errors as of :func:`serve_structure`.
 
     The axis is x and deflections are along y; the direction of the axis, which the sign of rotations tells where it is
     known, is free.
     """
-    n = beam.n_nodes
-    known = checked_anchors(anchors, beam.node_of_row, beam.layout.dim)
-    with clock("solve"):
+    n, bending = beam.n_nodes, beam.direction_of_row > 0
+    request.held(beam.node_of_row, beam.layout.dim)  # anchors that do not fit, before the long work
+    with request.clock("solve"):
         x = _along(n, beam.members, beam.steps)
         points = np.column_stack([x - x.mean(), np.zeros(n)])
-    with clock("certify"):
-        misfit, told = _held_against(matrix.csr(), beam, points[:, 0])
+    with request.clock("certify"):
+        misfit, told = _held_against(request.matrix.csr(), beam, points[:, 0])
+    evidence = Evidence(1, misfit, float("inf"), int(told.sum()))
+    found = Placed(points, np.zeros(n, np.int64), (evidence,), told, np.zeros_like(told))
     certified = misfit <= CERTIFIED
-    chains = int(np.count_nonzero(beam.direction_of_row <= 0))
-    reason = "bending members along a line give back the blocks of all neighbours, and the sums of rows between them: "
+    said = f"the bending rows differ from those of members along a line by {misfit:.1e} of the row's largest entry"
+    if certified:
+        whole = "bending members along a line give back the blocks of all neighbours, and the sums of rows between them"
+        said = f"{whole}: {covered(told, bending)}"
     notes = ["a beam by itself lies along x, in a direction that is free"]
-    if chains:
-        notes.append(f"{count_of(chains, 'row')} of stretching or torsion know no length: they are taken for those of "
-                     "the nodes next to which they are numbered")  # fmt: skip
-    bending = beam.direction_of_row > 0
-    component = np.zeros(n, np.int64)
-    points, _, more = anchored(points, component, 1, known, sized=True)
-    return Structure(
-        points=points,
+    if not bending.all():
+        chains = count_of(int((~bending).sum()), "row")
+        notes.append(f"{chains} of stretching or torsion know no length: they are taken for those of the nodes next to "
+                     "which they are numbered")  # fmt: skip
+    return answer(
+        beam,
+        request,
+        found,
+        ("certified" if certified else "uncertified", Reason(said)),
+        edges=beam.members,
+        uniqueness="proved",
+        notes=notes,
         lines=np.sort(beam.members, axis=1),
-        component=component,
-        scale=np.full(1, np.nan),
-        node_status=np.zeros(n, np.int8),
-        evidence=(Evidence(1, misfit, float("inf"), int(told.sum())),),
-        status="certified" if certified else "uncertified",
-        uniqueness="proved" if certified else None,
-        reason=reason + covered(told, bending)
-        if certified
-        else (f"the bending rows differ from those of members along a line by {misfit:.1e} of the row's largest entry"),
         operator="plane frame",
         backward_error=misfit,
-        timings=clock.timings,
-        warnings=(*matrix.warnings, *notes, *more),
-        node_of_row=beam.node_of_row,
-        direction_of_row=beam.direction_of_row,
-        numbering=beam.kind,
-        choice=choice,
     )
 
 
@@ -253,16 +206,12 @@ def _held_against(matrix: sp.csr_array, beam: Beam, x: NDArray[np.float64]) -> t
     stiffness = np.zeros(len(length))
     stiffness[both] = -entries_at(matrix, row_of[i[both], 0], row_of[j[both], 0]) / 12
     stiffness[~both] = entries_at(matrix, row_of[i[~both], 1], row_of[j[~both], 1]) / (2 * length[~both] ** 2)
-    one, left = np.ones_like(length), length
-    block = np.stack([12 * one, 6 * left, -12 * one, 6 * left,
-                      6 * left, 4 * left**2, -6 * left, 2 * left**2,
-                      -12 * one, -6 * left, 12 * one, -6 * left,
-                      6 * left, 2 * left**2, -6 * left, 4 * left**2], axis=1).reshape(-1, 4, 4)  # fmt: skip
+    scale = np.stack([np.ones_like(length), length], axis=1)[:, [0, 1, 0, 1]]
+    hermite = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
+    block = stiffness[:, None, None] * hermite * scale[:, :, None] * scale[:, None, :]
     rows = np.concatenate([row_of[i], row_of[j]], axis=1)
-    live = (rows[:, :, None] >= 0) & (rows[:, None, :] >= 0)
-    k, a, b = np.nonzero(live)
-    values = block[k, a, b] * stiffness[k]
-    again = sp.csr_array((values, (rows[k, a], rows[k, b])), shape=(order, order))
+    k, a, b = np.nonzero((rows[:, :, None] >= 0) & (rows[:, None, :] >= 0))
+    again = sp.csr_array((block[k, a, b], (rows[k, a], rows[k, b])), shape=(order, order))
     left_over = sp.coo_array(matrix - again)
     inner = np.bincount(beam.members.ravel(), minlength=n) == 2
     node = beam.node_of_row

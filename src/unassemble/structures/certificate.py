@@ -11,41 +11,28 @@ from numpy.typing import NDArray
 
 from ..nodes.nodal import determined
 from .layouts import Layout
+from .nodes import Nodes
+from .recognise import StructuralNumbering
 from .straight import Straight
 
 
 def forces(
     matrix: sp.csr_array,
-    layout: Layout,
-    node_of_row: NDArray[np.int64],
-    direction_of_row: NDArray[np.int64],
+    numbering: StructuralNumbering,
+    nodes: Nodes,
     points: NDArray[np.float64],
-    counted: NDArray[np.bool_],
+    valid: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Forces that rigid rotations of the nodes bring about, with their signs, relative to what makes them up.
+    """Forces (k,) that rigid rotations of the nodes bring about, with their signs, relative to what makes them up.
 
     That is bounded, without signs, by nodes that move by their distance from the centroid and turn by one: about
-    single axes both may be nothing but rounding.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-        As it was given.
-    layout : Layout
-    node_of_row, direction_of_row : (N,) int64
-        Rows whose direction is -1 do not move.
-    points : (n, d) float64
-        NaN where not determined; rows that touch such nodes do not count.
-    counted : (N, rotations) bool
-        Rows and rotations away from supports.
-
-    Returns
-    -------
-    force : (k,) float64
-        Of all rows and rotations that count.
-    used : (N,) bool
-        Rows with one that counts.
+    single axes both may be nothing but rounding. Rows of the given matrix whose direction is -1 do not move; those that
+    touch nodes without coordinates do not count, of the others those and the rotations that are `valid`, by node. With
+    rows (N,) one of whose forces counts.
     """
+    layout, node_of_row, direction_of_row = numbering.layout, numbering.node_of_row, numbering.direction_of_row
+    counted = np.zeros((len(node_of_row), len(layout.turning)), dtype=bool)
+    counted[nodes.row_of[nodes.present]] = valid[nodes.present]
     moves = len(layout.displacements)
     known, moving = determined(points), direction_of_row >= 0
     motions = layout.rigid_motions(np.where(known[:, None], points, 0.0))[:, :, moves:]
@@ -60,15 +47,7 @@ def forces(
 def members_misfits(
     members: Straight, layout: Layout, points: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """How far the blocks of straight members are from those of members between the points.
-
-    Returns
-    -------
-    ends : (k, 2) int64
-        Of members both of whose nodes have coordinates.
-    misfit : (k,) float64
-        Relative to the size of each part of the block.
-    """
+    """Ends (k, 2) of straight members, and how far each block is from that of one between the points, part by part."""
     some = determined(points)[members.ends].all(axis=1)
     ends, given = members.ends[some], members.blocks[some]
     if not len(ends):

@@ -24,28 +24,15 @@ from .straight import Straight
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """Equations for coordinates, each relative to the size of its coefficients.
+    """Equations for coordinates, each relative to the size of its coefficients."""
 
-    Attributes
-    ----------
-    operator : (m, n dim) sparse
-    right : (m,) float64
-    size : (m,) float64
-        What the equation was divided by.
-    lever : (m,) float64
-        Sum of the terms of the right-hand side, without signs.
-    row : (m,) int64
-        Row ``i b + k`` of direction k of node i; -1 for differences of two rows, and for what members tell.
-    rotation : (m,) int64
-        Which of the layout's rotations it is; -1 for what members tell.
-    """
-
-    operator: sp.csr_array
+    operator: sp.csr_array  # (m, n dim)
     right: NDArray[np.float64]
-    size: NDArray[np.float64]
-    lever: NDArray[np.float64]
+    size: NDArray[np.float64]  # what the equation was divided by
+    lever: NDArray[np.float64]  # sum of the terms of the right-hand side, without signs
+    # ``i b + k`` of direction k of node i; -1 for differences of two rows, and for what members tell
     row: NDArray[np.int64]
-    rotation: NDArray[np.int64]
+    rotation: NDArray[np.int64]  # which of the layout's rotations it is; -1 for what members tell
 
     def __getitem__(self, which: NDArray) -> Equations:
         """Some of the equations, by their indices or a mask."""
@@ -53,19 +40,11 @@ class Equations:
 
 
 def equations(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool, allowed: float = CANCELLED) -> Equations:
-    """Collect the valid equations.
+    """Collect the equations that are `valid`, (n, b, rotations); see :meth:`.nodes.Nodes.whole`.
 
-    Parameters
-    ----------
-    nodes : Nodes
-    valid : (n, b, rotations) bool
-        See :meth:`.nodes.Nodes.whole`.
-    springs : bool
-        Allow for springs between the rotations of a node and the ground, as programs add them where a flat shell has
-        no stiffness against drilling. They add an unknown symmetric matrix to the three moments' rows; what is left
-        are the differences of its two triangles.
-    allowed : float
-        What rounding leaves of coefficients that cancel, relative to them.
+    It can allow for `springs` between the rotations of a node and the ground, as programs add them where a flat shell
+    has no stiffness against drilling. They add an unknown symmetric matrix to the three moments' rows; what is left are
+    the differences of its two triangles. Coefficients that cancel up to what is `allowed`, relative to them, are none.
     """
     b, moves = nodes.layout.block_size, len(nodes.layout.displacements)
     every = [_rotation(nodes, k) for k in range(valid.shape[2])]
@@ -74,16 +53,9 @@ def equations(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool, allowed:
     for k, m in combinations(range(len(every)), 2) if springs else ():
         both = np.flatnonzero(valid[:, moves + m, k] & valid[:, moves + k, m]) * b + moves
         one, other = every[k][both + m], every[m][both + k]
-        parts.append(
-            Equations(
-                sp.csr_array(one.operator - other.operator),
-                one.right - other.right,
-                one.size + other.size,
-                one.lever + other.lever,
-                np.full(len(both), -1),
-                one.rotation,
-            )
-        )
+        operator, right = sp.csr_array(one.operator - other.operator), one.right - other.right
+        size, lever, row = one.size + other.size, one.lever + other.lever, np.full(len(both), -1)
+        parts.append(Equations(operator, right, size, lever, row, one.rotation))
     return _relative(joined(*parts), allowed)
 
 
@@ -117,14 +89,10 @@ def _relative(given: Equations, allowed: float) -> Equations:
 def _rotation(nodes: Nodes, k: int) -> Equations:
     """All rows' equation for rotation k, as it stands."""
     layout, order = nodes.layout, nodes.matrix.shape[0]
-    rows, columns, values = [], [], []
+    operator = sp.csr_array((order, nodes.n * layout.dim))
     for direction, coordinate, sign in layout.turned(layout.turning[k]):
-        part = nodes.direction(direction).tocoo()
-        rows.append(part.row)
-        columns.append(part.col * layout.dim + coordinate)
-        values.append(sign * part.data)
-    place = np.concatenate(rows), np.concatenate(columns)
-    operator = sp.csr_array((np.concatenate(values), place), shape=(order, nodes.n * layout.dim))
+        axis = sp.csr_array(sign * np.eye(layout.dim)[[coordinate]])
+        operator = operator + sp.kron(nodes.direction(direction), axis, format="csr")
     own = nodes.direction(len(layout.displacements) + k) if layout.rotations else sp.csr_array((order, nodes.n))
     right, lever, size = (np.asarray(part.sum(axis=1)).ravel() for part in (-own, abs(own), abs(operator)))
     return Equations(operator, right, size, lever, np.arange(order), np.full(order, k))

@@ -2,83 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..clock import Clock
 from ..linalg import blas_threads
-from ..matrix import OperatorMatrix
-from ..nodes.anchoring import anchored, checked_anchors, digits_lost, near_enough
-from ..nodes.redrawn import Known, known_to
-from ..nodes.rounded import Rounding, with_exact_sums
+from ..nodes.anchoring import Request
+from ..nodes.rounded import Known, Rounding, known_to, with_exact_sums
 from ..recovery import Structure
 from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SUMMED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
+from .answer import answer, covered
 from .certificate import forces, members_misfits
-from .contradictions import said_of
 from .members import members_and_cells, mispaired
 from .nodes import Nodes, nodes_of
-from .placed import Placed, covered
+from .placed import Placed
 from .recognise import StructuralNumbering
 from .straight import Straight, straight_members
-from .turning import turning_positions
+from .turning import said_of, turning_positions
 
 
-def serve_structure(
-    matrix: OperatorMatrix,
-    numbering: StructuralNumbering,
-    clock: Clock,
-    *,
-    anchors: Sequence[Any] | None,
-    choice: str,
-    cells: bool,
-) -> Structure:
+def serve_structure(numbering: StructuralNumbering, request: Request) -> Structure:
     """Recover the coordinates of a structure whose nodes and directions are known, in true units of length.
 
-    Parameters
-    ----------
-    matrix : OperatorMatrix
-    numbering : StructuralNumbering
-    clock : Clock
-    anchors : sequence of (row, x, y) or (row, x, y, z), optional
-        They move pieces; size and axes are the matrix's own.
-    choice : str
-        Why the matrix was taken for a structure's.
-    cells : bool
-        Look for members and shell cells too.
-
-    Raises
-    ------
-    InputError
-        For anchors that do not fit.
-    RecoveryError
-        If no node is determined.
+    Anchors move pieces; size and axes are the matrix's own. Rounding is looked for anew, as directions are known now.
+    InputError for anchors that do not fit, RecoveryError if no node is determined.
     """
-    layout = numbering.layout
-    node, direction = numbering.node_of_row, numbering.direction_of_row
-    held = checked_anchors(anchors, node, layout.space)
-    whole, rounding = with_exact_sums(matrix.csr(), known=(direction, layout.block_size))
+    layout, node = numbering.layout, numbering.node_of_row
+    sized, moves = bool(layout.rotations), len(layout.displacements)
+    request.held(node, layout.space)  # anchors that do not fit, before the long work
+    whole, rounding = with_exact_sums(request.matrix.csr(), known=(numbering.direction_of_row, layout.block_size))
     spread = rounding.spread if rounding else 0.0
-    with clock("solve"):
-        answer = _placed(whole, numbering, rounding)
-        nodes, members, found, valid = answer
-    with clock("certify"):
-        force, used = _forces(whole, numbering, *answer)
+    with request.clock("solve"):
+        nodes, members, found, valid = _placed(whole, numbering, rounding)
+    with request.clock("certify"):
+        force, used = forces(whole, numbering, nodes, found.points, valid)
         ends, misfit = members_misfits(members, layout, found.points)
         used = (used | np.isin(node, ends)) & ~np.isin(node, found.spoiled)
         error = float(np.concatenate([abs(force), misfit]).max()) if used.any() else float("inf")
         known = _known(error, force, found, members, numbering, rounding)
-        status, reason = _verdict(error, known, found, len(ends), rounding, sized=bool(layout.rotations))
-        inner: NDArray[np.bool_] = np.asarray(valid[:, : len(layout.displacements)].all(axis=(1, 2)))
-        pair = (
-            mispaired(nodes, found.points, inner, max(CANCELLED, spread))
-            if status == "certified" and numbering.kind != "given"
-            else None
-        )
+        status, reason = _verdict(error, known, found, len(ends), rounding, sized=sized)
+        pair = None
+        if status == "certified" and numbering.kind != "given":
+            inner: NDArray[np.bool_] = np.asarray(valid[:, :moves].all(axis=(1, 2)))
+            pair = mispaired(nodes, found.points, inner, max(CANCELLED, spread))
     if pair is not None:
         first, second = (np.flatnonzero(node == one)[0] for one in pair)
         status = "uncertified"
@@ -90,50 +60,36 @@ def serve_structure(
     elif status == "certified":
         reason = Reason(f"{reason.text}: {covered(used, abs(whole[used]).sum(axis=0) > 0)}")
     notes = [said_of(nodes, found.spoiled)] if len(found.spoiled) else []
-    notes += found.notes
-    placed = np.pad(found.points, ((0, 0), (0, layout.space - layout.dim)))
-    points, factor, more = anchored(placed, found.component, len(found.evidence), held, sized=bool(layout.rotations))
+    found = replace(found, points=np.pad(found.points, ((0, 0), (0, layout.space - layout.dim))))
     fields: dict[str, Any] = {}
-    if np.isnan(factor).any():
-        notes.append("size and sign are free: nodes have no rotations, from which angles would tell lengths")
-    if cells and error < max(ALIKE, spread):
-        with clock("members"):
-            fields = members_and_cells(nodes, placed, max(CANCELLED, spread))
+    if request.cells and error < max(ALIKE, spread):
+        with request.clock("members"):
+            fields = members_and_cells(nodes, found.points, max(CANCELLED, spread))
         notes.append("members and cells were read off the graph: what is certified is the coordinates")
-    if layout.rotations and not valid[:, len(layout.displacements) :].any():
+    if sized and not valid[:, moves:].any():
         notes.append("moments are not used alone: springs between rotations and the ground, as against drilling, would "
                      "spoil them")  # fmt: skip
-    untold = np.unique(node[direction < 0])
+    untold = np.unique(node[numbering.direction_of_row < 0])
     if len(untold):
         notes.append(f"which unknowns {count_of(len(untold), 'node')} lack the pattern does not tell: their rows were "
                      f"left out unless you {GIVE_NUMBERING}")  # fmt: skip
     if (found.component < 0).any():
         notes.append(f"{(found.component < 0).sum()} of {count_of(nodes.n, 'node')} cannot be determined: at supports, "
                      "or tied to these only")  # fmt: skip
-    lost = digits_lost(points, placed, found.component, factor) / _edge_length(nodes, found)
-    status, reason = near_enough(status, reason, lost)
-    return Structure(
-        **fields,
-        **found.fields(numbering),
-        points=points,
-        status=status,
-        uniqueness="searched" if status == "certified" else None,
-        reason=reason.text,
-        advice=reason.advice,
+    return answer(
+        numbering,
+        request,
+        found,
+        (status, reason),
+        edges=np.column_stack(sp.triu(nodes.graph, 1).nonzero()),
+        sized=sized,
+        free="size and sign are free: nodes have no rotations, from which angles would tell lengths",
+        notes=notes,
         operator=layout.name,
         backward_error=error,
         position_error=known.error if rounding and known.explained else None,
-        timings=clock.timings,
-        warnings=(*matrix.warnings, *notes, *more),
-        choice=choice,
+        **fields,
     )
-
-
-def _edge_length(nodes: Nodes, found: Placed) -> float:
-    """Mean distance of coupled nodes."""
-    i, j = sp.triu(nodes.graph, 1).nonzero()
-    length = np.linalg.norm(found.points[i] - found.points[j], axis=1)
-    return float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
 
 
 def _known(
@@ -150,26 +106,11 @@ def _known(
         return Known(float(error * np.sqrt(loosest.rows) / loosest.gap))
 
     def place(other: sp.csr_array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        answer = _placed(other, numbering, rounding, members.ends)
-        return answer[2].points, _forces(other, numbering, *answer)[0]
+        nodes, _, again, valid = _placed(other, numbering, rounding, members.ends)
+        return again.points, forces(other, numbering, nodes, again.points, valid)[0]
 
     sized = bool(numbering.layout.rotations)
     return known_to(found.points, found.component, force, rounding, place, sized=sized)
-
-
-def _forces(
-    matrix: sp.csr_array,
-    numbering: StructuralNumbering,
-    nodes: Nodes,
-    _members: Straight,
-    found: Placed,
-    valid: NDArray[np.bool_],
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Forces of what :func:`_placed` found in a matrix; see :func:`.certificate.forces`."""
-    layout, node = numbering.layout, numbering.node_of_row
-    counted = np.zeros((len(node), len(layout.turning)), dtype=bool)
-    counted[nodes.row_of[nodes.present]] = valid[nodes.present]
-    return forces(matrix, layout, node, numbering.direction_of_row, found.points, counted)
 
 
 def _placed(

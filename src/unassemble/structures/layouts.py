@@ -10,23 +10,12 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Layout:
-    """Unknowns of each node, in the order of their directions.
-
-    Attributes
-    ----------
-    name : str
-    dim : {1, 2, 3}
-        Coordinates of a node that the matrix tells.
-    displacements : tuple of int
-        Axis of each displacement; direction k of a node is ``displacements[k]``.
-    rotations : tuple of int
-        Axes of the rotations, which follow the displacements; none where nodes have displacements only.
-    """
+    """Unknowns of each node, in the order of their directions: first displacements, then rotations."""
 
     name: str
-    dim: int
-    displacements: tuple[int, ...]
-    rotations: tuple[int, ...]
+    dim: int  # coordinates of a node that the matrix tells
+    displacements: tuple[int, ...]  # axis of each; direction k of a node is ``displacements[k]``
+    rotations: tuple[int, ...]  # axis of each; none where nodes have displacements only
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -44,28 +33,12 @@ class Layout:
         return self.rotations or tuple(axis for axis in range(3) if self.turned(axis))
 
     @property
-    def free(self) -> int:
-        """Fields of coordinates that no matrix determines: translations and, without rotations, the size."""
-        return self.dim + (not self.rotations)
-
-    @property
     def space(self) -> int:
         """Coordinates of a node: those that the matrix does not tell are zero."""
         return self.dim if self.dim > 1 else 3
 
-    @property
-    def twisting(self) -> float:
-        """Share of the rotations that a straight line of members annihilates: that about its own axis."""
-        return max(axis < self.dim for axis in self.rotations) / len(self.rotations)
-
     def turned(self, axis: int) -> list[tuple[int, int, int]]:
-        """What a unit rotation about an axis does: the displacement e_axis x point, term by term.
-
-        Returns
-        -------
-        list of (direction, coordinate, sign)
-            The displacement of this direction is sign times the coordinate.
-        """
+        """Unit rotation about an axis: (direction, coordinate, sign) of displacements, sign times the coordinate."""
         after, last = (axis + 1) % 3, (axis + 2) % 3
         terms = ((after, last, -1), (last, after, 1))
         return [

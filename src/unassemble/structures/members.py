@@ -6,48 +6,72 @@ shell element transmits does not. So each pair of coupled nodes tells what it is
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elements.shells import graph_of, shell_cells
+from ..elements.cliques import Graph, shared_cliques, simplices
 from ..nodes.constants import row_sizes
 from ..nodes.nodal import determined
 from ..tolerances import CANCELLED
 from .layouts import PLANE
 from .nodes import Nodes
+from .straight import blocks_at
 
-MOST_PER_NODE = 4  # triangles of surfaces, of which two are a quadrilateral: by Euler two a node, more where they meet
+_FLAT = 0.3  # of its width: how thick a quadrilateral may be
+_MOST_PER_NODE = 4  # triangles of surfaces, of which two are a quadrilateral: by Euler two a node, more where they meet
 
 
 def members_and_cells(nodes: Nodes, points: NDArray[np.float64], allowed: float) -> dict[str, NDArray[np.int64]]:
     """Straight members between two nodes, and triangles and quadrilaterals between more.
 
-    Cells are cliques of pairs that are no members; a pair of which none is part of a cell is a member too.
-
-    Parameters
-    ----------
-    nodes : Nodes
-    points : (n, d) float64
-        NaN where not determined.
-    allowed : float
-        What is left of forces that balance, relative to them.
-
-    Returns
-    -------
-    dict
-        ``lines`` (m, 2), ``triangles`` (m, 3) and ``quads`` (m, 4): corners in order around the cell; in the plane
-        counter-clockwise.
+    Cells are cliques of pairs that are no members; a pair of which none is part of a cell is a member too. What is
+    `allowed` may be left of forces that balance. Returns ``lines`` (m, 2), ``triangles`` (m, 3) and ``quads`` (m, 4):
+    corners in order around the cell; in the plane counter-clockwise.
     """
     pairs = np.column_stack(sp.triu(nodes.graph, 1).nonzero()).astype(np.int64)
     pairs = pairs[determined(points)[pairs].all(axis=1)]
     alone = np.logical_and(*_balanced(nodes, points, pairs[:, 0], pairs[:, 1], allowed))
-    triangles, quads = shell_cells(graph_of(nodes.n, pairs[~alone]), points)
-    if len(triangles) + 2 * len(quads) > MOST_PER_NODE * nodes.n:  # faces of solids, and planes through them
+    graph = _graph_of(nodes.n, pairs[~alone])
+    quads, triangles = _around(points, shared_cliques(graph, 4)), simplices(graph, 2)
+    inside = _graph_of(nodes.n, quads).cliques(triangles)  # all sides are those of quadrilaterals, or diagonals
+    triangles = _counter_clockwise(points, triangles[~inside])
+    if len(triangles) + 2 * len(quads) > _MOST_PER_NODE * nodes.n:  # faces of solids, and planes through them
         triangles, quads = triangles[:0], quads[:0]
     else:
-        alone |= ~graph_of(nodes.n, triangles, quads).coupled(*pairs.T)
+        alone |= ~_graph_of(nodes.n, triangles, quads).coupled(*pairs.T)
     return {"lines": pairs[alone], "triangles": triangles, "quads": quads}
+
+
+def _graph_of(n: int, *cells: NDArray[np.int64]) -> Graph:
+    """The graph of n nodes in which those of each cell, (m, k), are coupled to each other."""
+    pairs = [some[:, pair] for some in cells for pair in combinations(range(some.shape[1]), 2)]
+    return Graph.of(n, *np.concatenate(pairs).T)
+
+
+def _around(points: NDArray[np.float64], cliques: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Those of four nodes that lie around a flat quadrilateral, in order."""
+    if not len(cliques):
+        return cliques
+    x = points[cliques] - points[cliques].mean(axis=1, keepdims=True)
+    _, size, axes = np.linalg.svd(x, full_matrices=False)
+    flat = size[:, 1] > 0
+    if points.shape[1] == 3:
+        flat &= size[:, 2] <= _FLAT * size[:, 1]
+    across = x @ axes[:, :2].transpose(0, 2, 1)
+    order = np.argsort(np.arctan2(across[..., 1], across[..., 0]), axis=1)
+    return _counter_clockwise(points, np.take_along_axis(cliques, order, axis=1)[flat])
+
+
+def _counter_clockwise(points: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Cells in the plane turned to run counter-clockwise; those in space as they are."""
+    if points.shape[1] == 3 or not len(cells):
+        return cells
+    first, second = points[cells[:, 1]] - points[cells[:, 0]], points[cells[:, -1]] - points[cells[:, 0]]
+    clockwise = first[:, 0] * second[:, 1] < first[:, 1] * second[:, 0]
+    return np.where(clockwise[:, None], cells[:, ::-1], cells)
 
 
 def mispaired(
@@ -60,17 +84,8 @@ def mispaired(
     directions or in none. In space each coordinate acts on two directions, which contradict each other where their rows
     are not one node's; the coordinates of a plate act on one direction. Those of a plane frame have a direction each,
     so that all depends on the pairing: its nodes have to be joined by members, and no two of them to have the same
-    neighbours. What was condensed joins the nodes next to it otherwise; these need a member to another node.
-
-    Parameters
-    ----------
-    nodes : Nodes
-    points : (n, dim) float64
-        NaN where not determined.
-    inner : (n,) bool
-        Nodes whose forces are not touched by supports, or by what was condensed.
-    allowed : float
-        What is left of forces that balance, relative to them.
+    neighbours. What was condensed joins the nodes next to it otherwise; these need a member to another node. `inner`
+    (n,) are nodes whose forces are touched neither by supports nor by what was condensed.
     """
     n, b = nodes.n, nodes.layout.block_size
     coo, size = nodes.matrix.tocoo(), np.minimum(np.abs(nodes.matrix.diagonal()), row_sizes(nodes.matrix))
@@ -108,10 +123,7 @@ def _balanced(nodes: Nodes, points: NDArray, i: NDArray, j: NDArray, allowed: fl
     j, T^T A_ij is minus the member's own block of node j, and symmetric.
     """
     b = nodes.layout.block_size
-    every, place = np.arange(b), b * np.column_stack([i, j])
-    rows, columns = place[:, 0, None, None] + every[:, None], place[:, 1, None, None] + every
-    block = np.asarray(nodes.matrix[np.broadcast_to(rows, (len(i), b, b)).ravel(),
-                                    np.broadcast_to(columns, (len(i), b, b)).ravel()]).reshape(-1, b, b)  # fmt: skip
+    block = blocks_at(nodes.matrix, b * i, b * j, b)
     turn = nodes.layout.rigid_motions(points[i] - points[j]).transpose(0, 2, 1)
     left = turn @ block
     left = np.pad(left, ((0, 0), (0, 0), (0, left.shape[1] - left.shape[2])))  # what no rotation takes up has to vanish

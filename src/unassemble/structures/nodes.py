@@ -16,20 +16,11 @@ from .layouts import Layout
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """Unknowns of a matrix by node and direction.
-
-    Attributes
-    ----------
-    layout : Layout
-    matrix : (n b, n b) sparse
-        Row ``i b + k`` belongs to direction k of node i; empty where the matrix has no such unknown.
-    row_of : (n, b) int64
-        Row of the given matrix, -1 where there is none, or only that of an identity.
-    """
+    """Unknowns of a matrix by node and direction."""
 
     layout: Layout
-    matrix: sp.csr_array
-    row_of: NDArray[np.int64]
+    matrix: sp.csr_array  # row ``i b + k`` is direction k of node i; empty where there is no such unknown
+    row_of: NDArray[np.int64]  # (n, b) of the given matrix; -1 where there is none, or only that of an identity
 
     @property
     def n(self) -> int:
@@ -44,14 +35,10 @@ class Nodes:
     @cached_property
     def graph(self) -> sp.csr_array:
         """(n, n) pattern of coupled nodes, with the diagonal."""
-        return self._pattern(self.layout.block_size)
+        return self.pattern(self.layout.block_size)
 
-    @cached_property
-    def moving(self) -> sp.csr_array:
-        """(n, n) pattern of nodes whose displacements are coupled, with the diagonal."""
-        return self._pattern(len(self.layout.displacements))
-
-    def _pattern(self, directions: int) -> sp.csr_array:
+    def pattern(self, directions: int) -> sp.csr_array:
+        """(n, n) pattern of nodes coupled in the first of their directions, with the diagonal."""
         coo, b, own = self.matrix.tocoo(), self.layout.block_size, np.arange(self.n)
         some = (coo.row % b < directions) & (coo.col % b < directions)
         place = np.concatenate([coo.row[some] // b, own]), np.concatenate([coo.col[some] // b, own])
@@ -81,7 +68,9 @@ class Nodes:
         size = np.column_stack([abs(part).sum(axis=1) for part in columns])
         zero = (np.abs(sums) <= CANCELLED * size).reshape(self.n, b, b)
         lacking = self.graph @ (~self.present).astype(np.int32) > 0
-        sound: NDArray[np.bool_] = self.present & ~self._penalised()
+        diagonal = np.abs(self.matrix.diagonal()).reshape(self.n, b)
+        penalised = diagonal > PENALTY * (size.reshape(self.n, b, b).sum(axis=2) - diagonal)
+        sound: NDArray[np.bool_] = self.present & ~penalised
         still = np.asarray(zero[:, :moves, :moves].all(axis=(1, 2)) & sound[:, :moves].all(axis=1))
         sound[:, :moves] &= zero[:, range(moves), range(moves)]
         sound[:, moves:] &= still[:, None]
@@ -92,23 +81,9 @@ class Nodes:
             valid[:, :, k] = zero[:, :, across].all(axis=2) & sound & ~lacking[:, needed].any(axis=1)[:, None]
         return valid
 
-    def _penalised(self) -> NDArray[np.bool_]:
-        """(n, b) unknowns with a penalty on the diagonal."""
-        diagonal = np.abs(self.matrix.diagonal())
-        rest = np.asarray(abs(self.matrix).sum(axis=1)).ravel() - diagonal
-        return np.asarray((diagonal > PENALTY * rest).reshape(self.n, -1))
-
 
 def nodes_of(matrix: sp.csr_array, layout: Layout, node: NDArray[np.int64], direction: NDArray[np.int64]) -> Nodes:
-    """Order a matrix by nodes; entries that are rounding and rows of the identity are left out.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-    layout : Layout
-    node, direction : (N,) int64
-        Rows whose direction is -1 are left out, as if they had been eliminated.
-    """
+    """Order a matrix by nodes; entries that are rounding, rows of the identity and of direction -1 are left out."""
     b = layout.block_size
     coo = matrix.tocoo()
     diagonal = np.abs(matrix.diagonal())

@@ -4,100 +4,52 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
+import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..budget import REFINEMENTS
 from ..errors import GeometryError
+from ..linalg import Factorisation, UpperTriangle, nearly_singular
+from ..linalg.definite import STEPS
 from ..nodes.nodal import determined
-from ..nodes.numbering import Numbering
+from ..nodes.shape import MOST_FIELDS, in_gauge, shape
 from ..recovery import Evidence
-from ..tolerances import CERTIFIED
+from ..tolerances import CERTIFIED, LAST_DIGITS, SINGULAR
 from ..words import count_of
-from .recognise import StructuralNumbering
+
+_PROBES = 3
 
 
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """Equations that share no node with others.
+class Piece(NamedTuple):
+    """Equations that share no node with others."""
 
-    Attributes
-    ----------
-    nodes : (k,) int64
-        Increasing.
-    rows : (m,) int64
-        Of the equations of all pieces.
-    operator : (m, k d) sparse
-    edges : (e, 2) int64
-        Coupled nodes, by their place in `nodes`.
-    """
-
-    nodes: NDArray[np.int64]
-    rows: NDArray[np.int64]
-    operator: sp.csr_array
-    edges: NDArray[np.int64]
+    nodes: NDArray[np.int64]  # (k,), increasing
+    rows: NDArray[np.int64]  # (m,) of the equations of all pieces
+    operator: sp.csr_array  # (m, k d)
+    edges: NDArray[np.int64]  # (e, 2) coupled nodes, by their place in `nodes`
 
 
-@dataclass(frozen=True, eq=False)
-class Positions:
-    """Coordinates of one piece.
-
-    Attributes
-    ----------
-    points : (n, d) float64
-        Centroid at the origin; NaN where loose.
-    evidence : Evidence
-    unnoticed : (m,) bool
-        Equations that a disturbance would change without being noticed; see :mod:`.redundancy`.
-    """
-
-    points: NDArray[np.float64]
-    evidence: Evidence
-    unnoticed: NDArray[np.bool_]
+# Points (k, d) of a piece, NaN where loose, its evidence, and equations (m,) that a disturbance would change without
+# being noticed; see :mod:`.turning`.
+Solve = Callable[[Piece], tuple[NDArray[np.float64], Evidence, NDArray[np.bool_]]]
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """Positions of the nodes of all pieces.
+    """Positions of the nodes of all pieces."""
 
-    Attributes
-    ----------
-    points : (n, d) float64
-        NaN where not determined.
-    component : (n,) int64
-        Piece of each node, -1 where not determined.
-    evidence : tuple of Evidence
-        One per piece.
-    used : (m,) bool
-        Equations that these positions rest on.
-    unnoticed : (m,) bool
-        Those of them that a disturbance would change without being noticed.
-    notes : tuple of str
-    spoiled : (k,) int64
-        Nodes whose rows contradict the others, and were left out.
-    """
-
-    points: NDArray[np.float64]
-    component: NDArray[np.int64]
-    evidence: tuple[Evidence, ...]
-    used: NDArray[np.bool_]
-    unnoticed: NDArray[np.bool_]
-    notes: tuple[str, ...]
+    points: NDArray[np.float64]  # (n, d), NaN where not determined
+    component: NDArray[np.int64]  # (n,) piece of each node, -1 where not determined
+    evidence: tuple[Evidence, ...]  # one per piece
+    used: NDArray[np.bool_]  # (m,) equations that these positions rest on
+    unnoticed: NDArray[np.bool_]  # (m,) those of them that a disturbance would change without being noticed
+    notes: tuple[str, ...] = ()
+    # nodes whose rows contradict the others, and were left out
     spoiled: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
-
-    def fields(self, numbering: Numbering | StructuralNumbering) -> dict[str, Any]:
-        """What every structure's recovery says of nodes, rows and pieces."""
-        return {
-            "component": self.component,
-            "scale": np.full(len(self.evidence), np.nan),
-            "node_status": (self.component < 0).astype(np.int8),
-            "evidence": self.evidence,
-            "node_of_row": numbering.node_of_row,
-            "direction_of_row": numbering.direction_of_row,
-            "numbering": numbering.kind,
-        }
 
     @property
     def residual(self) -> float:
@@ -111,122 +63,71 @@ class Placed:
 
 
 def without_free(found: Placed, most: int) -> Placed:
-    """Positions of the pieces whose null space has no larger dimension; of others they mean nothing.
-
-    Raises
-    ------
-    GeometryError
-        If no piece is left.
-    """
-    free = [k for k, one in enumerate(found.evidence) if one.null_dimension > most]
-    if not free:
+    """Positions of pieces whose null space has no larger dimension: others mean nothing. GeometryError for none."""
+    free = np.array([one.null_dimension > most for one in found.evidence])
+    if not free.any():
         return found
-    largest = found.null_dimension
-    said = f"the null space has dimension {largest} where {most} is expected"
-    if len(free) == len(found.evidence):
+    said = f"the null space has dimension {found.null_dimension} where {most} is expected"
+    if free.all():
         raise GeometryError(
             f"no positions were found: {said}. Supports leave too few whole rows, or unknowns of nodes are along axes "
             "of their own, as in cylindrical coordinates"
         )
-    kept = np.setdiff1d(np.arange(len(found.evidence)), free)
-    place = np.full(len(found.evidence) + 1, -1)
-    place[kept] = np.arange(len(kept))
+    place = np.append(np.where(free, -1, np.cumsum(~free) - 1), -1)
     component = place[found.component]
     return replace(
         found,
         points=np.where(component[:, None] < 0, np.nan, found.points),
         component=component,
-        evidence=tuple(found.evidence[k] for k in kept),
-        notes=(*found.notes, f"{said} in {count_of(len(free), 'piece')}, which were left out"),
+        evidence=tuple(one for one in found.evidence if one.null_dimension <= most),
+        notes=(*found.notes, f"{said} in {count_of(int(free.sum()), 'piece')}, which were left out"),
     )
 
 
-def covered(rows: NDArray[np.bool_], columns: NDArray[np.bool_]) -> str:
-    """How much of a matrix speaks for the coordinates, in words: masks of its rows, and of the unknowns they touch."""
-    return f"{rows.mean():.0%} of the rows say so, of {columns.mean():.0%} of the unknowns"
-
-
 def placed(
-    operator: sp.csr_array,
-    d: int,
-    edges: NDArray[np.int64],
-    solve: Callable[[Piece], Positions],
-    allowed: float = CERTIFIED,
+    operator: sp.csr_array, d: int, edges: NDArray[np.int64], solve: Solve, allowed: float = CERTIFIED
 ) -> Placed:
     """Positions from equations that others would contradict; where too few are left, or all contradict, from all.
 
-    Equations that would be disturbed without being noticed are left out, and what only they determine with them.
-
-    Parameters
-    ----------
-    operator : (m, n d) sparse
-    d : int
-    edges : (e, 2) int64
-        Coupled nodes.
-    solve : callable
-        Positions of one piece.
-    allowed : float
-        Residual up to which equations do not contradict each other.
-
-    Raises
-    ------
-    GeometryError
-        If no node is determined.
+    Equations (m, n d) that would be disturbed without being noticed are left out, and what only they determine with
+    them; they contradict each other if residuals exceed what is `allowed`. GeometryError if no node is determined.
     """
-    best = every = _placed(operator, d, edges, solve, np.ones(operator.shape[0], dtype=bool))
+
+    def from_those(used: NDArray[np.bool_]) -> Placed:
+        n = operator.shape[1] // d
+        points, component = np.full((n, d), np.nan), np.full(n, -1)
+        unnoticed, notes = np.zeros(len(used), dtype=bool), []
+        evidence: list[Evidence] = []
+        failure: GeometryError | None = None
+        for piece in pieces(operator, d, edges, np.flatnonzero(used)):
+            try:
+                points[piece.nodes], one, unnoticed[piece.rows] = solve(piece)
+            except GeometryError as error:
+                failure = failure or error
+                notes.append(f"the piece with node {piece.nodes[0]}: {error}")
+                continue
+            component[piece.nodes[determined(points[piece.nodes])]] = len(evidence)
+            evidence.append(one)
+        if not evidence:
+            raise failure or GeometryError("no node has an equation that supports leave whole")
+        return Placed(points, component, tuple(evidence), used, unnoticed, tuple(notes))
+
+    best = every = from_those(np.ones(operator.shape[0], dtype=bool))
     while best.residual <= allowed and best.unnoticed.any():
         try:
-            best = _placed(operator, d, edges, solve, best.used & ~best.unnoticed)
+            best = from_those(best.used & ~best.unnoticed)
         except GeometryError:
             return every
     return best if best.null_dimension <= every.null_dimension else every
 
 
-def _placed(
-    operator: sp.csr_array,
-    d: int,
-    edges: NDArray[np.int64],
-    solve: Callable[[Piece], Positions],
-    used: NDArray[np.bool_],
-) -> Placed:
-    n = operator.shape[1] // d
-    points, component = np.full((n, d), np.nan), np.full(n, -1)
-    unnoticed = np.zeros(len(used), dtype=bool)
-    found: list[Positions] = []
-    notes: list[str] = []
-    failure: GeometryError | None = None
-    for piece in pieces(operator, d, edges, np.flatnonzero(used)):
-        try:
-            one = solve(piece)
-        except GeometryError as error:
-            failure = failure or error
-            notes.append(f"the piece with node {piece.nodes[0]}: {error}")
-            continue
-        points[piece.nodes] = one.points
-        component[piece.nodes[determined(one.points)]] = len(found)
-        unnoticed[piece.rows] = one.unnoticed
-        found.append(one)
-    if not found:
-        raise failure or GeometryError("no node has an equation that supports leave whole")
-    return Placed(points, component, tuple(one.evidence for one in found), used, unnoticed, tuple(notes))
-
-
 def pieces(
     operator: sp.csr_array, d: int, edges: NDArray[np.int64], rows: NDArray[np.int64] | None = None
 ) -> Iterator[Piece]:
-    """Connected pieces, in the order of their first nodes; nodes in no equation are in none.
+    """Connected pieces, in the order of their first nodes, of equations (m, n d); nodes in no equation are in none.
 
-    The work is that of one pass over the equations, however many pieces there are.
-
-    Parameters
-    ----------
-    operator : (m, n d) sparse
-    d : int
-        Coordinates of a node.
-    edges : (e, 2) int64
-        Coupled nodes; those of different pieces are left out.
-    rows : (k,) int64, optional
-        The equations to use; all by default.
+    The work is that of one pass over the equations, however many pieces there are. Coupled nodes, `edges` (e, 2), of
+    different pieces are left out; `rows` (k,) are the equations to use, all by default.
     """
     rows = np.arange(operator.shape[0]) if rows is None else rows
     operator = sp.csr_array(operator[rows])
@@ -236,9 +137,8 @@ def pieces(
     incidence = sp.csr_array((np.ones(len(node), np.int8), (row, m + node)), shape=(m + n, m + n))
     count, label = sp.csgraph.connected_components(incidence, directed=False)
     of_row, of_node = label[:m], label[m:]
-    bodies, equations = _groups(of_node, count), _groups(of_row, count)
     inside = edges[of_node[edges[:, 0]] == of_node[edges[:, 1]]]
-    links = _groups(of_node[inside[:, 0]], count)
+    bodies, equations, links = (_groups(one, count) for one in (of_node, of_row, of_node[inside[:, 0]]))
     place = np.empty(n, np.int64)
     for body in bodies:
         place[body] = np.arange(len(body))
@@ -246,8 +146,7 @@ def pieces(
     for k in sorted(used, key=lambda k: bodies[k][0]):
         part = sp.csr_array(operator[equations[k]])
         columns = place[part.indices // d] * d + part.indices % d
-        shape = (len(equations[k]), len(bodies[k]) * d)
-        local = sp.csr_array((part.data, columns, part.indptr), shape=shape)
+        local = sp.csr_array((part.data, columns, part.indptr), shape=(len(equations[k]), len(bodies[k]) * d))
         yield Piece(bodies[k], rows[equations[k]], local, place[inside[links[k]]])
 
 
@@ -255,3 +154,59 @@ def _groups(label: NDArray, count: int) -> list[NDArray[np.int64]]:
     """Indices of each label, increasing."""
     order = np.argsort(label, kind="stable")
     return np.split(order, np.cumsum(np.bincount(label, minlength=count))[:-1])
+
+
+def up_to_size(piece: Piece, d: int) -> tuple[NDArray[np.float64], Evidence, NDArray[np.float64]]:
+    """Points of a piece whose equations leave the size free, evidence, and residuals (m, k) of random right-hand sides.
+
+    GeometryError if more is free than translations and size.
+    """
+    n, m = len(piece.nodes), len(piece.rows)
+    _, residuals, fields, values, gap = least_squares(piece.operator, np.zeros(m), d)
+    one = shape(fields, values, np.zeros(n, dtype=bool))
+    links = sp.csr_array((np.ones(len(piece.edges)), piece.edges.T), shape=(n, n))
+    return in_gauge(one.points, links), Evidence(one.dimension, float(values[d]), gap, m), residuals[:, 1:]
+
+
+def least_squares(
+    operator: sp.csr_array, right: NDArray[np.float64], d: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]:
+    """Solve equations for n nodes with d coordinates each, and see what they leave free and which of them are spare.
+
+    The solution (n d,), without what is free; residuals (m, k) of the right-hand side and of random ones; orthonormal
+    fields (n, d, k), all null fields and some more, and their singular values, increasing; and the least of these that
+    is none of a null field. GeometryError if far more is free than translations and enlargements.
+    """
+    random = np.random.default_rng(0).standard_normal((len(right), _PROBES))
+    sides = np.column_stack([right, random])
+    normal = operator.T @ operator
+    stored = sp.eye_array(normal.shape[0]) * np.finfo(float).tiny  # coordinates in no equation have a diagonal too
+    with nearly_singular(UpperTriangle.of(sp.csr_array(normal + stored))) as solver:
+        fields, values = _least_fields(operator, solver, d)
+        free = fields[..., values <= SINGULAR].reshape(operator.shape[1], -1)
+        x = np.zeros((operator.shape[1], sides.shape[1]))
+        for _ in range(REFINEMENTS):
+            step = solver.solve(operator.T @ (sides - operator @ x))
+            step -= free @ (free.T @ step)
+            x += step
+            if np.abs(step[:, 0]).max() <= LAST_DIGITS * np.abs(x[:, 0]).max():
+                break
+    gap = float(values[values > SINGULAR].min(initial=np.inf))
+    return x[:, 0], sides - operator @ x, fields, values, gap
+
+
+def _least_fields(operator: sp.csr_array, solver: Factorisation, d: int) -> tuple[NDArray, NDArray]:
+    """Fields (n, d, k) that the operator maps to least, and their singular values."""
+    order = operator.shape[1]
+    count = min(4 * d, order)
+    while True:
+        x = np.random.default_rng(0).standard_normal((order, count))
+        for _ in range(STEPS):
+            x = np.linalg.qr(solver.solve(x))[0]
+        _, values, v = scipy.linalg.svd(np.linalg.qr(operator @ x, mode="r"))
+        values = np.concatenate([values, np.zeros(count - len(values))])[::-1]
+        if values[-1] > SINGULAR or count == order:
+            return (x @ v[::-1].T).reshape(-1, d, count), values
+        if count >= MOST_FIELDS:
+            raise GeometryError("the equations away from supports leave most of the structure free")
+        count = min(2 * count, order)

@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 
 from ..budget import SAMPLE
 from ..errors import InputError
-from ..nodes.grouping import by_first_row
-from ..nodes.likeness import pattern_of
+from ..nodes.grouping import by_first_row, pattern_of
 from ..nodes.orders import ORDERS, regular
 from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST
 from .layouts import LAYOUTS, SOLIDS, SPACE, Layout
-from .runs import shortest_runs
 from .straight import shown_by_members
 
 # On regular meshes some of a solid's rows annihilate whatever is asked; read as what it is it has more of them.
@@ -29,23 +27,13 @@ _KNOWN = (*SOLIDS.values(), *LAYOUTS)
 
 @dataclass(frozen=True, eq=False)
 class StructuralNumbering:
-    """Nodes and directions of the rows of a structure's matrix.
-
-    Attributes
-    ----------
-    layout : Layout
-    node_of_row, direction_of_row : (N,) int64
-        A direction of -1 is not known.
-    kind : {"interleaved", "by component", "given"}
-    share : float
-        Share of the rows that annihilate all translations.
-    """
+    """Nodes and directions of the rows of a structure's matrix."""
 
     layout: Layout
     node_of_row: NDArray[np.int64]
-    direction_of_row: NDArray[np.int64]
-    kind: str
-    share: float
+    direction_of_row: NDArray[np.int64]  # -1 where it is not known
+    kind: str  # "interleaved", "by component" or "given"
+    share: float  # of the rows, that annihilate all translations
 
     @property
     def n_nodes(self) -> int:
@@ -56,6 +44,11 @@ class StructuralNumbering:
     def block_size(self) -> int:
         """Unknowns per node."""
         return self.layout.block_size
+
+    @property
+    def told(self) -> float:
+        """Share of all rows whose direction is known and that annihilate translations."""
+        return float(self.share * np.mean(self.direction_of_row >= 0))
 
 
 def find_structure(
@@ -70,18 +63,15 @@ def find_structure(
     kind : {None, "interleaved", "by component"}
     block_size : int, optional
     """
-    orders = ORDERS if kind is None else (kind,)
-    sizes = {layout.block_size for layout in _KNOWN}
-    usual = {
-        (b, name): regular(matrix.shape[0], b, name)
-        for b in sizes
-        for name in orders
-        if matrix.shape[0] % b == 0 and matrix.shape[0] >= 2 * b
+    order, orders = matrix.shape[0], ORDERS if kind is None else (kind,)
+    sizes = {
+        layout.block_size for layout in _KNOWN if order % layout.block_size == 0 and order >= 2 * layout.block_size
     }
+    usual = {(b, name): regular(order, b, name) for b in sizes for name in orders}
     best = _best(matrix, usual, block_size)
     if (best is None or best.share < MOST) and kind != "by component" and matrix.diagonal().all():
         other = _best(matrix, {(b, "interleaved"): _with_gaps(matrix, b) for b in (3, 6)}, block_size)
-        best = max((one for one in (best, other) if one is not None), key=_rows_told, default=None)
+        best = max((one for one in (best, other) if one is not None), key=lambda one: one.told, default=None)
         if best is other and best is not None and best.layout.rotations:
             best = _continued(matrix, best)
     return _beside(matrix, best) if best is not None and best.layout.rotations else None
@@ -103,24 +93,17 @@ def _beside(matrix: sp.csr_array, one: StructuralNumbering) -> StructuralNumberi
 
 def _best(
     matrix: sp.csr_array,
-    numberings: Mapping[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.int64]] | None],
+    numberings: Mapping[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.int64]]],
     block_size: int | None,
 ) -> StructuralNumbering | None:
     """The layout and the numbering, by its block size and name, with most rows that annihilate translations."""
-    best, most = None, HARDLY_ANY
-    for layout in _KNOWN:
-        for (b, name), numbering in numberings.items():
-            if numbering is None or layout.block_size != b or block_size not in (None, b):
-                continue
-            one = StructuralNumbering(layout, *numbering, name, _share(matrix, layout, numbering[1]))
-            if _rows_told(one) > most:
-                best, most = one, _rows_told(one)
-    return best
-
-
-def _rows_told(one: StructuralNumbering) -> float:
-    """Share of all rows whose direction is known and that annihilate translations."""
-    return float(one.share * np.mean(one.direction_of_row >= 0))
+    found = [
+        StructuralNumbering(layout, *numbering, name, _share(matrix, layout, numbering[1]))
+        for layout in _KNOWN
+        for (b, name), numbering in numberings.items()
+        if layout.block_size == b and block_size in (None, b)
+    ]
+    return max((one for one in found if one.told > HARDLY_ANY), key=lambda one: one.told, default=None)
 
 
 def given_structure(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> StructuralNumbering | None:
@@ -145,13 +128,9 @@ def given_structure(matrix: sp.csr_array, node: NDArray, direction: NDArray) -> 
     if len(np.unique(node * size + direction)) < len(node):
         return None
     fitting = [layout for layout in LAYOUTS if layout.block_size == size]
-    shares = [_share(matrix, layout, direction) for layout in fitting]
-    if size != SPACE.block_size and max(shares, default=0) <= HARDLY_ANY:
-        return None
-    if not fitting:
-        return None
-    best = int(np.argmax(shares))
-    return StructuralNumbering(fitting[best], node, direction, "given", shares[best])
+    found = [StructuralNumbering(one, node, direction, "given", _share(matrix, one, direction)) for one in fitting]
+    best = max(found, key=lambda one: one.share, default=None)
+    return best if best and (size == SPACE.block_size or best.share > HARDLY_ANY) else None
 
 
 def _share(matrix: sp.csr_array, layout: Layout, direction: NDArray) -> float:
@@ -177,7 +156,10 @@ def _share(matrix: sp.csr_array, layout: Layout, direction: NDArray) -> float:
     tells = coupled[:, :moves].any(axis=1)
     kinds = [kind & tells for kind in (turning, ~turning) if kind.any()]
     share = float(min(good[kind].mean() if kind.any() else 0.0 for kind in kinds))
-    return 0.0 if layout.rotations and own[turning].mean() > (LITTLE + layout.twisting) * share else share
+    if not layout.rotations:
+        return share
+    twisting = max(axis < layout.dim for axis in layout.rotations) / len(layout.rotations)  # a line, about its own axis
+    return 0.0 if own[turning].mean() > (LITTLE + twisting) * share else share
 
 
 def directions_with_gaps(matrix: sp.csr_array) -> Iterator[tuple[NDArray[np.int64], int]]:
@@ -188,24 +170,52 @@ def directions_with_gaps(matrix: sp.csr_array) -> Iterator[tuple[NDArray[np.int6
 
 
 def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Nodes of rows that stand node by node, where some nodes lack unknowns.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-    b : int
-        Unknowns of a whole node.
-
-    Returns
-    -------
-    node : (N,) int64
-    direction : (N,) int64
-        -1 for rows of nodes that lack unknowns: which ones, is not told.
-    """
+    """Nodes and directions (N,) of rows that stand node by node; -1 for those of nodes that lack some of b unknowns."""
     shown = [shown_by_members(matrix, layout) for layout in LAYOUTS if layout.block_size == b]
-    node = shortest_runs(matrix, b, np.any(shown, axis=0))
+    node = _shortest_runs(matrix, b, np.any(shown, axis=0))
     within = np.arange(len(node)) - np.searchsorted(node, node)
     return node, np.where(np.bincount(node)[node] == b, within, -1)
+
+
+def _shortest_runs(matrix: sp.csr_array, most: int, begins: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(N,) nodes of neighbouring rows, each of at most so many; a node of so many `begins` with some rows, (N,).
+
+    A matrix cut into nodes is written down with one index for each unknown that a node couples to, and one number for
+    each of its own unknowns beside it. Rows of one node couple to nearly the same unknowns, so that hardly a number is
+    a zero and the indices are shared; rows of two nodes share few. The shortest description is found by dynamic
+    programming. What it takes for one node is one unknown to couple to for the next, as long as fewer nodes come of it:
+    rows of nodes some of whose directions are not coupled, as in flat shells along an axis, meet the same nodes.
+    """
+    order = matrix.shape[0]
+    pattern = sp.csr_array(pattern_of(matrix))
+    node = np.arange(order)
+    while True:
+        onto = sp.csr_array((np.ones(order, np.float32), (np.arange(order), node)))
+        cut = _cut(sp.csr_array(pattern @ onto), most, begins)
+        if cut[-1] >= node[-1]:
+            return node
+        node = cut
+
+
+def _cut(pattern: sp.csr_array, most: int, begins: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(N,) runs of rows for which (columns in any of them) (rows + 1) is least in all; those known cost nothing."""
+    order = pattern.shape[0]
+    cost = np.full((order, most), np.inf)
+    union = pattern
+    for k in range(min(most, order)):
+        if k:
+            union = sp.csr_array(union[:-1] + pattern[k:])
+        cost[: order - k, k] = (k + 2.0) * np.diff(union.indptr)
+    cost[np.flatnonzero(begins), most - 1] = 0
+    least, length = np.zeros(order + most), np.ones(order, dtype=np.int64)
+    for row in range(order - 1, -1, -1):
+        ways = cost[row] + least[row + 1 : row + 1 + most]
+        length[row] = ways.argmin() + 1
+        least[row] = ways[length[row] - 1]
+    starts = [0]
+    while starts[-1] < order:
+        starts.append(starts[-1] + int(length[starts[-1]]))
+    return np.repeat(np.arange(len(starts) - 1), np.diff(starts))
 
 
 def _continued(matrix: sp.csr_array, one: StructuralNumbering) -> StructuralNumbering:

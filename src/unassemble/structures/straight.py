@@ -26,20 +26,11 @@ from .nodes import Nodes
 
 @dataclass(frozen=True, eq=False)
 class Straight:
-    """Members that their blocks tell.
+    """Members that their blocks tell."""
 
-    Attributes
-    ----------
-    ends : (m, 2) int64
-        Nodes, the lesser first.
-    vectors : (m, dim) float64
-        Position of the first less that of the second.
-    blocks : (m, b, b) float64
-    """
-
-    ends: NDArray[np.int64]
-    vectors: NDArray[np.float64]
-    blocks: NDArray[np.float64]
+    ends: NDArray[np.int64]  # (m, 2) nodes, the lesser first
+    vectors: NDArray[np.float64]  # (m, dim) position of the first less that of the second
+    blocks: NDArray[np.float64]  # (m, b, b)
 
 
 def straight_members(nodes: Nodes, allowed: float = SUMMED, ends: NDArray[np.int64] | None = None) -> Straight:
@@ -62,13 +53,7 @@ def straight_members(nodes: Nodes, allowed: float = SUMMED, ends: NDArray[np.int
 
 
 def told_by_blocks(blocks: NDArray[np.float64], layout: Layout) -> NDArray[np.float64]:
-    """(m, dim) position of the first node less that of the second, as V = U D / 2 has it; zero where it tells nothing.
-
-    Parameters
-    ----------
-    blocks : (m, b, b) float64
-    layout : Layout
-    """
+    """(m, dim) position of the first node less that of the second, as V = U D / 2 has it; zero where none is told."""
     moves = len(layout.displacements)
     size = np.abs(blocks).max(axis=(1, 2), initial=0, keepdims=True)
     blocks = blocks / np.where(size > 0, size, 1)
@@ -83,12 +68,6 @@ def misfits(blocks: NDArray[np.float64], vectors: NDArray[np.float64], layout: L
     """(m,) how far blocks are from those of members along given vectors, relative to the size of each part.
 
     Infinite, or no number, where a block does not couple displacements to rotations, or the vector vanishes.
-
-    Parameters
-    ----------
-    blocks : (m, b, b) float64
-    vectors : (m, dim) float64
-    layout : Layout
     """
     moves = len(layout.displacements)
     lever = layout.rigid_motions(vectors)[:, :moves, moves:]
@@ -122,13 +101,7 @@ def _relative(off: NDArray, part: NDArray) -> NDArray[np.float64]:
 
 
 def shown_by_members(matrix: sp.csr_array, layout: Layout) -> NDArray[np.bool_]:
-    """(N,) rows with which a node begins whose unknowns stand in order: those of members show it.
-
-    Parameters
-    ----------
-    matrix : (N, N) sparse
-    layout : Layout
-    """
+    """(N,) rows with which a node begins whose unknowns stand in order: those of members show it."""
     order, b = matrix.shape[0], layout.block_size
     entry = matrix.tocoo()
     some = (entry.col >= entry.row + b) & (entry.col <= order - b) & (entry.data < 0)
@@ -136,15 +109,17 @@ def shown_by_members(matrix: sp.csr_array, layout: Layout) -> NDArray[np.bool_]:
     for k in range(1, len(layout.displacements)):
         some = entries_at(matrix, i + k, j + k) < 0
         i, j = i[some], j[some]
-    every = np.arange(b)
-    rows, columns = i[:, None, None] + every[:, None], j[:, None, None] + every
-    shape = (len(i), b, b)
-    blocks = entries_at(matrix, np.broadcast_to(rows, shape).ravel(), np.broadcast_to(columns, shape).ravel())
-    blocks = blocks.reshape(shape)
+    blocks = blocks_at(matrix, i, j, b)
     good = misfits(blocks, told_by_blocks(blocks, layout), layout) <= SUMMED
     begins = np.zeros(order, dtype=bool)
     begins[i[good]] = begins[j[good]] = True
     return begins
+
+
+def blocks_at(matrix: sp.csr_array, i: NDArray[np.int64], j: NDArray[np.int64], b: int) -> NDArray[np.float64]:
+    """(k, b, b) blocks of a matrix that begin with rows i and columns j."""
+    rows, columns = np.broadcast_arrays(i[:, None, None] + np.arange(b)[:, None], j[:, None, None] + np.arange(b))
+    return entries_at(matrix, rows.ravel(), columns.ravel()).reshape(-1, b, b)
 
 
 def entries_at(matrix: sp.csr_array, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -7,84 +7,122 @@ bars' directions; where the truss has enough of them, these are its translations
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from dataclasses import replace
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..clock import Clock
+from ..budget import SAMPLE
 from ..errors import GeometryError
-from ..matrix import OperatorMatrix
-from ..nodes.anchoring import anchored, checked_anchors, digits_lost, near_enough
+from ..nodes.anchoring import Request
+from ..nodes.constants import uncoupled_rows
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix
 from ..nodes.numbering import Numbering
-from ..nodes.redrawn import Known, known_to
-from ..nodes.rounded import Rounding
-from ..nodes.shape import in_gauge, shape
+from ..nodes.orders import ORDERS, regular
+from ..nodes.rounded import Known, Rounding, known_to
 from ..recovery import Evidence, Structure
-from ..tolerances import ALIKE, CERTIFIED, SINGULAR, SMALL
+from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SMALL
 from ..words import Reason, count_of
-from .bars import Bars, bars_of
-from .placed import Piece, Placed, Positions, covered, placed, without_free
-from .positions import least_squares
+from .answer import answer, covered
+from .placed import Piece, Placed, placed, up_to_size, without_free
 
 
-def serve_truss(
-    matrix: OperatorMatrix,
-    nodal: NodalMatrix,
-    numbering: Numbering,
-    bars: Bars,
-    clock: Clock,
-    *,
-    anchors: Sequence[Any] | None,
-    choice: str,
-    rounding: Rounding | None = None,
-) -> Structure:
-    """Recover a truss, up to the size of each piece.
+class Bars(NamedTuple):
+    """Bars of a truss."""
 
-    Raises
-    ------
-    InputError
-        For anchors that do not fit.
-    RecoveryError
-        If no piece is determined.
+    ends: NDArray[np.int64]  # (m, 2) nodes, the lesser first
+    directions: NDArray[np.float64]  # (m, d) unit vectors, sign arbitrary
+    known: NDArray[np.bool_]  # False where both ends lack unknowns, so that only a part of the direction shows
+    whole: NDArray[np.bool_]  # False where one end lacks unknowns
+
+
+def bars_of(nodal: NodalMatrix, allowed: float = CANCELLED) -> Bars | None:
+    """The bars, if all pairs of coupled nodes are, but for what is `allowed`, and they span space; None if not so."""
+    upper = (nodal.node < nodal.indices) & (np.abs(nodal.data).max(axis=(1, 2)) > 0)
+    blocks = nodal.data[upper]
+    if not len(blocks):
+        return None
+    some = np.linalg.svd(blocks[:SAMPLE], compute_uv=False)
+    if (some[:, 1] > allowed * some[:, 0]).any():  # mostly a solid: not worth looking at all of it
+        return None
+    i, j = nodal.node[upper].astype(np.int64), nodal.indices[upper].astype(np.int64)
+    left, size, right = np.linalg.svd(blocks)
+    if (size[:, 1] > allowed * size[:, 0]).any():
+        return None
+    whole = nodal.row_of.min(axis=1) >= 0
+    # Rows belong to i, columns to j: whichever has all its unknowns shows all of the direction.
+    directions = np.where(whole[j][:, None], right[:, 0], left[:, :, 0])
+    known = whole[i] | whole[j]
+    both = whole[i] & whole[j]
+    aligned = (left[both, :, 0] * right[both, 0]).sum(axis=1)
+    if not both.any() or np.abs(np.abs(aligned) - 1).max() > allowed:
+        return None
+    spread = np.linalg.eigvalsh(directions[known].T @ directions[known] / known.sum())
+    pulls = np.trace(blocks[both], axis1=1, axis2=2) > 0
+    if spread[0] < CANCELLED or 0 < pulls.sum() < len(pulls):  # bars all in line or in a plane; of stiffness below zero
+        return None
+    return Bars(np.column_stack([i, j]), directions, known, both)
+
+
+def truss_numbering(
+    matrix: sp.csr_array, block_size: int | None = None, kind: str | None = None, allowed: float = CANCELLED
+) -> Numbering | None:
+    """The usual numbering in which all blocks are those of bars, however many supports there are; None if none is.
+
+    Parameters
+    ----------
+    matrix : (N, N) sparse
+    block_size : {2, 3}, optional
+    kind : {None, "interleaved", "by component"}
+    allowed : float
+        See :func:`bars_of`.
     """
-    known = checked_anchors(anchors, numbering.node_of_row, nodal.dim)
-    with clock("solve"):
-        found = place_joints(bars, nodal.n, rounding.spread if rounding else CERTIFIED)
-    with clock("certify"):
-        misfits = bars_misfits(nodal, found.points)
+    order = matrix.shape[0]
+    sizes = [d for d in ((3, 2) if block_size is None else (block_size,)) if order % d == 0 and order >= 2 * d]
+    for d, name in product(sizes, ORDERS if kind is None else (kind,)):
+        node, direction = regular(order, d, name)
+        numbering = Numbering(d, node, direction, uncoupled_rows(matrix), name, 0.0, 1.0)
+        if bars_of(nodal_matrix(matrix, numbering), allowed) is not None:
+            return numbering
+    return None
+
+
+def serve_truss(nodal: NodalMatrix, numbering: Numbering, bars: Bars, request: Request) -> Structure:
+    """Recover a truss, up to the size of each piece; errors as of :func:`.frames.serve_structure`."""
+    rounding = request.rounding
+    request.held(numbering.node_of_row, nodal.dim)  # anchors that do not fit, before the long work
+    with request.clock("solve"):
+        found = _place_joints(bars, nodal.n, rounding.spread if rounding else CERTIFIED)
+    with request.clock("certify"):
+        misfits = _misfits(nodal, found.points)
         error = float(np.abs(misfits).max(initial=0.0))
-        certain = _known(misfits, found, numbering, rounding)
+        known = _known(misfits, found, numbering, rounding)
     loose = found.component < 0
-    points, factor, notes = anchored(found.points, found.component, len(found.evidence), known)
-    if loose.any():
-        notes.append(f"{loose.sum()} of {count_of(nodal.n, 'node')} cannot be determined: the directions of all bars "
-                     "leave them room")  # fmt: skip
-    if np.isnan(factor).any():
-        notes.append("the sign of the scale is free: the point reflection of a truss has the same matrix")
-    lost = digits_lost(points, found.points, found.component, factor)
-    status, reason = _verdict(error, found, certain, rounding)
+    status, reason = _verdict(error, found, known, rounding)
     if status == "certified":
         rows = ~loose[numbering.node_of_row]
         reason = Reason(f"{reason.text}: {covered(rows, rows)}")
-    status, reason = near_enough(status, reason, lost)
-    return Structure(
-        **found.fields(numbering),
-        points=points,
-        lines=bars.ends[~loose[bars.ends].any(axis=1)],
-        status=status,
-        uniqueness="searched" if status == "certified" else None,
-        reason=reason.text,
-        advice=reason.advice,
+    notes = []
+    if loose.any():
+        notes.append(f"{loose.sum()} of {count_of(nodal.n, 'node')} cannot be determined: the directions of all bars "
+                     "leave them room")  # fmt: skip
+    lines = bars.ends[~loose[bars.ends].any(axis=1)]
+    return answer(
+        numbering,
+        request,
+        found,
+        (status, reason),
+        edges=lines,
+        sized=False,
+        free="the sign of the scale is free: the point reflection of a truss has the same matrix",
+        notes=notes,
+        lines=lines,
         operator="truss",
         backward_error=error,
-        position_error=certain.error if rounding and certain.explained else None,
-        timings=clock.timings,
-        warnings=(*matrix.warnings, *found.notes, *notes),
-        choice=choice,
+        position_error=known.error if rounding and known.explained else None,
     )
 
 
@@ -99,8 +137,8 @@ def _known(misfits: NDArray, found: Placed, numbering: Numbering, rounding: Roun
         bars = bars_of(nodal, allowed)
         if bars is None:
             raise GeometryError("blocks are no longer those of bars")
-        points = place_joints(bars, numbering.n_nodes, allowed).points
-        return points, bars_misfits(nodal, points)
+        points = _place_joints(bars, numbering.n_nodes, allowed).points
+        return points, _misfits(nodal, points)
 
     return known_to(found.points, found.component, misfits, rounding, place, sized=False)
 
@@ -123,50 +161,30 @@ def _verdict(error: float, found: Placed, known: Known, rounding: Rounding | Non
     )
 
 
-def place_joints(bars: Bars, n: int, allowed: float = CERTIFIED) -> Placed:
+def _place_joints(bars: Bars, n: int, allowed: float) -> Placed:
     """Find positions for which all bars have their directions.
 
     Whole blocks are those of bars or not, but a block of which only one row or column is left is that of a bar for any
     numbers: bars that only such blocks tell of count where others would contradict their directions.
-
-    Raises
-    ------
-    GeometryError
-        If no piece is determined: its bars may turn against each other.
     """
-    d = bars.directions.shape[1]
     ends, directions, whole = bars.ends[bars.known], bars.directions[bars.known], bars.whole[bars.known]
-
-    def solve(piece: Piece) -> Positions:
-        order = len(piece.nodes)
-        links = sp.csr_array((np.ones(len(piece.edges)), piece.edges.T), shape=(order, order))
-        links = sp.csr_array(links + links.T)
-        _, probes, fields, values = least_squares(piece.operator, np.zeros(len(piece.rows)), d)
-        one = shape(fields, values, np.zeros(order, dtype=bool))
-        which = piece.rows.reshape(-1, d)[:, 0] // d
-        seen = _across_one(directions[which]) @ probes[:, 1:].reshape(-1, d, probes.shape[1] - 1)
-        blind = ~whole[which] & (np.linalg.svd(seen, compute_uv=False)[:, d - 2] < SMALL)
-        gap = values[values > SINGULAR]
-        evidence = Evidence(one.dimension, float(values[d]), float(gap[0]) if len(gap) else float("inf"), len(which))
-        return Positions(in_gauge(one.points, links), evidence, np.repeat(blind, d))
-
-    return without_free(placed(_across(ends, directions, n), d, ends, solve, allowed), d + 1)
-
-
-def _across_one(directions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m, d, d) I - e e^T of each bar."""
-    return np.asarray(np.eye(directions.shape[1]) - directions[:, :, None] * directions[:, None, :])
-
-
-def _across(ends: NDArray[np.int64], directions: NDArray[np.float64], n: int) -> sp.csr_array:
-    """(m d, n d) what a field moves the ends of each bar against each other across its direction."""
     m, d = directions.shape
-    across = _across_one(directions)
+    across = np.eye(d) - directions[:, :, None] * directions[:, None, :]
+    # What a field moves the ends of each bar against each other across its direction.
     blocks = np.stack([across, -across], axis=1).reshape(2 * m, d, d)
-    return sp.bsr_array((blocks, ends.ravel(), np.arange(0, 2 * m + 1, 2)), shape=(m * d, n * d)).tocsr()
+    operator = sp.bsr_array((blocks, ends.ravel(), np.arange(0, 2 * m + 1, 2)), shape=(m * d, n * d)).tocsr()
+
+    def solve(piece: Piece) -> tuple[NDArray[np.float64], Evidence, NDArray[np.bool_]]:
+        points, evidence, probes = up_to_size(piece, d)
+        which = piece.rows[::d] // d
+        seen = across[which] @ probes.reshape(len(which), d, -1)
+        blind = ~whole[which] & (np.linalg.svd(seen, compute_uv=False)[:, d - 2] < SMALL)
+        return points, replace(evidence, rows=len(which)), np.repeat(blind, d)
+
+    return without_free(placed(operator, d, ends, solve, allowed), d + 1)
 
 
-def bars_misfits(nodal: NodalMatrix, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _misfits(nodal: NodalMatrix, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Entries that are left of blocks, (k,), once the bars between the given points are taken away.
 
     Relative to the largest off-diagonal entry of the node's rows; pairs with undetermined nodes do not count. Infinite

@@ -7,7 +7,7 @@ of each; the residual of the fit is the certificate. Material may differ from ce
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,31 +19,20 @@ from ...elements.surface import tiles
 from ...nodes.nodal import NodalMatrix, determined, surrounded, valid_pairs
 from ...tolerances import ALIKE, CERTIFIED
 from .entries import Entries, Pairs
-from .fits import Fit, fits
+from .fits import fits
 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Elements of a mesh.
+    """Elements of a mesh."""
 
-    Attributes
-    ----------
-    blocks : mapping of str to (m, k) int64
-        By kind, meshio's names: nodes in meshio's order, positively oriented. Empty where no element was recognised.
-    lame : (n_cells, 2) float64
-        lambda and mu of each cell, up to one common factor (the unknown size of the body), in the order of the blocks;
-        empty where they are not known.
-    backward_error : float
-        Largest difference between an entry and the re-assembled one, relative to the largest off-diagonal entry of
-        its row; NaN where the cells were read off the graph only.
-    shown : (n, d) bool, optional
-        Unknowns of nodes whose row has an entry that re-assembles and is not zero.
-    """
-
-    blocks: Mapping[str, NDArray[np.int64]]
-    lame: NDArray[np.float64]
-    backward_error: float
-    shown: NDArray[np.bool_] | None = None
+    # (m, k) by kind, meshio's names and order, positively oriented; empty where none was recognised
+    blocks: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
+    # (n_cells, 2) lambda and mu, up to the unknown size of the body; empty where they are not known
+    lame: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    # largest difference between an entry and the re-assembled one, relative to the largest of its row
+    backward_error: float = float("nan")
+    shown: NDArray[np.bool_] | None = None  # (n, d) unknowns whose row has an entry that re-assembles and is not zero
 
     @property
     def recognised(self) -> bool:
@@ -55,11 +44,6 @@ class Cells:
         """Whether the cells re-assemble to the given matrix."""
         return self.recognised and bool(np.isfinite(self.backward_error))
 
-    @property
-    def n_cells(self) -> int:
-        """Number of cells."""
-        return sum(map(len, self.blocks.values()))
-
     def among(self, nodes: NDArray[np.bool_]) -> Cells:
         """The cells all of whose nodes are among some, (n,) bool."""
         kept = [nodes[cells].all(axis=1) for cells in self.blocks.values()]
@@ -69,11 +53,6 @@ class Cells:
         blocks = {kind: cells[some] for (kind, cells), some in parts if some.any()}
         lame = self.lame[np.concatenate(kept)] if len(self.lame) else self.lame
         return replace(self, blocks=blocks, lame=lame)
-
-
-def no_cells() -> Cells:
-    """Nothing recognised."""
-    return Cells({}, np.empty((0, 2)), float("nan"))
 
 
 def coupled(nodal: NodalMatrix, points: NDArray[np.float64]) -> Graph:
@@ -100,11 +79,13 @@ def recognise_cells(nodal: NodalMatrix, points: NDArray[np.float64], ratio: floa
     """
     graph, known = coupled(nodal, points), determined(points)
     likely = Entries.of(nodal, known, surrounded(nodal, valid_pairs(nodal)))
-    found = no_cells()
+    found = Cells()
     # The power of two next to the largest entry: squares of what is measured in it neither overflow nor vanish.
     unit = float(2.0 ** np.frexp(nodal.size.max(initial=0.0))[1])
     for entries in [likely, Entries.of(nodal, known)] if (likely.complete != likely.sure).any() else [likely]:
-        other = _recognised(points, graph, entries.over(unit), ratio)
+        other = _recognised(
+            points, graph, replace(entries, value=entries.value / unit, size=entries.size / unit), ratio
+        )
         if other.certified:
             return replace(other, lame=other.lame * unit)
         found = found if found.recognised else other
@@ -116,7 +97,7 @@ def _recognised(points: NDArray[np.float64], graph: Graph, entries: Entries, rat
 
     Cells that hide next to supports are excused, and those of another kind must not pass for such.
     """
-    best, most = no_cells(), 0
+    best, most = Cells(), 0
     for blocks in candidates(graph, points) if len(entries.key) else ():
         told = entries.explained_by([Pairs.of(one.cells, entries) for one in blocks], graph)
         if told is None or len(told.key) <= most:
@@ -124,21 +105,15 @@ def _recognised(points: NDArray[np.float64], graph: Graph, entries: Entries, rat
         seen = [replace(one, cells=one.cells[Pairs.of(one.cells, told).seen]) for one in blocks]
         if not all(len(one.cells) for one in seen):
             continue
-        found = next((cells for fit in fits(points, seen, told, ratio) if (cells := _accepted(fit))), None)
+        found = next((cells for fit in fits(points, seen, told, ratio) if (cells := _accepted(*fit))), None)
         if found is not None:
             best, most = replace(found, shown=told.shown()), len(told.key)
-        elif not best.recognised:
-            best = _by_graph(seen)
+        elif not best.recognised and not any(one.kind.linear_simplex for one in seen) and tiles(_linear(seen)):
+            # without certificate; that cliques lie side by side is no evidence of linear simplices
+            best = Cells({one.kind.name: one.cells for one in seen})
         if most == len(entries.key):
             break
     return best
-
-
-def _by_graph(blocks: Sequence[Block]) -> Cells:
-    """Cells without certificate, if they lie side by side; cliques of linear simplices are no evidence."""
-    if any(one.kind.linear_simplex for one in blocks) or not tiles(_linear(blocks)):
-        return no_cells()
-    return Cells({one.kind.name: one.cells for one in blocks}, np.empty((0, 2)), float("nan"))
 
 
 def _linear(blocks: Sequence[Block]) -> dict[str, NDArray[np.int64]]:
@@ -146,18 +121,17 @@ def _linear(blocks: Sequence[Block]) -> dict[str, NDArray[np.int64]]:
     return {one.kind.base: one.cells[:, : one.kind.corners] for one in blocks}
 
 
-def _accepted(fit: Fit) -> Cells | None:
+def _accepted(blocks: Sequence[Block], lame: NDArray[np.float64], misfit: float) -> Cells | None:
     """Cells that carry material, if they fit, have shear moduli of one sign and do not overlap; made-up ones do.
 
     A quadratic triangle, for one, is a combination of small linear ones and a large one with a negative modulus.
     """
-    lame = fit.lame
-    if not fit.misfit <= CERTIFIED or not lame.any():
+    if not misfit <= CERTIFIED or not lame.any():
         return None
     carries = np.abs(lame).max(axis=1) > ALIKE * np.abs(lame).max()
-    parts = np.split(carries, np.cumsum([len(one.cells) for one in fit.blocks])[:-1])
-    blocks = [replace(one, cells=one.cells[part]) for one, part in zip(fit.blocks, parts, strict=True) if part.any()]
+    parts = np.split(carries, np.cumsum([len(one.cells) for one in blocks])[:-1])
+    blocks = [replace(one, cells=one.cells[part]) for one, part in zip(blocks, parts, strict=True) if part.any()]
     mu = lame[carries, 1]
     if not ((mu > 0).all() or (mu < 0).all()) or not tiles(_linear(blocks)):
         return None
-    return Cells({one.kind.name: one.cells for one in blocks}, lame[carries], fit.misfit)
+    return Cells({one.kind.name: one.cells for one in blocks}, lame[carries], misfit)

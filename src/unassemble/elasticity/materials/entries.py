@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from ...budget import AT_ONCE
 from ...elements.cliques import Graph
 from ...elements.kinds import Kind
-from ...elements.matrices import elasticity
-from ...elements.reference import Rule
+from ...elements.reference import Rule, elasticity
 from ...nodes.nodal import NodalMatrix, valid_pairs
 from ...tolerances import CERTIFIED
 
@@ -24,43 +23,21 @@ class Entries:
 
     Entries between two nodes that both miss a neighbour are left out, since cells that lost a node to a support
     contribute to them. A neighbour that lacks some directions only is none that they miss.
-
-    Attributes
-    ----------
-    n : int
-        Nodes.
-    key : (e,) int64
-        Pairs i < j as i n + j, increasing.
-    value : (e, d, d) float64
-        Zero where not told.
-    told : (e, d, d) bool
-        Places of unknowns that the matrix has.
-    size : (e,) float64
-        Largest entry of the two nodes' rows, the smaller of the two.
-    complete : (n,) bool
-        Nodes that lost no neighbour, and of which none is unknown.
-    sure : (n,) bool
-        Those of which every row shows it.
     """
 
-    n: int
-    key: NDArray[np.int64]
-    value: NDArray[np.float64]
-    told: NDArray[np.bool_]
-    size: NDArray[np.float64]
-    complete: NDArray[np.bool_]
-    sure: NDArray[np.bool_]
+    n: int  # nodes
+    key: NDArray[np.int64]  # (e,) pairs i < j as i n + j, increasing
+    value: NDArray[np.float64]  # (e, d, d), zero where not told
+    told: NDArray[np.bool_]  # (e, d, d) places of unknowns that the matrix has
+    size: NDArray[np.float64]  # (e,) largest entry of the two nodes' rows, the smaller of the two
+    complete: NDArray[np.bool_]  # (n,) nodes that lost no neighbour, and of which none is unknown
+    sure: NDArray[np.bool_]  # (n,) those of which every row shows it
 
     @classmethod
     def of(cls, nodal: NodalMatrix, known: NDArray[np.bool_], likely: NDArray[np.bool_] | None = None) -> Entries:
-        """Those of a matrix between nodes whose places are known; cells that have others are as good as lost.
+        """Those of a matrix between nodes whose places are `known`, (n,); cells that have others are as good as lost.
 
-        Parameters
-        ----------
-        nodal : NodalMatrix
-        known : (n,) bool
-        likely : (n,) bool, optional
-            Nodes that count as complete though not every row shows it.
+        Nodes that are `likely`, (n,), count as complete though not every row shows it.
         """
         alone = np.bincount(nodal.node, ~known[nodal.indices], minlength=nodal.n) == 0
         sure = np.asarray(valid_pairs(nodal).all(axis=(1, 2)) & alone)
@@ -84,10 +61,6 @@ class Entries:
     def at(self, place: NDArray[np.int64]) -> Entries:
         """Some of them."""
         return replace(self, key=self.key[place], value=self.value[place], told=self.told[place], size=self.size[place])
-
-    def over(self, unit: float) -> Entries:
-        """The same in another unit."""
-        return replace(self, value=self.value / unit, size=self.size / unit)
 
     def shown(self) -> NDArray[np.bool_]:
         """(n, d) unknowns whose rows have one of these entries that is not zero."""
@@ -120,21 +93,11 @@ class Entries:
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """The pairs of nodes of cells among the entries, (m, k (k - 1) / 2) each.
+    """The pairs of nodes of cells among the entries, (m, k (k - 1) / 2) each."""
 
-    Attributes
-    ----------
-    place : int64
-        Of the entry; any where there is none.
-    there : bool
-        Whether there is one.
-    flip : bool
-        Whether the entry is that of the pair the other way round.
-    """
-
-    place: NDArray[np.int64]
-    there: NDArray[np.bool_]
-    flip: NDArray[np.bool_]
+    place: NDArray[np.int64]  # of the entry; any where there is none
+    there: NDArray[np.bool_]  # whether there is one
+    flip: NDArray[np.bool_]  # whether the entry is that of the pair the other way round
 
     @classmethod
     def of(cls, cells: NDArray[np.int64], entries: Entries) -> Pairs:
@@ -177,22 +140,12 @@ class Model:
     kind: Kind
     rule: Rule
 
-    @property
-    def coefficients(self) -> int:
-        """Nonzero numbers of the matrix that takes all coefficients to the entries."""
-        return len(self.cells) * self.kind.nodes * (self.kind.nodes - 1) * self.kind.dim**2
-
     def contributions(
         self, pairs: Pairs, entries: Entries, some: NDArray | slice = slice(None)
     ) -> Iterator[tuple[slice, NDArray[np.float64]]]:
-        """What unit Lame coefficients of some cells add to the entries of their pairs; zero where unknowns lack.
+        """What unit Lame coefficients, (1, 0) and (0, 1), of some cells add to the entries of their pairs, by batches.
 
-        Yields
-        ------
-        batch : slice
-            Of these cells.
-        unit : (2, b, pairs, d, d) float64
-            For (lambda, mu) = (1, 0) and (0, 1).
+        The cells of a batch, and (2, b, pairs, d, d); zero where unknowns lack.
         """
         own, cells = pairs.at(some), self.cells[some]
         k, d, partial = self.kind.nodes, self.kind.dim, not entries.told.all()

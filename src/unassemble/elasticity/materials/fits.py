@@ -7,7 +7,7 @@ What is left once these cells are taken away belongs to linear simplices: of one
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,36 +24,16 @@ _FEW = 0.3  # of the candidates: how many may be no cells
 _LARGEST = 50_000_000  # numbers in a least-squares problem
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Lame coefficients and how well they fit.
-
-    Attributes
-    ----------
-    blocks : tuple of Block
-    lame : (m, 2) float64
-        lambda and mu of the cells of all blocks, one after the other; zero for candidates that carry no material.
-    misfit : float
-        Largest difference between an entry and the re-assembled one, relative to its row.
-    """
-
-    blocks: tuple[Block, ...]
-    lame: NDArray[np.float64]
-    misfit: float
+# Blocks, lambda and mu (m, 2) of their cells, one after the other, zero for candidates that carry no material; and the
+# largest difference between an entry and the re-assembled one, relative to its row.
+Fit = tuple[Sequence[Block], NDArray[np.float64], float]
 
 
 def fits(points: NDArray[np.float64], blocks: Sequence[Block], entries: Entries, ratio: float | None) -> Iterator[Fit]:
     """Lame coefficients of the candidates, in the ways that suit their kinds, the simplest first.
 
-    Parameters
-    ----------
-    points : (n, d) float64
-    blocks : sequence of Block
-        Linear simplices, cells with entries of their own, or the one beside the other.
-    entries : Entries
-        Those that these cells explain.
-    ratio : float, optional
-        lambda / mu, where it is one number.
+    They are linear simplices, cells with entries of their own, or the one beside the other, and explain the entries;
+    lambda / mu is the `ratio` where it is one number.
     """
     simple = [Model(points, one.cells, one.kind, next(rules(one.kind))) for one in blocks if one.kind.linear_simplex]
     beside = [Pairs.of(one.cells, entries) for one in simple]
@@ -68,14 +48,15 @@ def fits(points: NDArray[np.float64], blocks: Sequence[Block], entries: Entries,
             return
         lame.append(found)
     if not simple:
-        yield Fit(tuple(rich), np.vstack(lame), entries.largest)
+        yield rich, np.vstack(lame), entries.largest
     for model in simple:
         if ratio is not None:
             mu, rest = one_material(model, entries, ratio)
-            yield Fit(tuple(blocks), np.vstack([mu[:, None] * [ratio, 1], *lame]), rest.largest)
-        if model.coefficients <= _LARGEST:
+            yield blocks, np.vstack([mu[:, None] * [ratio, 1], *lame]), rest.largest
+        pairs = model.kind.nodes * (model.kind.nodes - 1)
+        if len(model.cells) * pairs * model.kind.dim**2 <= _LARGEST:
             coefficients, rest = _least_squares(model, entries)
-            yield Fit(tuple(blocks), np.vstack([coefficients, *lame]), rest.largest)
+            yield blocks, np.vstack([coefficients, *lame]), rest.largest
 
 
 def _likely_rule(points: NDArray, block: Block, entries: Entries, beside: Sequence[Pairs]) -> Rule | None:
@@ -150,7 +131,12 @@ def one_material(model: Model, entries: Entries, ratio: float) -> tuple[NDArray[
     """
     pairs = Pairs.of(model.cells, entries)
     full = model.assembled(pairs, entries, np.ones((len(model.cells), 1)) * [ratio, 1])
-    mu = _usual_factor(full, entries.value)
+    square = (full * full).sum(axis=(1, 2))
+    weighty = square > ROUNDED * square.max(initial=0)
+    if not weighty.any():
+        return np.zeros(len(model.cells)), entries
+    # Between the entries and those assembled, whatever a few candidates too many add.
+    mu = float(np.median((full * entries.value).sum(axis=(1, 2))[weighty] / square[weighty]))
     rest = replace(entries, value=entries.value - mu * full)
     poor = np.abs(rest.value).max(axis=(1, 2)) > CERTIFIED * entries.size
     suspects = np.flatnonzero((poor[pairs.place] | ~pairs.there).all(axis=1))
@@ -165,15 +151,6 @@ def one_material(model: Model, entries: Entries, ratio: float) -> tuple[NDArray[
     moduli[suspects[no_cell]] = 0
     again = doubted.assembled(pairs.at(suspects), entries, lame * ~no_cell[:, None])
     return moduli, replace(rest, value=without.value - again)
-
-
-def _usual_factor(blocks: NDArray, values: NDArray) -> float:
-    """Between the entries and those assembled, whatever a few candidates too many add."""
-    square = (blocks * blocks).sum(axis=(1, 2))
-    weighty = square > ROUNDED * square.max(initial=0)
-    if not weighty.any():
-        return 0.0
-    return float(np.median((blocks * values).sum(axis=(1, 2))[weighty] / square[weighty]))
 
 
 def _least_squares(model: Model, entries: Entries, ratio: float | None = None) -> tuple[NDArray[np.float64], Entries]:

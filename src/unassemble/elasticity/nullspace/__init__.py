@@ -1,7 +1,7 @@
 """From rows with known nodes and directions to positions: the null space of the identities."""
 
 from .atlas import PATCH
-from .solution import Solution
+from .placing import Solution
 
 __all__ = [
     "PATCH",

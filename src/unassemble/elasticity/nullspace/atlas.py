@@ -1,61 +1,41 @@
 """The atlas: charts joined where they overlap into fields on the whole body.
 
+The identities behave like a differential operator of fourth order, so that one factorisation of the whole body is dear
+in space and ill-conditioned, while an iteration needs many steps. But they are local, and so is their answer: the rows
+of some two thousand neighbouring nodes, a chart, determine the positions of all nodes they touch, up to few freedoms.
+
 Neighbouring charts share two layers of nodes and more. Coefficients c_P of the fields Z_P are wanted for which the
-charts agree
-there and the residual of every chart is least:
+charts agree there and the residual of every chart is least:
 
     minimise  sum over P of |S_P c_P|^2  +  sum over nodes j and charts P of |Z_P(j) c_P - mean over the charts of j|^2
 
-over |c| = 1. This has a few unknowns per chart and is well conditioned: the charts' own
-conditioning is behind us. Exact null fields of the body are exactly those of value zero.
+over |c| = 1. This has a few unknowns per chart and is well conditioned: the charts' own conditioning is behind us.
+Exact null fields of the body are exactly those of value zero.
 """
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...linalg import svd
+from ...linalg import Factorisation, UpperTriangle, nearly_singular, svd
+from ...linalg.definite import STEPS
 from ...nodes.nodal import NodalMatrix
-from ...tolerances import ALIKE
-from .charts import Chart, chart, patches
-from .identities import identities
+from ...nodes.shape import MOST_FIELDS
+from ...tolerances import ALIKE, LITTLE, SMALL
+from .identities import Identities, identities
 
-_log = logging.getLogger(__name__)
 PATCH = {2: 6000, 3: 1900}  # rows per chart: larger ones cost more to factorise, smaller ones overlap more
 _MOST = 64  # fields of the whole body to look for, at most
 _LEAST = 8
 
-
-@dataclass(frozen=True, eq=False)
-class NullFields:
-    """Fields on the nodes of a body that fit its identities best.
-
-    Attributes
-    ----------
-    nodes : (n,) int64
-        Nodes that some valid identity touches.
-    fields : (n, d, k) float64
-        Orthonormal.
-    values : (k,) float64
-        Singular values, increasing; fields beyond the null fields are those of the joined charts, and their values
-        upper bounds.
-    rows : int
-        Nodes with valid identities.
-    charts : int
-    """
-
-    nodes: NDArray[np.int64]
-    fields: NDArray[np.float64]
-    values: NDArray[np.float64]
-    rows: int
-    charts: int
+Of = Callable[[NDArray[np.int64]], Identities]  # those of some rows
 
 
 def null_fields(
@@ -65,50 +45,41 @@ def null_fields(
     *,
     patch: int | None = None,
     terms: NDArray[np.float64] | None = None,
-) -> NullFields:
-    """Least singular fields of all valid identities of a body.
-
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    valid : (n, d, d) bool
-    body : (m,) int64
-        Nodes of the body, whose identities to use.
-    patch : int, optional
-        Most rows in one chart.
-    terms : (d, d, d, t) float64, optional
-        Unknown boundary terms; see :func:`.identities.identities`.
-    """
-    parts = _patches(nodal, body, patch or PATCH[nodal.dim])
-    made = [chart(nodal, valid, rows, whole=len(parts) == 1, terms=terms) for rows in parts]
-    made = [one for one in made if len(one.nodes)]
-    _log.debug("%d charts of %s fields", len(made), [len(one.values) for one in made])
-    if not made:
-        return NullFields(np.empty(0, np.int64), np.empty((0, nodal.dim, 0)), np.empty(0), 0, 0)
+) -> Fields:
+    """Least singular fields of all valid identities of a body's nodes, (m,), by charts of no more rows than `patch`."""
+    of: Of = partial(identities, nodal, valid, terms=terms)
+    size, graph = patch or PATCH[nodal.dim], nodal.graph
+    parts = [body[part] for part in _patches(graph[body][:, body], size)] if len(body) > 1.5 * size else [body]
+    made = [_chart(of, graph, rows, whole=len(parts) == 1) for rows in parts]
+    made = [one for one in made if len(one.nodes)] or made[:1]
     if len(made) == 1:
-        one = made[0]
-        return NullFields(one.nodes, one.fields, one.values, one.rows, 1)
-    nodes, fields = _join(made, nodal.n)
-    return _measured(nodal, valid, parts, nodes, fields, made, terms)
+        return made[0]
+    nodes, fields = _joined(made, nodal.n)
+    d, k = fields.shape[1:]
+    place, triangle = np.full(nodal.n, -1), np.zeros((0, k))
+    place[nodes] = np.arange(len(nodes))
+    for part in parts:  # Rayleigh-Ritz on the whole body, part by part
+        local = of(part)
+        residual = local.residual(fields[place[local.columns]]).reshape(-1, k)
+        triangle = np.asarray(np.linalg.qr(np.vstack([triangle, np.linalg.qr(residual, mode="r")]), mode="r"))
+    _, values, v = svd(triangle)
+    fields = (fields.reshape(-1, k) @ v[::-1].T).reshape(-1, d, k)
+    return Fields(nodes, fields, values[::-1], sum(one.rows for one in made), len(made))
 
 
-def _patches(nodal: NodalMatrix, body: NDArray[np.int64], size: int) -> list[NDArray[np.int64]]:
-    if len(body) <= 1.5 * size:
-        return [body]
-    graph = nodal.graph
-    return [body[part] for part in patches(graph[body][:, body], size)]
-
-
-def _join(charts: list[Chart], n: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _joined(charts: list[Fields], n: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Nodes of the charts, and orthonormal fields on them whose charts agree best."""
-    d = charts[0].fields.shape[1]
-    copies = np.zeros(n)
-    for one in charts:
-        copies[one.nodes] += 1
-    place = _places(charts)
+    nodes, d = np.concatenate([one.nodes for one in charts]), charts[0].fields.shape[1]
+    copies = np.bincount(nodes, minlength=n).astype(float)
+    which = np.repeat(np.arange(len(charts)), [len(one.nodes) for one in charts])
+    shares = sp.csr_array((np.ones(len(nodes)), (which, nodes)), shape=(len(charts), n))
+    end = np.cumsum([len(one.values) for one in charts]).tolist()
+    place = [slice(last - len(one.values), last) for one, last in zip(charts, end, strict=True)]
     form = np.diag(1 + np.concatenate([one.values**2 for one in charts]))
-    for k, m in _overlapping(charts, n):
-        product = _product(charts[k], charts[m], copies)
+    for k, m in np.column_stack(sp.triu(shares @ shares.T).nonzero()).tolist():
+        shared, mine, others = np.intersect1d(charts[k].nodes, charts[m].nodes, assume_unique=True, return_indices=True)
+        left = (charts[k].fields[mine] / copies[shared, None, None]).reshape(-1, len(charts[k].values))
+        product = left.T @ charts[m].fields[others].reshape(-1, len(charts[m].values))
         form[place[k], place[m]] -= product
         if k != m:
             form[place[m], place[k]] -= product.T
@@ -122,62 +93,125 @@ def _join(charts: list[Chart], n: int) -> tuple[NDArray[np.int64], NDArray[np.fl
     return nodes, flat.reshape(len(nodes), d, -1)
 
 
-def _places(charts: list[Chart]) -> list[slice]:
-    """Which of all coefficients are each chart's."""
-    end = np.cumsum([len(one.values) for one in charts])
-    return [slice(int(last) - len(one.values), int(last)) for one, last in zip(charts, end, strict=True)]
-
-
-def _overlapping(charts: list[Chart], n: int) -> Iterator[tuple[int, int]]:
-    """Pairs of charts that share nodes, k <= m."""
-    nodes = np.concatenate([one.nodes for one in charts])
-    which = np.repeat(np.arange(len(charts)), [len(one.nodes) for one in charts])
-    shares = sp.csr_array((np.ones(len(nodes)), (which, nodes)), shape=(len(charts), n))
-    first, second = sp.triu(shares @ shares.T).nonzero()
-    return zip(first.tolist(), second.tolist(), strict=True)
-
-
-def _product(one: Chart, other: Chart, copies: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Products of the fields of two charts over the nodes that they share, each over the number of its copies."""
-    shared, mine, others = np.intersect1d(one.nodes, other.nodes, assume_unique=True, return_indices=True)
-    left = (one.fields[mine] / copies[shared, None, None]).reshape(-1, len(one.values))
-    return np.asarray(left.T @ other.fields[others].reshape(-1, len(other.values)))
-
-
 def _lowest(form: NDArray, count: int) -> NDArray:
-    """Eigenvectors of the least eigenvalues of a positive semidefinite form, by inverse iteration."""
+    """Eigenvectors of the least eigenvalues of a positive semidefinite form; of large ones by inverse iteration."""
     n = len(form)
     if n <= 4 * count:
         values, v = scipy.linalg.eigh(form)
-        return np.asarray(v[:, : max(int((values[:count] < ALIKE).sum()) + 1, min(_LEAST, count))])
-    factor = scipy.linalg.cho_factor(form + 1e-13 * np.eye(n))
-    x = np.random.default_rng(0).standard_normal((n, count))
-    for _ in range(4):
-        x = np.linalg.qr(scipy.linalg.cho_solve(factor, x))[0]
-    values, v = scipy.linalg.eigh(x.T @ form @ x)
+        values = values[:count]
+    else:
+        factor = scipy.linalg.cho_factor(form + 1e-13 * np.eye(n))
+        x = np.random.default_rng(0).standard_normal((n, count))
+        for _ in range(4):
+            x = np.linalg.qr(scipy.linalg.cho_solve(factor, x))[0]
+        values, v = scipy.linalg.eigh(x.T @ form @ x)
+        v = x @ v
     # The stiff rest says nothing but where it begins.
-    kept = max(int((values < ALIKE).sum()) + 1, min(_LEAST, count))
-    return np.asarray(x @ v[:, :kept])
+    return np.asarray(v[:, : max(int((values < ALIKE).sum()) + 1, min(_LEAST, count))])
 
 
-def _measured(
-    nodal: NodalMatrix,
-    valid: NDArray[np.bool_],
-    parts: list[NDArray[np.int64]],
-    nodes: NDArray[np.int64],
-    fields: NDArray[np.float64],
-    made: list[Chart],
-    terms: NDArray[np.float64] | None,
-) -> NullFields:
-    """Rayleigh-Ritz on the whole body, through the identities part by part."""
-    d, k = fields.shape[1:]
-    place = np.full(nodal.n, -1)
-    place[nodes] = np.arange(len(nodes))
-    triangle = np.zeros((0, k))
-    for part in parts:
-        local = identities(nodal, valid, part, terms)
-        residual = local.residual(fields[place[local.columns]]).reshape(-1, k)
-        triangle = np.asarray(np.linalg.qr(np.vstack([triangle, np.linalg.qr(residual, mode="r")]), mode="r"))
-    _, values, v = svd(triangle)
-    fields = (fields.reshape(-1, k) @ v[::-1].T).reshape(-1, d, k)
-    return NullFields(nodes, fields, values[::-1], sum(one.rows for one in made), len(made))
+@dataclass(frozen=True, eq=False)
+class Fields:
+    """Fields on some nodes that fit the identities of some rows best."""
+
+    nodes: NDArray[np.int64]  # that some valid identity touches
+    fields: NDArray[np.float64]  # (n, d, k) orthonormal
+    values: NDArray[np.float64]  # singular values, increasing: norms of residuals; of several charts some upper bounds
+    rows: int  # nodes whose identities were used
+    charts: int = 1
+
+
+def _chart(of: Of, graph: sp.csr_array, rows: NDArray[np.int64], *, whole: bool) -> Fields:
+    """Compute the least singular fields of the identities of some rows, by themselves and in a graph of nodes.
+
+    If these are not the `whole` body's, fields are added until the rest is stiff, so that the charts together hold
+    every field of the body that fits.
+    """
+    local = of(rows)
+    own = len(local.rows)
+    if own and not whole:
+        local = _supported(local, of, graph)
+    n, d = len(local.columns), local.dim
+    if not n:
+        return Fields(local.columns, np.empty((0, d, 0)), np.empty(0), 0)
+    count = min(4 * d, n * d)
+    with nearly_singular(UpperTriangle.of(local.normal_matrix())) as solver:
+        while True:
+            fields, values = _least_fields(local, solver, count)
+            if count == n * d or count >= MOST_FIELDS or values[-1] > (ALIKE if whole else SMALL):
+                break
+            count = min(2 * count, n * d)
+        if not whole:
+            keep = values < LITTLE
+            fields, values = fields[..., keep], values[keep]
+        fields, values = _refined(local, solver, fields, values)
+    return Fields(local.columns, fields, values, own)
+
+
+def _supported(local: Identities, of: Of, graph: sp.csr_array) -> Identities:
+    """The identities, and those of the neighbours of rows at the rim that have too few to place what they touch.
+
+    Each node takes d equations, which the rows that touch it share. A row with many neighbours that no other row of the
+    chart touches leaves most of these free to move, each by itself. Neighbours that are short of equations, too, would
+    only add to that.
+    """
+    short = _short(local)
+    if not short.any():
+        return local
+    near = np.unique(graph[local.rows[short]].indices)
+    more = of(np.union1d(local.rows, near))
+    kept = ~_short(more) | np.isin(more.rows, local.rows)
+    return more if kept.all() else of(more.rows[kept])
+
+
+def _short(local: Identities) -> NDArray[np.bool_]:
+    """(m,) rows with fewer equations than their share of what the nodes take that they touch."""
+    touching = np.bincount(local.indices, minlength=len(local.columns))
+    return np.asarray(np.add.reduceat(local.dim / touching[local.indices], local.indptr[:-1]) > local.equations)
+
+
+def _least_fields(local: Identities, solver: Factorisation, count: int) -> tuple[NDArray, NDArray]:
+    """Inverse iteration on a block of fields, then Rayleigh-Ritz on squares: values to half the digits."""
+    n, d = len(local.columns), local.dim
+    x = np.random.default_rng(0).standard_normal((n * d, count))
+    for _ in range(STEPS):
+        x = np.linalg.qr(solver.solve(x))[0]
+    residual = local.residual(x.reshape(n, d, -1)).reshape(-1, count)
+    squares, v = scipy.linalg.eigh(residual.T @ residual)
+    return (x @ v).reshape(n, d, -1), np.sqrt(np.maximum(squares, 0))
+
+
+def _refined(local: Identities, solver: Factorisation, fields: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
+    """One step of inverse iteration in correction form: its error is that of the residual, not of the factor.
+
+    Fields are rotated to singular ones by residuals, not by their squares, which keeps all digits.
+    """
+    n, d, k = fields.shape
+    null = values < ALIKE
+    if null.any():
+        gradient = local.gradient(local.residual(fields[..., null]))
+        fields = fields.copy()
+        fields[..., null] -= solver.solve(gradient.reshape(n * d, -1)).reshape(n, d, -1)
+        fields = np.linalg.qr(fields.reshape(n * d, k))[0].reshape(n, d, k)
+    _, values, v = svd(np.linalg.qr(local.residual(fields).reshape(-1, k), mode="r"))
+    values = np.concatenate([values, np.zeros(k - len(values))])
+    return (fields.reshape(n * d, k) @ v[::-1].T).reshape(n, d, k), values[::-1]
+
+
+def _patches(graph: sp.csr_array, size: int) -> list[NDArray[np.int64]]:
+    """Cut a graph into halves of so many nodes at most, again and again, by breadth-first distance from one end."""
+    done: list[NDArray[np.int64]] = []
+    open_: list[NDArray[np.int64]] = [np.arange(graph.shape[0])]
+    breadth_first = sp.csgraph.breadth_first_order
+    while open_:
+        nodes = open_.pop()
+        if len(nodes) <= size:
+            done.append(nodes)
+            continue
+        sub = graph[nodes][:, nodes]
+        order = breadth_first(sub, 0, directed=False, return_predecessors=False)
+        order = breadth_first(sub, order[-1], directed=False, return_predecessors=False)
+        order = np.concatenate([order, np.setdiff1d(np.arange(len(nodes)), order)])  # further components follow
+        half = len(order) // 2
+        open_ += [nodes[np.sort(order[half:])], nodes[np.sort(order[:half])]]
+    return done

@@ -17,19 +17,9 @@ from ...nodes.nodal import NodalMatrix, determined
 
 
 def residuals(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Misfits of valid identities among determined nodes.
+    """(k,) misfits of valid identities, relative to the size of a row times the mean distance of coupled nodes.
 
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    valid : (n, d, d) bool
-    points : (n, d) float64
-        NaN where not determined; identities that touch such a node are skipped.
-
-    Returns
-    -------
-    (k,) float64
-        Relative to the size of a row, times the mean distance between coupled nodes.
+    Those that touch nodes without coordinates are skipped.
     """
     d = nodal.dim
     known = determined(points)
@@ -40,19 +30,16 @@ def residuals(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.f
     usable = valid & (blind == 0)[:, None, None]
     if not usable.any():
         return np.empty(0)
-    size = np.where(nodal.size > 0, nodal.size, 1.0) * _mean_distance(nodal, points)
+    off = nodal.node < nodal.indices
+    length = np.linalg.norm(points[nodal.node[off]] - points[nodal.indices[off]], axis=1)
+    mean = float(np.nanmean(length)) if np.isfinite(length).any() else 1.0
+    size = np.where(nodal.size > 0, nodal.size, 1.0) * mean
     value = np.empty((d, d, d, nodal.n))
     for c, b in product(range(d), repeat=2):
         entries = np.ascontiguousarray(nodal.data[:, c, b])
         block = sp.csr_array((entries, nodal.indices, nodal.indptr), shape=(nodal.n, nodal.n))
         value[c, b] = (block @ x).T / size
     return np.concatenate([misfit[needed] for misfit, needed in _differences(value, usable, d)])
-
-
-def _mean_distance(nodal: NodalMatrix, points: NDArray) -> float:
-    off = nodal.node < nodal.indices
-    length = np.linalg.norm(points[nodal.node[off]] - points[nodal.indices[off]], axis=1)
-    return float(np.nanmean(length)) if np.isfinite(length).any() else 1.0
 
 
 def _differences(value: NDArray, usable: NDArray[np.bool_], d: int) -> Iterator[tuple[NDArray, NDArray]]:

@@ -19,23 +19,16 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...nodes.nodal import NodalMatrix
+from ...nodes.nodal import NodalMatrix, determined
+from ...tolerances import ALIKE, SMALL
 
 
 def boundary_terms(d: int) -> NDArray[np.float64]:
     """(d, d, d, 2 d) what p_1 .. p_d, q_1 .. q_d put into the places c, b, a."""
-    terms = np.zeros((d, d, d, 2 * d))
-    for k in range(d):
-        for m in range(d):
-            terms[k, m, m, k] += 1  # delta_ab p_c
-            terms[m, k, m, d + k] += 1  # delta_ac q_b
-            terms[m, m, k, d + k] += 1  # delta_cb q_a
-    return terms
-
-
-def no_terms(d: int) -> NDArray[np.float64]:
-    """(d, d, d, 0) boundary terms inside homogeneous material: none."""
-    return np.empty((d, d, d, 0))
+    one = np.eye(d)
+    p = np.einsum("ab,ck->cbak", one, one)
+    q = np.einsum("ac,bk->cbak", one, one) + np.einsum("cb,ak->cbak", one, one)
+    return np.concatenate([p, q], axis=3)
 
 
 def seen_terms(valid: NDArray[np.bool_], terms: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -62,50 +55,22 @@ def boundary_basis(valid: NDArray[np.bool_], terms: NDArray[np.float64]) -> NDAr
 class Identities:
     """The valid identities of some nodes, as an operator on the coordinates of the nodes they touch.
 
-    Attributes
-    ----------
-    rows : (m,) int64
-        Nodes whose rows are used.
-    columns : (n,) int64
-        Nodes that these rows touch, increasing.
-    indptr, indices : int32
-        Row k couples to ``columns[indices[indptr[k]:indptr[k + 1]]]``.
-    data : (nnz, d, d) float64
-        Blocks relative to the size of their row, zero where not valid.
-    valid : (m, d, d, d) bool
-        Places (c, b, a) that count.
-    terms : (d, d, d, t) float64
-        What unknown boundary terms may put into the places c, b, a; see :func:`boundary_terms` and :func:`no_terms`.
+    Row k couples to ``columns[indices[indptr[k]:indptr[k + 1]]]``.
     """
 
-    rows: NDArray[np.int64]
-    columns: NDArray[np.int64]
+    rows: NDArray[np.int64]  # (m,) nodes whose rows are used
+    columns: NDArray[np.int64]  # (n,) nodes that these rows touch, increasing
     indptr: NDArray[np.int32]
     indices: NDArray[np.int32]
-    data: NDArray[np.float64]
-    valid: NDArray[np.bool_]
-    terms: NDArray[np.float64]
+    data: NDArray[np.float64]  # (nnz, d, d) blocks relative to the size of their row, zero where not valid
+    valid: NDArray[np.bool_]  # (m, d, d, d) places (c, b, a) that count
+    kinds: list[tuple[NDArray[np.int64], NDArray[np.float64]]]  # rows with the same places, and their boundary basis
+    equations: NDArray[np.int64]  # (m,) of each row once p and q are eliminated
 
     @property
     def dim(self) -> int:
         """Dimension of space."""
         return self.data.shape[1]
-
-    @cached_property
-    def _kinds(self) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]:
-        """Rows with the same valid pairs, and the basis of their boundary terms."""
-        d = self.dim
-        code = self.valid.reshape(-1, d**3) @ (1 << np.arange(d**3))
-        kinds = [np.flatnonzero(code == value) for value in np.unique(code)]
-        return [(rows, boundary_basis(self.valid[rows[0]], self.terms)) for rows in kinds]
-
-    @cached_property
-    def equations(self) -> NDArray[np.int64]:
-        """(m,) equations of each row once p and q are eliminated."""
-        count = self.valid.sum(axis=(1, 2, 3))
-        for rows, basis in self._kinds:
-            count[rows] -= basis.shape[3]
-        return np.asarray(count)
 
     @cached_property
     def _stacked(self) -> sp.csr_array:
@@ -131,7 +96,7 @@ class Identities:
 
     def outside_terms(self, value: NDArray) -> NDArray[np.float64]:
         """(m, d, d, d, k) what sticks out of the boundary terms of such products, which are overwritten."""
-        for rows, basis in self._kinds:
+        for rows, basis in self.kinds:
             part = np.einsum("cbap,ncbak->npk", basis, value[rows], optimize=True)
             value[rows] -= np.einsum("cbap,npk->ncbak", basis, part, optimize=True)
         return value
@@ -168,77 +133,71 @@ class Identities:
     def _boundary_part(self) -> sp.bsr_array:
         """Components of the products along the boundary terms: blocks of 2 d by d."""
         d, m = self.dim, len(self.rows)
-        block_row = np.repeat(np.arange(m), np.diff(self.indptr))
-        kind = np.empty(m, dtype=np.int64)
+        row = np.repeat(np.arange(m), np.diff(self.indptr))
         blocks = np.zeros((len(self.indices), 2 * d, d))
-        for index, (rows, _) in enumerate(self._kinds):
-            kind[rows] = index
-        for index, (_, basis) in enumerate(self._kinds):
-            if not basis.shape[3]:
-                continue
-            here = kind[block_row] == index
-            weights = basis.transpose(0, 1, 3, 2).reshape(d * d, -1)
-            part = self.data[here].reshape(-1, d * d) @ weights
-            blocks[here, : basis.shape[3]] = part.reshape(-1, basis.shape[3], d)
+        for rows, basis in self.kinds:
+            here, k = np.isin(np.arange(m), rows)[row], basis.shape[3]
+            if k:
+                weights = basis.transpose(0, 1, 3, 2).reshape(d * d, -1)
+                blocks[here, :k] = (self.data[here].reshape(-1, d * d) @ weights).reshape(-1, k, d)
         return sp.bsr_array((blocks, self.indices, self.indptr), shape=(2 * d * m, d * len(self.columns)))
-
-    def boundary_values(self, x: NDArray) -> tuple[NDArray, NDArray]:
-        """Vectors p and q of each row, (m, d) each, that fit coordinates x of shape (n, d) best.
-
-        NaN where the valid pairs do not determine them. In units of the size of the row. Both have to be among the
-        terms.
-        """
-        d = self.dim
-        value = self.apply(x[:, :, None])[..., 0]
-        found = np.full((len(self.rows), 2 * d), np.nan)
-        for rows, basis in self._kinds:
-            if basis.shape[3] == 2 * d:
-                seen = seen_terms(self.valid[rows[0]], self.terms).reshape(d**3, 2 * d)
-                found[rows] = value[rows].reshape(len(rows), -1) @ np.linalg.pinv(seen).T
-        return found[:, :d], found[:, d:]
-
-
-def _telling(valid: NDArray[np.bool_], terms: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(m,) rows with an equation left once p and q are eliminated."""
-    d = valid.shape[1]
-    code = valid.reshape(-1, d**3) @ (1 << np.arange(d**3))
-    telling = np.zeros(len(valid), dtype=bool)
-    for value in np.unique(code):
-        here = np.flatnonzero(code == value)
-        one = valid[here[0]]
-        telling[here] = one.sum() > boundary_basis(one, terms).shape[3]
-    return telling
 
 
 def identities(
     nodal: NodalMatrix, valid: NDArray[np.bool_], rows: NDArray[np.int64], terms: NDArray[np.float64] | None = None
 ) -> Identities:
-    """Collect the valid identities of some nodes.
+    """Collect the valid identities of some rows (m,), without those that say nothing once p and q are eliminated.
 
-    Parameters
-    ----------
-    nodal : NodalMatrix
-    valid : (n, d, d) or (n, d, d, d) bool
-        See :func:`~unassemble.elasticity.nodal.valid_pairs` and
-        :func:`~unassemble.elasticity.nullspace.planes.with_planes`.
-    rows : (m,) int64
-        Nodes whose rows to use; those that say nothing once p and q are eliminated are dropped.
-    terms : (d, d, d, t) float64, optional
-        Unknown boundary terms: the fewer there are, the more equations are left. Any p and q, where not given.
+    What is `valid`, (n, d, d) or (n, d, d, d), see :func:`.nodal.valid_pairs`. The
+    fewer boundary `terms` (d, d, d, t) are unknown, the more equations are left; any p and q, where they are not given.
     """
     terms = boundary_terms(nodal.dim) if terms is None else terms
     valid = valid if valid.ndim == 4 else np.repeat(valid[..., None], nodal.dim, axis=3)
-    rows = rows[_telling(valid[rows], terms)]
-    count = np.diff(nodal.indptr)[rows]
-    start = np.repeat(nodal.indptr[rows] - (np.cumsum(count) - count), count)
-    entry = (np.arange(count.sum()) + start).astype(np.int64)
-    row = np.repeat(np.arange(len(rows)), count)
-    data = nodal.data[entry] * (valid[rows].any(axis=3) / nodal.size[rows, None, None])[row]
+    code = valid[rows].reshape(-1, nodal.dim**3) @ (1 << np.arange(nodal.dim**3))
+    alike = [(code == value, boundary_basis(valid[rows[np.argmax(code == value)]], terms)) for value in np.unique(code)]
+    equations = valid[rows].sum(axis=(1, 2, 3))
+    for same, basis in alike:
+        equations[same] -= basis.shape[3]
+    telling = equations > 0
+    rows, equations = rows[telling], equations[telling]
+    kinds = [(np.flatnonzero(same[telling]), basis) for same, basis in alike if (same & telling).any()]
+    entries = np.arange(len(nodal.indices))
+    part = sp.csr_array((entries, nodal.indices, nodal.indptr), shape=(nodal.n, nodal.n))[rows]
+    row = np.repeat(np.arange(len(rows)), np.diff(part.indptr))
+    data = nodal.data[part.data] * (valid[rows].any(axis=3) / nodal.size[rows, None, None])[row]
     live = (data != 0).any(axis=(1, 2))
-    neighbour = nodal.indices[entry[live]]
-    touched = np.zeros(nodal.n, dtype=bool)
-    touched[neighbour] = True
-    columns = np.flatnonzero(touched)
-    local = np.cumsum(touched) - 1
+    columns, local = np.unique(part.indices[live].astype(np.int64), return_inverse=True)
     indptr = np.concatenate([[0], np.cumsum(np.bincount(row[live], minlength=len(rows)))]).astype(np.int32)
-    return Identities(rows, columns, indptr, local[neighbour].astype(np.int32), data[live], valid[rows], terms)
+    return Identities(rows, columns, indptr, local.astype(np.int32), data[live], valid[rows], kinds, equations)
+
+
+def poisson_ratio(lame_ratio: float) -> float:
+    """Poisson's ratio, in plane strain where the body is plane, of lambda / mu."""
+    return lame_ratio / (2 * (1 + lame_ratio))
+
+
+def lame_ratio(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64]) -> float | None:
+    """The number lambda / mu of the body; None where it varies or does not show.
+
+    p and q are in this ratio at every node. They vanish at nodes around which the material is homogeneous, so that
+    nodes on free surfaces and material interfaces count.
+    """
+    known, d = determined(points), nodal.dim
+    local = identities(nodal, valid, np.arange(nodal.n))
+    if not len(local.rows):
+        return None
+    value = local.apply(np.where(known[:, None], points, 0.0)[local.columns, :, None])
+    both = np.full((len(local.rows), 2 * d), np.nan)  # p and q, in units of the size of the row
+    for rows, basis in local.kinds:
+        if basis.shape[3] == 2 * d:  # the valid pairs determine them
+            seen = seen_terms(local.valid[rows[0]], boundary_terms(d)).reshape(d**3, 2 * d)
+            both[rows] = value[rows].reshape(len(rows), -1) @ np.linalg.pinv(seen).T
+    unknown = nodal.graph @ (~known).astype(float) > 0
+    p, q = np.split(both[np.isfinite(both).all(axis=1) & ~unknown[local.rows]], 2, axis=1)
+    strength = np.linalg.norm(q, axis=1)
+    if strength.max(initial=0.0) < 1e-8:
+        return None
+    p, q = p[strength > SMALL * strength.max()], q[strength > SMALL * strength.max()]
+    ratio = float((p * q).sum() / (q * q).sum())
+    misfit = np.linalg.norm(p - ratio * q, axis=1) / np.linalg.norm(q, axis=1)
+    return ratio if np.max(misfit) <= ALIKE * (1 + abs(ratio)) else None

@@ -1,0 +1,196 @@
+"""The kinds of answer: planar meshes, surfaces, bodies, structures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..topology.polygons import Polygons
+from .base import Recovery, none_of, occurring, with_mid_nodes
+
+if TYPE_CHECKING:
+    from ..cells import Alternative
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class PlanarMesh(Recovery):
+    """A planar mesh of triangles: from a scalar matrix, or from directions that are not coupled."""
+
+    n_holes: int  #: Bounded boundary loops, over all pieces.
+    polygons_offsets: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))  #: (polygons + 1,)
+    #: (polygons_offsets[-1],) cells that the matrix leaves undivided, counter-clockwise, where polygon k is
+    #: ``polygons_data[polygons_offsets[k]:polygons_offsets[k + 1]]``.
+    polygons_data: NDArray[np.int64] = field(default_factory=none_of())
+    #: (n, 2) one standard deviation of each coordinate, on request.
+    standard_deviations: NDArray[np.float64] | None = None
+    #: With noise, or entries that were rounded, ``statistic``, ``degrees_of_freedom``, ``p_value``, ``sigma``,
+    #: ``largest``, ``largest_p_value``; see :func:`unassemble.certify.chi_square_verdict`.
+    chi_square: Mapping[str, float] | None = None
+    #: Standard deviation of independent errors of the entries that would leave the misfit; None where it is no noise.
+    estimated_noise: float | None = None
+    #: ``"mass"``, ``"coefficient"`` or ``"one sign"``, a term that the model lacks, where that explains the misfit.
+    missing_term: str = ""
+    #: (k, 2) entries that stand out from the misfit of their piece, at most one of each.
+    suspects: NDArray[np.int64] = field(default_factory=none_of(2))
+    #: (m,) of a mass matrix, which tells no shape, s times the areas of the triangles; `points` are NaN.
+    areas: NDArray[np.float64] | None = None
+    #: (n,) the diagonal matrix S, of geometric mean 1, where the matrix is S c L S.
+    row_scaling: NDArray[np.float64] | None = None
+    #: Cells in doubt where other meshes fit as well, and what these have instead.
+    alternatives: tuple[Alternative, ...] = ()
+    n_entries: int = 0  #: Entries above the diagonal.
+    n_fitting: int = 0  #: Those that the mesh gives back to 1e-9 of their row's largest.
+    #: (k, 2) vertices that the matrix has no rows for, where it determines them; see :mod:`unassemble.boundaries`.
+    eliminated_points: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+
+    @property
+    def n_polygons(self) -> int:
+        """Number of cells that the matrix leaves undivided."""
+        return len(self.polygons_offsets) - 1
+
+    @property
+    def largest_deviation(self) -> float | None:
+        """The largest error bar of a coordinate, where there are any."""
+        deviations = self.standard_deviations
+        if deviations is None or not np.isfinite(deviations).any():
+            return None
+        return float(np.nanmax(deviations))
+
+    def divided(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Triangles, with the polygons in fans.
+
+        Returns
+        -------
+        triangles : (m, 3) int64
+        outline : (m, 3) bool
+            False for sides, from each corner to the next, that are diagonals of polygons.
+        """
+        fans, outline = Polygons(self.polygons_offsets, self.polygons_data).fans()
+        return np.concatenate([self.triangles, fans]), np.concatenate([np.ones(self.triangles.shape, bool), outline])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class ConformingMesh(PlanarMesh):
+    """A planar mesh of other elements than linear triangles, or of these beside quadrilaterals."""
+
+    #: (m, 4) quadrilaterals, counter-clockwise. Of quadratic and cubic cells, as in `triangles`, these are the corners.
+    quads: NDArray[np.int64] = field(default_factory=none_of(4))
+    #: (m, k) the nodes that each cell of a higher order has besides its corners, in meshio's order; else empty.
+    mid_nodes: NDArray[np.int64] = field(default_factory=none_of(0))
+    quadrature: str  #: The rule that integrated the elements, where their shape shows it.
+    straight: bool  #: Whether nodes other than corners lie on straight sides at equal distances.
+
+    @property
+    def cells(self) -> dict[str, NDArray[np.int64]]:
+        """Cells of each kind that occurs, all their nodes, by meshio's names."""
+        return with_mid_nodes(occurring(triangle=self.triangles, quad=self.quads), self.mid_nodes)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Surface(Recovery):
+    """A triangulated surface, known by its edge lengths.
+
+    `points` are NaN unless coordinates in space were asked for; `node_status` says for which vertices the entries tell
+    lengths. Triangles of a piece run the same way round where it is orientable. `boundary` holds the edges with one
+    triangle, loop by loop, in no order and direction.
+    """
+
+    edges: NDArray[np.int64]  #: (e, 2) sides of the triangles, rows i < j.
+    edge_lengths: NDArray[np.float64]  #: (e,) mean 1 in each piece.
+    #: (n,) what the angles about a vertex lack of 2 pi, or of pi on the boundary; added up where several sheets touch
+    #: in a vertex, NaN where there is none. Over a piece it adds up to 2 pi times the Euler characteristic.
+    curvature: NDArray[np.float64]
+    #: (number of pieces,) Euler characteristic; sheets that only touch in a vertex count as apart there.
+    euler: NDArray[np.int64]
+    orientable: NDArray[np.bool_]  #: (number of pieces,)
+    loops: NDArray[np.int64]  #: (number of pieces,) boundary loops.
+    #: Of coordinates in space ``misfit``, the root mean square difference of edge lengths relative to their mean,
+    #: ``largest``, the largest such difference, and ``misfits``, those of all starts.
+    realisation: Mapping[str, Any] | None = None
+    chi_square: Mapping[str, float] | None = None  #: With noise, the test that rows sum to zero, as in `PlanarMesh`.
+    length_deviations: NDArray[np.float64] | None = None  #: (e,) with noise, on request, one standard deviation.
+
+    @property
+    def flat(self) -> bool:
+        """Whether the angles about every vertex inside add up to a full turn, up to rounding."""
+        inside = np.isfinite(self.curvature)
+        inside[self.boundary] = False
+        return bool(np.abs(self.curvature[inside]).max(initial=0.0) < 1e-8)
+
+    @property
+    def fits_no_plane(self) -> bool:
+        """Whether a piece is closed, one-sided or has a handle, so that no mesh in the plane has these triangles."""
+        return bool(((self.loops == 0) | ~self.orientable | (self.genus > 0)).any())
+
+    @property
+    def genus(self) -> NDArray[np.int64]:
+        """(number of pieces,) handles, or cross-caps of pieces that are not orientable."""
+        total = 2 - self.loops - self.euler
+        return np.asarray(np.where(self.orientable, total // 2, total))
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How uniquely the matrix determines a piece of a body or structure."""
+
+    #: Independent fields that satisfy all valid identities, nodes that stay loose left out. 4 in space, 3 in the plane,
+    #: translations and scale. One less where no field but translations is exact.
+    null_dimension: int
+    residual: float  #: Singular value of the coordinates, norm of the residual over the norm of the centred field.
+    gap: float  #: Singular value of the best field that is none of these; an upper bound on large bodies.
+    rows: int  #: Nodes with valid identities.
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Mechanical(Recovery):
+    """What bodies and structures share: positions that solve linear identities."""
+
+    evidence: tuple[Evidence, ...] = ()  #: The null space of each piece's identities.
+    #: Of entries with few digits, how far off a node may be, ten standard deviations, over its piece's diameter.
+    position_error: float | None = None
+    #: (m, 4) cells of four corners, counter-clockwise in the plane.
+    quads: NDArray[np.int64] = field(default_factory=none_of(4))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Body(Mechanical):
+    """An elastic body in the plane or in space.
+
+    Cells are in meshio's order and positively oriented. Of quadratic ones `triangles`, `quads`, `tetrahedra` and
+    `hexahedra` are the corners.
+    """
+
+    tetrahedra: NDArray[np.int64] = field(default_factory=none_of(4))  #: (m, 4)
+    hexahedra: NDArray[np.int64] = field(default_factory=none_of(8))  #: (m, 8)
+    #: (m, k) of quadratic cells the nodes that each has besides its corners, in meshio's order; else empty.
+    mid_nodes: NDArray[np.int64] = field(default_factory=none_of(0))
+    poisson_ratio: float | None = None  #: Where it is one number; that of plane strain in the plane.
+    #: (n_cells, 2) lambda and mu of each cell, as in `scale`.
+    lame: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+
+    @property
+    def cells(self) -> dict[str, NDArray[np.int64]]:
+        """Cells of each kind that occurs, all their nodes, by meshio's names."""
+        corners = occurring(triangle=self.triangles, quad=self.quads, tetra=self.tetrahedra, hexahedron=self.hexahedra)
+        return with_mid_nodes(corners, self.mid_nodes)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Structure(Mechanical):
+    """A frame, shell, plate or truss."""
+
+    lines: NDArray[np.int64] = field(default_factory=none_of(2))  #: (m, 2) members.
+
+    @property
+    def cells(self) -> dict[str, NDArray[np.int64]]:
+        """Members and shell cells, each kind that occurs, by meshio's names."""
+        return occurring(line=self.lines, triangle=self.triangles, quad=self.quads)
+
+    @property
+    def element(self) -> None:
+        """None: members and shell cells are read off the graph, and what they are is not looked for."""
+        return None

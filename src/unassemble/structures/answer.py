@@ -1,0 +1,62 @@
+"""A structure as it is given back: moved to its anchors, with the fields and sentences that all kinds share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..nodes.anchoring import Request, anchored, near_enough
+from ..nodes.numbering import Numbering
+from ..recovery import Structure
+from ..words import Reason
+from .placed import Placed
+from .recognise import StructuralNumbering
+
+
+def covered(rows: NDArray[np.bool_], columns: NDArray[np.bool_]) -> str:
+    """How much of a matrix speaks for the coordinates, in words: masks of its rows, and of the unknowns they touch."""
+    return f"{rows.mean():.0%} of the rows say so, of {columns.mean():.0%} of the unknowns"
+
+
+def answer(
+    numbering: Numbering | StructuralNumbering,
+    request: Request,
+    found: Placed,
+    verdict: tuple[str, Reason],
+    *,
+    edges: NDArray[np.int64],
+    sized: bool = True,
+    free: str = "",
+    uniqueness: str = "searched",
+    notes: list[str],
+    **fields: Any,
+) -> Structure:
+    """What was found, by status and reason of the `verdict`; what is `free` is said where anchors leave a size so.
+
+    Errors are measured in distances of coupled nodes, `edges` (e, 2); `fields` are further ones of a Structure.
+    """
+    held = request.held(numbering.node_of_row, found.points.shape[1])
+    points, factor, more = anchored(found.points, found.component, len(found.evidence), held, sized=sized)
+    length = np.linalg.norm(found.points[edges[:, 0]] - found.points[edges[:, 1]], axis=1)
+    edge = float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
+    status, reason = near_enough(*verdict, points, found.points, found.component, factor, edge)
+    return Structure(
+        points=points,
+        component=found.component,
+        scale=np.full(len(factor), np.nan),
+        node_status=(found.component < 0).astype(np.int8),
+        evidence=found.evidence,
+        status=status,
+        uniqueness=uniqueness if status == "certified" else None,
+        reason=reason.text,
+        advice=reason.advice,
+        timings=request.clock.timings,
+        warnings=(*request.matrix.warnings, *found.notes, *notes, *([free] if np.isnan(factor).any() else []), *more),
+        node_of_row=numbering.node_of_row,
+        direction_of_row=numbering.direction_of_row,
+        numbering=numbering.kind,
+        choice=request.choice,
+        **fields,
+    )
