@@ -32,7 +32,6 @@ import skfem
 from click.testing import CliRunner
 from hostile_inputs import KINDS, Given, Piece, pieces_of
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 from skfem.models import laplace, mass
 
 from unassemble import ConformingMesh, InputError, RecoveryError, Surface, recover
@@ -93,9 +92,9 @@ def gives_back(found, matrix: Any) -> bool:
     for part in pieces_of_linear(found, cells["triangle"]) if linear else pieces_of_elements(found, cells):
         part = sp.csr_array(part - sp.diags_array(part.diagonal()))
         total = total + part * ratio(part, off)
-    known = found.node_status == 0
-    sums = np.abs(given.sum(axis=1)) > MISFIT * np.maximum(np.abs(given).max(axis=1).toarray().ravel(), 1e-300)
-    return agree(off, total, known, sums & ~known.all())
+    size = np.maximum(np.abs(given).max(axis=1).toarray().ravel(), 1e-300)
+    lost = (np.abs(given.sum(axis=1)) > MISFIT * size) & (getattr(found, "n_entries", 1) == 0)  # else all are claimed
+    return agree(off, total, found.node_status == 0, cells, lost)
 
 
 def ratio(part: sp.csr_array, off: sp.csr_array) -> float:
@@ -106,22 +105,28 @@ def ratio(part: sp.csr_array, off: sp.csr_array) -> float:
     return float(np.median(off[row, column][large] / own[large]))
 
 
-def agree(off: sp.csr_array, total: sp.csr_array, known: NDArray[np.bool_], lost: NDArray | None = None) -> bool:
+def agree(
+    off: sp.csr_array, total: sp.csr_array, known: NDArray[np.bool_], cells: dict[str, NDArray], lost: NDArray[np.bool_]
+) -> bool:
     """Whether entries between rows that are claimed are the same, relative to their rows.
 
-    Nothing is claimed of entries beside triangles that may be gone: where two rows have a common neighbour without a
-    position, or are both in `lost`.
+    Cells may be gone next to rows in `lost` and to rows with a neighbour without a position: between two of them
+    nothing is claimed but of pairs that two cells share.
     """
     largest = np.maximum(np.abs(off).max(axis=1).toarray().ravel(), 1e-300)
     difference = sp.coo_array(off - total)
     row, column = difference.coords
     wrong = np.abs(difference.data) > MISFIT * np.minimum(largest[row], largest[column])
-    beside = sp.csr_array(off != 0, dtype=np.int32)[:, ~known]
-    beside = sp.csr_array(beside @ beside.T)
-    claimed = known[row] & known[column] & (beside[row, column] == 0)
-    if lost is not None:
-        claimed &= ~(lost[row] & lost[column])
-    return not (wrong & claimed).any()
+    lost = lost | ((off != 0) @ (~known).astype(int) > 0)
+    lost = lost[row] & lost[column] & (cells_of_pairs(cells, off.shape)[row, column] < 2)
+    return not (wrong & known[row] & known[column] & ~lost).any()
+
+
+def cells_of_pairs(cells: dict[str, NDArray], shape: tuple[int, int]) -> sp.csr_array:
+    """How many cells two rows share."""
+    pairs = [some[:, [a, b]] for some in cells.values() for a in range(some.shape[1]) for b in range(some.shape[1])]
+    ends = np.concatenate(pairs)
+    return sp.coo_array((np.ones(len(ends)), ends.T), shape=shape).tocsr()
 
 
 def lengths_give_back(found: Surface, matrix: sp.csr_array) -> bool:
@@ -137,16 +142,15 @@ def lengths_give_back(found: Surface, matrix: sp.csr_array) -> bool:
     factor = np.repeat(found.scale[found.component[found.triangles].max(axis=1)], 3)[part.row]
     total = sp.coo_array((part.data * factor, (rows[part.row], rows[part.col])), shape=matrix.shape).tocsr()
     off, total = (sp.csr_array(one - sp.diags_array(one.diagonal())) for one in (matrix, total))
-    return agree(off, total, found.node_status == 0)
+    nothing = np.zeros(len(off.indptr) - 1, dtype=bool)
+    return agree(off, total, found.node_status == 0, {"triangle": found.triangles}, nothing)
 
 
 def pieces_of_linear(found, triangles: NDArray) -> Iterator[sp.csr_array]:
     """The matrix of each piece of a mesh of linear triangles."""
     label = pieces_of(triangles)
     for k in range(label.max() + 1):
-        rows, corners = np.unique(triangles[label == k], return_inverse=True)
-        mesh = skfem.MeshTri(found.points[rows].T.copy(), corners.reshape(-1, 3).T.copy())
-        yield assembled_on(mesh, skfem.ElementTriP1(), rows, found, laplace)
+        yield assembled_on("triangle", triangles[label == k], found, laplace)
 
 
 def pieces_of_elements(found, cells: dict[str, NDArray], form=laplace) -> Iterator[sp.csr_array]:
@@ -156,17 +160,19 @@ def pieces_of_elements(found, cells: dict[str, NDArray], form=laplace) -> Iterat
         for name, some in cells.items():
             own = some[found.component[some].max(axis=1) == k]
             if len(own):
-                kind, element, corners = ELEMENTS[name]
-                vertices, local = np.unique(own[:, :corners], return_inverse=True)
-                mesh = kind(found.points[vertices].T.copy(), local.reshape(-1, corners).T.copy())
-                total = total + assembled_on(mesh, element(), np.unique(own), found, form)
+                total = total + assembled_on(name, own, found, form)
         yield total
 
 
-def assembled_on(mesh, element, rows: NDArray, found, form) -> sp.csr_array:
-    """The matrix of a form, nodes being the rows that lie where they do."""
-    basis = skfem.Basis(mesh, element)
-    place = rows[cKDTree(found.points[rows]).query(basis.doflocs.T)[1]]
+def assembled_on(name: str, cells: NDArray, found, form) -> sp.csr_array:
+    """The matrix of a form on straight elements, whose nodes are told cell by cell: in slits two lie in one place."""
+    kind, element, corners = ELEMENTS[name]
+    vertices, local = np.unique(cells[:, :corners], return_inverse=True)
+    mesh = kind(found.points[vertices].T.copy(), local.reshape(-1, corners).T.copy())
+    basis = skfem.Basis(mesh, element())
+    off = basis.doflocs[:, basis.element_dofs].transpose(2, 1, 0)[:, :, None] - found.points[cells][:, None]
+    place = np.empty(basis.N, dtype=np.int64)
+    place[basis.element_dofs.T] = np.take_along_axis(cells, np.linalg.norm(off, axis=3).argmin(axis=2), axis=1)
     part = sp.coo_array(form.assemble(basis))
     return sp.coo_array((part.data, (place[part.row], place[part.col])), shape=2 * (found.n_points,)).tocsr()
 
@@ -183,10 +189,7 @@ def masses(found) -> sp.csr_array:
     """The mass matrix, from scikit-fem; other elements are straight."""
     if found.element != "P1":
         return sum(pieces_of_elements(found, found.cells, mass))
-    rows, corners = np.unique(found.divided()[0], return_inverse=True)
-    mesh = skfem.MeshTri(found.points[rows].T.copy(), corners.reshape(-1, 3).T.copy())
-    part = sp.coo_array(mass.assemble(skfem.Basis(mesh, skfem.ElementTriP1())))
-    return sp.coo_array((part.data, (rows[part.row], rows[part.col])), shape=2 * (found.n_points,)).tocsr()
+    return assembled_on("triangle", found.divided()[0], found, mass)
 
 
 def judged(given: Given) -> str:

@@ -130,6 +130,12 @@ def test_regular_frames_are_certified(make, counts):
     assert sound(given.matrix, rows_per_node(given))
 
 
+def test_multiples_of_a_row_do_not_check_it():
+    """A matrix of rank one, whose row adds up to zero by chance, has two equations for a difference of two nodes."""
+    row = np.array([4.0, -2, -3, -4, -4, 4])
+    assert recover(np.outer(row, row)).status == "uncertified"
+
+
 def test_the_reason_says_what_the_certificate_covers():
     given = frame()
     found = recover(given.clamped(given.points[:, 2] < 1).matrix)

@@ -17,6 +17,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SolverError
 from ..tolerances import LAST_DIGITS, ROUNDED
 from ..topology import Piece
 from .cotangent import edge_weights
@@ -103,6 +104,8 @@ def polish(
     start, for instance of :func:`~unassemble.planar.conformal.conformal_map`; `scale`: c, where it is known, otherwise
     it is fitted; `spread` (e,): standard deviations of the errors of a up to a common factor, for instance
     :func:`~unassemble.planar.cotangent.weight_roundings`, of one size by default.
+
+    Raises SolverError if cells are flat at the start.
     """
     options = options or PolishOptions()
     extent = np.abs(z - z.mean()).max()
@@ -112,6 +115,8 @@ def polish(
     model = Cotangents(drawn) if isinstance(drawn, Piece) else drawn
     problem = Problem(model, weights, spread, scale)
     fit = problem.at(z)
+    if not np.isfinite(fit.weights).all():
+        raise SolverError("cells are flat")
     equations: NormalEquations | None = None
     system: GaussNewton | IterativeNormalEquations | None = None
     factorisations, steps, length, converged = 0, 0, np.inf, False

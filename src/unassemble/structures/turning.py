@@ -44,6 +44,7 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     attempts: list[tuple[Placed, NDArray[np.bool_]]] = []
     failure: GeometryError | None = None
     layout, valid = nodes.layout, nodes.whole()
+    telling = valid & _distinct(nodes.matrix, valid.any(axis=2).ravel()).reshape(nodes.n, -1, 1)
     edges = np.column_stack(sp.triu(nodes.pattern(len(layout.displacements)), 1).nonzero())
     ways = [(False, False), (False, True), (True, False)] if layout.rotations else [(False, False)]
     if layout.rotations and layout.dim == 3:  # where nothing drills, forces alone are too few to leave any out
@@ -51,7 +52,7 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     for but_for_some, springs in ways:
         if but_for_some and (allowed > CERTIFIED or any(found.residual <= allowed for found, _ in attempts)):
             break  # of entries with few digits other ones would be left out each time that these are drawn anew
-        given = joined(equations(nodes, valid, springs=springs, allowed=allowed), told_by(members, nodes))
+        given = joined(equations(nodes, telling, springs=springs, allowed=allowed), told_by(members, nodes))
         counted = valid.copy()
         if springs:
             counted[:, len(layout.displacements) :] = False
@@ -78,6 +79,19 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     found, counted = min(attempts, key=lambda one: _doubts(one[0], allowed))
     most = layout.dim + (not layout.rotations)  # no matrix tells translations, nor the size without rotations
     return without_free(found, most), counted
+
+
+def _distinct(matrix: sp.csr_array, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Some rows, but of those that are multiples of each other one: they check nothing. Two random fields tell them."""
+    rows = np.flatnonzero(some)
+    size = np.maximum(sp.linalg.norm(matrix, axis=1), np.finfo(float).tiny)[rows, None]
+    seen = (matrix @ np.random.default_rng(0).standard_normal((matrix.shape[1], 2)))[rows] / size
+    seen *= np.where(seen[:, :1] < 0, -1, 1)
+    order = np.lexsort(seen.T)
+    again = np.abs(np.diff(seen[order], axis=0)).max(axis=1, initial=0) <= CANCELLED
+    result = some.copy()
+    result[rows[order[1:][again]]] = False
+    return result
 
 
 def _doubts(found: Placed, allowed: float) -> tuple[bool, bool, bool, int, float]:
