@@ -48,8 +48,8 @@ CONDITIONS = {
     "identity": identity_rows,
     "robin": lambda mesh: robin(mesh, 1.0),
     "convection": lambda mesh: symmetric(*convected(mesh, (3.0, -2.0))),
-    "two materials": lambda mesh: materials(mesh, (1.0, 5.0)),
-    "four materials": lambda mesh: materials(mesh, (1.0, 3.0, 0.2, 20.0)),
+    "two-materials": lambda mesh: materials(mesh, (1.0, 5.0)),
+    "four-materials": lambda mesh: materials(mesh, (1.0, 3.0, 0.2, 20.0)),
 }
 WRONG = 1e-8
 

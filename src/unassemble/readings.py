@@ -93,7 +93,7 @@ class ScalarReadings:
             order.append((1 if replaced or incomplete else 3, self._partial))
             order.append((0, self._without_boundary_terms))
         if not replaced:
-            order += [(1 if self.crowded else 3, lambda: self.other_elements), (2, self._linear), (2, self._regions)]
+            order += [(1 if self.crowded else 3, lambda: self.other_elements), (2, self._regions), (2, self._linear)]
         nearest: PlanarMesh | None = None
         failure: RecoveryError | None = None
         for _, reading in sorted(order, key=lambda one: one[0]):
@@ -122,7 +122,7 @@ class ScalarReadings:
         return recover_partial(matrix, whole, self.placement, self.clock, self.options)
 
     def _regions(self) -> PlanarMesh | None:
-        return recover_regions(self.matrix, self.placement, self.clock, self.options)
+        return recover_regions(with_diagonals(self.matrix, everywhere=True), self.placement, self.clock, self.options)
 
     def _linear(self) -> PlanarMesh:
         return recover_with_terms(self.matrix, self._plain, self.clock, self.placement.coefficients)

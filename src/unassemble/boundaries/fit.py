@@ -208,7 +208,7 @@ class WholeEntries:
         gradient, response = solved[:, 0], solved[:, 1:]
         left = system.size - system.slope.T @ response
         np.fill_diagonal(left, np.maximum(left.diagonal(), 1e-12 * system.size.diagonal()))
-        move = np.linalg.solve(left, system.along - system.slope.T @ gradient)
+        move = np.linalg.lstsq(left, system.along - system.slope.T @ gradient, rcond=None)[0]
         step = np.ascontiguousarray(gradient - response @ move).view(np.complex128)
         step = np.append(step, 0)[np.where(self.free, self.place, len(step))]
         return (step, move) if np.isfinite(step).all() and np.isfinite(move).all() else None

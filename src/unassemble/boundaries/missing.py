@@ -44,17 +44,18 @@ def with_boundary_edges(matrix: OperatorMatrix) -> OperatorMatrix:
     return _with_zeros(matrix, added)
 
 
-def with_diagonals(matrix: OperatorMatrix) -> OperatorMatrix:
+def with_diagonals(matrix: OperatorMatrix, *, everywhere: bool = False) -> OperatorMatrix:
     """The same with zeros on one diagonal of each cell of four rows, whose diagonals both vanish: it is a rectangle.
 
-    Only for rows that were replaced: all edges but those between two of these have triangles on both sides, so that
-    cells are missing, and not holes, where they do not.
+    Where rows were replaced all edges but those between two of these have triangles on both sides, so that cells are
+    missing, and not holes, where they do not. Else only on request, and holes of four edges count as cells.
     """
-    if matrix.replaced is None:
+    if matrix.replaced is None and not everywhere:
         return matrix
     n, edges = matrix.n, matrix.edges
+    gone = np.zeros(n, dtype=bool) if matrix.replaced is None else matrix.replaced
     _, opposite = three_cycles(n, edges)
-    replaced = matrix.replaced[edges].all(axis=1)
+    replaced = gone[edges].all(axis=1)
     opened = np.bincount(opposite.ravel(), minlength=len(edges)) < np.where(replaced, 1, 2)
     ends = edges[opened]
     graph = sp.coo_array((np.ones(len(ends), np.int32), ends.T), shape=(n, n)).tocsr()
@@ -64,7 +65,7 @@ def with_diagonals(matrix: OperatorMatrix) -> OperatorMatrix:
     pairs = pairs[~contains(pair_keys(n, *edges.T), pair_keys(n, *pairs.T))]
     absent = {frozenset(pair) for pair in pairs.tolist()}
     added: list[tuple[int, int]] = []
-    for a, c in pairs[~matrix.replaced[pairs].all(axis=1)].tolist():
+    for a, c in pairs[~gone[pairs].all(axis=1)].tolist():
         other = frozenset(set(_around(graph, a)) & set(_around(graph, c)))
         if other in absent:
             absent.discard(frozenset((a, c)))  # its cell is divided

@@ -33,12 +33,16 @@ class ExchangeOptions:
     least : tuple of (float, bool)
         Above which number a triangle changes, one after the other, and whether only those are candidates that entries
         speak for where nothing else changes.
+    alone : int
+        Candidates, those next to the largest misfits, that change alone at last: on the boundary positions take up
+        nearly all of a change to first order.
     at_once : int
         Columns that are solved for at once.
     """
 
     most: int = 300
     least: tuple[tuple[float, bool], ...] = ((0.5, True), (0.5, False), (0.25, True), (0.9, True))
+    alone: int = 8
     at_once: int = 32
 
 
@@ -76,6 +80,10 @@ def exchanges(
             new = region.copy()
             new[triangle[taken]] = other[taken]
             yield new
+    for one in np.argsort(-np.abs(misfit[sides]).max(axis=1))[: options.alone].tolist():
+        new = region.copy()
+        new[triangle[one]] = other[one]
+        yield new
 
 
 def _beside(problem: WholeEntries) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

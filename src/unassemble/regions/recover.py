@@ -12,8 +12,11 @@ from ..boundaries.fit import Fit, FitOptions, WholeEntries
 from ..boundaries.judge import determined
 from ..certify import Certificate, certify
 from ..clock import Clock
+from ..errors import GeometryError, SolverError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
+from ..planar.conformal import conformal_map
+from ..planar.cotangent import edge_weights
 from ..recovery import PlanarMesh
 from ..scalar.joined import JoinedMesh
 from ..scalar.notes import piece_notes, topology_notes
@@ -37,14 +40,19 @@ class RegionOptions:
         Of the fit from the start, and of those after exchanges.
     rounds : int
         Exchanges, one after the other.
-    exact : float
-        Root mean square misfit that is none, in units of typical entries.
+    better : float
+        Part of a misfit that an exchange leaves, at most.
+    exact, near : float
+        Root mean square misfit that is none, in units of typical entries; and that of a mesh without regions whose
+        entries have errors.
     """
 
     first: FitOptions = field(default_factory=lambda: FitOptions(last_steps=40, damping=1e-3))
     next: FitOptions = field(default_factory=lambda: FitOptions(last_steps=15, damping=1e-6))
     rounds: int = 30
+    better: float = 0.98
     exact: float = 1e-12
+    near: float = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +98,8 @@ def recover_regions(
     with clock("regions"):
         weights = [-matrix.entries[piece.edge_rows] for piece in topology.pieces]
         guesses = [guessed_regions(piece, own) for piece, own in zip(topology.pieces, weights, strict=True)]
-        if all(len(scale) == 1 for _, scale in guesses):
+        told = zip(topology.pieces, weights, guesses, strict=True)
+        if all(len(scale) == 1 or _uniform(piece, own) for piece, own, (_, scale) in told):
             return None
         found: list[_Regions] = []
         for piece, own, guess in zip(topology.pieces, weights, guesses, strict=True):
@@ -123,12 +132,23 @@ def recover_regions(
     return _report(mesh, region, known, held, topology, [*notes, *topology_notes(topology)], placement, clock)
 
 
+def _uniform(piece: Piece, weights: NDArray) -> bool:
+    """Whether one factor comes near all entries, at the conformal map."""
+    try:
+        found = conformal_map(piece, weights, scale=None, sharp=False)
+    except (GeometryError, SolverError):
+        return False
+    with np.errstate(all="ignore"):
+        misfit = weights / found.scale - edge_weights(piece, found.z)
+    return bool(np.sqrt(np.mean(misfit**2)) < RegionOptions.near)
+
+
 def _fitted(
     piece: Piece, weights: NDArray, region: NDArray, scale: NDArray, options: RegionOptions | None = None
 ) -> _Regions | None:
     """All entries of a piece fitted, triangles exchanged where they do not fit; None where that comes to no end."""
     options = options or RegionOptions()
-    unit = float(np.median(np.abs(scale)))
+    unit = float(np.median(scale))
     weights = weights / unit
     z, scale = started(piece, weights, region, scale / unit)
     problem, fit = _fit(piece, weights, region, z, scale, options.first)
@@ -138,7 +158,12 @@ def _fitted(
             break
         for other in exchanges(problem, fit.z, fit.scale):
             trial, found = _fit(piece, weights, other, fit.z, fit.scale, options.next)
-            if found.misfit < fit.misfit:
+            if found.misfit > options.exact:  # from where wrong regions have bent the mesh, or from a start of its own
+                again, anew = _fit(piece, weights, other, *started(piece, weights, other, fit.scale), options.first)
+                if anew.misfit < found.misfit:
+                    trial, again, found = again, trial, anew
+                again.release()
+            if found.misfit < options.better * fit.misfit:
                 problem.release()
                 problem, fit = trial, found
                 break
