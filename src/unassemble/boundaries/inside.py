@@ -41,11 +41,7 @@ class InsideMesh:
 
 
 def fit_inside(
-    piece: Piece,
-    weights: NDArray,
-    given: NDArray[np.bool_],
-    shared: NDArray[np.bool_],
-    scale: float | None = None,
+    piece: Piece, weights: NDArray, given: NDArray[np.bool_], shared: NDArray[np.bool_], scale: float | None = None
 ) -> InsideMesh | None:
     """A mesh that fits whole entries; None where there are too few.
 

@@ -28,11 +28,7 @@ from .inside import InsideMesh, fit_inside
 
 
 def recover_partial(
-    matrix: OperatorMatrix,
-    whole: NDArray[np.bool_] | None,
-    placement: Placement,
-    clock: Clock,
-    options: ScalarOptions,
+    matrix: OperatorMatrix, whole: NDArray[np.bool_] | None, placement: Placement, clock: Clock, options: ScalarOptions
 ) -> PlanarMesh | None:
     """The mesh of the 3-cycles of a matrix, fitted to entries that are those of its triangles and no others.
 
@@ -63,11 +59,7 @@ def recover_partial(
         given = [_given(piece, matrix, whole) for piece in topology.pieces]
         meshes = [
             fit_inside(
-                piece,
-                -matrix.entries[piece.edge_rows],
-                own,
-                ~own if whole is None else np.zeros_like(own),
-                scale,
+                piece, -matrix.entries[piece.edge_rows], own, ~own if whole is None else np.zeros_like(own), scale
             )
             for piece, own in zip(topology.pieces, given, strict=True)
         ]
