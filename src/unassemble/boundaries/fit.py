@@ -113,14 +113,13 @@ class WholeEntries:
         return weight_gradient(self.piece, z, scale[self.region]) / self.unit(scale)
 
     def slopes(self, z: NDArray, scale: Scale) -> NDArray[np.float64]:
-        """(e, k) what misfits change by with -log c, of each region."""
+        """(e, k) what misfits change by with -log c, of each region; no columns where c is known."""
+        if self.known_scale is not None:
+            return np.zeros((len(self.weights), 0))
         if self.region is None:
             return np.asarray(self.weights / scale)[:, None]
-        parts = [
-            edge_weights(self.piece, z, np.where(self.region == k, scale[k], 0.0)) / self.unit(scale)
-            for k in range(len(scale))
-        ]
-        return np.column_stack(parts)
+        own = [np.where(self.region == k, c, 0.0) for k, c in enumerate(scale)]
+        return np.column_stack([edge_weights(self.piece, z, one) / self.unit(scale) for one in own])
 
     def _scaled(self, scale: Scale, move: NDArray) -> Scale:
         """Factors whose logarithms have changed; where c is known it stays."""
@@ -246,8 +245,7 @@ class System:
         jacobian = jacobian_rows(problem.columns, parts)
         self.jacobian_transposed = jacobian.T.tobsr()
         self._upper = UpperTriangle.of(self.jacobian_transposed @ jacobian)
-        known = problem.known_scale is not None
-        self._slopes = trust[:, None] * problem.slopes(z, scale)[:, : 0 if known else None]
+        self._slopes = trust[:, None] * problem.slopes(z, scale)
         self.slope = self.jacobian_transposed @ np.pad(self._slopes, ((0, len(shape)), (0, 0)))
         self.size = self._slopes.T @ self._slopes
         self.towards(misfit, shape)

@@ -41,9 +41,8 @@ def determined(
     length = np.abs(z[piece.edges[:, 1]] - z[piece.edges[:, 0]])
     size = np.bincount(piece.edges.ravel(), np.repeat(length, 2), n) / np.bincount(piece.edges.ravel(), minlength=n)
     gradient = problem.gradient(z, scale) * size[piece.stencil]
-    slopes = problem.slopes(z, scale)[:, : 0 if problem.known_scale is not None else None]
     try:
-        checked, free = _Linearised.of(piece, gradient, slopes, whole).judged(problem.analysed)
+        checked, free = _Linearised.of(piece, gradient, problem.slopes(z, scale), whole).judged(problem.analysed)
     except SolverError:
         checked, free = np.zeros_like(whole), np.zeros((n, 0), dtype=np.complex128)
     if not checked.any():

@@ -41,7 +41,9 @@ def realised(surface: Surface, clock: Clock, starts: int = 4) -> Surface:
             misfits = np.linalg.norm(left, axis=1) / np.linalg.norm(lengths)
             # Dents make a shape smaller, and fit as well.
             fitting = np.flatnonzero(misfits <= max(float(misfits.min()), CERTIFIED))
-            points[vertices] = _in_axes(shapes[max(fitting, key=lambda k: float(np.var(shapes[k], axis=0).sum()))])
+            best = shapes[max(fitting, key=lambda k: float(np.var(shapes[k], axis=0).sum()))]
+            centred = best - best.mean(axis=0)
+            points[vertices] = centred @ np.linalg.svd(centred, full_matrices=False)[2].T  # in principal axes
     misfit = _lengths(points, surface.edges)[known] - surface.edge_lengths[known]
     found = {
         "misfit": float(np.sqrt(np.mean(misfit**2))),
@@ -53,12 +55,6 @@ def realised(surface: Surface, clock: Clock, starts: int = 4) -> Surface:
 
 def _lengths(points: NDArray, edges: NDArray) -> NDArray[np.float64]:
     return np.asarray(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1))
-
-
-def _in_axes(points: NDArray) -> NDArray[np.float64]:
-    """Centred, in principal axes."""
-    centred = points - points.mean(axis=0)
-    return np.asarray(centred @ np.linalg.svd(centred, full_matrices=False)[2].T)
 
 
 def _starts(n: int, edges: NDArray, lengths: NDArray, count: int) -> list[NDArray[np.float64]]:

@@ -90,14 +90,20 @@ def _recovered(
                 f"{count_of(len(matrix.edges), 'edge')} on {count_of(matrix.n, 'row')} are those of no surface, unless "
                 "it has more handles than a sixth of its rows"
             )
-        used, notes = _used(matrix)
-        cycles = Cycles.of(used.n, used.edges)
+        cycles, notes = Cycles.of(matrix.n, matrix.edges), list(matrix.warnings)
+        spare = (cycles.at_edges() == 0) & (matrix.entries == 0)
+        if spare.any():
+            notes.append(f"{count_of(int(spare.sum()), 'stored zero')} on no cycle of three edges left out")
+            matrix = matrix.without(spare)
+            cycles = Cycles.of(matrix.n, matrix.edges)
+        if not len(matrix.edges):
+            raise TopologyError("the matrix is diagonal: no edges, and no surface")
         if triangles is None:
             readings = list(islice(surface_readings(cycles), _READINGS + 1))
         else:
             readings = [cycles.among(triangles)]
         solid = in_four_cliques(cycles)
-    found = [_solved(used, SurfaceMesh.of(cycles, chosen), clock, options) for chosen in readings[:_READINGS]]
+    found = [_solved(matrix, SurfaceMesh.of(cycles, chosen), clock, options) for chosen in readings[:_READINGS]]
     fitting = [one for one in found if one.fits]
     best = (fitting or found)[0]
     if not np.isfinite(best.scale).any():
@@ -123,17 +129,6 @@ _SEVERAL = (
     "with one vertex put back into each hole where rows lack entries, lengths give all entries and row sums back, but "
     "so may several vertices in a hole"
 )
-
-
-def _used(matrix: OperatorMatrix) -> tuple[OperatorMatrix, list[str]]:
-    """The matrix without zeros that belong to no triangle."""
-    cycles = Cycles.of(matrix.n, matrix.edges)
-    spare = (cycles.at_edges() == 0) & (matrix.entries == 0)
-    notes = [f"{count_of(int(spare.sum()), 'stored zero')} on no cycle of three edges left out"] if spare.any() else []
-    used = matrix.without(spare) if spare.any() else matrix
-    if not len(used.edges):
-        raise TopologyError("the matrix is diagonal: no edges, and no surface")
-    return used, [*matrix.warnings, *notes]
 
 
 def _solved(matrix: OperatorMatrix, mesh: SurfaceMesh, clock: Clock, options: ScalarOptions) -> _Found:
