@@ -38,7 +38,7 @@ from irregular import laplacian, largest_piece
 from noise_elements import specimen
 from scipy.spatial import Delaunay
 
-from unassemble import Recovery, recover
+from unassemble import Recovery, RecoveryError, recover
 
 LARGEST = 1e-3
 """Noise up to which errors are held against the bound."""
@@ -89,16 +89,20 @@ def count_channels(size: int, sigma: float, draws: int) -> None:
     matrix, true = laplacian(points[used], triangles.reshape(-1, 3), 1.0)
     z = true @ [1, 1j]
     z = z / (2 * np.abs(z - z.mean()).max())
-    certified, flipped, before, after = 0, 0, [], []
+    certified, refused, flipped, before, after = 0, 0, 0, [], []
     for seed in range(draws):
         given = noisy(matrix, sigma, seed)[0]
-        polished, start = recover(given, noise=sigma), recover(given, noise=sigma, refine=False)
+        try:
+            polished, start = recover(given, noise=sigma), recover(given, noise=sigma, refine=False)
+        except RecoveryError:
+            refused += 1
+            continue
         certified += polished.certified
         flipped += any_flipped(start)
         before.append(mean_square(start.points, z) ** 0.5)
         after.append(mean_square(polished.points, z) ** 0.5)
     print(
-        f"channel of {len(z):6d} vertices, sigma {sigma:.0e}: certified {certified} of {draws}, "
+        f"channel of {len(z):6d} vertices, sigma {sigma:.0e}: certified {certified} of {draws}, refused {refused}, "
         f"starts with flipped triangles {flipped}; median error {np.median(before):.1e} diameters at the start, "
         f"{np.median(after):.1e} after",
         flush=True,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SolverError
-from ..tolerances import LARGEST_NOISE, LAST_DIGITS, SIGMAS
+from ..tolerances import LAST_DIGITS
 from ..topology import Piece
 from .conformal import conformal_map
 from .cotangent import edge_weights, weight_roundings
@@ -34,30 +34,6 @@ def positions(piece: Piece, weights: NDArray, *, scale: float | None, sharp: boo
     found = conformal_map(piece, weights, scale=scale, sharp=sharp)
     notes = () if found.converged else ("the conformal solve did not converge",)
     return PieceMesh(found.z, found.scale, notes)
-
-
-def brought_near(piece: Piece, weights: NDArray, mesh: PieceMesh, *, scale: float | None) -> PieceMesh:
-    """A start for the polish in place of one that noise has bent too far; the same mesh where there is none.
-
-    That is a first polish from there, which does not know yet how errors are spread.
-    """
-    if _fits_roughly(piece, weights, mesh.z, mesh.scale):
-        return mesh
-    try:
-        found = _polished(piece, weights, mesh.z, scale, None)
-    except SolverError:
-        return mesh
-    near = found.converged and _fits_roughly(piece, weights, found.z, found.scale)
-    return replace(mesh, z=found.z, scale=found.scale) if near else mesh
-
-
-def _fits_roughly(piece: Piece, weights: NDArray, z: NDArray, scale: float) -> bool:
-    """Whether no triangle is turned over, and no more is left than the largest noise that is tested leaves anywhere."""
-    with np.errstate(all="ignore"):
-        misfit = np.abs(weights / scale - edge_weights(piece, z))
-    return not count_flipped(piece, z) and bool(
-        np.sqrt(np.mean(misfit**2)) < LARGEST_NOISE and misfit.max() < SIGMAS * LARGEST_NOISE
-    )
 
 
 def refined(

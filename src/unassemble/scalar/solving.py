@@ -17,7 +17,7 @@ from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.cotangent import left_by_all
 from ..planar.hinges import groups
-from ..planar.piece import PieceMesh, brought_near, collapsed, positions, refined
+from ..planar.piece import PieceMesh, collapsed, positions, refined
 from ..tolerances import NOISY
 from ..topology import Piece, Topology
 from ..words import sentences
@@ -83,14 +83,11 @@ def leaders(topology: Topology) -> NDArray[np.int64]:
 def solve(topology: Topology, matrix: OperatorMatrix, clock: Clock, task: Task) -> Solved:
     """Positions and scale of each piece; raises RecoveryError if no piece has any."""
     method, refine, scale, noise = task.options.method, task.options.polished, task.scale, task.noise
-    drowning = refine and noise is not None and not noise.digits  # rounding to a few digits does not
 
     @cache
     def start(piece: Piece) -> Outcome:
         try:
-            weights = -matrix.entries[piece.edge_rows]
-            mesh = _start(piece, weights, method, scale, sharp=not refine)
-            return brought_near(piece, weights, mesh, scale=scale) if drowning else mesh
+            return _start(piece, -matrix.entries[piece.edge_rows], method, scale, sharp=not refine)
         except (GeometryError, SolverError) as error:
             return error
 

@@ -13,7 +13,6 @@ from ..cells import Alternative
 from ..certify import Certificate, without_spare_equations
 from ..matrix import OperatorMatrix
 from ..tolerances import ALIKE, CERTIFIED, MAGNIFIED, PLACED, SUSPICIOUS
-from ..topology import Topology
 from ..words import Reason
 from .evidence import Evidence
 from .joined import JoinedMesh
@@ -205,21 +204,17 @@ def _discord(solved: Solved, backward_error: float) -> str:
             f"{c[p]:.6g} in piece {p}, of row {topology.pieces[p].vertices.min()}" for p in (int(lead[worst]), worst)
         )
         return f"pieces that share vertices have different factors c: {named}"
-    if noise and (rough := _unconfirmed(topology, lead)).any():
-        row = topology.pieces[int(rough.argmax())].vertices.min()
-        return f"the piece of row {row}, which shares vertices with others, has too few entries to tell under {noise}"
-    return ""
-
-
-def _unconfirmed(topology: Topology, lead: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(pieces,) those that may be something else, as far as the entries of each by itself go.
-
-    A piece with entries to spare tells c. One that hangs by a single vertex on pieces of which one does so can only be
-    read in itself, and no other way if nothing has vanished and no triangle may be a hole.
-    """
+    if noise is None:
+        return ""
+    # A piece with entries to spare tells c. One that hangs by a single vertex on pieces of which one does so can only
+    # be read in itself, and no other way if nothing has vanished and no triangle, with others all around, is a hole.
     gone = np.zeros(len(topology.edges), dtype=bool)
     gone[topology.vanished] = True
     shared = np.array([np.count_nonzero(topology.multiplicity[piece.vertices] > 1) for piece in topology.pieces])
-    otherwise = np.array([gone[piece.edge_rows].any() or piece.enclosed.any() for piece in topology.pieces])
+    otherwise = np.array([gone[p.edge_rows].any() or p.inner[p.opposite].all(axis=1).any() for p in topology.pieces])
     spare = np.array([piece.redundancy > 0 for piece in topology.pieces])
-    return np.asarray((shared > 0) & (~spare[lead] | ((otherwise | (shared > 1)) & ~spare)))
+    rough = (shared > 0) & (~spare[lead] | ((otherwise | (shared > 1)) & ~spare))
+    if not rough.any():
+        return ""
+    row = topology.pieces[int(rough.argmax())].vertices.min()
+    return f"the piece of row {row}, which shares vertices with others, has too few entries to tell under {noise}"

@@ -42,11 +42,6 @@ class Piece:
         """(e,) edges with a triangle on both sides."""
         return self.facing[:, 1] >= 0
 
-    @property
-    def enclosed(self) -> NDArray[np.bool_]:
-        """(m,) triangles with others beyond all of their sides."""
-        return np.asarray(self.inner[self.opposite].all(axis=1))
-
     @cached_property
     def stencil(self) -> NDArray[np.int64]:
         """(4, e) tail, head and left apex of each edge as its first triangle has them, and its right apex.

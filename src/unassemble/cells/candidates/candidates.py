@@ -84,11 +84,6 @@ class Candidates:
         return self.cells.count
 
     @property
-    def size(self) -> NDArray[np.int64]:
-        """(cells,) number of vertices."""
-        return self.cells.size
-
-    @property
     def judged_by(self) -> float:
         """The c that angles are judged by."""
         given = np.flatnonzero(self.weights)[0]
@@ -109,7 +104,7 @@ class Candidates:
     @property
     def triangles(self) -> NDArray[np.bool_]:
         """(cells,) faces of three edges, but for outer ones."""
-        return self.first & (self.size == 3)
+        return self.first & (self.cells.size == 3)
 
     @property
     def triangle_sides(self) -> NDArray[np.int64]:

@@ -72,7 +72,7 @@ _LEFT_OUT = 0.05
 
 def likely_labels(candidates: Candidates) -> Iterator[NDArray[np.bool_]]:
     """(cells,) labels to begin with, the likeliest first."""
-    long = ~candidates.corner & ~candidates.outer & (candidates.size > 3)
+    long = ~candidates.corner & ~candidates.outer & (candidates.cells.size > 3)
     by_angles = long & (candidates.belief > 0.7)  # angles that add up to less than 1.3 pi
     corners = [candidates.corner & (candidates.belief > 0.5 + excess / np.pi) for excess in _INNER]
     corners.append(np.zeros_like(candidates.corner))

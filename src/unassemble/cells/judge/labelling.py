@@ -204,8 +204,8 @@ def _triangulation(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray
     """
     n, shift = candidates.n_vertices, np.zeros(candidates.count, dtype=np.int64)
     given = candidates.edges[:, 0] * n + candidates.edges[:, 1]
-    for _ in range(int(candidates.size.max())):
-        triangles, cell, diagonal = _fans(candidates, labels, shift)
+    for _ in range(int(candidates.cells.size.max())):
+        triangles, cell, diagonal = fans(candidates, labels, shift)
         # Each diagonal belongs to the triangle before it.
         key, owner = pair_keys(n, *triangles[diagonal][:, [2, 0]].T), cell[diagonal]
         value, place, count = np.unique(key, return_inverse=True, return_counts=True)
@@ -220,17 +220,18 @@ def _triangulation(candidates: Candidates, labels: NDArray[np.bool_]) -> NDArray
     return triangles
 
 
-def _fans(candidates: Candidates, labels: NDArray, shift: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Triangles, the cell of each, and whether its last side is a diagonal."""
+def fans(
+    candidates: Candidates, labels: NDArray[np.bool_], shift: NDArray[np.int64] | None = None
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+    """Triangles (m, 3) of cells in fans, the cell of each, and whether its last side is a diagonal.
+
+    The apex of a fan is the vertex in place `shift`, (cells,), the first one by default.
+    """
     cells = np.flatnonzero(labels)
-    cell, step = runs(candidates.size[cells] - 2)
-    cell, step = cells[cell], step + 1
-    start, length = candidates.cells.offsets[cell], candidates.size[cell]
-    corner = (shift[cell][:, None] + np.column_stack([np.zeros_like(step), step, step + 1])) % length[:, None]
-    return candidates.cells.vertices[start[:, None] + corner], cell, step < length - 2
-
-
-def fans_of(candidates: Candidates, labels: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """(m, 3) triangles of cells, each in a fan about its first vertex, and (m,) the cell of each."""
-    triangles, cell, _ = _fans(candidates, labels, np.zeros(candidates.count, dtype=np.int64))
-    return triangles, cell
+    owner, step = runs(candidates.cells.size[cells] - 2)
+    cell = cells[owner]
+    start, length = candidates.cells.offsets[cell], candidates.cells.size[cell]
+    corner = np.column_stack([np.zeros_like(step), step + 1, step + 2])
+    if shift is not None:
+        corner = (corner + shift[cell][:, None]) % length[:, None]
+    return candidates.cells.vertices[start[:, None] + corner], cell, step + 1 < length - 2
