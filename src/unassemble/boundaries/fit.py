@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -38,80 +38,34 @@ Scale = Any  # float, or (k,) float64 where there are regions
 
 @dataclass(frozen=True)
 class FitOptions:
-    """Settings of the iteration.
+    """Settings of the iteration."""
 
-    Attributes
-    ----------
-    steps : int
-        Most of them for one mu.
-    last_steps : int
-        For mu = 0.
-    gain, near : float
-        A relative decrease below this ends the iteration; a step that leaves no more than this of the sum of squares is
-        followed by one with the same factor.
-    exact : float
-        Root mean square misfit, in units of typical weights, that is rounding.
-    damping : float
-        To begin with, in units of the diagonal of the normal matrix.
-    trials : int
-        Of a step, each with ten times the damping.
-    guess, most_guess : float
-        Weight of a guessed entry: in units of the prior's, and at most, beside 1 of whole entries.
-    shortest : float
-        Part of a step below which the iteration ends after it: a few places hold all others up.
-    """
-
-    steps: int = 12
-    last_steps: int = 30
-    gain: float = 1e-3
-    near: float = 1e-2
-    exact: float = 1e-13
-    damping: float = 1e-6
-    trials: int = 12
-    guess: float = 10.0
-    most_guess: float = 0.3
-    shortest: float = 0.0
+    steps: int = 12  # most of them for one mu
+    last_steps: int = 30  # for mu = 0
+    near: float = 1e-2  # a step that leaves less than this of the squares is followed by one with the same factor
+    exact: float = 1e-13  # root mean square misfit, in units of typical weights, that is rounding
+    damping: float = 1e-6  # to begin with, in units of the diagonal of the normal matrix
+    trials: int = 12  # of a step, each with ten times the damping
+    shortest: float = 0.0  # part of a step below which the iteration ends: a few places hold all others up
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Where the iteration has ended.
-
-    Attributes
-    ----------
-    z : (n,) complex128
-    scale : float or (k,) float64
-        c, or that of each region.
-    misfit : float
-        Root mean square of a / c - w over whole entries.
-    prior : float
-        Root of the sum of squares of the prior.
-    factorisations : int
-    """
+    """Where the iteration has ended."""
 
     z: NDArray[np.complex128]
     scale: Scale
-    misfit: float
-    prior: float
-    factorisations: int = 0
+    misfit: float  # root mean square of a / c - w over whole entries
+    prior: float  # root of the sum of squares of the prior
 
 
 class WholeEntries:
     """The problem on one piece; the pattern of its normal matrix is analysed once.
 
-    Parameters
-    ----------
-    piece : Piece
-    weights : (e,) float64
-        -A_ij of each edge, of any size where they are not whole.
-    guessed : (e,) bool
-        Weights that are about right where they are not whole: these count as the prior does.
-    scale : float or (k,) float64, optional
-        c, where it is known.
-    free : (n,) bool, optional
-        Vertices that move; all others stay, and entries that only these have a part in are left out.
-    region : (m,) int64, optional
-        Of each triangle, where each region has a factor of its own.
+    Given are -A_ij of each edge (e,), of any size where entries are not whole; (e,) bool, weights that are about right
+    where they are not whole, which count as the prior does; c, where it is known; vertices (n,) bool that move, where
+    all others stay, and entries of these alone are left out; and the region of each triangle, where regions have
+    factors of their own.
     """
 
     def __init__(
@@ -182,21 +136,10 @@ class WholeEntries:
     def fit(
         self, z: NDArray, scale: Scale, whole: NDArray[np.bool_], mu: float, options: FitOptions | None = None
     ) -> Fit:
-        """Improve positions, in which no triangle is turned over.
-
-        Parameters
-        ----------
-        z : (n,) complex128
-        scale : float
-        whole : (e,) bool
-            Entries to be fitted; sides of the others have a prior.
-        mu : float
-            Weight of the prior.
-        options : FitOptions, optional
-        """
+        """Improve positions in which no triangle is turned over; sides of other entries have a prior of weight mu."""
         options = options or FitOptions()
         prior = ShapePrior.of(self.piece, ~whole)
-        count, damping, small, factorisations = max(int(whole.sum()), 1), options.damping, 0, 0
+        count, damping, small = max(int(whole.sum()), 1), options.damping, 0
         misfit, shape = self.residuals(z, scale, whole, prior, mu)
         cost = float(misfit @ misfit + shape @ shape)
         for _ in range(options.steps if mu else options.last_steps):
@@ -205,7 +148,6 @@ class WholeEntries:
             system = System(self, z, scale, whole, prior, mu, misfit, shape)
             better = None
             for _ in range(options.trials):
-                factorisations += 1
                 step = self.step(system, damping)
                 if step is not None:
                     better = self._along(z, scale, *step, whole, prior, mu, cost)
@@ -225,27 +167,23 @@ class WholeEntries:
                 z, scale, misfit, shape, share = better
                 last, cost = cost, float(misfit @ misfit + shape @ shape)
             damping = max(damping / 10, 1e-15) if share == 1 else 1.5 * damping
-            small = small + 1 if cost > (1 - options.gain) * before else 0
+            small = small + 1 if cost > (1 - 1e-3) * before else 0
             if small >= (1 if mu else 4) or share < options.shortest:
                 break
         rest, size = float(np.linalg.norm(misfit[whole])) / np.sqrt(count), float(np.linalg.norm(prior.residual(z)))
-        _log.debug("mu %.0e: misfit %.1e, prior %.1e, %d factorisations", mu, rest, size, factorisations)
-        return Fit(z, scale, rest, size, factorisations)
+        _log.debug("mu %.0e: misfit %.1e, prior %.1e", mu, rest, size)
+        return Fit(z, scale, rest, size)
 
-    def faded(
-        self, z: NDArray, scale: Scale, whole: NDArray[np.bool_], mus: Sequence[float],
-        options: FitOptions | None = None,
-    ) -> Fit:  # fmt: skip
-        """One fit after the other, with less and less prior; parameters as for :meth:`fit`."""
-        work = 0
+    def faded(self, z: NDArray, scale: Scale, whole: NDArray[np.bool_], mus: Sequence[float]) -> Fit:
+        """One fit after the other, with less and less prior."""
         for mu in mus:
-            found = self.fit(z, scale, whole, mu, options)
-            z, scale, work = found.z, found.scale, work + found.factorisations
-        return replace(found, factorisations=work)
+            found = self.fit(z, scale, whole, mu)
+            z, scale = found.z, found.scale
+        return found
 
     def trust(self, whole: NDArray, mu: float) -> NDArray[np.float64]:
-        """(e,) weights of entries."""
-        return np.where(whole, 1.0, min(FitOptions.guess * mu, FitOptions.most_guess) * (self.guessed & self.asked))
+        """(e,) weights of entries; guessed ones have some of the prior's, and less than whole entries."""
+        return np.where(whole, 1.0, min(10 * mu, 0.3) * (self.guessed & self.asked))
 
     def residuals(
         self, z: NDArray, scale: Scale, whole: NDArray, prior: ShapePrior, mu: float

@@ -30,53 +30,12 @@ from ..topology import Piece
 from .fit import Scale, WholeEntries, jacobian_rows
 
 
-@dataclass(frozen=True)
-class JudgeOptions:
-    """What counts as known; squares of singular values are relative to the typical diagonal entry of J'J.
-
-    Attributes
-    ----------
-    shift : float
-        Of J'J, to make it definite. Displacements with smaller eigenvalues than some hundred times it count as free:
-        entries know these to 1e-10 of the length of edges.
-    moves : float
-        Part of the length of edges by which a null vector of length 1 may move a vertex that is determined.
-    unchecked : float
-        What is left of a standard normal number at an entry that nothing checks.
-    probes : int
-        Random vectors.
-    projections, solves : int
-        Iterations that take the image of J from them, and that lead to displacements.
-    parts : int
-        Vertices far from the rim about which others are looked for that move with them.
-    """
-
-    shift: float = 1e-14
-    moves: float = 1e-9
-    unchecked: float = 1e-6
-    probes: int = 2
-    projections: int = 3
-    solves: int = 5
-    parts: int = 8
-
-
 def determined(
     problem: WholeEntries, z: NDArray, scale: Scale, whole: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Vertices, up to a similarity of all of them, and the entries that determine and check them.
+    """Vertices (n,), up to a similarity of all of them, and entries (e,) that determine and check them.
 
-    Parameters
-    ----------
-    problem : WholeEntries
-    z : (n,) complex128
-        Positions at which whole entries fit.
-    scale : float or (k,) float64
-    whole : (e,) bool
-
-    Returns
-    -------
-    vertices : (n,) bool
-    entries : (e,) bool
+    At positions z and a scale with which whole entries, (e,) bool, fit.
     """
     piece, n = problem.piece, problem.piece.n_vertices
     length = np.abs(z[piece.edges[:, 1]] - z[piece.edges[:, 0]])
@@ -97,23 +56,12 @@ def determined(
 
 @dataclass(frozen=True, eq=False)
 class _Linearised:
-    """J of some entries, in lengths of edges, and the columns of log c.
+    """J of some entries, in lengths of edges, and the columns of log c."""
 
-    Attributes
-    ----------
-    jacobian : (e, 2 n) sparse
-        Zero for other entries.
-    slope : (e, k) float64
-        An orthonormal basis of them.
-    entries : (e,) bool
-    held : (n,) bool
-        Vertices that some of the entries depend on.
-    """
-
-    jacobian: sp.bsr_array
-    slope: NDArray[np.float64]
+    jacobian: sp.bsr_array  # (e, 2 n), zero for other entries
+    slope: NDArray[np.float64]  # (e, k), an orthonormal basis
     entries: NDArray[np.bool_]
-    held: NDArray[np.bool_]
+    held: NDArray[np.bool_]  # (n,) vertices that some of the entries depend on
 
     @classmethod
     def of(cls, piece: Piece, gradient: NDArray, slopes: NDArray, entries: NDArray[np.bool_]) -> _Linearised:
@@ -128,14 +76,15 @@ class _Linearised:
     ) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
         """(e,) entries that others say something about, and (n, k) displacements that leave these as they are.
 
-        The inverse is that of J'J, made definite by a small shift; with c free its columns are projected out,
-        which is a matter of low rank.
+        The inverse is that of J'J, made definite by a small shift, relative to its typical diagonal entry: eigenvalues
+        less than some hundred times as large count as zero, and entries know displacements to 1e-10 of the length of
+        edges. With c free its columns are projected out, which is a matter of low rank.
         """
         transposed = self.jacobian.T.tobsr()
         product = UpperTriangle.of(transposed @ self.jacobian)
         data, start = product.data.copy(), product.indptr[:-1]
         typical = float(np.median(np.diagonal(data[start][self.held], axis1=1, axis2=2)))
-        data[start] += np.where(self.held, JudgeOptions.shift, 1.0)[:, None, None] * typical * np.eye(2)
+        data[start] += np.where(self.held, 1e-14, 1.0)[:, None, None] * typical * np.eye(2)
         matrix = product.with_data(data)
         solver = analyse(matrix)
         solver.factorise(matrix)
@@ -147,15 +96,15 @@ class _Linearised:
             x = solver.solve(np.ascontiguousarray(transposed @ self._without_slope(y)))
             return np.asarray(x + response @ np.linalg.lstsq(left, pull.T @ x, rcond=None)[0])
 
-        rng = np.random.default_rng(1)
-        y = rng.standard_normal((len(self.slope), JudgeOptions.probes)) * self.entries[:, None]
-        for _ in range(JudgeOptions.projections):  # what the shift leaves, and rounding
+        rng, probes = np.random.default_rng(1), 2
+        y = rng.standard_normal((len(self.slope), probes)) * self.entries[:, None]
+        for _ in range(3):  # what the shift leaves, and rounding
             y = y - self.jacobian @ preimage(y)
         y = self._without_slope(y)
-        checked = self.entries & (np.abs(y).max(axis=1) > JudgeOptions.unchecked)
+        checked = self.entries & (np.abs(y).max(axis=1) > 1e-6)
         right = rng.standard_normal(y.shape) * (self.entries & ~checked)[:, None]
-        x = rng.standard_normal((2 * len(self.held), JudgeOptions.probes)) * np.repeat(self.held, 2)[:, None]
-        for _ in range(JudgeOptions.solves):
+        x = rng.standard_normal((2 * len(self.held), probes)) * np.repeat(self.held, 2)[:, None]
+        for _ in range(5):
             x = x + preimage(right - self.jacobian @ x)
         return checked, np.ascontiguousarray((x / np.linalg.norm(x, axis=0)).T).view(np.complex128).T
 
@@ -176,7 +125,7 @@ def _moving_alike(piece: Piece, z: NDArray, free: NDArray, size: NDArray, held: 
     depth = np.where(held, csgraph.dijkstra(graph, unweighted=True, indices=outside, min_only=True), -1)
     basis = np.column_stack([np.ones(n), z / np.abs(z).max()])
     best = np.zeros(n, dtype=bool)
-    for _ in range(JudgeOptions.parts):
+    for _ in range(8):
         deepest = int(depth.argmax())
         alike = np.zeros(n, dtype=bool)
         alike[[deepest, *graph.indices[graph.indptr[deepest] : graph.indptr[deepest + 1]]]] = True
@@ -184,7 +133,7 @@ def _moving_alike(piece: Piece, z: NDArray, free: NDArray, size: NDArray, held: 
         while True:
             fit = np.linalg.lstsq(basis[alike], free[alike], rcond=None)[0]
             moves = np.abs(free - basis @ fit).max(axis=1, initial=0.0)
-            now = held & (moves <= JudgeOptions.moves * size)
+            now = held & (moves <= 1e-9 * size)
             if now.sum() <= alike.sum():
                 alike = np.zeros(n, dtype=bool) if (alike & ~now).any() else now
                 break
