@@ -65,7 +65,7 @@ def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:
 def arrays(recovery: Recovery) -> dict[str, Any]:
     """What the ``.npz`` holds, by key; what there is nothing of has no key."""
     content: dict[str, Any] = {} if without_points(recovery) else {"points": recovery.points}
-    for name in ("triangles", "quads", "tetrahedra", "hexahedra", "mid_nodes", "lines", "eliminated_points"):
+    for name in ("triangles", "quads", "tetrahedra", "hexahedra", "mid_nodes", "lines", "eliminated_points", "region"):
         found = getattr(recovery, name, None)  # each kind of result has its own
         if found is not None and found.size:
             content[name] = found
@@ -136,6 +136,8 @@ def _point_data(recovery: Recovery) -> dict[str, NDArray]:
         "backward_error": float(recovery.backward_error),
     }
     data |= {name: np.full(recovery.n_points, value) for name, value in worth.items()}
+    if isinstance(recovery, PlanarMesh) and recovery.region is not None:
+        return data  # each cell has a factor, points have none
     return data | {"scale": np.append(recovery.scale, np.nan)[recovery.component]}
 
 

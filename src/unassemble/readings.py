@@ -23,6 +23,7 @@ from .further_terms import less_mass, recover_elements_with_terms, recover_with_
 from .matrix import OperatorMatrix
 from .options import ScalarOptions
 from .recovery import PlanarMesh
+from .regions import recover_regions
 from .scalar import recover_scalar
 from .scalar.placement import Placement
 from .tolerances import CERTIFIED, LITTLE
@@ -92,7 +93,7 @@ class ScalarReadings:
             order.append((1 if replaced or incomplete else 3, self._partial))
             order.append((0, self._without_boundary_terms))
         if not replaced:
-            order += [(1 if self.crowded else 3, lambda: self.other_elements), (2, self._linear)]
+            order += [(1 if self.crowded else 3, lambda: self.other_elements), (2, self._regions), (2, self._linear)]
         nearest: PlanarMesh | None = None
         failure: RecoveryError | None = None
         for _, reading in sorted(order, key=lambda one: one[0]):
@@ -119,6 +120,9 @@ class ScalarReadings:
         matrix = with_boundary_edges(with_diagonals(self.matrix))
         whole = None if matrix.replaced is None else np.asarray(~matrix.replaced[matrix.edges].all(axis=1))
         return recover_partial(matrix, whole, self.placement, self.clock, self.options)
+
+    def _regions(self) -> PlanarMesh | None:
+        return recover_regions(with_diagonals(self.matrix, everywhere=True), self.placement, self.clock, self.options)
 
     def _linear(self) -> PlanarMesh:
         return recover_with_terms(self.matrix, self._plain, self.clock, self.placement.coefficients)

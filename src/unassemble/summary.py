@@ -93,6 +93,8 @@ def _rows(recovery: Recovery) -> list[tuple[str, str]]:
 
 def _planar_rows(mesh: PlanarMesh) -> list[tuple[str, str]]:
     rows = [("holes", f"{mesh.n_holes:,}"), ("scale c", scale_text(mesh))]
+    if mesh.region is not None:
+        rows.insert(1, ("regions", f"{len(mesh.scale):,}, each with a factor of its own"))
     if mesh.reaction:
         rows.append(("reaction s", f"{mesh.reaction:.10g}"))
     if mesh.estimated_noise is not None and mesh.backward_error > SUSPICIOUS:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from skfem import Basis, BilinearForm, ElementTriP1, FacetBasis, MeshTri, condense, enforce
+from skfem import Basis, BilinearForm, ElementTriP0, ElementTriP1, FacetBasis, MeshTri, condense, enforce
 from skfem.helpers import dot, grad
 from skfem.models import laplace, mass
 
@@ -82,3 +82,19 @@ def largest_error_of(found: PlanarMesh, points: NDArray, known: NDArray) -> floa
     """Of each piece by itself."""
     pieces = [known & (found.component == label) for label in range(found.n_components)]
     return max(largest_error(found.points[rows], points[rows]) for rows in pieces if rows.sum() > 2)
+
+
+def materials(mesh: MeshTri, factors: Sequence[float], at: Callable[[NDArray], NDArray] | None = None) -> Given:
+    """With a factor for each of two halves, or four quarters, or for what `at` tells from the centres of triangles."""
+    centre = mesh.p[:, mesh.t].mean(axis=1)
+    beyond = centre > np.median(centre, axis=1, keepdims=True)
+    label = beyond[0] + (2 * beyond[1] if len(factors) > 2 else 0) if at is None else at(centre)
+
+    @BilinearForm
+    def form(u, v, w):
+        return w.k * dot(grad(u), grad(v))
+
+    flat = Basis(mesh, ElementTriP0())
+    values = flat.zeros()
+    values[flat.element_dofs[0]] = np.array(factors)[label.astype(int)]
+    return shuffled(form.assemble(Basis(mesh, ElementTriP1()), k=flat.interpolate(values)), mesh.p.T)

@@ -15,19 +15,10 @@ from ..topology import Piece
 
 
 def tutte(piece: Piece, outline: int) -> NDArray[np.complex128]:
-    """Positions in which no triangle is turned over, of mean area 1/2; a vertex in the middle closes each other loop.
+    """Positions (n,) in which no triangle is turned over, of mean area 1/2; a vertex closes each loop but the outline.
 
-    Parameters
-    ----------
-    piece : Piece
-    outline : int
-        The loop on the unit circle. A ring has two such drawings, and which of them is nearer to the mesh depends on
-        where it is.
-
-    Returns
-    -------
-    (n,) complex128
-        Flat where the graph is not 3-connected.
+    That loop is on the unit circle. A ring has two such drawings, and which of them is nearer to the mesh depends on
+    where it is. Triangles are flat where the graph is not 3-connected.
     """
     n = piece.n_vertices
     ends, number = [piece.edges], n

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 
@@ -15,70 +14,37 @@ from ..planar.conformal import ConformalOptions, conformal_map, estimate_scale
 from ..topology import Piece
 from .embedding import areas, tutte
 from .fit import Fit, FitOptions, WholeEntries
-from .local import fit_near
-from .patch import distance
+from .patch import distance, fit_near
 from .rim import Rim
 
-
-@dataclass(frozen=True)
-class FirstOptions:
-    """Where fits start.
-
-    Attributes
-    ----------
-    fading, slowly : tuple of float
-        Weights of the prior, one after the other, and once more.
-    unknown : float
-        Guess of the weight of an edge that has no guess, in units of typical ones.
-    outlines : int
-        Boundary loops, the longest ones, that are tried as the outer one.
-    near : float
-        Root mean square misfit, in units of typical weights, next to which no other drawing is tried.
-    band, settling : int
-        In edges, how deep the rim is that is fitted by itself in a large mesh, and steps of that.
-    """
-
-    fading: tuple[float, ...] = (0.1, 0.01, 1e-3, 0.0)
-    slowly: tuple[float, ...] = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
-    unknown: float = 0.5
-    outlines: int = 4
-    near: float = 0.01
-    band: int = 5
-    settling: int = 3
+# Weights of the prior, one after the other, and once more.
+_FADING = (0.1, 0.01, 1e-3, 0.0)
+_SLOWLY = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
 
 
-def first_fits(
-    problem: WholeEntries, rim: Rim, newton: FitOptions, options: FirstOptions | None = None
-) -> Iterator[tuple[Fit, bool]]:
+def first_fits(problem: WholeEntries, rim: Rim, newton: FitOptions) -> Iterator[tuple[Fit, bool]]:
     """Fits, one after the other, each with whether it started so near that the rim alone needed more than one step.
 
-    Parameters
-    ----------
-    problem : WholeEntries
-    rim : Rim
-    newton : FitOptions
-        Of steps of all vertices of a large mesh.
-    options : FirstOptions, optional
+    Steps `newton` are those of all vertices of a large mesh.
     """
-    options = options or FirstOptions()
-    conformal = _conformal(problem, _guessed(problem, rim.given, options))
-    fit = _settled(problem, rim, conformal, newton, options)
+    conformal = _conformal(problem, _guessed(problem, rim.given))
+    fit = _settled(problem, rim, conformal, newton)
     if fit is not None:
         yield fit, True
-    for fading, start in ((options.fading, conformal), (options.slowly, None))[fit is not None :]:
-        first = _start(problem, rim, fading[0], options, start)
+    for fading, start in ((_FADING, conformal), (_SLOWLY, None))[fit is not None :]:
+        first = _start(problem, rim, fading[0], start)
         if first is not None:
             yield problem.faded(first.z, first.scale, rim.whole, fading[1:]), False
 
 
-def _guessed(problem: WholeEntries, whole: NDArray[np.bool_], options: FirstOptions) -> NDArray[np.float64]:
+def _guessed(problem: WholeEntries, whole: NDArray[np.bool_]) -> NDArray[np.float64]:
     """(e,) weights, guessed where they are not whole.
 
     Halves of weights are about those g of one triangle, and g1 g2 + g2 g3 + g3 g1 = c^2 / 4 in each. With guesses that
     are too low some map has no energy at the rim, and the conformal map a fold there: of two the larger one counts.
     """
     piece = problem.piece
-    given = np.where(problem.guessed, problem.weights, options.unknown)
+    given = np.where(problem.guessed, problem.weights, 0.5)
     c = estimate_scale(piece, given)
     triangle, place = np.divmod(piece.facing[:, 0], 3)
     one, other = (given[piece.opposite[triangle, (place + turn) % 3]] / 2 for turn in (1, 2))
@@ -86,21 +52,19 @@ def _guessed(problem: WholeEntries, whole: NDArray[np.bool_], options: FirstOpti
     return np.where(whole | piece.inner, given, np.maximum(given, third))
 
 
-def _settled(problem: WholeEntries, rim: Rim, z: NDArray, newton: FitOptions, options: FirstOptions) -> Fit | None:
+def _settled(problem: WholeEntries, rim: Rim, z: NDArray, newton: FitOptions) -> Fit | None:
     """A fit from near, in a large mesh: steps of the rim by itself and of all vertices in turn."""
-    band = distance(problem.piece, rim.opened, options.band) <= options.band
+    band = distance(problem.piece, rim.opened, 5) <= 5
     if 2 * band.sum() >= len(band) or not _upright(problem.piece, z):
         return None
     fit = Fit(z, problem.best_scale(z, rim.whole), np.inf, 0.0)
-    for mu in options.fading[:-1]:
-        z = fit_near(problem, fit.z, fit.scale, rim.whole, band, ((mu, options.settling),))
+    for mu in _FADING[:-1]:
+        z = fit_near(problem, fit.z, fit.scale, rim.whole, band, ((mu, 3),))
         fit = problem.fit(z, fit.scale, rim.whole, mu, newton)
     return fit
 
 
-def _start(
-    problem: WholeEntries, rim: Rim, weight: float, options: FirstOptions, conformal: NDArray | None
-) -> Fit | None:
+def _start(problem: WholeEntries, rim: Rim, weight: float, conformal: NDArray | None) -> Fit | None:
     """The best first fit from drawings without crossings.
 
     The conformal map of guessed entries is the nearest one, if its ring is not inside out; where it turns triangles
@@ -109,10 +73,10 @@ def _start(
     piece, whole, best, least = problem.piece, rim.whole, None, np.inf
     drawings: Iterable[NDArray[np.complex128]] = [] if conformal is None else [conformal]
     if piece.n_loops > 1 or not any(map(partial(_upright, piece), drawings)):
-        loops = np.argsort(-np.diff(piece.loop_offsets), kind="stable")[: options.outlines]
+        loops = np.argsort(-np.diff(piece.loop_offsets), kind="stable")[:4]
         drawings = chain(drawings, (tutte(piece, loop) for loop in loops.tolist()))
     for z in drawings:
-        if best is not None and best.misfit <= options.near:
+        if best is not None and best.misfit <= 0.01:
             break
         if not _upright(piece, z):
             continue

@@ -6,7 +6,8 @@ Minimised is
 
 a_e = -A_ij. The prior holds what few entries hold, and fades: each mu starts where the one before has ended, the last
 is zero. Cotangents have poles where triangles are flat, and meshes beyond them are no meshes: steps end before any
-triangle turns over.
+triangle turns over. Where regions have factors of their own, both sides of a_e = c w_e(z) have them: misfits are those
+of a_e, and of half a cotangent times its region's factor from each triangle, in units of the mean of these factors.
 
 References
 ----------
@@ -17,7 +18,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -31,87 +33,47 @@ from .shape import ShapePrior
 
 _log = logging.getLogger(__name__)
 
+Scale = Any  # float, or (k,) float64 where there are regions
+
 
 @dataclass(frozen=True)
 class FitOptions:
-    """Settings of the iteration.
+    """Settings of the iteration."""
 
-    Attributes
-    ----------
-    steps : int
-        Most of them for one mu.
-    last_steps : int
-        For mu = 0.
-    gain, near : float
-        A relative decrease below this ends the iteration; a step that leaves no more than this of the sum of squares is
-        followed by one with the same factor.
-    exact : float
-        Root mean square misfit, in units of typical weights, that is rounding.
-    damping : float
-        To begin with, in units of the diagonal of the normal matrix.
-    trials : int
-        Of a step, each with ten times the damping.
-    guess, most_guess : float
-        Weight of a guessed entry: in units of the prior's, and at most, beside 1 of whole entries.
-    shortest : float
-        Part of a step below which the iteration ends after it: a few places hold all others up.
-    """
-
-    steps: int = 12
-    last_steps: int = 30
-    gain: float = 1e-3
-    near: float = 1e-2
-    exact: float = 1e-13
-    damping: float = 1e-6
-    trials: int = 12
-    guess: float = 10.0
-    most_guess: float = 0.3
-    shortest: float = 0.0
+    steps: int = 12  # most of them for one mu
+    last_steps: int = 30  # for mu = 0
+    near: float = 1e-2  # a step that leaves less than this of the squares is followed by one with the same factor
+    exact: float = 1e-13  # root mean square misfit, in units of typical weights, that is rounding
+    damping: float = 1e-6  # to begin with, in units of the diagonal of the normal matrix
+    trials: int = 12  # of a step, each with ten times the damping
+    shortest: float = 0.0  # part of a step below which the iteration ends: a few places hold all others up
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Where the iteration has ended.
-
-    Attributes
-    ----------
-    z : (n,) complex128
-    scale : float
-    misfit : float
-        Root mean square of a / c - w over whole entries.
-    prior : float
-        Root of the sum of squares of the prior.
-    factorisations : int
-    """
+    """Where the iteration has ended."""
 
     z: NDArray[np.complex128]
-    scale: float
-    misfit: float
-    prior: float
-    factorisations: int = 0
+    scale: Scale
+    misfit: float  # root mean square of a / c - w over whole entries
+    prior: float  # root of the sum of squares of the prior
 
 
 class WholeEntries:
     """The problem on one piece; the pattern of its normal matrix is analysed once.
 
-    Parameters
-    ----------
-    piece : Piece
-    weights : (e,) float64
-        -A_ij of each edge, of any size where they are not whole.
-    guessed : (e,) bool
-        Weights that are about right where they are not whole: these count as the prior does.
-    scale : float, optional
-        c, where it is known.
-    free : (n,) bool, optional
-        Vertices that move; all others stay, and entries that only these have a part in are left out.
+    Given are -A_ij of each edge (e,), of any size where entries are not whole; (e,) bool, weights that are about right
+    where they are not whole, which count as the prior does; c, where it is known; vertices (n,) bool that move, where
+    all others stay, and entries of these alone are left out; and the region of each triangle, where regions have
+    factors of their own.
     """
 
     def __init__(
-        self, piece: Piece, weights: NDArray, guessed: NDArray[np.bool_], scale: float | None = None,
-        free: NDArray[np.bool_] | None = None,
+        self, piece: Piece, weights: NDArray, guessed: NDArray[np.bool_], scale: Scale | None = None,
+        free: NDArray[np.bool_] | None = None, region: NDArray[np.int64] | None = None,
     ):  # fmt: skip
         self.piece, self.weights, self.guessed, self.known_scale = piece, weights, guessed, scale
+        self.region: Any = region  # an array wherever it is used
         self.free = np.ones(piece.n_vertices, dtype=bool) if free is None else free
         self.asked = self.free[piece.stencil].any(axis=0)
         count = int(self.free.sum())
@@ -138,28 +100,46 @@ class WholeEntries:
         w, a = edge_weights(self.piece, z)[whole], self.weights[whole]
         return float(w @ a / (w @ w))
 
-    def misfits(self, z: NDArray, scale: float) -> NDArray[np.float64]:
+    def misfits(self, z: NDArray, scale: Scale) -> NDArray[np.float64]:
         """(e,) a / c - w."""
-        return np.asarray(self.weights / scale - edge_weights(self.piece, z))
+        if self.region is None:
+            return np.asarray(self.weights / scale - edge_weights(self.piece, z))
+        return np.asarray((self.weights - edge_weights(self.piece, z, scale[self.region])) / self.unit(scale))
+
+    def gradient(self, z: NDArray, scale: Scale) -> NDArray[np.complex128]:
+        """(4, e) as :func:`..planar.cotangent.weight_gradient` has it."""
+        if self.region is None:
+            return weight_gradient(self.piece, z)
+        return weight_gradient(self.piece, z, scale[self.region]) / self.unit(scale)
+
+    def slopes(self, z: NDArray, scale: Scale) -> NDArray[np.float64]:
+        """(e, k) what misfits change by with -log c, of each region."""
+        if self.region is None:
+            return np.asarray(self.weights / scale)[:, None]
+        parts = [
+            edge_weights(self.piece, z, np.where(self.region == k, scale[k], 0.0)) / self.unit(scale)
+            for k in range(len(scale))
+        ]
+        return np.column_stack(parts)
+
+    def _scaled(self, scale: Scale, move: NDArray) -> Scale:
+        """Factors whose logarithms have changed; where c is known it stays."""
+        if self.known_scale is not None:
+            return scale
+        return scale * np.exp(move) if self.region is not None else scale * float(np.exp(move[0]))
+
+    def unit(self, scale: NDArray) -> NDArray[np.float64]:
+        """(e,) the mean of c on both sides of each edge."""
+        one, other = scale[self.region][self.piece.facing // 3].T
+        return np.asarray(np.where(self.piece.inner, (one + other) / 2, one))
 
     def fit(
-        self, z: NDArray, scale: float, whole: NDArray[np.bool_], mu: float, options: FitOptions | None = None
+        self, z: NDArray, scale: Scale, whole: NDArray[np.bool_], mu: float, options: FitOptions | None = None
     ) -> Fit:
-        """Improve positions, in which no triangle is turned over.
-
-        Parameters
-        ----------
-        z : (n,) complex128
-        scale : float
-        whole : (e,) bool
-            Entries to be fitted; sides of the others have a prior.
-        mu : float
-            Weight of the prior.
-        options : FitOptions, optional
-        """
+        """Improve positions in which no triangle is turned over; sides of other entries have a prior of weight mu."""
         options = options or FitOptions()
         prior = ShapePrior.of(self.piece, ~whole)
-        count, damping, small, factorisations = max(int(whole.sum()), 1), options.damping, 0, 0
+        count, damping, small = max(int(whole.sum()), 1), options.damping, 0
         misfit, shape = self.residuals(z, scale, whole, prior, mu)
         cost = float(misfit @ misfit + shape @ shape)
         for _ in range(options.steps if mu else options.last_steps):
@@ -168,7 +148,6 @@ class WholeEntries:
             system = System(self, z, scale, whole, prior, mu, misfit, shape)
             better = None
             for _ in range(options.trials):
-                factorisations += 1
                 step = self.step(system, damping)
                 if step is not None:
                     better = self._along(z, scale, *step, whole, prior, mu, cost)
@@ -188,36 +167,32 @@ class WholeEntries:
                 z, scale, misfit, shape, share = better
                 last, cost = cost, float(misfit @ misfit + shape @ shape)
             damping = max(damping / 10, 1e-15) if share == 1 else 1.5 * damping
-            small = small + 1 if cost > (1 - options.gain) * before else 0
+            small = small + 1 if cost > (1 - 1e-3) * before else 0
             if small >= (1 if mu else 4) or share < options.shortest:
                 break
         rest, size = float(np.linalg.norm(misfit[whole])) / np.sqrt(count), float(np.linalg.norm(prior.residual(z)))
-        _log.debug("mu %.0e: misfit %.1e, prior %.1e, %d factorisations", mu, rest, size, factorisations)
-        return Fit(z, scale, rest, size, factorisations)
+        _log.debug("mu %.0e: misfit %.1e, prior %.1e", mu, rest, size)
+        return Fit(z, scale, rest, size)
 
-    def faded(
-        self, z: NDArray, scale: float, whole: NDArray[np.bool_], mus: Sequence[float],
-        options: FitOptions | None = None,
-    ) -> Fit:  # fmt: skip
-        """One fit after the other, with less and less prior; parameters as for :meth:`fit`."""
-        work = 0
+    def faded(self, z: NDArray, scale: Scale, whole: NDArray[np.bool_], mus: Sequence[float]) -> Fit:
+        """One fit after the other, with less and less prior."""
         for mu in mus:
-            found = self.fit(z, scale, whole, mu, options)
-            z, scale, work = found.z, found.scale, work + found.factorisations
-        return replace(found, factorisations=work)
+            found = self.fit(z, scale, whole, mu)
+            z, scale = found.z, found.scale
+        return found
 
     def trust(self, whole: NDArray, mu: float) -> NDArray[np.float64]:
-        """(e,) weights of entries."""
-        return np.where(whole, 1.0, min(FitOptions.guess * mu, FitOptions.most_guess) * (self.guessed & self.asked))
+        """(e,) weights of entries; guessed ones have some of the prior's, and less than whole entries."""
+        return np.where(whole, 1.0, min(10 * mu, 0.3) * (self.guessed & self.asked))
 
     def residuals(
-        self, z: NDArray, scale: float, whole: NDArray, prior: ShapePrior, mu: float
+        self, z: NDArray, scale: Scale, whole: NDArray, prior: ShapePrior, mu: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Misfits of entries (e,) and of the prior, weighted."""
         return self.trust(whole, mu) * self.misfits(z, scale), mu * prior.residual(z)
 
-    def step(self, system: System, damping: float | NDArray) -> tuple[NDArray, float] | None:
-        """Displacement and change of log c; None where the normal matrix cannot be factorised."""
+    def step(self, system: System, damping: float | NDArray) -> tuple[NDArray, NDArray] | None:
+        """Displacement, and changes (k,) of log c if it is free; None where the normal matrix cannot be factorised."""
         matrix = system.damped(damping)
         try:
             self.analysed(matrix).factorise(matrix)
@@ -226,28 +201,28 @@ class WholeEntries:
             return None
         return self._solved(system)
 
-    def _solved(self, system: System) -> tuple[NDArray, float] | None:
+    def _solved(self, system: System) -> tuple[NDArray, NDArray] | None:
         """The same with the factor that is there."""
         assert self._factor is not None
-        gradient, response = self._factor.solve(np.column_stack([system.right, system.slope])).T
-        move = 0.0
-        if self.known_scale is None:
-            left = system.size - system.slope @ response
-            move = float((system.along - system.slope @ gradient) / max(left, 1e-12 * system.size))
-        step = np.ascontiguousarray(gradient - move * response).view(np.complex128)
+        solved = self._factor.solve(np.column_stack([system.right, system.slope]))
+        gradient, response = solved[:, 0], solved[:, 1:]
+        left = system.size - system.slope.T @ response
+        np.fill_diagonal(left, np.maximum(left.diagonal(), 1e-12 * system.size.diagonal()))
+        move = np.linalg.lstsq(left, system.along - system.slope.T @ gradient, rcond=None)[0]
+        step = np.ascontiguousarray(gradient - response @ move).view(np.complex128)
         step = np.append(step, 0)[np.where(self.free, self.place, len(step))]
-        return (step, move) if np.isfinite(step).all() and np.isfinite(move) else None
+        return (step, move) if np.isfinite(step).all() and np.isfinite(move).all() else None
 
     def _along(
-        self, z: NDArray, scale: float, step: NDArray, move: float, whole: NDArray, prior: ShapePrior, mu: float,
+        self, z: NDArray, scale: Scale, step: NDArray, move: NDArray, whole: NDArray, prior: ShapePrior, mu: float,
         cost: float,
-    ) -> tuple[NDArray, float, NDArray, NDArray, float] | None:  # fmt: skip
+    ) -> tuple[NDArray, Scale, NDArray, NDArray, float] | None:  # fmt: skip
         """The longest part of a step, of a few, that turns no triangle over and lowers the cost."""
         fitted = self.piece.triangles[(whole[self.piece.opposite] | (mu > 0)).any(axis=1)]
         flip = float(first_flips(fitted, z, step).min(initial=np.inf))
-        share = min(1.0, 0.5 / max(abs(move), 1e-300), 0.9 * flip)
+        share = min(1.0, 0.5 / max(np.abs(move).max(initial=0.0), 1e-300), 0.9 * flip)
         for _ in range(5):
-            there, c = z + share * step, scale * float(np.exp(share * move))
+            there, c = z + share * step, self._scaled(scale, share * move)
             with np.errstate(all="ignore"):
                 misfit, shape = self.residuals(there, c, whole, prior, mu)
                 if misfit @ misfit + shape @ shape < cost:
@@ -257,29 +232,30 @@ class WholeEntries:
 
 
 class System:
-    """The linearised problem: normal matrix, right-hand side, and the column of log c beside them."""
+    """The linearised problem: normal matrix, right-hand side, and the columns of log c beside them."""
 
     def __init__(
-        self, problem: WholeEntries, z: NDArray, scale: float, whole: NDArray, prior: ShapePrior, mu: float,
+        self, problem: WholeEntries, z: NDArray, scale: Scale, whole: NDArray, prior: ShapePrior, mu: float,
         misfit: NDArray, shape: NDArray,
     ):  # fmt: skip
         piece, free = problem.piece, problem.free
         trust = problem.trust(whole, mu)
-        entries = trust * np.where(free[piece.stencil], weight_gradient(piece, z), 0)
+        entries = trust * np.where(free[piece.stencil], problem.gradient(z, scale), 0)
         gradient = mu * np.where(free[prior.corners], prior.gradient(z), 0)
         parts = [(entries, problem.place[piece.stencil]), (gradient, problem.place[prior.corners])]
         jacobian = jacobian_rows(problem.columns, parts)
-        self._transposed = jacobian.T.tobsr()
-        self._upper = UpperTriangle.of(self._transposed @ jacobian)
-        self._fitted = trust * problem.weights / scale  # what a / c changes by with -log c
-        self.slope = self._transposed @ np.concatenate([self._fitted, np.zeros(len(shape))])
-        self.size = float(self._fitted @ self._fitted)
+        self.jacobian_transposed = jacobian.T.tobsr()
+        self._upper = UpperTriangle.of(self.jacobian_transposed @ jacobian)
+        known = problem.known_scale is not None
+        self._slopes = trust[:, None] * problem.slopes(z, scale)[:, : 0 if known else None]
+        self.slope = self.jacobian_transposed @ np.pad(self._slopes, ((0, len(shape)), (0, 0)))
+        self.size = self._slopes.T @ self._slopes
         self.towards(misfit, shape)
 
     def towards(self, misfit: NDArray, shape: NDArray) -> System:
         """With other right-hand sides."""
-        self.right = self._transposed @ np.concatenate([misfit, -shape])
-        self.along = float(self._fitted @ misfit)
+        self.right = self.jacobian_transposed @ np.concatenate([misfit, -shape])
+        self.along = self._slopes.T @ misfit
         return self
 
     def damped(self, damping: float | NDArray) -> UpperTriangle:

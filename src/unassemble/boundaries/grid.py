@@ -24,50 +24,32 @@ STEPS = {4: _AXES, 6: np.array([(1, 0), (0, 1), (-1, 1)]), 8: np.vstack([_AXES, 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Vertices of a plane lattice.
+    """Vertices of a plane lattice."""
 
-    Attributes
-    ----------
-    neighbours : {4, 6, 8}
-        Of a row inside.
-    at : (n, 2) int64
-        Coordinates of each row, all different.
-    step : (e,) int64
-        Direction of each edge: a row of ``STEPS[neighbours]``.
-    """
-
-    neighbours: int
-    at: NDArray[np.int64]
-    step: NDArray[np.int64]
+    neighbours: int  # 4, 6 or 8, of a row inside
+    at: NDArray[np.int64]  # (n, 2) coordinates of each row, all different
+    step: NDArray[np.int64]  # (e,) direction of each edge: a row of ``STEPS[neighbours]``
 
     @classmethod
     def of(cls, n: int, edges: NDArray[np.int64]) -> Grid | None:
-        """The grid that a graph is, with no edge missing between neighbours; None where it is none.
-
-        Parameters
-        ----------
-        n : int
-        edges : (e, 2) int64
-            Pairs i < j.
-        """
+        """The grid that a graph of edges (e, 2) is, with no edge missing between neighbours; None where it is none."""
         neighbours = int(np.bincount(edges.ravel(), minlength=n).max())
         if neighbours not in STEPS or len(edges) > neighbours * n // 2:
             return None
-        graph = _adjacency(n, edges)
-        seed = _Rows.of(_with_diagonals(graph) if neighbours == 4 else graph)
+        both = np.concatenate([edges, edges[:, ::-1]]).astype(np.int32)
+        graph = sp.coo_array((np.ones(len(both), np.int8), both.T), shape=(n, n)).tocsr()
+        seed = _Rows.of(sp.csr_array(graph + (_common(graph) == 2)) if neighbours == 4 else graph)  # with diagonals
         if seed is None or not len(seed.rows):
             return None
         at = _spread(seed, n)
         if at is None:
             return None
-        step = _steps(at[edges[:, 1]] - at[edges[:, 0]], STEPS[neighbours])
+        along, steps = (at[edges[:, 1]] - at[edges[:, 0]])[:, None], STEPS[neighbours]
+        match = (along == steps).all(axis=2) | (along == -steps).all(axis=2)
         shifted = (at - at.min(axis=0)) @ [1, 2 * n]
-        return None if step is None or len(np.unique(shifted)) < n else cls(neighbours, at, step)
-
-
-def _adjacency(n: int, edges: NDArray) -> sp.csr_array:
-    both = np.concatenate([edges, edges[:, ::-1]]).astype(np.int32)
-    return sp.coo_array((np.ones(len(both), np.int8), both.T), shape=(n, n)).tocsr()
+        if not match.any(axis=1).all() or len(np.unique(shifted)) < n:
+            return None
+        return cls(neighbours, at, match.argmax(axis=1))
 
 
 def _common(graph: sp.csr_array) -> sp.csr_array:
@@ -77,26 +59,13 @@ def _common(graph: sp.csr_array) -> sp.csr_array:
     return sp.csr_array(common - common.multiply(graph))
 
 
-def _with_diagonals(graph: sp.csr_array) -> sp.csr_array:
-    """Squares with both diagonals."""
-    return sp.csr_array(graph + (_common(graph) == 2))
-
-
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Rows with all their neighbours, and opposite pairs of these.
+    """Rows with all their neighbours, and opposite pairs of these."""
 
-    Attributes
-    ----------
-    graph : (n, n) sparse
-        Of triangles, or of squares with diagonals.
-    rows : (k,) int64
-    pairs : (k, 3 or 4, 2) int64
-    """
-
-    graph: sp.csr_array
-    rows: NDArray[np.int64]
-    pairs: NDArray[np.int64]
+    graph: sp.csr_array  # of triangles, or of squares with diagonals
+    rows: NDArray[np.int64]  # (k,)
+    pairs: NDArray[np.int64]  # (k, 3 or 4, 2)
 
     @classmethod
     def of(cls, graph: sp.csr_array) -> _Rows | None:
@@ -176,9 +145,3 @@ def _spread(seed: _Rows, n: int) -> NDArray[np.int64] | None:
             return None
         at[row] = at[beside].sum(axis=0) - at[apex]
     return at
-
-
-def _steps(difference: NDArray, steps: NDArray) -> NDArray[np.int64] | None:
-    """Which direction each difference is; None where one is none of them."""
-    match = (difference[:, None] == steps).all(axis=2) | (difference[:, None] == -steps).all(axis=2)
-    return match.argmax(axis=1) if match.any(axis=1).all() else None

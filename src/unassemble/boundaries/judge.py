@@ -26,70 +26,24 @@ from scipy.sparse import csgraph
 
 from ..errors import SolverError
 from ..linalg import Factorisation, UpperTriangle
-from ..planar.cotangent import edge_weights, weight_gradient
 from ..topology import Piece
-from .fit import jacobian_rows
-
-
-@dataclass(frozen=True)
-class JudgeOptions:
-    """What counts as known; squares of singular values are relative to the typical diagonal entry of J'J.
-
-    Attributes
-    ----------
-    shift : float
-        Of J'J, to make it definite. Displacements with smaller eigenvalues than some hundred times it count as free:
-        entries know these to 1e-10 of the length of edges.
-    moves : float
-        Part of the length of edges by which a null vector of length 1 may move a vertex that is determined.
-    unchecked : float
-        What is left of a standard normal number at an entry that nothing checks.
-    probes : int
-        Random vectors.
-    projections, solves : int
-        Iterations that take the image of J from them, and that lead to displacements.
-    parts : int
-        Vertices far from the rim about which others are looked for that move with them.
-    """
-
-    shift: float = 1e-14
-    moves: float = 1e-9
-    unchecked: float = 1e-6
-    probes: int = 2
-    projections: int = 3
-    solves: int = 5
-    parts: int = 8
+from .fit import Scale, WholeEntries, jacobian_rows
 
 
 def determined(
-    piece: Piece, z: NDArray, whole: NDArray[np.bool_], analyse: Callable[[UpperTriangle], Factorisation], *,
-    known_scale: bool = False,
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:  # fmt: skip
-    """Vertices, up to a similarity of all of them, and the entries that determine and check them.
+    problem: WholeEntries, z: NDArray, scale: Scale, whole: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Vertices (n,), up to a similarity of all of them, and entries (e,) that determine and check them.
 
-    Parameters
-    ----------
-    piece : Piece
-    z : (n,) complex128
-        Positions at which whole entries fit.
-    whole : (e,) bool
-    analyse : callable
-        Makes a factorisation from the pattern of the normal matrix of all entries.
-    known_scale : bool
-        Whether c is given.
-
-    Returns
-    -------
-    vertices : (n,) bool
-    entries : (e,) bool
+    At positions z and a scale with which whole entries, (e,) bool, fit.
     """
-    n = piece.n_vertices
+    piece, n = problem.piece, problem.piece.n_vertices
     length = np.abs(z[piece.edges[:, 1]] - z[piece.edges[:, 0]])
     size = np.bincount(piece.edges.ravel(), np.repeat(length, 2), n) / np.bincount(piece.edges.ravel(), minlength=n)
-    gradient = weight_gradient(piece, z) * size[piece.stencil]
-    weights = edge_weights(piece, z) * (not known_scale)
+    gradient = problem.gradient(z, scale) * size[piece.stencil]
+    slopes = problem.slopes(z, scale)[:, : 0 if problem.known_scale is not None else None]
     try:
-        checked, free = _Linearised.of(piece, gradient, weights, whole).judged(analyse)
+        checked, free = _Linearised.of(piece, gradient, slopes, whole).judged(problem.analysed)
     except SolverError:
         checked, free = np.zeros_like(whole), np.zeros((n, 0), dtype=np.complex128)
     if not checked.any():
@@ -102,71 +56,61 @@ def determined(
 
 @dataclass(frozen=True, eq=False)
 class _Linearised:
-    """J of some entries, in lengths of edges, and the column of log c.
+    """J of some entries, in lengths of edges, and the columns of log c."""
 
-    Attributes
-    ----------
-    jacobian : (e, 2 n) sparse
-        Zero for other entries.
-    slope : (e,) float64
-    entries : (e,) bool
-    held : (n,) bool
-        Vertices that some of the entries depend on.
-    """
-
-    jacobian: sp.bsr_array
-    slope: NDArray[np.float64]
+    jacobian: sp.bsr_array  # (e, 2 n), zero for other entries
+    slope: NDArray[np.float64]  # (e, k), an orthonormal basis
     entries: NDArray[np.bool_]
-    held: NDArray[np.bool_]
+    held: NDArray[np.bool_]  # (n,) vertices that some of the entries depend on
 
     @classmethod
-    def of(cls, piece: Piece, gradient: NDArray, weights: NDArray, entries: NDArray[np.bool_]) -> _Linearised:
-        """For gradients (4, e) over the stencils of edges."""
+    def of(cls, piece: Piece, gradient: NDArray, slopes: NDArray, entries: NDArray[np.bool_]) -> _Linearised:
+        """For gradients (4, e) over the stencils of edges, and what entries change by with log c, (e, k)."""
         held = np.zeros(piece.n_vertices, dtype=bool)
         held[piece.stencil[:, entries]] = True
         jacobian = jacobian_rows(len(held), [(np.where(entries, gradient, 0), piece.stencil)])
-        return cls(jacobian, np.where(entries, weights, 0.0), entries, held)
+        return cls(jacobian, np.linalg.qr(np.where(entries[:, None], slopes, 0.0))[0], entries, held)
 
     def judged(
         self, analyse: Callable[[UpperTriangle], Factorisation]
     ) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
         """(e,) entries that others say something about, and (n, k) displacements that leave these as they are.
 
-        The inverse is that of J'J, made definite by a small shift; with c free its column is projected out, which is a
-        matter of rank one.
+        The inverse is that of J'J, made definite by a small shift, relative to its typical diagonal entry: eigenvalues
+        less than some hundred times as large count as zero, and entries know displacements to 1e-10 of the length of
+        edges. With c free its columns are projected out, which is a matter of low rank.
         """
         transposed = self.jacobian.T.tobsr()
         product = UpperTriangle.of(transposed @ self.jacobian)
         data, start = product.data.copy(), product.indptr[:-1]
         typical = float(np.median(np.diagonal(data[start][self.held], axis1=1, axis2=2)))
-        data[start] += np.where(self.held, JudgeOptions.shift, 1.0)[:, None, None] * typical * np.eye(2)
+        data[start] += np.where(self.held, 1e-14, 1.0)[:, None, None] * typical * np.eye(2)
         matrix = product.with_data(data)
         solver = analyse(matrix)
         solver.factorise(matrix)
         pull = transposed @ self.slope
-        response = solver.solve(pull)
-        left = float(self.slope @ self.slope - pull @ response)
+        response = solver.solve(pull) if pull.size else pull
+        left = self.slope.T @ self.slope - pull.T @ response
 
         def preimage(y: NDArray) -> NDArray:
             x = solver.solve(np.ascontiguousarray(transposed @ self._without_slope(y)))
-            return x + np.outer(response, pull @ x) / left if left > 0 else x
+            return np.asarray(x + response @ np.linalg.lstsq(left, pull.T @ x, rcond=None)[0])
 
-        rng = np.random.default_rng(1)
-        y = rng.standard_normal((len(self.slope), JudgeOptions.probes)) * self.entries[:, None]
-        for _ in range(JudgeOptions.projections):  # what the shift leaves, and rounding
+        rng, probes = np.random.default_rng(1), 2
+        y = rng.standard_normal((len(self.slope), probes)) * self.entries[:, None]
+        for _ in range(3):  # what the shift leaves, and rounding
             y = y - self.jacobian @ preimage(y)
         y = self._without_slope(y)
-        checked = self.entries & (np.abs(y).max(axis=1) > JudgeOptions.unchecked)
+        checked = self.entries & (np.abs(y).max(axis=1) > 1e-6)
         right = rng.standard_normal(y.shape) * (self.entries & ~checked)[:, None]
-        x = rng.standard_normal((2 * len(self.held), JudgeOptions.probes)) * np.repeat(self.held, 2)[:, None]
-        for _ in range(JudgeOptions.solves):
+        x = rng.standard_normal((2 * len(self.held), probes)) * np.repeat(self.held, 2)[:, None]
+        for _ in range(5):
             x = x + preimage(right - self.jacobian @ x)
         return checked, np.ascontiguousarray((x / np.linalg.norm(x, axis=0)).T).view(np.complex128).T
 
     def _without_slope(self, image: NDArray) -> NDArray[np.float64]:
-        """Columns (e, k) less their component along the column of log c."""
-        size = float(self.slope @ self.slope)
-        return np.asarray(image - np.outer(self.slope, self.slope @ image) / size if size else image)
+        """Columns (e, 2) less their components along the columns of log c."""
+        return np.asarray(image - self.slope @ (self.slope.T @ image))
 
 
 def _moving_alike(piece: Piece, z: NDArray, free: NDArray, size: NDArray, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -181,7 +125,7 @@ def _moving_alike(piece: Piece, z: NDArray, free: NDArray, size: NDArray, held: 
     depth = np.where(held, csgraph.dijkstra(graph, unweighted=True, indices=outside, min_only=True), -1)
     basis = np.column_stack([np.ones(n), z / np.abs(z).max()])
     best = np.zeros(n, dtype=bool)
-    for _ in range(JudgeOptions.parts):
+    for _ in range(8):
         deepest = int(depth.argmax())
         alike = np.zeros(n, dtype=bool)
         alike[[deepest, *graph.indices[graph.indptr[deepest] : graph.indptr[deepest + 1]]]] = True
@@ -189,7 +133,7 @@ def _moving_alike(piece: Piece, z: NDArray, free: NDArray, size: NDArray, held: 
         while True:
             fit = np.linalg.lstsq(basis[alike], free[alike], rcond=None)[0]
             moves = np.abs(free - basis @ fit).max(axis=1, initial=0.0)
-            now = held & (moves <= JudgeOptions.moves * size)
+            now = held & (moves <= 1e-9 * size)
             if now.sum() <= alike.sum():
                 alike = np.zeros(n, dtype=bool) if (alike & ~now).any() else now
                 break

@@ -21,24 +21,12 @@ from .grid import Grid
 
 @dataclass(frozen=True, eq=False)
 class _Kind:
-    """Cells of a grid.
+    """Cells of a grid."""
 
-    Attributes
-    ----------
-    corners : (shapes, k, 2) int64
-        Counter-clockwise.
-    pairs : tuple of (corner, corner, direction)
-        Which corners have an entry, and which direction of :data:`.grid.STEPS` that is.
-    sharing : tuple of int
-        Number of cells that share an edge of each direction.
-    stencil : (directions, 3) float64
-        Entries of a row by (G11, G22, G12).
-    """
-
-    corners: NDArray[np.int64]
-    pairs: tuple[tuple[int, int, int], ...]
-    sharing: tuple[int, ...]
-    stencil: NDArray[np.float64]
+    corners: NDArray[np.int64]  # (shapes, k, 2) counter-clockwise
+    pairs: tuple[tuple[int, int, int], ...]  # which corners have an entry, and a direction of :data:`.grid.STEPS`
+    sharing: tuple[int, ...]  # number of cells that share an edge of each direction
+    stencil: NDArray[np.float64]  # (directions, 3) entries of a row by (G11, G22, G12)
 
 
 _SQUARE = np.array([[(0, 0), (1, 0), (1, 1), (0, 1)]])
@@ -64,27 +52,13 @@ _KINDS = {
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """Cells on rows of a matrix, and on vertices that it lacks.
+    """Cells on rows of a matrix, and on vertices that it lacks."""
 
-    Attributes
-    ----------
-    neighbours : {4, 6, 8}
-        Of a row inside, see :class:`.grid.Grid`; eight where cells are bilinear.
-    scale : float
-        c.
-    z : (n + g,) complex128
-        Positions of the rows, then of the vertices that are gone.
-    cells : (m, 3 or 4) int64
-        All of them, counter-clockwise.
-    shift : float
-        The multiple of the identity that rows inside have besides.
-    """
-
-    neighbours: int
-    scale: float
-    z: NDArray[np.complex128]
-    cells: NDArray[np.int64]
-    shift: float
+    neighbours: int  # of a row inside, see :class:`.grid.Grid`; eight where cells are bilinear
+    scale: float  # c
+    z: NDArray[np.complex128]  # (n + g,) positions of the rows, then of the vertices that are gone
+    cells: NDArray[np.int64]  # (m, 3 or 4) all of them, counter-clockwise
+    shift: float  # the multiple of the identity that rows inside have besides
 
     @classmethod
     def of(cls, matrix: OperatorMatrix) -> Lattice | None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells.undivided import undivided
-from ..certify import certify
+from ..certify import Certificate, certify
 from ..certify_elements import certify_elements
 from ..clock import Clock
 from ..matrix import OperatorMatrix
@@ -24,7 +24,6 @@ from ..topology.keys import with_sides
 from ..topology.pieces import planar_pieces
 from ..words import count_of
 from .lattice import Lattice, rows_alike
-from .witness import Witness
 
 _RULE = "2 x 2 Gauss"
 
@@ -53,10 +52,13 @@ def recover_lattice(
         placed, notes = placement.apply(piece, lattice.z[piece.vertices])
         tensor = placement.tensor
         mesh = JoinedMesh.of(topology, [placed], np.array([lattice.scale / (tensor.root_determinant if tensor else 1)]))
-        gone = _moved_along(lattice.z[: matrix.n], mesh.points, lattice.z[matrix.n :])
+        design = np.column_stack([lattice.z.real, lattice.z.imag, np.ones(len(lattice.z))])
+        affine = np.linalg.lstsq(design[: matrix.n], mesh.points, rcond=None)[0]
+        gone = design[matrix.n :] @ affine
     with clock("certify"):
         points = np.concatenate([mesh.points, gone])
-        cells = _upright(points, lattice.cells)
+        a, b, c = (points @ [1, 1j])[lattice.cells[0, :3]]  # the mesh may be turned over as a whole
+        cells = lattice.cells if (np.conj(b - a) * (c - a)).imag > 0 else lattice.cells[:, ::-1]
         if lattice.neighbours == 8:
             seen = tensor.to_laplacian(points @ [1, 1j]) if tensor else points @ [1, 1j]
             certificate = certify_elements(
@@ -67,9 +69,15 @@ def recover_lattice(
             triangles = _divided(cells)
             factor = np.full(len(triangles), float(mesh.scale[0]))
             certificate = certify(matrix.edges, matrix.entries, points, triangles, factor, placement.coefficients)
-        witness = Witness.of(matrix, certificate, len(points), lattice.shift)
-    if not witness.backward_error <= CERTIFIED:
+        error = _backward_error(matrix, certificate, len(points), lattice.shift)
+    if not error <= CERTIFIED:
         return None
+    lattice_notes = [
+        "this is the only mesh whose cells are all alike; others, bent next to the unknowns that were eliminated, may "
+        "fit as well"
+    ]
+    if lattice.shift:
+        lattice_notes.append(f"{lattice.shift:.6g} times the identity was added to the matrix")
     kind: Callable[..., PlanarMesh] = PlanarMesh
     undivided_cells = [] if lattice.neighbours == 8 else vanished_notes(topology)
     fields = mesh.fields(triangulate=options.triangulate and lattice.neighbours != 8)
@@ -85,25 +93,31 @@ def recover_lattice(
         uniqueness="ambiguous",
         reason=(
             f"the lattice, continued by {count_of(len(gone), 'vertex that has', 'vertices that have')} no row, gives "
-            f"the matrix back to {witness.backward_error:.1e} (relative), row sums included"
+            f"the matrix back to {error:.1e} (relative), row sums included"
         ),
         operator=placement.operator,
-        backward_error=witness.backward_error,
+        backward_error=error,
         n_holes=topology.n_holes,
         timings=clock.timings,
-        warnings=(*matrix.warnings, *_lattice_notes(lattice), *notes, *undivided_cells),
+        warnings=(*matrix.warnings, *lattice_notes, *notes, *undivided_cells),
         eliminated_points=gone,
     )
 
 
-def _lattice_notes(lattice: Lattice) -> list[str]:
-    notes = [
-        "this is the only mesh whose cells are all alike; others, bent next to the unknowns that were eliminated, may "
-        "fit as well"
-    ]
-    if lattice.shift:
-        notes.append(f"{lattice.shift:.6g} times the identity was added to the matrix")
-    return notes
+def _backward_error(matrix: OperatorMatrix, found: Certificate, n_points: int, shift: float) -> float:
+    """Of entries and of diagonal entries, which say how much is gone, of rows that come first among the points.
+
+    Relative to the largest off-diagonal entry of each row; infinite where a triangle is flat or turned over.
+    """
+    n = matrix.n
+    sums = np.zeros(n)
+    for end in matrix.edges.T:
+        sums += np.bincount(end, matrix.entries, n)
+    for end in found.pairs.T:
+        sums += np.bincount(end, found.differences, n_points)[:n]
+    diagonal = np.abs(shift - sums - matrix.diagonal) / matrix.row_size
+    entries = found.misfits[(found.pairs < n).all(axis=1)]
+    return np.inf if len(found.flipped) else max(float(entries.max()), float(diagonal.max()))
 
 
 def _topology(matrix: OperatorMatrix, lattice: Lattice) -> Topology | None:
@@ -126,16 +140,3 @@ def _topology(matrix: OperatorMatrix, lattice: Lattice) -> Topology | None:
 def _divided(cells: NDArray[np.int64]) -> NDArray[np.int64]:
     """Triangles, with squares (m, 4) divided in two."""
     return cells[:, [0, 1, 2, 0, 2, 3][: 3 * (cells.shape[1] - 2)]].reshape(-1, 3)
-
-
-def _moved_along(z: NDArray, points: NDArray, others: NDArray) -> NDArray[np.float64]:
-    """Where others go by the affine map that moves z to points."""
-    design = np.column_stack([z.real, z.imag, np.ones(len(z))])
-    affine = np.linalg.lstsq(design, points, rcond=None)[0]
-    return np.column_stack([others.real, others.imag, np.ones(len(others))]) @ affine
-
-
-def _upright(points: NDArray, cells: NDArray) -> NDArray[np.int64]:
-    """Cells of a mesh that may be turned over as a whole, counter-clockwise."""
-    a, b, c = (points @ [1, 1j])[cells[0, :3]]
-    return cells if (np.conj(b - a) * (c - a)).imag > 0 else cells[:, ::-1]

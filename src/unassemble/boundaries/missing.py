@@ -41,50 +41,51 @@ def with_boundary_edges(matrix: OperatorMatrix) -> OperatorMatrix:
                 added += [(a, middle), (middle, b)]
     if not added:
         return matrix
-    given = pair_keys(n, *edges.T)
-    keys = distinct(np.concatenate([given, pair_keys(n, *np.array(added).T)]))
-    entries = np.zeros(len(keys))
-    entries[np.searchsorted(keys, given)] = matrix.entries
-    return replace(matrix, edges=np.column_stack(np.divmod(keys, n)), entries=entries)
+    return _with_zeros(matrix, added)
 
 
-def with_diagonals(matrix: OperatorMatrix) -> OperatorMatrix:
+def with_diagonals(matrix: OperatorMatrix, *, everywhere: bool = False) -> OperatorMatrix:
     """The same with zeros on one diagonal of each cell of four rows, whose diagonals both vanish: it is a rectangle.
 
-    Only for rows that were replaced: all edges but those between two of these have triangles on both sides, so that
-    cells are missing, and not holes, where they do not.
+    Where rows were replaced all edges but those between two of these have triangles on both sides, so that cells are
+    missing, and not holes, where they do not. Else only on request, and holes of four edges count as cells.
     """
-    if matrix.replaced is None:
+    if matrix.replaced is None and not everywhere:
         return matrix
     n, edges = matrix.n, matrix.edges
+    gone = np.zeros(n, dtype=bool) if matrix.replaced is None else matrix.replaced
     _, opposite = three_cycles(n, edges)
-    replaced = matrix.replaced[edges].all(axis=1)
+    replaced = gone[edges].all(axis=1)
     opened = np.bincount(opposite.ravel(), minlength=len(edges)) < np.where(replaced, 1, 2)
     ends = edges[opened]
     graph = sp.coo_array((np.ones(len(ends), np.int32), ends.T), shape=(n, n)).tocsr()
     graph = graph + graph.T
     across = sp.triu(graph @ graph, 1).tocoo()
     pairs = np.column_stack([across.row, across.col])[across.data == 2].astype(np.int64)
-    given = pair_keys(n, *edges.T)
-    pairs = pairs[~contains(given, pair_keys(n, *pairs.T))]
+    pairs = pairs[~contains(pair_keys(n, *edges.T), pair_keys(n, *pairs.T))]
     absent = {frozenset(pair) for pair in pairs.tolist()}
-    added: list[list[int]] = []
-    for a, c in pairs[~matrix.replaced[pairs].all(axis=1)].tolist():
+    added: list[tuple[int, int]] = []
+    for a, c in pairs[~gone[pairs].all(axis=1)].tolist():
         other = frozenset(set(_around(graph, a)) & set(_around(graph, c)))
         if other in absent:
             absent.discard(frozenset((a, c)))  # its cell is divided
-            added.append([a, c])
+            added.append((a, c))
     if not added:
         return matrix
-    keys = np.concatenate([given, pair_keys(n, *np.array(added).T)])
-    order = np.argsort(keys)
-    entries = np.concatenate([matrix.entries, np.zeros(len(added))])[order]
     note = (
         f"{count_of(len(added), 'cell has', 'cells have')} four corners on one circle: entries on both diagonals "
         "vanish, and which of them divides it is arbitrary"
     )
-    edges = np.column_stack(np.divmod(keys[order], n))
-    return replace(matrix, edges=edges, entries=entries, warnings=(*matrix.warnings, note))
+    return replace(_with_zeros(matrix, added), warnings=(*matrix.warnings, note))
+
+
+def _with_zeros(matrix: OperatorMatrix, added: list[tuple[int, int]]) -> OperatorMatrix:
+    """The same with zeros stored for these pairs of rows."""
+    given = pair_keys(matrix.n, *matrix.edges.T)
+    keys = distinct(np.concatenate([given, pair_keys(matrix.n, *np.array(added).T)]))
+    entries = np.zeros(len(keys))
+    entries[np.searchsorted(keys, given)] = matrix.entries
+    return replace(matrix, edges=np.column_stack(np.divmod(keys, matrix.n)), entries=entries)
 
 
 def _around(graph: sp.csr_array, row: int) -> list[int]:

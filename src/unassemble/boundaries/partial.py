@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,8 @@ from ..errors import GeometryError, SolverError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..planar.cotangent import edge_weights
+from ..planar.deviations import covariances
+from ..planar.normal import WeightJacobian, distant_pair
 from ..planar.piece import positions
 from ..recovery import PlanarMesh
 from ..scalar.joined import JoinedMesh
@@ -21,16 +24,11 @@ from ..scalar.placement import Placement
 from ..tolerances import ALIKE, CERTIFIED
 from ..topology import Piece, Topology, local_numbering, surfaces
 from ..words import count_of
-from .deviations import deviations_inside
 from .inside import InsideMesh, fit_inside
 
 
 def recover_partial(
-    matrix: OperatorMatrix,
-    whole: NDArray[np.bool_] | None,
-    placement: Placement,
-    clock: Clock,
-    options: ScalarOptions,
+    matrix: OperatorMatrix, whole: NDArray[np.bool_] | None, placement: Placement, clock: Clock, options: ScalarOptions
 ) -> PlanarMesh | None:
     """The mesh of the 3-cycles of a matrix, fitted to entries that are those of its triangles and no others.
 
@@ -61,11 +59,7 @@ def recover_partial(
         given = [_given(piece, matrix, whole) for piece in topology.pieces]
         meshes = [
             fit_inside(
-                piece,
-                -matrix.entries[piece.edge_rows],
-                own,
-                shared=~own if whole is None else None,
-                scale=scale,
+                piece, -matrix.entries[piece.edge_rows], own, ~own if whole is None else np.zeros_like(own), scale
             )
             for piece, own in zip(topology.pieces, given, strict=True)
         ]
@@ -113,26 +107,13 @@ def _nothing_gone(piece: Piece, matrix: OperatorMatrix, mesh: InsideMesh, scale:
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """Pieces that have positions, in their final frames.
+    """Pieces that have positions, in their final frames."""
 
-    Attributes
-    ----------
-    topology : Topology
-        Of these pieces.
-    meshes : list of InsideMesh
-    positions : list of (k,) complex128
-        Of each piece in its final frame.
-    mesh : JoinedMesh
-    status : (n,) int8
-        As in :class:`..recovery.Recovery`.
-    notes : list of str
-    """
-
-    topology: Topology
+    topology: Topology  # of these pieces
     meshes: list[InsideMesh]
     positions: list[NDArray[np.complex128]]
     mesh: JoinedMesh
-    status: NDArray[np.int8]
+    status: NDArray[np.int8]  # (n,) as in :class:`..recovery.Recovery`
     notes: list[str]
 
     @classmethod
@@ -152,38 +133,37 @@ class _Placed:
         return cls(topology, [mesh for _, mesh in found], positions, joined, status, notes)
 
     def deviations(self, matrix: OperatorMatrix, placement: Placement, *, known_scale: bool) -> NDArray[np.float64]:
-        """(n, 2) standard deviations; of a vertex in several pieces those of the first."""
+        """(n, 2) standard deviations, by what entries leave of each other; in several pieces those of the first."""
         result = np.full((matrix.n, 2), np.nan)
         tensor = placement.tensor
         for piece, mesh, z in reversed(list(zip(self.topology.pieces, self.meshes, self.positions, strict=True))):
             drawn, stretch = (tensor.to_laplacian(z), tensor.root) if tensor else (z, None)
-            weights = -matrix.entries[piece.edge_rows]
-            result[piece.vertices] = deviations_inside(
-                piece, mesh, weights, drawn, known_scale=known_scale, stretch=stretch
-            )
+            known, used = mesh.determined, mesh.entries
+            result[piece.vertices] = np.nan
+            spare = int(used.sum()) - 2 * int(known.sum()) + (4 if known_scale else 3)
+            if spare <= 0:
+                continue
+            own = edge_weights(piece, mesh.z)
+            misfit = -matrix.entries[piece.edge_rows] / mesh.scale - own
+            sigma = float(np.linalg.norm(misfit[used])) / np.sqrt(spare)
+            jacobian = WeightJacobian(piece, drawn, np.where(used, 1.0, np.inf))
+            pins = np.append(np.flatnonzero(~known), np.flatnonzero(known)[distant_pair(drawn[known])])
+            covariance = covariances(
+                jacobian, np.where(used, own, 0.0), drawn[known], pins,
+                free_scale=not known_scale, stretch=stretch, nodes=itemgetter(known),
+            )  # fmt: skip
+            result[piece.vertices[known]] = sigma * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
         return result
 
 
 @dataclass(frozen=True, eq=False)
 class _Judged:
-    """Whole entries between determined vertices, held against the mesh as it is written.
+    """Whole entries between determined vertices, held against the mesh as it is written."""
 
-    Attributes
-    ----------
-    backward_error : float
-        As in :class:`..recovery.Recovery`, of these entries.
-    entries : int
-        Their number.
-    spare : int
-        What is left of it, in the piece where least is, beyond unknowns.
-    nothing_gone : bool
-        Whether the matrix has the diagonal of the mesh: then entries that do not fit are wrong ones.
-    """
-
-    backward_error: float
-    entries: int
-    spare: int
-    nothing_gone: bool
+    backward_error: float  # as in :class:`..recovery.Recovery`, of these entries
+    entries: int  # their number
+    spare: int  # what is left of it, in the piece where least is, beyond unknowns
+    nothing_gone: bool  # whether the matrix has the mesh's diagonal: then entries that do not fit are wrong ones
 
     @classmethod
     def of(cls, matrix: OperatorMatrix, placed: _Placed, placement: Placement, *, known_scale: bool) -> _Judged:

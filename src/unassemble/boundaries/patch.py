@@ -1,33 +1,32 @@
-"""Parts of a piece in which some vertices move and all others stay where they are."""
+"""Levenberg-Marquardt where only vertices near the rim move, each with a damping of its own.
+
+Far from each other they have nothing to do with each other, and one place that comes to no end must not hold up the
+others: each vertex has a damping, and a step counts where it lowers the squares of the entries near.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse import csgraph
 
 from ..topology import Piece
+from .fit import System, WholeEntries, first_flips
+from .shape import ShapePrior
 
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Triangles about vertices that move.
-
-    Attributes
-    ----------
-    piece : Piece
-        The triangles with a part in entries that moving vertices change; without boundary loops.
-    vertices, edges : (k,) int64, (e,) int64
-        Of the whole piece.
-    free : (k,) bool
-        Vertices that move.
-    """
+    """The triangles with a part in entries that moving vertices change, as a piece without boundary loops."""
 
     piece: Piece
-    vertices: NDArray[np.int64]
-    edges: NDArray[np.int64]
-    free: NDArray[np.bool_]
+    vertices: NDArray[np.int64]  # (k,) of the whole piece
+    edges: NDArray[np.int64]  # (e,)
+    free: NDArray[np.bool_]  # (k,) vertices that move
 
     @classmethod
     def about(cls, piece: Piece, free: NDArray[np.bool_]) -> Patch:
@@ -76,3 +75,102 @@ def spread(piece: Piece, values: NDArray, most: np.ufunc, rounds: int) -> NDArra
         most.at(values, piece.edges[:, 0], there)
         most.at(values, piece.edges[:, 1], here)
     return values
+
+
+def fit_near(
+    problem: WholeEntries, z: NDArray, scale: float, whole: NDArray[np.bool_], free: NDArray[np.bool_],
+    schedule: Sequence[tuple[float, int]], rng: np.random.Generator | None = None,
+) -> NDArray[np.complex128]:  # fmt: skip
+    """Positions of which some, (n,) bool, are improved; the others, and c, stay.
+
+    A schedule has weights of the prior, one after the other, and numbers of steps with each; with a generator the prior
+    has random triangles.
+    """
+    patch = Patch.about(problem.piece, free)
+    part = WholeEntries(patch.piece, problem.weights[patch.edges], problem.guessed[patch.edges], scale, patch.free)
+    moved = z.copy()
+    try:
+        for mu, steps in schedule:
+            moved[patch.vertices] = _fitted(part, moved[patch.vertices], whole[patch.edges], mu, steps, rng)
+    finally:
+        part.release()
+    return moved
+
+
+def fit_anew(
+    problem: WholeEntries, z: NDArray, scale: float, whole: NDArray[np.bool_], places: NDArray[np.bool_],
+    rng: np.random.Generator,
+) -> NDArray[np.complex128]:  # fmt: skip
+    """Positions about places that do not fit, (n,) bool, from random triangles at the rim; what is no better stays.
+
+    Few entries may have several solutions next to each other and a minimum that is none, each with triangles of its
+    own: which of them a fit comes to is decided by the prior.
+    """
+    piece = problem.piece
+    free = distance(piece, places, 3) <= 3
+    with np.errstate(all="ignore"):  # random triangles may lead far away
+        there = fit_near(problem, z, scale, whole, free, ((0.1, 10), (0.01, 5)), rng)
+        there = fit_near(problem, there, scale, whole, free, ((1e-3, 10), (0.0, 20)))
+    ends = piece.edges[free[piece.edges].all(axis=1)].T
+    graph = sp.coo_array((np.ones(ends.shape[1], np.int8), ends), shape=(len(z), len(z)))
+    label = np.where(free, csgraph.connected_components(graph, directed=False)[1], -1)
+    touched = label[piece.stencil].max(axis=0)
+    asked = whole & (touched >= 0)
+    with np.errstate(all="ignore"):
+        before, after = (
+            np.bincount(touched[asked], problem.misfits(some, scale)[asked] ** 2, len(z)) for some in (z, there)
+        )
+    return np.where(free & (after < before)[label], there, z)
+
+
+def _fitted(
+    part: WholeEntries, z: NDArray, whole: NDArray[np.bool_], mu: float, steps: int,
+    rng: np.random.Generator | None,
+) -> NDArray[np.complex128]:  # fmt: skip
+    piece, scale = part.piece, part.known_scale
+    prior = ShapePrior.of(piece, ~whole).about(part.free)
+    prior = prior if rng is None else prior.unlike(rng)
+    whole = whole & part.asked
+    fitted = piece.triangles[(whole[piece.opposite] | (mu > 0)).any(axis=1)]
+    damping = np.full(len(z), 1e-3)
+    misfit, shape = part.residuals(z, scale, whole, prior, mu)
+    for _ in range(steps):
+        if not (np.abs(misfit) > 1e-14).any():
+            break
+        system = System(part, z, scale, whole, prior, mu, misfit, shape)
+        found = part.step(system, np.append(damping[part.free], 1.0)[: part.columns])
+        if found is None:
+            damping *= 100
+            continue
+        step, _ = found
+        limit = np.ones(len(z))
+        np.minimum.at(limit, fitted.ravel(), np.repeat(0.9 * first_flips(fitted, z, step), 3))
+        step *= spread(piece, limit, np.minimum, 3)
+        there = z + step
+        with np.errstate(all="ignore"):
+            new, new_shape = part.residuals(there, scale, whole, prior, mu)
+        before, after = (_near(piece, prior, m, s) for m, s in ((misfit, shape), (new, new_shape)))
+        worse = ~(after < before) & ((before > 1e-28) | ~(after < 1e-26))
+        worse[fitted[first_flips(fitted, z, step) < 1]] = True
+        refused = spread(piece, worse, np.maximum, 2)
+        there = np.where(refused, z, there)
+        if (first_flips(fitted, z, there - z) < 1).any():  # between what was taken and what was not
+            refused[:] = True
+        else:
+            z = there
+            with np.errstate(all="ignore"):
+                misfit, shape = part.residuals(z, scale, whole, prior, mu)
+        damping = np.where(refused, np.minimum(10 * damping, 1e6), np.maximum(damping / 10, 1e-14))
+    return z
+
+
+def _near(piece: Piece, prior: ShapePrior, misfit: NDArray, shape: NDArray) -> NDArray[np.float64]:
+    """(n,) sums of squares of entries, and of the prior, up to two edges from each vertex."""
+    n = piece.n_vertices
+    total = np.zeros(n)
+    for ends, squares in ((piece.stencil, misfit**2), (prior.corners, shape**2)):
+        for end in ends:
+            total += np.bincount(end, squares, n)
+    one, other = piece.edges.T
+    near: NDArray[np.float64] = total + np.bincount(one, total[other], n) + np.bincount(other, total[one], n)
+    return near

@@ -19,35 +19,9 @@ from ..topology import Piece
 from .patch import nearest, spread
 
 
-@dataclass(frozen=True)
-class RimOptions:
-    """What is taken off.
-
-    Attributes
-    ----------
-    row : int
-        Vertices of the rim in a row that are looked at together.
-    apart, reach : int
-        Distances in edges: of such places from each other, and of vertices of the rim from them.
-    """
-
-    row: int = 4
-    apart: int = 4
-    reach: int = 6
-
-
 @dataclass(frozen=True, eq=False)
 class Rim:
-    """Triangles that are left, and the entries that they have whole.
-
-    Attributes
-    ----------
-    piece : Piece
-    given : (e,) bool
-        Entries that are whole where both triangles of their edge are left.
-    left : (m,) bool
-        Triangles.
-    """
+    """Triangles that are left (m,) bool, and entries (e,) that are whole where both triangles of an edge are left."""
 
     piece: Piece
     given: NDArray[np.bool_]
@@ -66,8 +40,7 @@ class Rim:
     @cached_property
     def whole(self) -> NDArray[np.bool_]:
         """(e,) entries that the triangles left have whole."""
-        facing = self.piece.inner + 1
-        return np.asarray(self.given & (self._sides == facing))
+        return np.asarray(self.given & (self._sides == self.piece.inner + 1))
 
     @cached_property
     def _open(self) -> NDArray[np.bool_]:
@@ -125,21 +98,20 @@ class Rim:
 
         Triangles marked in `keep`, (m,) bool, stay. Peaks are larger than `least`, and than all others near.
         """
-        piece, opened = self.piece, self.opened
+        piece, opened, reach = self.piece, self.opened, 6
         rest = np.where(self.whole, misfit, 0.0)
         hot = np.zeros(piece.n_vertices)
         for end in piece.edges.T:
             np.maximum.at(hot, end, rest)
-        peak = (hot == spread(piece, hot, np.maximum, RimOptions.apart)) & (hot > least) & (hot > 0)
-        far, label = nearest(piece, np.where(peak, np.arange(piece.n_vertices), -1), RimOptions.reach)
+        peak = (hot == spread(piece, hot, np.maximum, 4)) & (hot > least) & (hot > 0)
+        far, label = nearest(piece, np.where(peak, np.arange(piece.n_vertices), -1), reach)
         reached = np.flatnonzero(opened & (label >= 0))
-        first = np.full(piece.n_vertices, RimOptions.reach + 1)
+        first = np.full(piece.n_vertices, reach + 1)
         np.minimum.at(first, label[reached], far[reached])
         gone = np.zeros(piece.n_vertices, dtype=bool)
         gone[reached] = far[reached] <= first[label[reached]]
-        stay = False if keep is None else keep
-        left = self.left & (~gone[self.piece.triangles].any(axis=1) | stay)
-        return Rim(self.piece, self.given, left) if (left != self.left).any() else None
+        left = self.left & (~gone[piece.triangles].any(axis=1) | (False if keep is None else keep))
+        return Rim(piece, self.given, left) if (left != self.left).any() else None
 
 
 def _marked(piece: Piece, vertices: NDArray | list[int]) -> NDArray[np.bool_]:
@@ -150,13 +122,13 @@ def _marked(piece: Piece, vertices: NDArray | list[int]) -> NDArray[np.bool_]:
 
 
 def _rows(v: int, along: dict[int, list[int]]) -> Iterator[list[int]]:
-    """A vertex, and rows of a few along the rim that begin with it."""
+    """A vertex, and rows of up to four along the rim that begin with it."""
     yield [v]
     for second in along[v]:
         row = [v, second]
         while True:
             yield row
             onward = [w for w in along[row[-1]] if w not in row]
-            if len(row) == RimOptions.row or len(onward) != 1:
+            if len(row) == 4 or len(onward) != 1:
                 break
             row = [*row, onward[0]]

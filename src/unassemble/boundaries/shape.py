@@ -12,18 +12,10 @@ from ..topology import Piece
 
 @dataclass(frozen=True, eq=False)
 class ShapePrior:
-    """log |ab|^2 less the mean of log |bc|^2 and log |ca|^2, for each triangle abc on a side ab without a whole entry.
+    """log |ab|^2 less the mean of log |bc|^2 and log |ca|^2, for triangles abc on a side ab without a whole entry."""
 
-    Attributes
-    ----------
-    corners : (3, m) int64
-        a, b, c.
-    wanted : (m,) float64 or float
-        What it should be.
-    """
-
-    corners: NDArray[np.int64]
-    wanted: NDArray[np.float64] | float = 0.0
+    corners: NDArray[np.int64]  # (3, m) a, b, c
+    wanted: NDArray[np.float64] | float = 0.0  # (m,) what it should be
 
     @classmethod
     def of(cls, piece: Piece, unknown: NDArray[np.bool_]) -> ShapePrior:

@@ -64,28 +64,14 @@ def recover_without_boundary_terms(
 
 @dataclass(frozen=True, eq=False)
 class _Loops:
-    """Boundary edges, loop by loop in running order, of a matrix of a single piece.
-
-    Attributes
-    ----------
-    piece : Piece
-    ends : (b, 2) int64
-        Rows of the matrix.
-    edge : (b,) int64
-        Rows of `matrix.edges`.
-    loop : (b,) int64
-    sign : (b,) int64
-        1 and -1 in turn, from 1 in each loop.
-    sums : (b,) float64
-        Of the row at the first end of each edge.
-    """
+    """Boundary edges, loop by loop in running order, of a matrix of a single piece."""
 
     piece: Piece
-    ends: NDArray[np.int64]
-    edge: NDArray[np.int64]
-    loop: NDArray[np.int64]
-    sign: NDArray[np.int64]
-    sums: NDArray[np.float64]
+    ends: NDArray[np.int64]  # (b, 2) rows of the matrix
+    edge: NDArray[np.int64]  # (b,) rows of `matrix.edges`
+    loop: NDArray[np.int64]  # (b,)
+    sign: NDArray[np.int64]  # (b,) 1 and -1 in turn, from 1 in each loop
+    sums: NDArray[np.float64]  # (b,) of the row at the first end of each edge
 
     @classmethod
     def of(cls, matrix: OperatorMatrix) -> _Loops | None:
@@ -102,11 +88,12 @@ class _Loops:
         outside[ends[:, 0]] = True
         if (incomplete & ~outside).any() or outside.sum() < len(ends) or len(piece.edges) < len(matrix.edges):
             return None
-        sums = matrix.row_sums
         key = np.searchsorted(matrix.edges @ [matrix.n, 1], np.sort(ends, axis=1) @ [matrix.n, 1])
         size = np.diff(piece.loop_offsets)
         place = np.arange(len(ends)) - np.repeat(piece.loop_offsets[:-1], size)
-        return cls(piece, ends, key, np.repeat(np.arange(len(size)), size), 1 - 2 * (place % 2), sums[ends[:, 0]])
+        return cls(
+            piece, ends, key, np.repeat(np.arange(len(size)), size), 1 - 2 * (place % 2), matrix.row_sums[ends[:, 0]]
+        )
 
     def _particular(self) -> NDArray[np.float64] | None:
         """(b,) terms that give the row sums; None where there are none."""
@@ -123,7 +110,7 @@ class _Loops:
             terms[start:end] = sign * (first + along)
         return terms
 
-    def terms(self, matrix: OperatorMatrix, scale: float | None, steps: int = 12) -> NDArray[np.float64] | None:
+    def terms(self, matrix: OperatorMatrix, scale: float | None) -> NDArray[np.float64] | None:
         """(b,) m with which a conformal map has all entries, by Gauss-Newton; None where there is none."""
         terms = self._particular()
         if terms is None:
@@ -133,7 +120,7 @@ class _Loops:
         ways = np.where(self.loop[:, None] == even, self.sign[:, None], 0).astype(float)
         misfit = self._misfit(matrix, terms, scale)
         step = ALIKE * float(np.median(np.abs(matrix.entries)))
-        for _ in range(steps):
+        for _ in range(12):
             if misfit is None or np.abs(misfit).max() <= ROUNDED or not len(even):
                 break
             others = [self._misfit(matrix, terms + step * way, scale) for way in ways.T]

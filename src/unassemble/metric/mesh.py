@@ -14,40 +14,25 @@ from ..topology.keys import Grouped
 from ..topology.manifold import Cycles
 from ..topology.numbering import local_numbering
 from ..topology.orientation import glue, orient
+from .program import angles
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceMesh:
     """Triangles glued along edges, at most two on each.
 
-    Attributes
-    ----------
-    n : int
-        Vertices.
-    edges : (e, 2) int64
-        Pairs i < j in lexicographic order; each is a side of a triangle.
-    triangles : (m, 3) int64
-        Neighbours run along a common edge in opposite directions, in orientable pieces.
-    opposite : (m, 3) int64
-        Rows of `edges` that face the corners.
-    piece : (m,) int64
-        Label of the edge-connected piece, in order of the pieces' lowest vertices.
-    orientable : (number of pieces,) bool
-    fan : (m, 3) int64
-        Label of the fan of triangles about a vertex that each corner belongs to; a vertex has several where sheets of
-        surface touch in it.
-    boundary : (b,) int64
-        Rows of `edges` with a triangle on one side only.
+    Neighbours run along a common edge in opposite directions, in orientable pieces. A vertex has several fans where
+    sheets of surface touch in it.
     """
 
     n: int
-    edges: NDArray[np.int64]
-    triangles: NDArray[np.int64]
-    opposite: NDArray[np.int64]
-    piece: NDArray[np.int64]
-    orientable: NDArray[np.bool_]
-    fan: NDArray[np.int64]
-    boundary: NDArray[np.int64]
+    edges: NDArray[np.int64]  # (e, 2) pairs i < j in lexicographic order; each is a side of a triangle
+    triangles: NDArray[np.int64]  # (m, 3)
+    opposite: NDArray[np.int64]  # (m, 3) rows of `edges` that face the corners
+    piece: NDArray[np.int64]  # (m,) label of the edge-connected piece, in order of the pieces' lowest vertices
+    orientable: NDArray[np.bool_]  # of each piece
+    fan: NDArray[np.int64]  # (m, 3) label of the fan of triangles about a vertex that each corner belongs to
+    boundary: NDArray[np.int64]  # (b,) rows of `edges` with a triangle on one side only
 
     @classmethod
     def of(cls, cycles: Cycles, chosen: NDArray[np.bool_] | slice = slice(None)) -> SurfaceMesh:
@@ -61,15 +46,9 @@ class SurfaceMesh:
         triangles = np.where(flip[:, None], triangles[:, [0, 2, 1]], triangles)
         opposite = np.where(flip[:, None], opposite[:, [0, 2, 1]], opposite)
         return cls(
-            cycles.n,
-            cycles.edges,
-            triangles,
-            opposite,
-            np.argsort(order)[piece],
-            orientable[order],
-            _fans(triangles, opposite),
-            np.flatnonzero(gluing.count == 1),
-        )
+            cycles.n, cycles.edges, triangles, opposite, np.argsort(order)[piece], orientable[order],
+            _fans(triangles, opposite), np.flatnonzero(gluing.count == 1),
+        )  # fmt: skip
 
     @property
     def n_pieces(self) -> int:
@@ -84,15 +63,7 @@ class SurfaceMesh:
         return label
 
     def pieces(self) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-        """Each piece by itself, its edges in an order in which neighbours are near each other.
-
-        Yields
-        ------
-        rows : (k,) int64
-            Of `edges`.
-        opposite : (m, 3) int64
-            For each triangle the places in `rows` of the edges that face its corners.
-        """
+        """Rows (k,) of `edges` of each piece, neighbours near each other, and places (m, 3) in these facing corners."""
         edges, triangles = Grouped(self.piece_of_edge, self.n_pieces), Grouped(self.piece, self.n_pieces)
         place = np.empty(len(self.edges), np.int64)
         for label in range(self.n_pieces):
@@ -141,6 +112,19 @@ class SurfaceMesh:
         """Vertices shared by several pieces."""
         pairs = np.unique(np.repeat(self.piece, 3) * self.n + self.triangles.ravel())
         return np.flatnonzero(np.bincount(pairs % self.n, minlength=self.n) > 1)
+
+    def curvature(self, squared: NDArray) -> NDArray[np.float64]:
+        """(n,) what the angles about each vertex lack of 2 pi, or of pi at the boundary; NaN where no triangle is.
+
+        For squared edge lengths (e,). Where several sheets touch in a vertex theirs are added up. With v - e + m the
+        Euler characteristic, and b = 2 e - 3 m the number of boundary edges, the sum over all vertices of a piece is
+        2 pi v - pi b - pi m = 2 pi (v - e + m): Gauss and Bonnet, whatever the lengths.
+        """
+        total = np.bincount(self.triangles.ravel(), angles(squared[self.opposite]).ravel(), self.n)
+        _, one = np.unique(self.fan, return_index=True)
+        fans = np.bincount(self.triangles.ravel()[one], minlength=self.n)
+        on_boundary = np.bincount(self.edges[self.boundary].ravel(), minlength=self.n)
+        return np.where(fans > 0, 2 * np.pi * fans - np.pi / 2 * on_boundary - total, np.nan)
 
 
 def _fans(triangles: NDArray, opposite: NDArray) -> NDArray[np.int64]:

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from ..certify import chi_square_verdict
 from ..linalg.responses import SamplingOptions, noise_blocks
 from ..matrix import OperatorMatrix
-from .lengths import areas_cotangents
-from .program import Normal, blocks_of, summed
+from .program import Normal, areas_cotangents, blocks_of, summed
 
 
 def row_sum_test(matrix: OperatorMatrix, sigma: float) -> dict[str, float]:

@@ -28,45 +28,53 @@ from numpy.typing import NDArray
 
 from ..errors import GeometryError, SolverError
 from ..linalg import Factorisation, UpperTriangle, factorisation
-from .lengths import SIGNS, areas_cotangents, heron, longest_step
+
+_STEPS = 120  # in all, before the method gives up; hard meshes take some thirty
+_NONE = "no edge lengths were found that have these entries: the triangles that come nearest have no area"
+
+# d(u_1 + u_2 - u_0)/du and so on: sums that are four areas times the cotangents.
+_SIGNS = np.array([[-1, 1, 1], [1, -1, 1], [1, 1, -1]], dtype=np.float64)
 
 
-@dataclass(frozen=True)
-class MetricOptions:
-    """How the program is solved.
+def heron(sides: NDArray) -> NDArray[np.float64]:
+    """(m,) 16 times the squared area of triangles with squared side lengths (m, 3); negative where there is none.
 
-    Attributes
-    ----------
-    shrink : float
-        By how much the barrier shrinks after a step that was long enough.
-    last : float
-        The last barrier, relative to areas; Newton's method converges from there.
-    steps : int
-        In all, before the method gives up. Hard meshes take some thirty.
+    As a difference of two squares that share the shortest side, which loses the fewest digits.
     """
+    low, middle, high = np.sort(sides, axis=1).T
+    return np.asarray(4 * low * middle - (high - low - middle) ** 2)
 
-    shrink: float = 0.1
-    last: float = 1e-6
-    steps: int = 120
+
+def areas_cotangents(sides: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Areas (m,), and cotangents (m, 3) of the angles that face the sides."""
+    area = np.sqrt(heron(sides)) / 4
+    return area, np.asarray(sides @ _SIGNS / (4 * area)[:, None])
+
+
+def angles(sides: NDArray) -> NDArray[np.float64]:
+    """(m, 3) angles that face the sides."""
+    return np.arctan2(np.sqrt(heron(sides))[:, None], sides @ _SIGNS)
+
+
+def longest_step(sides: NDArray, change: NDArray) -> float:
+    """The least t > 0 at which sides + t change is a triangle without area: Heron's formula is a quadratic in t."""
+
+    def product(a: NDArray, b: NDArray) -> NDArray:
+        return a.sum(axis=1) * b.sum(axis=1) - 2 * (a * b).sum(axis=1)
+
+    constant, half, square = heron(sides), product(sides, change), product(change, change)
+    slope = np.sqrt(np.maximum(half**2 - constant * square, 0)) - half
+    with np.errstate(divide="ignore"):
+        return float(np.min(np.where(slope > 0, constant / slope, np.inf)))
 
 
 @dataclass(frozen=True, eq=False)
 class Metric:
-    """Squared edge lengths of one edge-connected piece, and how they were found.
+    """Squared edge lengths of one edge-connected piece, and how they were found."""
 
-    Attributes
-    ----------
-    squared : (e,) float64
-        In the gauge of mean 1.
-    scale : float
-        The factor c of the weights.
-    history : tuple of float
-        Norm of the misfit of the weights, relative to theirs, before each step.
-    """
-
-    squared: NDArray[np.float64]
-    scale: float
-    history: tuple[float, ...]
+    squared: NDArray[np.float64]  # (e,) in the gauge of mean 1
+    scale: float  # the factor c of the weights
+    history: tuple[float, ...]  # norm of the misfit of the weights, relative to theirs, before each step
 
 
 class Normal:
@@ -96,9 +104,7 @@ class Normal:
             self._factor.release()
 
 
-def solve_metric(
-    weights: NDArray, opposite: NDArray, options: MetricOptions | None = None, *, polish: bool = True
-) -> Metric:
+def solve_metric(weights: NDArray, opposite: NDArray, *, polish: bool = True) -> Metric:
     """Edge lengths of an edge-connected surface whose weights are `weights`, up to a positive factor.
 
     Parameters
@@ -107,7 +113,6 @@ def solve_metric(
         c w, for an unknown c > 0.
     opposite : (m, 3) int64
         The edge that faces each corner.
-    options : MetricOptions, optional
     polish : bool
         Go on with Newton's method to the level of rounding.
 
@@ -116,17 +121,16 @@ def solve_metric(
     GeometryError
         If the program has no solution inside the cone.
     """
-    options = options or MetricOptions()
     unit = weights / np.abs(weights).max()
     if not np.isfinite(unit).all():
         raise GeometryError("all entries of a piece vanish")
     normal = Normal(opposite, len(weights))
     try:
         with np.errstate(all="ignore"):  # what is not finite is refused
-            u, count = _central_path(unit, opposite, normal, options)
+            u, count = _central_path(unit, opposite, normal)
             history: list[float] = []
             if polish:
-                u, history = _newton(unit, opposite, normal, u, options.steps - count)
+                u, history = _newton(unit, opposite, normal, u, _STEPS - count)
     except SolverError as error:
         raise GeometryError(_NONE) from error
     finally:
@@ -136,15 +140,12 @@ def solve_metric(
     return Metric(u / u.mean(), float((weights @ u) / (own @ u)), tuple(history))
 
 
-_NONE = "no edge lengths were found that have these entries: the triangles that come nearest have no area"
-
-
 def summed(opposite: NDArray, values: NDArray, size: int) -> NDArray[np.float64]:
     """(size,) sums over the corners that face each edge."""
     return np.asarray(np.bincount(opposite.ravel(), values.ravel(), size), np.float64)
 
 
-def _central_path(w: NDArray, opposite: NDArray, normal: Normal, options: MetricOptions) -> tuple[NDArray, int]:
+def _central_path(w: NDArray, opposite: NDArray, normal: Normal) -> tuple[NDArray, int]:
     """From equilateral triangles to lengths right to about the last barrier, and the number of steps.
 
     The barrier is relative to the triangle's area at the last centre, so that grading by many orders does no harm.
@@ -153,7 +154,7 @@ def _central_path(w: NDArray, opposite: NDArray, normal: Normal, options: Metric
     if not w @ u > 0:
         raise GeometryError(_NONE)
     barrier, reference = 1.0, np.full(len(opposite), np.sqrt(3) / 4)
-    for count in range(1, options.steps):
+    for count in range(1, _STEPS):
         sides = u[opposite]
         area, cotangents = areas_cotangents(sides)
         ratio = barrier * reference / area
@@ -170,9 +171,9 @@ def _central_path(w: NDArray, opposite: NDArray, normal: Normal, options: Metric
         step = min(1.0, 0.95 * longest_step(sides, change[opposite]))
         u = u + step * change
         if step > 0.5:
-            if barrier < options.last:
+            if barrier < 1e-6:  # Newton's method converges from there
                 return u, count
-            barrier, reference = options.shrink * barrier, np.sqrt(heron(u[opposite])) / 4
+            barrier, reference = 0.1 * barrier, np.sqrt(heron(u[opposite])) / 4
     raise GeometryError(_NONE)
 
 
@@ -183,7 +184,7 @@ def blocks_of(sides: NDArray, area: NDArray, cotangents: NDArray, first: NDArray
     """
     unit = sides / np.sqrt(16 * area)[:, None]
     flat = cotangents * unit
-    second = first[:, None, None] * (SIGNS * unit[:, :, None] * unit[:, None, :])
+    second = first[:, None, None] * (_SIGNS * unit[:, :, None] * unit[:, None, :])
     return np.asarray(-second - outer[:, None, None] * (flat[:, :, None] * flat[:, None, :]))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,25 +14,6 @@ from ..errors import SolverError
 from ..linalg import UpperTriangle, factorisation
 from ..recovery import Surface
 from ..tolerances import CERTIFIED
-
-
-@dataclass(frozen=True)
-class RealisationOptions:
-    """How coordinates are looked for.
-
-    Attributes
-    ----------
-    steps : int
-        Of Levenberg's and Marquardt's method from each start, at most.
-    landmarks : int
-        Vertices whose distances to all others make the starts.
-    """
-
-    steps: int = 80
-    landmarks: int = 60
-
-
-_OPTIONS = RealisationOptions()
 
 
 def realised(surface: Surface, clock: Clock, starts: int = 4) -> Surface:
@@ -90,7 +71,7 @@ def _starts(n: int, edges: NDArray, lengths: NDArray, count: int) -> list[NDArra
     marks = [0]
     far = np.full(n, np.inf)
     distances = []
-    for _ in range(min(n, _OPTIONS.landmarks)):
+    for _ in range(min(n, 60)):
         distances.append(csgraph.dijkstra(graph, directed=False, indices=marks[-1]))
         far = np.minimum(far, distances[-1])
         marks.append(int(np.argmax(far)))
@@ -122,7 +103,7 @@ def _fitted(start: NDArray, edges: NDArray, lengths: NDArray) -> NDArray[np.floa
         return side / lengths[:, None], ((side**2).sum(axis=1) - lengths**2) / (2 * lengths)
 
     side, left = residual(x)
-    for _ in range(_OPTIONS.steps):
+    for _ in range(80):
         jacobian = sp.csr_array((np.hstack([side, -side]).ravel(), (rows, columns)), shape=(len(edges), x.size))
         normal = UpperTriangle.of(sp.csr_array(jacobian.T @ jacobian))
         data = normal.data.copy()

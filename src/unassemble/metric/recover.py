@@ -19,7 +19,6 @@ from ..recovery import Surface
 from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE
 from ..topology.manifold import Cycles, in_four_cliques, surface_readings
 from ..words import count_of, sentences, words_of
-from .curvature import curvatures
 from .mesh import SurfaceMesh
 from .noise import length_deviations, row_sum_test, scale_deviation
 from .program import Metric, solve_metric
@@ -84,7 +83,13 @@ def _recovered(
 ) -> Surface:
     """The same, the last `back` rows being those of vertices that were put back."""
     with clock("topology"):
-        _require_few_handles(matrix)
+        if len(matrix.edges) > 4 * matrix.n:
+            # Before 3-cycles are listed: dense graphs have most of all. By Euler's formula a closed surface of n
+            # vertices and g handles has 3 n - 6 + 6 g edges, and one with holes fewer.
+            raise TopologyError(
+                f"{count_of(len(matrix.edges), 'edge')} on {count_of(matrix.n, 'row')} are those of no surface, unless "
+                "it has more handles than a sixth of its rows"
+            )
         used, notes = _used(matrix)
         cycles = Cycles.of(used.n, used.edges)
         if triangles is None:
@@ -101,7 +106,11 @@ def _recovered(
     deviations = None
     if options.noise is not None and options.standard_deviations:
         with clock("deviations"):
-            deviations = _deviations(best, options.noise)
+            deviations = np.full(len(best.squared), np.nan)
+            for scale, (rows, opposite) in zip(best.scale, best.mesh.pieces(), strict=True):
+                if np.isfinite(scale):
+                    own = length_deviations(best.squared[rows], opposite)
+                    deviations[rows] = options.noise / abs(scale) * own
     if back:
         best = best.without_last(back)
         notes.append(f"{count_of(back, 'vertex was', 'vertices were')} put back, with the entries that rows lack")
@@ -114,26 +123,6 @@ _SEVERAL = (
     "with one vertex put back into each hole where rows lack entries, lengths give all entries and row sums back, but "
     "so may several vertices in a hole"
 )
-
-
-def _require_few_handles(matrix: OperatorMatrix) -> None:
-    """Refuse graphs that have no surface of few handles, before 3-cycles are listed: dense ones have most of all.
-
-    A closed surface of n vertices and g handles has 3 n - 6 + 6 g edges (Euler's formula), and one with holes fewer.
-    """
-    if len(matrix.edges) > 4 * matrix.n:
-        edges, rows = (count_of(k, word) for k, word in ((len(matrix.edges), "edge"), (matrix.n, "row")))
-        raise TopologyError(
-            f"{edges} on {rows} are those of no surface, unless it has more handles than a sixth of its rows"
-        )
-
-
-def _deviations(found: _Found, sigma: float) -> NDArray[np.float64]:
-    deviations = np.full(len(found.squared), np.nan)
-    for scale, (rows, opposite) in zip(found.scale, found.mesh.pieces(), strict=True):
-        if np.isfinite(scale):
-            deviations[rows] = sigma / abs(scale) * length_deviations(found.squared[rows], opposite)
-    return deviations
 
 
 def _used(matrix: OperatorMatrix) -> tuple[OperatorMatrix, list[str]]:
@@ -252,16 +241,10 @@ _SUMS = {
 }
 
 
-def _report(
-    found: _Found,
-    verdict: _Verdict,
-    notes: list[str],
-    clock: Clock,
-    deviations: NDArray | None,
-) -> Surface:
+def _report(found: _Found, verdict: _Verdict, notes: list[str], clock: Clock, deviations: NDArray | None) -> Surface:
     mesh = found.mesh
     worst, misfits = found.certificate.entries.worst(10 if verdict.uniqueness is None else 0)
-    curvature = curvatures(mesh, found.squared)
+    curvature = mesh.curvature(found.squared)
     loop = mesh.loop_of_boundary
     order = np.argsort(loop, kind="stable")
     _, first = np.unique(loop[order], return_index=True)

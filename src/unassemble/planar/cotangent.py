@@ -21,9 +21,11 @@ def _sides(piece: Piece, z: NDArray) -> tuple[tuple[NDArray, NDArray], tuple[NDA
     return (tail - left, head - left), (head - right, tail - right)
 
 
-def _halved(piece: Piece, left: NDArray, right: NDArray) -> NDArray:
-    """Half the sum over both sides of each edge; on the boundary there is no right one."""
+def _halved(piece: Piece, left: NDArray, right: NDArray, factor: NDArray | None = None) -> NDArray:
+    """Half the sum over both sides of each edge, times factors (m,) of triangles; on the boundary there is no right."""
     with np.errstate(invalid="ignore"):  # flat triangles on both sides
+        if factor is not None:
+            left, right = factor[piece.facing // 3].T * (left, right)
         return np.asarray((left + np.where(piece.inner, right, 0)) / 2)
 
 
@@ -34,10 +36,13 @@ def cotangent(u: NDArray, w: NDArray) -> NDArray[np.float64]:
         return np.asarray(product.real / product.imag)
 
 
-def edge_weights(piece: Piece, z: NDArray) -> NDArray[np.float64]:
-    """w_e: half the sum of the cotangents that face each edge (e,), for positions z (n,) complex."""
+def edge_weights(piece: Piece, z: NDArray, factor: NDArray | None = None) -> NDArray[np.float64]:
+    """w_e: half the sum of the cotangents that face each edge (e,), for positions z (n,) complex.
+
+    With factors (m,) each triangle's cotangents count so many times.
+    """
     left, right = _sides(piece, z)
-    return _halved(piece, cotangent(*left), cotangent(*right))
+    return _halved(piece, cotangent(*left), cotangent(*right), factor)
 
 
 def left_by_all(
@@ -92,13 +97,14 @@ def corner_gradients(u: NDArray, w: NDArray) -> tuple[NDArray, NDArray]:
     return -factor / u, factor / w
 
 
-def weight_gradient(piece: Piece, z: NDArray) -> NDArray[np.complex128]:
+def weight_gradient(piece: Piece, z: NDArray, factor: NDArray | None = None) -> NDArray[np.complex128]:
     """Derivative of the weights: dw_e = Re sum_k g_ke dz_(v_ke) over the vertices v_ke of ``piece.stencil``.
 
     Returns (4, e), zero in the last row on the boundary; not finite at flat triangles.
     """
     left, right = _sides(piece, z)
+    one, other = (1.0, 1.0) if factor is None else factor[piece.facing // 3].T
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        tail, head = corner_gradients(*left)
-        head_right, tail_right = (np.where(piece.inner, g, 0) for g in corner_gradients(*right))
+        tail, head = (one * g for g in corner_gradients(*left))
+        head_right, tail_right = (np.where(piece.inner, other * g, 0) for g in corner_gradients(*right))
     return np.stack([tail + tail_right, head + head_right, -(tail + head), -(tail_right + head_right)])

@@ -32,8 +32,9 @@ class Recovery:
     #: (n,) edge-connected piece of each point, the lowest of those that share it; -1 for points of no cell.
     component: NDArray[np.int64]
     hinges: NDArray[np.int64] = field(default_factory=none_of())  #: (k,) vertices shared by several pieces.
-    #: (number of pieces,) the factor c of each piece in A = c L + D. For elasticity the mean shear modulus of the
-    #: piece's cells, on the mesh as it is given here; NaN where no cells are recognised.
+    #: (number of pieces,) the factor c of each piece in A = c L + D, or of each region where there are some. For
+    #: elasticity the mean shear modulus of the piece's cells, on the mesh as it is given here; NaN where no cells are
+    #: recognised.
     scale: NDArray[np.float64]
     #: (b, 2) directed boundary edges of planar cells with the mesh on their left, loop by loop in running order.
     boundary: NDArray[np.int64] = field(default_factory=none_of(2))
@@ -105,7 +106,7 @@ class Recovery:
     @property
     def n_components(self) -> int:
         """Number of edge-connected pieces."""
-        return len(self.scale)
+        return int(self.component.max(initial=-1)) + 1
 
     @property
     def cells(self) -> dict[str, NDArray[np.int64]]:

@@ -46,6 +46,8 @@ class PlanarMesh(Recovery):
     n_fitting: int = 0  #: Those that the mesh gives back to 1e-9 of their row's largest.
     #: (k, 2) vertices that the matrix has no rows for, where it determines them; see :mod:`unassemble.boundaries`.
     eliminated_points: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    #: (m,) of each cell, where coefficients are constant on regions; `scale` has one factor for each region then.
+    region: NDArray[np.int64] | None = None
 
     @property
     def n_polygons(self) -> int:

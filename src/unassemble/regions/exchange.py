@@ -1,0 +1,126 @@
+"""Triangles that belong to the region beside them: what the misfit of a fit shows, geometry taken out.
+
+Changing triangle t to a region with another factor adds a column b_t to the linearised problem, with entries at its
+three sides. Displacements and factors take up what they can: with the projection P from their columns, the changes are
+those numbers between 0 and 1 that make |P (r - sum_t a_t b_t)| least, r the misfit; about 0 where nothing changes, and
+about 1 where something does. All that is wrong shows at once, as far as it is small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from ..boundaries.fit import System, WholeEntries
+from ..boundaries.shape import ShapePrior
+from ..errors import SolverError
+from ..planar.cotangent import cotangent
+
+
+@dataclass(frozen=True)
+class ExchangeOptions:
+    """Which triangles change.
+
+    Attributes
+    ----------
+    most : int
+        Candidates, those that entries speak most for.
+    least : tuple of (float, bool)
+        Above which number a triangle changes, one after the other, and whether only those are candidates that entries
+        speak for where nothing else changes.
+    alone : int
+        Candidates, those next to the largest misfits, that change alone at last: on the boundary positions take up
+        nearly all of a change to first order.
+    at_once : int
+        Columns that are solved for at once.
+    """
+
+    most: int = 300
+    least: tuple[tuple[float, bool], ...] = ((0.5, True), (0.5, False), (0.25, True), (0.9, True))
+    alone: int = 8
+    at_once: int = 32
+
+
+def exchanges(
+    problem: WholeEntries, z: NDArray[np.complex128], scale: NDArray, options: ExchangeOptions | None = None
+) -> Iterator[NDArray[np.int64]]:
+    """Regions (m,) of which some triangles are another's, the likeliest first.
+
+    Parameters
+    ----------
+    problem : WholeEntries
+        With regions.
+    z : (n,) complex128
+        Where all entries are fitted, as far as they go.
+    scale : (k,) float64
+        Factors of regions.
+    options : ExchangeOptions, optional
+    """
+    options = options or ExchangeOptions()
+    piece, region, misfit = problem.piece, problem.region, problem.misfits(z, scale)
+    triangle, other = _beside(problem)
+    corner = z[piece.triangles[triangle]]
+    half = cotangent(np.roll(corner, -1, axis=1) - corner, np.roll(corner, 1, axis=1) - corner) / 2
+    sides = piece.opposite[triangle]
+    column = half * (scale[other] - scale[region[triangle]])[:, None] / problem.unit(scale)[sides]
+    score = (column * misfit[sides]).sum(axis=1) / np.sqrt((column**2).sum(axis=1))
+    for least, only in options.least:
+        order = np.argsort(-score)[: options.most]
+        order = order[score[order] > 0] if only else order
+        if not len(order):
+            continue
+        share = _shares(problem, z, scale, column[order], sides[order], options)
+        taken = order[share > least]
+        if len(taken):
+            new = region.copy()
+            new[triangle[taken]] = other[taken]
+            yield new
+    for one in np.argsort(-np.abs(misfit[sides]).max(axis=1))[: options.alone].tolist():
+        new = region.copy()
+        new[triangle[one]] = other[one]
+        yield new
+
+
+def _beside(problem: WholeEntries) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Triangles, and regions other than theirs that they share a vertex with."""
+    piece, region, m = problem.piece, problem.region, len(problem.piece.triangles)
+    corners = sp.csr_array(
+        (np.ones(3 * m), piece.triangles.ravel(), np.arange(0, 3 * m + 1, 3)), shape=(m, piece.n_vertices)
+    )
+    kinds = sp.csr_array((np.ones(m), region, np.arange(m + 1)), shape=(m, int(region.max()) + 1))
+    triangle, other = sp.coo_array(corners @ (corners.T @ kinds)).coords
+    change = other != region[triangle]
+    return triangle[change], other[change]
+
+
+def _shares(
+    problem: WholeEntries, z: NDArray, scale: NDArray, column: NDArray, sides: NDArray, options: ExchangeOptions
+) -> NDArray[np.float64]:
+    """(k,) numbers between 0 and 1 of columns with entries (k, 3) at sides (k, 3)."""
+    misfit, count = problem.misfits(z, scale), len(column)
+    whole = np.ones(len(misfit), dtype=bool)
+    added = sp.csr_array((column.ravel(), sides.ravel(), np.arange(0, 3 * count + 1, 3)), shape=(count, len(misfit)))
+    system = System(problem, z, scale, whole, ShapePrior.of(problem.piece, ~whole), 0.0, misfit, np.zeros(0))
+    matrix = system.damped(1e-10)
+    try:
+        factor = problem.analysed(matrix)
+        factor.factorise(matrix)
+    except SolverError:
+        problem.release()
+        return np.zeros(count)
+    pulled = sp.csr_array((system.jacobian_transposed @ added.T).T)
+    response = factor.solve(system.slope)
+    along = added @ problem.slopes(z, scale) - pulled @ response
+    gram = (added @ added.T).toarray()
+    for first in range(0, count, options.at_once):
+        some = slice(first, first + options.at_once)
+        gram[:, some] -= pulled @ factor.solve(np.ascontiguousarray(pulled[some].T.toarray()))
+    gram -= along @ np.linalg.lstsq(system.size - system.slope.T @ response, along.T, rcond=None)[0]
+    value, vector = np.linalg.eigh((gram + gram.T) / 2)
+    root = np.sqrt(np.maximum(value, 1e-8 * value.max()))
+    return np.asarray(lsq_linear((vector * root).T, (vector / root).T @ (added @ misfit), bounds=(0, 1)).x)

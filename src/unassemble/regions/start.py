@@ -1,0 +1,128 @@
+"""Positions to start from: the conformal map of entries in units of the factors on both sides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
+
+from ..boundaries.embedding import areas, tutte
+from ..boundaries.patch import distance
+from ..errors import GeometryError, SolverError
+from ..planar.conformal import ConformalOptions, conformal_map
+from ..planar.cotangent import edge_weights
+from ..topology import Piece
+
+
+@dataclass(frozen=True)
+class StartOptions:
+    """How positions are found.
+
+    Attributes
+    ----------
+    maps : int
+        Conformal maps, each with the factors that fit the one before.
+    settled : float
+        Relative change of factors at which there is no next one.
+    unfolded : int
+        In edges, how far around triangles that are turned over vertices are drawn anew.
+    """
+
+    maps: int = 5
+    settled: float = 1e-3
+    unfolded: int = 6
+
+
+def started(
+    piece: Piece, weights: NDArray, region: NDArray[np.int64], scale: NDArray, options: StartOptions | None = None
+) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
+    """Positions in which no triangle is turned over, and factors.
+
+    Parameters
+    ----------
+    piece : Piece
+    weights : (e,) float64
+        -A_ij.
+    region : (m,) int64
+    scale : (k,) float64
+        About the factors of regions.
+    options : StartOptions, optional
+
+    Returns
+    -------
+    z : (n,) complex128
+    scale : (k,) float64
+    """
+    options = options or StartOptions()
+    one, other = region[piece.facing // 3].T
+    alike = (one == other) | ~piece.inner
+    best, fewest, factors = None, len(piece.triangles) / 4, scale
+    for _ in range(options.maps):
+        unit = np.where(piece.inner, (factors[one] + factors[other]) / 2, factors[one])
+        try:
+            found = conformal_map(
+                piece, weights / unit, scale=None, sharp=False, options=ConformalOptions(max_factorisations=2)
+            )
+        except (GeometryError, SolverError):
+            break
+        area = areas(piece, found.z)
+        z = (found.z if area.sum() > 0 else np.conj(found.z)) / np.sqrt(np.abs(area).mean())
+        upright = areas(piece, z) > 0
+        whole = alike & upright[piece.facing // 3].all(axis=1)
+        new = _fitted(edge_weights(piece, z), weights, np.where(whole, one, -1), factors)
+        change = np.abs(new / factors - 1).max()
+        if (~upright).sum() < fewest:
+            best, fewest, scale = z, (~upright).sum(), new
+        factors = new
+        if change < options.settled:
+            break
+    z = None if best is None else _unfolded(piece, best, options)
+    return (tutte(piece, int(np.argmax(np.diff(piece.loop_offsets)))) if z is None else z), scale
+
+
+def _fitted(drawn: NDArray, weights: NDArray, region: NDArray, scale: NDArray) -> NDArray[np.float64]:
+    """Factors (k,) of the weights of each region that make up for most of the entries: least absolute misfits."""
+    result = scale.copy()
+    for k in range(len(scale)):
+        own = (region == k) & np.isfinite(drawn)
+        w, a, c = drawn[own], weights[own], scale[k]
+        for _ in range(10 * (own.sum() > 2)):
+            misfit = np.abs(a - c * w)
+            trust = 1 / np.maximum(misfit, 0.1 * np.median(misfit) + 1e-12 * abs(c))
+            c = (trust * w) @ a / ((trust * w) @ w)
+        result[k] = c if c / scale[k] > 0 else scale[k]
+    return result
+
+
+def _unfolded(piece: Piece, z: NDArray, options: StartOptions) -> NDArray[np.complex128] | None:
+    """The same, vertices about triangles that are turned over being means of their neighbours; None if that fails."""
+    n = piece.n_vertices
+    graph = sp.coo_array((np.ones(len(piece.edges)), piece.edges.T), shape=(n, n)).tocsr()
+    graph = graph + graph.T
+    laplacian = sp.csc_array(sp.diags_array(graph.sum(axis=1)) - graph)
+    for reach in range(1, options.unfolded + 1):
+        near = _folded(piece, z)
+        if not near.any():
+            return z
+        free = distance(piece, near, reach) <= reach
+        if free.all():
+            break
+        solver = splu(laplacian[free][:, free])
+        pull = -(laplacian[free][:, ~free] @ z[~free])
+        z = z.copy()
+        z[free] = solver.solve(pull.real) + 1j * solver.solve(pull.imag)
+    return None if _folded(piece, z).any() else z
+
+
+def _folded(piece: Piece, z: NDArray) -> NDArray[np.bool_]:
+    """(n,) vertices of triangles that are turned over, and those inside around which triangles go more than once."""
+    corner = z[piece.triangles]
+    angle = np.angle((np.roll(corner, 1, axis=1) - corner) * np.conj(np.roll(corner, -1, axis=1) - corner))
+    around = np.bincount(piece.triangles.ravel(), angle.ravel(), piece.n_vertices)
+    folded = np.abs(around - 2 * np.pi) > 1
+    folded[piece.boundary] = False
+    folded[piece.triangles[areas(piece, z) <= 0]] = True
+    return folded
