@@ -1,7 +1,5 @@
 """Positions of all pieces that linear equations hold together, from equations that others would contradict."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple

@@ -8,8 +8,6 @@ determine all nodes several times over.
 R. Chartrand and W. Yin, Iteratively reweighted algorithms for compressive sensing, ICASSP 2008, 3869-3872.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial

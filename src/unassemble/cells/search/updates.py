@@ -1,7 +1,5 @@
 """What small changes of the labels would leave, by the maps of :mod:`unassemble.cells.search.low_rank`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
