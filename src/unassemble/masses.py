@@ -6,8 +6,6 @@ tells rho where the size is known (by anchors), and the size where rho is: 1, as
 assembled here on the mesh as written and held against the matrix as given.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The recovery of a vector-valued matrix on one page: a structure, a truss, or a solid body."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -5,8 +5,6 @@ References
 Tutte, "How to draw a graph", Proc. London Math. Soc. 13, 1963.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

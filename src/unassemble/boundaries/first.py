@@ -1,7 +1,5 @@
 """First fits of a mesh to its whole entries: from conformal maps of guesses, or from drawings without crossings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from functools import partial
 from itertools import chain

@@ -1,7 +1,5 @@
 """The mesh of a piece of which some entries are whole, and what of it they determine."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Scalar matrices that have lost rows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

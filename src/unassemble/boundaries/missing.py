@@ -1,7 +1,5 @@
 """Edges of matrices with replaced rows, where zeros are not stored."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

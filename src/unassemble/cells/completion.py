@@ -1,7 +1,5 @@
 """Components whose triangles do not explain the matrix: cells looked for, vanished entries put back."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Which parts of a matrix their triangles do not explain."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

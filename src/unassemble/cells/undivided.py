@@ -1,7 +1,5 @@
 """Triangles that share a vanished side are one cell, however a reading came by them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

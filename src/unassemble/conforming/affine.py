@@ -6,8 +6,6 @@ and quadrilaterals that are no parallelograms, the right order is the one that f
 known matrix, times the area.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 

@@ -6,8 +6,6 @@ P' M P, is the one of linear elements on the corners: with quadratic or cubic tr
 problem of the size of the corners serves all orders, and its null space is that of linear elements.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice

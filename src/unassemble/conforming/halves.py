@@ -7,8 +7,6 @@ the numbers tell the diagonal: the entries of the middle with two sides of a rig
 diagonals have that, and the matrix is the same for either.
 """
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

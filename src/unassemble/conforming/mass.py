@@ -6,8 +6,6 @@ triangles have no such entries, and quadrilaterals two, fewer than the numbers t
 guessed from row sums, s times the integrals of the basis functions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

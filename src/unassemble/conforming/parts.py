@@ -1,7 +1,5 @@
 """Cells cut into edge-connected parts, oriented, each in a numbering of its own."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

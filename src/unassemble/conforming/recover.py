@@ -1,7 +1,5 @@
 """A scalar matrix of any planar element on one page: cells, positions, place, certificate."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace

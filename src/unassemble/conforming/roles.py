@@ -5,8 +5,6 @@ the same cells the corner is the one of the smallest diagonal entry of L: on a s
 middle of a side is at least twice that of a corner. What the graph then leaves, entries decide (:mod:`.affine`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import permutations, product

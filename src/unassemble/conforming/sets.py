@@ -1,7 +1,5 @@
 """Sets of rows that are the nodes of one cell, read off the graph."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """From a mesh held against the matrix to its status: decided here, once."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

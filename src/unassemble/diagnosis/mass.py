@@ -8,8 +8,6 @@ stiffnesses are against each other. Those of straight simplices, cubic ones too,
 A. J. Wathen, Realistic eigenvalue bounds for the Galerkin mass matrix, IMA J. Numer. Anal. 7 (1987), 449-457.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

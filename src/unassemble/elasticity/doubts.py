@@ -1,7 +1,5 @@
 """What is not sure about nodes, which of them elements show to be right all the same, and what is said of it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -9,8 +9,6 @@ stays valid, though A^{cb} x_a for other a does not. And x_b is constant over su
 That they lie in a plane is an assumption. It is refused where no exact null field is left with it.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Coordinates from an elasticity matrix: the whole room on one page."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Whether coordinates are certified, and why not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

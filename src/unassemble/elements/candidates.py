@@ -3,8 +3,6 @@
 Nothing here depends on more than an affine picture of the points.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Kinds of cells by meshio's names: how many nodes, in which order."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 _TRIANGLE = ((0, 1), (1, 2), (2, 0))

@@ -1,7 +1,5 @@
 """Sets of nodes put in meshio's order, by where they lie."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

@@ -4,8 +4,6 @@ An isoparametric cell maps the reference element by x(t) = sum_k x_k phi_k(t). W
 J^-T times those in the reference element, and |det J| is the volume that goes with a weight.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cache
 from itertools import permutations, product

@@ -1,7 +1,5 @@
 """The outside of a mesh: facets that belong to one cell only."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 

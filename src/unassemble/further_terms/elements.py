@@ -7,8 +7,6 @@ Anderson, which is found up to s h^2 / c of 1 to 3, on meshes of any size.
 D. G. Anderson, Iterative procedures for nonlinear integral equations, J. ACM 12 (1965), 547-560.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """What all terms have in common: the row sums that show them, and a mesh held against the whole matrix."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property

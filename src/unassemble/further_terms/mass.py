@@ -3,8 +3,6 @@
 Areas are taken off the matrix, what is left is a Laplacian and recovered as one, and the whole is assembled again.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -6,8 +6,6 @@ to a factor that only c could tell it from. With an unknown D there is no such v
 diagonal than coordinates and factors.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Semidefinite matrices made definite by a small multiple of the identity, normal equations, singular values."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Choice of the sparse direct solver and of its threads, and the solvers that ship with scipy."""
 
-from __future__ import annotations
-
 import os
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, Protocol

@@ -1,7 +1,5 @@
 """Of all least-squares solutions of a sparse system that of least norm."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray

@@ -6,8 +6,6 @@ Parameter numbers are those of the oneMKL reference, "Intel oneMKL PARDISO - Par
 Solver Interface", counted from 1 there and from 0 in ``_iparm``.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import re

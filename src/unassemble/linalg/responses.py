@@ -1,7 +1,5 @@
 """Responses of an estimate to independent errors of its data, added up one by one or by random patterns."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

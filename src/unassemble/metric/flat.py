@@ -1,7 +1,5 @@
 """Surfaces that are flat: the planar mesh says more, with more certainty."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Independent errors of known size in the entries: what they leave of row sums, and what they make of lengths."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

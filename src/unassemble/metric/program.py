@@ -19,8 +19,6 @@ Gu, Guo, Luo, Zeng, "Discrete Laplace-Beltrami operator determines discrete Riem
 Boyd, Vandenberghe, "Convex Optimization", Cambridge 2004, chapter 11.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Coordinates in space for given edge lengths: least squares from several starts, one shape of possibly many."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

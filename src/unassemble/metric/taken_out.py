@@ -1,7 +1,5 @@
 """Single vertices that were taken out of a surface, put back: what the rows around the hole lack is theirs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

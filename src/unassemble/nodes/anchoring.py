@@ -1,7 +1,5 @@
 """What is asked for beside the matrix; known positions: one fixes the translation of its piece, two size and sign."""
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Sequence
 from dataclasses import dataclass

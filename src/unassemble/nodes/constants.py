@@ -1,7 +1,5 @@
 """Constants, the first evidence of directions: in rows that lack nothing, entries of each direction add up to zero."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray

@@ -7,8 +7,6 @@ nodes stay apart. Rows that are likest each other are given what any of them cou
 these entries more rows show where they belong.
 """
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rows grouped by what they couple to."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A vector-valued matrix seen node by node, and which of its rows still say something about positions."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which rows of a matrix belong to one node and to which direction each of them, and how much speaks for it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ Supports take single unknowns out, so that no stride fits the rest. Direction by
 still stand one after the other, with nodes in the same order in each; node by node directions increase in each node.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_left
 from itertools import permutations
 from typing import NamedTuple

@@ -11,8 +11,6 @@ magnifies are seen where it does. That holds if rounding is all that entries are
 then are as large as the changes that drawing anew brings to them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain

@@ -6,8 +6,6 @@ that couple to the same unknowns are one node's, as far as the order allows. Whe
 patterns do not show nodes, and are made up for first.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From null fields to coordinates: projecting translations out, setting aside what stays loose, choosing the gauge."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

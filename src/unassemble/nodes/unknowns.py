@@ -5,8 +5,6 @@ the rows of interior nodes. And the pattern: the unknowns of a node couple to th
 tried first, whole and then with gaps; only where they fail is searched for nodes anywhere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from itertools import product

@@ -13,8 +13,6 @@ Levy, Petitjean, Ray, Maillot, "Least squares conformal maps", ACM TOG 21, 2002.
 Mullen, Tong, Alliez, Desbrun, "Spectral conformal parameterization", CGF 27, 2008.
 """
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass
 

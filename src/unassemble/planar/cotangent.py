@@ -4,8 +4,6 @@ Everything is computed edge by edge from its stencil: tail t, head h and the ape
 and right. The angle at the left apex lies between t - a and h - a, that at the right one between h - b and t - b.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

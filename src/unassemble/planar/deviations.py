@@ -1,7 +1,5 @@
 """Standard deviations of recovered coordinates, the diagonal of sigma^2 (J'J)^+."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Similarity frames: the gauge of a mesh that is known up to similarity and reflection."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pieces that meet in single vertices: join them there."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array

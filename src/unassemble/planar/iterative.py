@@ -8,8 +8,6 @@ spaces), and the energy is Hermitian with one complex unknown a vertex. On latti
 with the size.
 """
 
-from __future__ import annotations
-
 import logging
 
 import numpy as np

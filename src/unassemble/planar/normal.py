@@ -1,7 +1,5 @@
 """Normal equations of the cotangent weights, with the similarities pinned."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np

@@ -9,8 +9,6 @@ has the mesh on its left. For A = c L + D the matrix c L is known (its rows sum 
 is positive semidefinite for 0 <= s <= c; M(c) z = 0 exactly for similarities of the true mesh.
 """
 
-from __future__ import annotations
-
 import logging
 
 import numpy as np

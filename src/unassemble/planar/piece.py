@@ -1,7 +1,5 @@
 """One piece from its entries to positions and scale."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -5,8 +5,6 @@ entries of a mass matrix, or of a coefficient that varies in space, explain more
 small it is: the score test (C. R. Rao, 1948), with the level of the noise estimated from the same misfit.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

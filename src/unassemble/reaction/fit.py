@@ -11,8 +11,6 @@ single triangle the cosine of the angle, which is linear in the square of the si
 there. Positions follow from the metric by the linear solve of the Laplacian.
 """
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass
 

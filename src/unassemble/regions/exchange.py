@@ -6,8 +6,6 @@ those numbers between 0 and 1 that make |P (r - sum_t a_t b_t)| least, r the mis
 about 1 where something does. All that is wrong shows at once, as far as it is small.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ between its two triangles gives a value of c for each of them, right to some thi
 bring that down to a few per cent and keep jumps where they are.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

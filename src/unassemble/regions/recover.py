@@ -1,7 +1,5 @@
 """Meshes whose coefficient is constant on regions, from entries to result."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass, field
 

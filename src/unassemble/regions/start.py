@@ -1,7 +1,5 @@
 """Positions to start from: the conformal map of entries in units of the factors on both sides."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

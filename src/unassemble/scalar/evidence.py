@@ -1,7 +1,5 @@
 """What a misfit looks like: noise of some size, a term that the model lacks, or a wrong entry."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

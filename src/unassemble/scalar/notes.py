@@ -1,7 +1,5 @@
 """What is to be said about a mesh beside its status: sentences for ``warnings``."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A scalar matrix on one page: recognise, solve, place, certify."""
 
-from __future__ import annotations
-
 from contextlib import nullcontext
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Every piece from its entries to positions; pieces that fail do not stop the others."""
 
-from __future__ import annotations
-
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cache

@@ -1,7 +1,5 @@
 """A structure as it is given back: moved to its anchors, with the fields and sentences that all kinds share."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -9,8 +9,6 @@ and four entries, and says by itself that it is one: x_j - x_i = -2 A[w_i, t_j] 
 supports spoil are not needed. Stretching and torsion are chains of springs beside it, which know no length.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 Nothing is shared with the solver: members between the points, as they are written, are set up by the textbook.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray

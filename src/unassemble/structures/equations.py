@@ -33,6 +33,7 @@ class Equations:
     # ``i b + k`` of direction k of node i; -1 for differences of two rows, and for what members tell
     row: NDArray[np.int64]
     rotation: NDArray[np.int64]  # which of the layout's rotations it is; -1 for what members tell
+    mixed: NDArray[np.float64]  # a random right-hand side that depends as the rows of the matrix depend on each other
 
     def __getitem__(self, which: NDArray) -> Equations:
         """Some of the equations, by their indices or a mask."""
@@ -55,7 +56,7 @@ def equations(nodes: Nodes, valid: NDArray[np.bool_], *, springs: bool, allowed:
         one, other = every[k][both + m], every[m][both + k]
         operator, right = sp.csr_array(one.operator - other.operator), one.right - other.right
         size, lever, row = one.size + other.size, one.lever + other.lever, np.full(len(both), -1)
-        parts.append(Equations(operator, right, size, lever, row, one.rotation))
+        parts.append(Equations(operator, right, size, lever, row, one.rotation, one.mixed - other.mixed))
     return _relative(joined(*parts), allowed)
 
 
@@ -71,7 +72,8 @@ def told_by(members: Straight, nodes: Nodes) -> Equations:
     place = (members.ends[:, :, None] * d + np.arange(d)).transpose(0, 2, 1).reshape(m, 2)
     half = np.tile([0.5, -0.5], m), (np.repeat(np.arange(m), 2), place.ravel())
     right, unknown = members.vectors.ravel() / 2, np.full(m, -1)
-    return Equations(sp.csr_array(half, shape=(m, nodes.n * d)), right, np.ones(m), np.abs(right), unknown, unknown)
+    operator, mixed = sp.csr_array(half, shape=(m, nodes.n * d)), np.random.default_rng(0).standard_normal(m)
+    return Equations(operator, right, np.ones(m), np.abs(right), unknown, unknown, mixed)
 
 
 def _relative(given: Equations, allowed: float) -> Equations:
@@ -83,7 +85,8 @@ def _relative(given: Equations, allowed: float) -> Equations:
     tells = np.flatnonzero(size > allowed * given.size)
     some, size = given[tells], size[tells]
     operator = sp.csr_array(sp.diags_array(1 / size) @ some.operator)
-    return replace(some, operator=operator, right=some.right / size, size=size, lever=some.lever / size)
+    right, lever, mixed = some.right / size, some.lever / size, some.mixed / size
+    return replace(some, operator=operator, right=right, size=size, lever=lever, mixed=mixed)
 
 
 def _rotation(nodes: Nodes, k: int) -> Equations:
@@ -95,4 +98,6 @@ def _rotation(nodes: Nodes, k: int) -> Equations:
         operator = operator + sp.kron(nodes.direction(direction), axis, format="csr")
     own = nodes.direction(len(layout.displacements) + k) if layout.rotations else sp.csr_array((order, nodes.n))
     right, lever, size = (np.asarray(part.sum(axis=1)).ravel() for part in (-own, abs(own), abs(operator)))
-    return Equations(operator, right, size, lever, np.arange(order), np.full(order, k))
+    stiffness = np.abs(nodes.matrix.diagonal())
+    field = np.random.default_rng(k).standard_normal(order) / np.sqrt(np.where(stiffness > 0, stiffness, 1))
+    return Equations(operator, right, size, lever, np.arange(order), np.full(order, k), nodes.matrix @ field)

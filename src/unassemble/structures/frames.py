@@ -1,7 +1,5 @@
 """Coordinates from the matrix of a frame, shell or plate, in true units of length."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

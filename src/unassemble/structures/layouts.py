@@ -1,7 +1,5 @@
 """What the unknowns of a node of a frame, shell or plate are: displacements and rotations."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

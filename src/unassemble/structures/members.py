@@ -4,8 +4,6 @@ What a straight member between two nodes transmits balances by itself, whatever 
 shell element transmits does not. So each pair of coupled nodes tells what it is.
 """
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

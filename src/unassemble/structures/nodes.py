@@ -1,7 +1,5 @@
 """The matrix of a structure node by node, and which of its equations are whole."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

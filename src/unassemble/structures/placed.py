@@ -1,7 +1,5 @@
 """Positions of all pieces that linear equations hold together, from equations that others would contradict."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -173,9 +171,10 @@ def least_squares(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]:
     """Solve equations for n nodes with d coordinates each, and see what they leave free and which of them are spare.
 
-    The solution (n d,), without what is free; residuals (m, k) of the right-hand side and of random ones; orthonormal
-    fields (n, d, k), all null fields and some more, and their singular values, increasing; and the least of these that
-    is none of a null field. GeometryError if far more is free than translations and enlargements.
+    The solution (n d,) for the right-hand side, the first if there are several, without what is free; residuals (m, k)
+    of all and of random ones; orthonormal fields (n, d, k), all null fields and some more, and their singular values,
+    increasing; and the least of these that is none of a null field. GeometryError if far more is free than translations
+    and enlargements.
     """
     random = np.random.default_rng(0).standard_normal((len(right), _PROBES))
     sides = np.column_stack([right, random])

@@ -4,8 +4,6 @@ The displacements of one direction, all the same, cost nothing: a row away from 
 all the same and without displacements, bend everything. This tells the layouts from one another, and from solids.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 

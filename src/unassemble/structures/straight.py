@@ -11,8 +11,6 @@ the others contradict it where the block is not a member's: it has nine entries 
 space for eight. No sum over neighbours is involved, so that supports and springs to the ground do not matter.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ stiffness, next to supports as well, (I - e e^T) (x_i - x_j) = 0: linear in the 
 bars' directions; where the truss has enough of them, these are its translations and enlargements.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 from typing import NamedTuple

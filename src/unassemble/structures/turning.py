@@ -8,8 +8,6 @@ determine all nodes several times over.
 R. Chartrand and W. Yin, Iteratively reweighted algorithms for compressive sensing, ICASSP 2008, 3869-3872.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
@@ -44,7 +42,6 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     attempts: list[tuple[Placed, NDArray[np.bool_]]] = []
     failure: GeometryError | None = None
     layout, valid = nodes.layout, nodes.whole()
-    telling = valid & _distinct(nodes.matrix, valid.any(axis=2).ravel()).reshape(nodes.n, -1, 1)
     edges = np.column_stack(sp.triu(nodes.pattern(len(layout.displacements)), 1).nonzero())
     ways = [(False, False), (False, True), (True, False)] if layout.rotations else [(False, False)]
     if layout.rotations and layout.dim == 3:  # where nothing drills, forces alone are too few to leave any out
@@ -52,7 +49,7 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     for but_for_some, springs in ways:
         if but_for_some and (allowed > CERTIFIED or any(found.residual <= allowed for found, _ in attempts)):
             break  # of entries with few digits other ones would be left out each time that these are drawn anew
-        given = joined(equations(nodes, telling, springs=springs, allowed=allowed), told_by(members, nodes))
+        given = joined(equations(nodes, valid, springs=springs, allowed=allowed), told_by(members, nodes))
         counted = valid.copy()
         if springs:
             counted[:, len(layout.displacements) :] = False
@@ -81,19 +78,6 @@ def turning_positions(nodes: Nodes, members: Straight, allowed: float = CERTIFIE
     return without_free(found, most), counted
 
 
-def _distinct(matrix: sp.csr_array, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Some rows, but of those that are multiples of each other one: they check nothing. Two random fields tell them."""
-    rows = np.flatnonzero(some)
-    size = np.maximum(sp.linalg.norm(matrix, axis=1), np.finfo(float).tiny)[rows, None]
-    seen = (matrix @ np.random.default_rng(0).standard_normal((matrix.shape[1], 2)))[rows] / size
-    seen *= np.where(seen[:, :1] < 0, -1, 1)
-    order = np.lexsort(seen.T)
-    again = np.abs(np.diff(seen[order], axis=0)).max(axis=1, initial=0) <= CANCELLED
-    result = some.copy()
-    result[rows[order[1:][again]]] = False
-    return result
-
-
 def _doubts(found: Placed, allowed: float) -> tuple[bool, bool, bool, int, float]:
     """What speaks against positions, the gravest first."""
     free, lost = found.null_dimension > found.points.shape[1], int(np.count_nonzero(found.component < 0))
@@ -113,7 +97,7 @@ def _solved(given: Equations, layout: Layout, piece: Piece) -> tuple[NDArray[np.
         return points, evidence, _unnoticed(local, probes, layout, np.nan_to_num(points), piece.edges)
     if n < 2 or m < (n - 1) * d:
         raise GeometryError(f"{m} equations are too few for {n} nodes: too much lies next to supports")
-    x, residuals, fields, values, gap = least_squares(piece.operator, part.right, d)
+    x, residuals, fields, values, gap = least_squares(piece.operator, np.column_stack([part.right, part.mixed]), d)
     x = x.reshape(n, d)
     span = np.linalg.norm(x[piece.edges[:, 0]] - x[piece.edges[:, 1]], axis=1).max(initial=0)
     if span <= CANCELLED * part.lever.max(initial=0):
@@ -121,7 +105,9 @@ def _solved(given: Equations, layout: Layout, piece: Piece) -> tuple[NDArray[np.
     null, loose = fields[..., values <= SINGULAR], np.zeros(n, dtype=bool)
     if null.shape[2] > d:
         null, loose = set_aside(null, d)
-    blind = _unnoticed(local, residuals[:, 1:], layout, x, piece.edges) & (part.rotation >= 0)
+    blind = _unnoticed(local, residuals[:, 2:], layout, x, piece.edges)
+    blind |= np.linalg.norm(residuals[:, 1]) < SMALL * np.linalg.norm(part.mixed)  # no row is spare
+    blind &= part.rotation >= 0
     evidence = Evidence(null.shape[2], float(np.abs(residuals[:, 0]).max()) / span, gap, m)
     return np.where(loose[:, None], np.nan, x - x[~loose].mean(axis=0)), evidence, blind
 

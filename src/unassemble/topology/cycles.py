@@ -1,7 +1,5 @@
 """The short cycles of a sparse graph: 3-cycles, those with something on both sides, 4-cycles without chords."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Faces of a graph: from its short cycles where these settle it, else from a planar embedding."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sets of integers as sorted arrays, the keys of pairs of vertices, and rows grouped by label."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Vertices renumbered so that neighbours have nearby numbers, by breadth-first search."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Triangles glued along edges: their consistent orientation, and the loops of their boundary."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From glued triangles to oriented pieces, each in a numbering of its own."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

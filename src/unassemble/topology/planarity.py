@@ -1,7 +1,5 @@
 """Planarity by the edge-addition method, through ``planarity`` where it is installed, else networkx."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Pieces from the 3-cycles of the sparsity graph alone (paper, section 2.2), and why a graph is not planar."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a graph becomes once its faces are known: connectivity without coordinates."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -7,8 +7,6 @@ still add up to about pi; those of a hole are too large, since its weights are t
 the corners at an interior vertex add up to about 2 pi.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

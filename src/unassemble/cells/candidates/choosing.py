@@ -1,7 +1,5 @@
 """Sets of candidates that are labellings, no half-edge in two cells and no edge in none; those to begin with."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

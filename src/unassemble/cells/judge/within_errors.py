@@ -1,7 +1,5 @@
 """Readings of entries with errors of known size: what of a misfit these do not explain."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc

@@ -7,8 +7,6 @@ There both must have the same weight between them: one equation more than unknow
 each triangle is listed, small trees first, and where two lists agree to the last digits there is a patch.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

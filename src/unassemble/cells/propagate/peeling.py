@@ -6,8 +6,6 @@ its far side: if it is nothing, this is a hole, else a cell. So it goes on until
 two sides whose weights may be shared. A wrong c soon leads to a contradiction.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

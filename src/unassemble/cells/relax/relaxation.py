@@ -10,8 +10,6 @@ together, along the central path of a logarithmic barrier t:
 one Newton step for each t, q falling with t. The path commits itself to whole labels as late as possible.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray

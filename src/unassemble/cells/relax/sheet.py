@@ -5,8 +5,6 @@ candidate k had the conductivity s_k, and the area form is that of the candidate
 map is found as ever.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -9,8 +9,6 @@ Displacements spread the misfit over the mesh, so that the largest residuals nee
 labels that take part in the best explanation do.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray

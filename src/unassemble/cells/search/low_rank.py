@@ -10,8 +10,6 @@ pencil, and nothing in it is linearised: a change may well move vertices by more
 as much as some tens of solves.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a search for labels may do."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,7 +1,5 @@
 """From a planar graph and its numbers to the cells that fit."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What small changes of the labels would leave, by the maps of :mod:`unassemble.cells.search.low_rank`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
@@ -166,12 +164,12 @@ class Updates:
             hopeful[hopeful] = _misfits(w, self._weights[edges]).sum(axis=0) <= most * len(self._weights)
         w = self._fitted(z[:, hopeful], after[:, hopeful])
         c = np.ones(w.shape[1])
-        if self.sheet.free_scale:  # for each column, from the weights that it brings near the given ones
-            used = np.clip(w, -5.0, 5.0)  # more belongs to flat triangles
-            for _ in range(3):
-                c = (self._weights @ used) / np.maximum((used * used).sum(axis=0), np.finfo(float).tiny)
-                used = np.where(np.abs(c * w - self._weights[:, None]) < 0.5, w, 0.0)
         with np.errstate(all="ignore"):  # flat triangles beside small entries, or nothing at all, have no scale
+            if self.sheet.free_scale:  # for each column, from the weights that it brings near the given ones
+                used = np.clip(w, -5.0, 5.0)  # more belongs to flat triangles
+                for _ in range(3):
+                    c = (self._weights @ used) / np.maximum((used * used).sum(axis=0), np.finfo(float).tiny)
+                    used = np.where(np.abs(c * w - self._weights[:, None]) < 0.5, w, 0.0)
             left[hopeful] = _misfits(c * w, self._weights).mean(axis=0)
         return left
 

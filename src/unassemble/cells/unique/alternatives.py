@@ -12,8 +12,6 @@ A component of up to 1,000 rows is searched around its answer, all with low-rank
 What then fits when solved by itself is another mesh with the same matrix.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass

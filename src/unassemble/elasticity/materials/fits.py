@@ -4,8 +4,6 @@ Boxes and quadratic cells have entries of their own, between nodes on opposite s
 What is left once these cells are taken away belongs to linear simplices: of one material, or by sparse least squares.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ Nothing here is shared with the solver, which eliminates p and q by a projection
 taking differences of equations that contain the same one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import product
 

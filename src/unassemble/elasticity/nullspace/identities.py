@@ -10,8 +10,6 @@ surrounds the node, they vanish. What sticks out of that space is linear in the 
 ones. p and q never appear as unknowns.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

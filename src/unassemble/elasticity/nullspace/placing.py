@@ -1,7 +1,5 @@
 """Positions piece by piece: the least singular fields of the identities, and the coordinates among them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

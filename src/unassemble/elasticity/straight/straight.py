@@ -18,8 +18,6 @@ shows, up to a common factor. The sum of the T^{cc} is (kappa + d mu) S. In its 
 T^{cc} is a multiple of the identity plus one of rank one, whose direction is w_c.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
