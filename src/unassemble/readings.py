@@ -23,7 +23,7 @@ from .further_terms import less_mass, recover_elements_with_terms, recover_with_
 from .matrix import OperatorMatrix
 from .options import ScalarOptions
 from .recovery import PlanarMesh
-from .regions import recover_regions
+from .regions import recover_regions, uneven
 from .scalar import recover_scalar
 from .scalar.placement import Placement
 from .tolerances import CERTIFIED, LITTLE
@@ -93,7 +93,8 @@ class ScalarReadings:
             order.append((1 if replaced or incomplete else 3, self._partial))
             order.append((0, self._without_boundary_terms))
         if not replaced:
-            order += [(1 if self.crowded else 3, lambda: self.other_elements), (2, self._regions), (2, self._linear)]
+            linear = [self._regions, self._linear] if uneven(self.matrix) else [self._linear, self._regions]
+            order += [(1 if self.crowded else 3, lambda: self.other_elements), *((2, reading) for reading in linear)]
         nearest: PlanarMesh | None = None
         failure: RecoveryError | None = None
         for _, reading in sorted(order, key=lambda one: one[0]):

@@ -206,6 +206,8 @@ class WholeEntries:
         solved = self._factor.solve(np.column_stack([system.right, system.slope]))
         gradient, response = solved[:, 0], solved[:, 1:]
         left = system.size - system.slope.T @ response
+        if not np.isfinite(left).all():
+            return None
         np.fill_diagonal(left, np.maximum(left.diagonal(), 1e-12 * system.size.diagonal()))
         move = np.linalg.lstsq(left, system.along - system.slope.T @ gradient, rcond=None)[0]
         step = np.ascontiguousarray(gradient - response @ move).view(np.complex128)

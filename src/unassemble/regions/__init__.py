@@ -5,6 +5,7 @@ and factors. Which triangles belong to which region, entries show nearly by them
 fit decide the last ones.
 """
 
+from .guess import uneven
 from .recover import recover_regions
 
-__all__ = ["recover_regions"]
+__all__ = ["recover_regions", "uneven"]

@@ -66,7 +66,7 @@ def exchanges(
     half = cotangent(np.roll(corner, -1, axis=1) - corner, np.roll(corner, 1, axis=1) - corner) / 2
     sides = piece.opposite[triangle]
     column = half * (scale[other] - scale[region[triangle]])[:, None] / problem.unit(scale)[sides]
-    score = (column * misfit[sides]).sum(axis=1) / np.sqrt((column**2).sum(axis=1))
+    score = np.nan_to_num((column * misfit[sides]).sum(axis=1) / np.sqrt((column**2).sum(axis=1)), nan=-np.inf)
     for least, only in options.least:
         order = np.argsort(-score)[: options.most]
         order = order[score[order] > 0] if only else order
@@ -119,6 +119,8 @@ def _shares(
         some = slice(first, first + options.at_once)
         gram[:, some] -= pulled @ factor.solve(np.ascontiguousarray(pulled[some].T.toarray()))
     gram -= along @ np.linalg.lstsq(system.size - system.slope.T @ response, along.T, rcond=None)[0]
+    if not np.isfinite(gram).all():
+        return np.zeros(count)
     value, vector = np.linalg.eigh((gram + gram.T) / 2)
     root = np.sqrt(np.maximum(value, 1e-8 * value.max()))
     return np.asarray(lsq_linear((vector * root).T, (vector / root).T @ (added @ misfit), bounds=(0, 1)).x)

@@ -93,7 +93,7 @@ def recover_regions(
         return None
     with clock("topology"):
         topology = surfaces(matrix.n, matrix.edges, local_numbering(matrix.n, matrix.edges))
-    with clock("regions"):
+    with clock("regions"), np.errstate(all="ignore"):  # flat triangles, which no fit takes
         weights = [-matrix.entries[piece.edge_rows] for piece in topology.pieces]
         guesses = [guessed_regions(piece, own) for piece, own in zip(topology.pieces, weights, strict=True)]
         told = zip(topology.pieces, weights, guesses, strict=True)
