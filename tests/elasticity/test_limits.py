@@ -138,3 +138,15 @@ def test_fields_that_hardly_any_node_shares():
     case = held(body, "several", "boundary first by component", "stored")
     found = recover_elasticity(case.matrix)
     assert judged(found, case).error < 1e-9
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_elements_without_shear_prove_nothing(seed):
+    """Any three vectors that add up to zero are the divergence on some triangle."""
+    vectors = np.random.default_rng(seed).uniform(-1, 1, (3, 2))
+    field = (vectors - vectors.mean(axis=0)).ravel()
+    try:
+        found = recover_elasticity(sp.csr_array(np.outer(field, field)))
+    except RecoveryError:
+        return
+    assert found.status == "uncertified", found.reason

@@ -84,7 +84,8 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     lone = determined(solution.points) & ~checked(nodal, solution) if alone else np.zeros(nodal.n, dtype=bool)
     if lone.any() and not cells:  # only elements can confirm them
         return _described(nodal, numbering, solution, replace(request, cells=True))
-    if alone and not (determined(solution.points) & ~lone).any():
+    simplex = nodal.n <= nodal.dim + 1  # whose rows may all depend on one
+    if alone and (simplex or not (determined(solution.points) & ~lone).any()):
         status, reason, lone = "uncertified", NOTHING_CHECKED, np.zeros_like(lone)
     bar = None
     if rounding and near and not any(solution.freedoms):
@@ -109,6 +110,8 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         status, reason = "uncertified", NOTHING_SHOWN
     if status == "certified" and _flat(placed, component):
         status, reason = "uncertified", Reason("the points lie in one line or plane, and no solid body does")
+    if status == "certified" and found.certified and _without_shear(found):
+        status, reason = "uncertified", Reason("elements have no shear stiffness, and any vectors that cancel are such")
     held = request.held(numbering.node_of_row, nodal.dim)
     points, factor, notes = anchored(placed, component, len(solution.evidence), held)
     status, reason = near_enough(status, reason, points, placed, component, factor, 1.0)  # mean edges have length one
@@ -162,6 +165,12 @@ def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
             return None
         told.append(read)
     return told[0] if np.ptp([poisson_ratio(one) for one in told]) < ALIKE else None
+
+
+def _without_shear(found: Cells) -> bool:
+    """Whether some cell has no shear modulus."""
+    bulk, shear = np.abs(found.lame).T
+    return bool((shear <= ALIKE * bulk).any())
 
 
 def _flat(points: NDArray[np.float64], component: NDArray[np.int64]) -> bool:
