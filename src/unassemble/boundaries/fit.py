@@ -34,6 +34,7 @@ from .shape import ShapePrior
 _log = logging.getLogger(__name__)
 
 Scale = Any  # float, or (k,) float64 where there are regions
+EXACT = 1e-12  # root mean square misfit of whole entries that is none, in units of typical ones
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from ..planar.cotangent import weight_roundings
 from ..topology import Piece
 from .embedding import areas
 from .first import first_fits
-from .fit import Fit, FitOptions, WholeEntries
+from .fit import EXACT, Fit, FitOptions, WholeEntries
 from .judge import determined
 from .patch import distance, fit_anew, fit_near, nearest
 from .rim import Rim
@@ -18,12 +18,11 @@ from .rim import Rim
 _log = logging.getLogger(__name__)
 
 
-_EXACT = 1e-12  # root mean square misfit of whole entries that is none, in units of typical ones
 _ROUNDS = 8  # fits with fewer vertices at the rim each
 
 # Steps of all vertices that start near: smooth displacements are stiff only in the fourth power of their length, so
 # that any damping would hold them.
-_NEWTON = FitOptions(steps=1, last_steps=8, damping=1e-15, exact=_EXACT, near=0.05, shortest=1.0)
+_NEWTON = FitOptions(steps=1, last_steps=8, damping=1e-15, exact=EXACT, near=0.05, shortest=1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +58,7 @@ def fit_inside(
         core = _core(problem, rim)
         if core is None:
             return None
-        exact = core[0].misfit <= _EXACT
+        exact = core[0].misfit <= EXACT
         fit, rim = _grown(problem, *core) if exact else core
         if exact:  # what is left is rounding after one step more
             last = FitOptions(last_steps=1, trials=1, damping=1e-15)
@@ -82,7 +81,7 @@ def _core(problem: WholeEntries, rim: Rim) -> tuple[Fit, Rim] | None:
         # What comes to a bad end with one part of the largest misfit for peaks often does not with another. A small
         # mesh loses more of its rim where that is taken off as a whole, and is peeled a few times before.
         found = _shrunk(problem, rim, fit, 0 if near else 3, 0.35 if again else 0.25)
-        if found[0].misfit <= _EXACT:
+        if found[0].misfit <= EXACT:
             break
     return found
 
@@ -94,7 +93,7 @@ def _bare(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> tuple[Fit,
         if bare.whole.sum() <= 2.3 * bare.inside.sum():  # two to a vertex determine, far inside there are three
             return None
         found = problem.fit(found.z, found.scale, bare.whole, 0.0, _NEWTON)
-        if found.misfit <= _EXACT:
+        if found.misfit <= EXACT:
             break
         less = _less(problem, bare, found, peaks)
         if less is None:
@@ -114,9 +113,9 @@ def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, peaks: flo
         _log.debug("%d whole entries: misfit %.1e", rim.whole.sum(), fit.misfit)
         if turn < patience:
             fit = _tried(problem, rim, fit, peaks)
-        elif fit.misfit > _EXACT and (bare := _bare(problem, rim, fit, peaks)):
+        elif fit.misfit > EXACT and (bare := _bare(problem, rim, fit, peaks)):
             return bare
-        if fit.misfit <= _EXACT:
+        if fit.misfit <= EXACT:
             break
         peeled = _less(problem, rim, fit, peaks)
         if peeled is None or not (peeled := peeled.pruned()).whole.any():
@@ -137,7 +136,7 @@ def _tried(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> Fit:
     for turn in range(tries):
         misfit = np.where(rim.whole, np.abs(problem.misfits(fit.z, fit.scale)), 0.0)
         places = np.isin(np.arange(len(fit.z)), problem.piece.edges[misfit > peaks * misfit.max()])
-        if fit.misfit <= _EXACT or fit.misfit > 1e-3 or 4 * places.sum() > len(places):
+        if fit.misfit <= EXACT or fit.misfit > 1e-3 or 4 * places.sum() > len(places):
             break
         if 2 * turn >= tries and 2 * fit.misfit > first:
             break
@@ -172,7 +171,7 @@ def _grown(problem: WholeEntries, core: Fit, rim: Rim) -> tuple[Fit, Rim]:
         grown, free = less, movable & (distance(piece, near, 3) <= 3)
     for _ in range(4):
         fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
-        if fit.misfit <= _EXACT:
+        if fit.misfit <= EXACT:
             return fit, grown
         less = _less(problem, grown, fit, 0.25, keep=rim.left)
         if less is None:

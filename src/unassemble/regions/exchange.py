@@ -7,7 +7,7 @@ about 1 where something does. All that is wrong shows at once, as far as it is s
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,48 +18,14 @@ from ..boundaries.fit import System, WholeEntries
 from ..boundaries.shape import ShapePrior
 from ..errors import SolverError
 from ..planar.cotangent import cotangent
+from .guess import corners_of
 
 
-@dataclass(frozen=True)
-class ExchangeOptions:
-    """Which triangles change.
-
-    Attributes
-    ----------
-    most : int
-        Candidates, those that entries speak most for.
-    least : tuple of (float, bool)
-        Above which number a triangle changes, one after the other, and whether only those are candidates that entries
-        speak for where nothing else changes.
-    alone : int
-        Candidates, those next to the largest misfits, that change alone at last: on the boundary positions take up
-        nearly all of a change to first order.
-    at_once : int
-        Columns that are solved for at once.
-    """
-
-    most: int = 300
-    least: tuple[tuple[float, bool], ...] = ((0.5, True), (0.5, False), (0.25, True), (0.9, True))
-    alone: int = 8
-    at_once: int = 32
-
-
-def exchanges(
-    problem: WholeEntries, z: NDArray[np.complex128], scale: NDArray, options: ExchangeOptions | None = None
-) -> Iterator[NDArray[np.int64]]:
+def exchanges(problem: WholeEntries, z: NDArray[np.complex128], scale: NDArray) -> Iterator[NDArray[np.int64]]:
     """Regions (m,) of which some triangles are another's, the likeliest first.
 
-    Parameters
-    ----------
-    problem : WholeEntries
-        With regions.
-    z : (n,) complex128
-        Where all entries are fitted, as far as they go.
-    scale : (k,) float64
-        Factors of regions.
-    options : ExchangeOptions, optional
+    At positions z (n,) and factors (k,) all entries are fitted, as far as they go.
     """
-    options = options or ExchangeOptions()
     piece, region, misfit = problem.piece, problem.region, problem.misfits(z, scale)
     triangle, other = _beside(problem)
     corner = z[piece.triangles[triangle]]
@@ -67,18 +33,23 @@ def exchanges(
     sides = piece.opposite[triangle]
     column = half * (scale[other] - scale[region[triangle]])[:, None] / problem.unit(scale)[sides]
     score = np.nan_to_num((column * misfit[sides]).sum(axis=1) / np.sqrt((column**2).sum(axis=1)), nan=-np.inf)
-    for least, only in options.least:
-        order = np.argsort(-score)[: options.most]
+
+    @cache
+    def shares(only: bool) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        order = np.argsort(-score)[:300]
         order = order[score[order] > 0] if only else order
-        if not len(order):
-            continue
-        share = _shares(problem, z, scale, column[order], sides[order], options)
+        return order, _shares(problem, z, scale, misfit, column[order], sides[order])
+
+    # above which number triangles change, and whether only those are candidates that entries speak for by themselves
+    for least, only in ((0.5, True), (0.5, False), (0.25, True), (0.9, True)):
+        order, share = shares(only)
         taken = order[share > least]
         if len(taken):
             new = region.copy()
             new[triangle[taken]] = other[taken]
             yield new
-    for one in np.argsort(-np.abs(misfit[sides]).max(axis=1))[: options.alone].tolist():
+    # next to the largest misfits one alone: on the boundary positions take up nearly all of a change to first order
+    for one in np.argsort(-np.abs(misfit[sides]).max(axis=1))[:8].tolist():
         new = region.copy()
         new[triangle[one]] = other[one]
         yield new
@@ -87,9 +58,7 @@ def exchanges(
 def _beside(problem: WholeEntries) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Triangles, and regions other than theirs that they share a vertex with."""
     piece, region, m = problem.piece, problem.region, len(problem.piece.triangles)
-    corners = sp.csr_array(
-        (np.ones(3 * m), piece.triangles.ravel(), np.arange(0, 3 * m + 1, 3)), shape=(m, piece.n_vertices)
-    )
+    corners = corners_of(piece)
     kinds = sp.csr_array((np.ones(m), region, np.arange(m + 1)), shape=(m, int(region.max()) + 1))
     triangle, other = sp.coo_array(corners @ (corners.T @ kinds)).coords
     change = other != region[triangle]
@@ -97,10 +66,12 @@ def _beside(problem: WholeEntries) -> tuple[NDArray[np.int64], NDArray[np.int64]
 
 
 def _shares(
-    problem: WholeEntries, z: NDArray, scale: NDArray, column: NDArray, sides: NDArray, options: ExchangeOptions
+    problem: WholeEntries, z: NDArray, scale: NDArray, misfit: NDArray, column: NDArray, sides: NDArray
 ) -> NDArray[np.float64]:
     """(k,) numbers between 0 and 1 of columns with entries (k, 3) at sides (k, 3)."""
-    misfit, count = problem.misfits(z, scale), len(column)
+    count = len(column)
+    if not count:
+        return np.zeros(0)
     whole = np.ones(len(misfit), dtype=bool)
     added = sp.csr_array((column.ravel(), sides.ravel(), np.arange(0, 3 * count + 1, 3)), shape=(count, len(misfit)))
     system = System(problem, z, scale, whole, ShapePrior.of(problem.piece, ~whole), 0.0, misfit, np.zeros(0))
@@ -115,8 +86,8 @@ def _shares(
     response = factor.solve(system.slope)
     along = added @ problem.slopes(z, scale) - pulled @ response
     gram = (added @ added.T).toarray()
-    for first in range(0, count, options.at_once):
-        some = slice(first, first + options.at_once)
+    for first in range(0, count, 32):
+        some = slice(first, first + 32)
         gram[:, some] -= pulled @ factor.solve(np.ascontiguousarray(pulled[some].T.toarray()))
     gram -= along @ np.linalg.lstsq(system.size - system.slope.T @ response, along.T, rcond=None)[0]
     if not np.isfinite(gram).all():

@@ -5,36 +5,19 @@ between its two triangles gives a value of c for each of them, right to some thi
 bring that down to a few per cent and keep jumps where they are.
 """
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
-from scipy.sparse import csgraph
 
 from ..matrix import OperatorMatrix
 from ..topology import Piece
+from ..topology.numbering import connected
 
-
-@dataclass(frozen=True)
-class GuessOptions:
-    """How regions are told apart.
-
-    Attributes
-    ----------
-    medians : int
-        How often each triangle takes the median of those that share a vertex with it.
-    width : float
-        Of the Gaussians whose sum is the density of log c.
-    valley : float
-        The least density between two peaks, relative to the lower one, up to which they are two.
-    """
-
-    medians: int = 3
-    width: float = 0.05
-    valley: float = 0.5
+_WIDTH = 0.05  # of the Gaussians whose sum is the density of log c
+_VALLEY = 0.5  # the least density between two peaks, relative to the lower one, up to which they are two
 
 
 def uneven(matrix: OperatorMatrix) -> bool:
@@ -51,43 +34,28 @@ def uneven(matrix: OperatorMatrix) -> bool:
     size = np.log(total / count + np.finfo(float).tiny)
     for _ in range(2):
         size = (graph @ size) / count
-    return len(_valleys(size, GuessOptions())) > 0
+    return len(_valleys(size)) > 0
 
 
-def guessed_regions(
-    piece: Piece, weights: NDArray, options: GuessOptions | None = None
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Regions, edge-connected, and their factors.
-
-    Parameters
-    ----------
-    piece : Piece
-    weights : (e,) float64
-        -A_ij.
-    options : GuessOptions, optional
-
-    Returns
-    -------
-    region : (m,) int64
-    scale : (k,) float64
-    """
-    options = options or GuessOptions()
+def guessed_regions(piece: Piece, weights: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Regions (m,) of triangles, edge-connected, and their factors (k,), from -A_ij (e,)."""
     share = weights / (piece.inner + 1.0)
     a, b, c = share[piece.opposite].T
     tiny = 1e-6 * np.abs(share).max() + np.finfo(float).tiny
     own = np.log(2 * np.sqrt(np.maximum(a * b + b * c + c * a, tiny**2)))
-    touching = sp.csr_array(_corners(piece) @ _corners(piece).T)
+    corners = corners_of(piece)
+    touching = sp.csr_array(corners @ corners.T)
     smooth = own
-    for _ in range(options.medians):
+    for _ in range(3):
         smooth = _medians(touching, smooth)
-    region = _connected(piece, np.searchsorted(_valleys(smooth, options), smooth))
+    region = _connected(piece, np.searchsorted(_valleys(smooth), smooth))
     region = _broad(piece, region, smooth)
     scale = np.array([np.exp(np.median(own[region == k])) for k in range(region.max() + 1)])
     return region, np.sign(weights.sum()) * scale
 
 
-def _corners(piece: Piece) -> sp.csr_array:
-    """(m, n) which triangles have which vertices."""
+def corners_of(piece: Piece) -> sp.csr_array:
+    """(m, n) ones: which triangles have which vertices."""
     m = len(piece.triangles)
     ones = np.ones(3 * m, dtype=np.int32)
     return sp.csr_array((ones, piece.triangles.ravel(), np.arange(0, 3 * m + 1, 3)), shape=(m, piece.n_vertices))
@@ -101,16 +69,16 @@ def _medians(graph: sp.csr_array, values: NDArray) -> NDArray[np.float64]:
     return np.asarray(near[graph.indptr[:-1] + count // 2])
 
 
-def _valleys(values: NDArray, options: GuessOptions) -> NDArray[np.float64]:
+def _valleys(values: NDArray) -> NDArray[np.float64]:
     """Values that part the peaks of the density of others."""
-    step = options.width / 4
+    step = _WIDTH / 4
     grid = np.arange(values.min() - 1, values.max() + 1, step)
     density = gaussian_filter1d(np.histogram(values, np.append(grid, grid[-1] + step) - step / 2)[0] * 1.0, 4)
     peaks = np.flatnonzero((density[1:-1] > density[:-2]) & (density[1:-1] >= density[2:])) + 1
     while len(peaks) > 1:
         low = [density[i : j + 1].min() / min(density[i], density[j]) for i, j in pairwise(peaks)]
         k = int(np.argmax(low))
-        if low[k] < options.valley:
+        if low[k] < _VALLEY:
             break
         peaks = np.delete(peaks, k + (density[peaks[k]] > density[peaks[k + 1]]))
     return np.array([grid[i + int(density[i : j + 1].argmin())] for i, j in pairwise(peaks)])
@@ -120,8 +88,7 @@ def _connected(piece: Piece, region: NDArray) -> NDArray[np.int64]:
     """(m,) edge-connected parts of regions."""
     one, other = piece.facing[piece.inner].T // 3
     alike = region[one] == region[other]
-    graph = sp.coo_array((np.ones(alike.sum()), (one[alike], other[alike])), shape=2 * (len(region),))
-    return np.asarray(csgraph.connected_components(graph, directed=False)[1], dtype=np.int64)
+    return connected(len(region), one[alike], other[alike])[1]
 
 
 def _broad(piece: Piece, region: NDArray, values: NDArray) -> NDArray[np.int64]:

@@ -1,14 +1,14 @@
 """Meshes whose coefficient is constant on regions, from entries to result."""
 
 import logging
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..boundaries.fit import Fit, FitOptions, WholeEntries
+from ..boundaries.fit import EXACT, Fit, FitOptions, WholeEntries
 from ..boundaries.judge import determined
-from ..certify import Certificate, certify
+from ..certify import certify
 from ..clock import Clock
 from ..errors import GeometryError, SolverError
 from ..matrix import OperatorMatrix
@@ -17,10 +17,10 @@ from ..planar.conformal import conformal_map
 from ..planar.cotangent import edge_weights
 from ..recovery import PlanarMesh
 from ..scalar.joined import JoinedMesh
-from ..scalar.notes import piece_notes, topology_notes
 from ..scalar.placement import Placement
+from ..scalar.verdict import Held
 from ..tolerances import CERTIFIED
-from ..topology import Piece, Topology, local_numbering, surfaces
+from ..topology import Piece, local_numbering, surfaces
 from .exchange import exchanges
 from .guess import guessed_regions
 from .start import started
@@ -28,48 +28,18 @@ from .start import started
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class RegionOptions:
-    """Settings of the search.
-
-    Attributes
-    ----------
-    first, next : FitOptions
-        Of the fit from the start, and of those after exchanges.
-    rounds : int
-        Exchanges, one after the other.
-    better : float
-        Part of a misfit that an exchange leaves, at most.
-    exact, near : float
-        Root mean square misfit that is none, in units of typical entries; and that of a mesh without regions whose
-        entries have errors.
-    """
-
-    first: FitOptions = field(default_factory=lambda: FitOptions(last_steps=40, damping=1e-3))
-    next: FitOptions = field(default_factory=lambda: FitOptions(last_steps=15, damping=1e-6))
-    rounds: int = 30
-    better: float = 0.98
-    exact: float = 1e-12
-    near: float = 1e-3
+_FIRST = FitOptions(last_steps=40, damping=1e-3)  # of the fit from a start
+_NEXT = FitOptions(last_steps=15, damping=1e-6)  # and of those after exchanges
 
 
 @dataclass(frozen=True, eq=False)
 class _Regions:
-    """One piece: positions, and factors of regions.
+    """One piece: positions, and factors of regions."""
 
-    Attributes
-    ----------
-    z : (n,) complex128
-    region : (m,) int64
-    scale : (k,) float64
-    known : (n,) bool
-        Vertices that entries determine.
-    """
-
-    z: NDArray[np.complex128]
-    region: NDArray[np.int64]
-    scale: NDArray[np.float64]
-    known: NDArray[np.bool_]
+    z: NDArray[np.complex128]  # (n,)
+    region: NDArray[np.int64]  # (m,)
+    scale: NDArray[np.float64]  # (k,)
+    known: NDArray[np.bool_]  # (n,) vertices that entries determine
 
 
 def recover_regions(
@@ -111,23 +81,40 @@ def recover_regions(
     starts = np.cumsum([0, *(len(one.scale) for one in found)])
     region = place[np.concatenate([one.region + start for one, start in zip(found, starts, strict=False)])]
     with clock("place"):
-        placed = [placement.apply(piece, one.z) for piece, one in zip(topology.pieces, found, strict=True)]
+        placed, origins, notes = placement.placed(topology, [one.z for one in found], [()] * len(found))
         stretch = placement.tensor.root_determinant if placement.tensor else 1.0
-        mesh = JoinedMesh.of(topology, [z for z, _ in placed], scale / stretch)
+        mesh = JoinedMesh.of(topology, placed, scale / stretch)
+        points = mesh.shifted(origins)
     with clock("certify"):
         factor = mesh.scale[region]
-        held = certify(
-            matrix.edges, matrix.entries, np.nan_to_num(mesh.points), mesh.triangles, factor, placement.coefficients
+        certificate = certify(
+            matrix.edges, matrix.entries, np.nan_to_num(points), mesh.triangles, factor, placement.coefficients
         )
-    if not held.backward_error <= CERTIFIED or len(held.flipped):
+    if not certificate.backward_error <= CERTIFIED or len(certificate.flipped):
         return None
     known = np.ones(matrix.n, dtype=bool)
     for piece, one in zip(topology.pieces, found, strict=True):
         known[piece.vertices] &= one.known
     if not known[topology.multiplicity > 0].any():
         return None
-    notes = [*matrix.warnings, *piece_notes([some for _, some in placed]), *placement.unused(topology)]
-    return _report(mesh, region, known, held, topology, [*notes, *topology_notes(topology)], placement, clock)
+    return PlanarMesh(
+        **mesh.fields(triangulate=True),
+        **Held(certificate, None, None).fields(0),
+        points=points,
+        region=region,
+        hinges=topology.hinges,
+        node_status=np.where(topology.multiplicity == 0, 1, np.where(known, 0, 2)).astype(np.int8),
+        status="certified",
+        uniqueness="searched",
+        reason=(
+            f"the operator re-assembled on the mesh, with a factor for each of {len(scale)} regions, gives the entries "
+            f"back to {certificate.backward_error:.1e} (relative)"
+        ),
+        operator=placement.operator,
+        n_holes=topology.n_holes,
+        timings=clock.timings,
+        warnings=(*matrix.warnings, *notes),
+    )
 
 
 def _uniform(piece: Piece, weights: NDArray) -> bool:
@@ -136,56 +123,48 @@ def _uniform(piece: Piece, weights: NDArray) -> bool:
         found = conformal_map(piece, weights, scale=None, sharp=False)
     except (GeometryError, SolverError):
         return False
-    with np.errstate(all="ignore"):
-        misfit = weights / found.scale - edge_weights(piece, found.z)
-    return bool(np.sqrt(np.mean(misfit**2)) < RegionOptions.near)
+    misfit = weights / found.scale - edge_weights(piece, found.z)
+    return bool(np.sqrt(np.mean(misfit**2)) < 1e-3)  # entries may have errors
 
 
-def _fitted(
-    piece: Piece, weights: NDArray, region: NDArray, scale: NDArray, options: RegionOptions | None = None
-) -> _Regions | None:
+def _fitted(piece: Piece, weights: NDArray, region: NDArray, scale: NDArray) -> _Regions | None:
     """All entries of a piece fitted, triangles exchanged where they do not fit; None where that comes to no end."""
-    options = options or RegionOptions()
     unit = float(np.median(scale))
     weights = weights / unit
-    z, scale = started(piece, weights, region, scale / unit)
-    problem, fit = _fit(piece, weights, region, z, scale, options.first)
-    for _ in range(options.rounds):
-        _log.debug("%d regions: misfit %.1e", len(scale), fit.misfit)
-        if fit.misfit <= options.exact:
-            break
-        for other in exchanges(problem, fit.z, fit.scale):
-            trial, found = _fit(piece, weights, other, fit.z, fit.scale, options.next)
-            if found.misfit > options.exact:  # from where wrong regions have bent the mesh, or from a start of its own
-                again, anew = _fit(piece, weights, other, *started(piece, weights, other, fit.scale), options.first)
-                if anew.misfit < found.misfit:
-                    trial, again, found = again, trial, anew
-                again.release()
-            if found.misfit < options.better * fit.misfit:
-                problem.release()
-                problem, fit = trial, found
-                break
-            trial.release()
-        else:
-            break
-    try:
-        if not fit.misfit <= options.exact:
-            return None
-        used, place = np.unique(problem.region, return_inverse=True)
-        scale, same = _distinct(fit.scale[used])
-        problem.region = same[place.ravel()]
-        known, _ = determined(problem, fit.z, scale, np.ones(len(weights), dtype=bool))
-        return _Regions(fit.z, problem.region, scale * unit, known)
-    finally:
-        problem.release()
-
-
-def _fit(
-    piece: Piece, weights: NDArray, region: NDArray, z: NDArray, scale: NDArray, options: FitOptions
-) -> tuple[WholeEntries, Fit]:
     whole = np.ones(len(weights), dtype=bool)
     problem = WholeEntries(piece, weights, ~whole, region=region)
-    return problem, problem.fit(z, scale, whole, 0.0, options)
+
+    def fit(region: NDArray, z: NDArray, scale: NDArray, options: FitOptions) -> Fit:
+        kept, problem.region = problem.region, region
+        found = problem.fit(z, scale, whole, 0.0, options)
+        problem.region = kept
+        return found
+
+    try:
+        best = fit(region, *started(piece, weights, region, scale / unit), _FIRST)
+        for _ in range(30):
+            _log.debug("%d regions: misfit %.1e", len(scale), best.misfit)
+            if best.misfit <= EXACT:
+                break
+            for other in exchanges(problem, best.z, best.scale):
+                found = fit(other, best.z, best.scale, _NEXT)
+                if found.misfit > EXACT:  # from where wrong regions have bent the mesh, or from a start of its own
+                    anew = fit(other, *started(piece, weights, other, best.scale), _FIRST)
+                    found = anew if anew.misfit < found.misfit else found
+                if found.misfit < 0.98 * best.misfit:
+                    problem.region, best = other, found
+                    break
+            else:
+                break
+        if not best.misfit <= EXACT:
+            return None
+        used, place = np.unique(problem.region, return_inverse=True)
+        scale, same = _distinct(best.scale[used])
+        problem.region = same[place.ravel()]
+        known, _ = determined(problem, best.z, scale, whole)
+        return _Regions(best.z, problem.region, scale * unit, known)
+    finally:
+        problem.release()
 
 
 def _distinct(scale: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -196,30 +175,3 @@ def _distinct(scale: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     label = np.empty(len(scale), dtype=np.int64)
     label[order] = np.cumsum(new) - 1
     return ends[new], label
-
-
-def _report(
-    mesh: JoinedMesh, region: NDArray, known: NDArray[np.bool_], held: Certificate, topology: Topology,
-    notes: list[str], placement: Placement, clock: Clock,
-) -> PlanarMesh:  # fmt: skip
-    status = np.where(topology.multiplicity == 0, 1, np.where(known, 0, 2)).astype(np.int8)
-    return PlanarMesh(
-        **mesh.fields(triangulate=True),
-        points=mesh.points,
-        region=region,
-        hinges=topology.hinges,
-        node_status=status,
-        status="certified",
-        uniqueness="searched",
-        reason=(
-            f"the operator re-assembled on the mesh, with a factor for each of {len(mesh.scale)} regions, gives the "
-            f"entries back to {held.backward_error:.1e} (relative)"
-        ),
-        operator=placement.operator,
-        backward_error=held.backward_error,
-        n_holes=topology.n_holes,
-        timings=clock.timings,
-        warnings=tuple(notes),
-        n_entries=len(held.misfits),
-        n_fitting=int(np.count_nonzero(held.misfits <= CERTIFIED)),
-    )

@@ -1,7 +1,5 @@
 """Positions to start from: the conformal map of entries in units of the factors on both sides."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -15,50 +13,17 @@ from ..planar.cotangent import edge_weights
 from ..topology import Piece
 
 
-@dataclass(frozen=True)
-class StartOptions:
-    """How positions are found.
-
-    Attributes
-    ----------
-    maps : int
-        Conformal maps, each with the factors that fit the one before.
-    settled : float
-        Relative change of factors at which there is no next one.
-    unfolded : int
-        In edges, how far around triangles that are turned over vertices are drawn anew.
-    """
-
-    maps: int = 5
-    settled: float = 1e-3
-    unfolded: int = 6
-
-
 def started(
-    piece: Piece, weights: NDArray, region: NDArray[np.int64], scale: NDArray, options: StartOptions | None = None
+    piece: Piece, weights: NDArray, region: NDArray[np.int64], scale: NDArray
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
-    """Positions in which no triangle is turned over, and factors.
+    """Positions (n,) in which no triangle is turned over, and factors (k,), from what these are about.
 
-    Parameters
-    ----------
-    piece : Piece
-    weights : (e,) float64
-        -A_ij.
-    region : (m,) int64
-    scale : (k,) float64
-        About the factors of regions.
-    options : StartOptions, optional
-
-    Returns
-    -------
-    z : (n,) complex128
-    scale : (k,) float64
+    `weights` (e,) are -A_ij, `region` (m,) those of triangles.
     """
-    options = options or StartOptions()
     one, other = region[piece.facing // 3].T
     alike = (one == other) | ~piece.inner
     best, fewest, factors = None, len(piece.triangles) / 4, scale
-    for _ in range(options.maps):
+    for _ in range(5):  # each with the factors that fit the one before
         unit = np.where(piece.inner, (factors[one] + factors[other]) / 2, factors[one])
         try:
             found = conformal_map(
@@ -75,9 +40,9 @@ def started(
         if (~upright).sum() < fewest:
             best, fewest, scale = z, (~upright).sum(), new
         factors = new
-        if change < options.settled:
+        if change < 1e-3:
             break
-    z = None if best is None else _unfolded(piece, best, options)
+    z = None if best is None else _unfolded(piece, best)
     return (tutte(piece, int(np.argmax(np.diff(piece.loop_offsets)))) if z is None else z), scale
 
 
@@ -95,13 +60,13 @@ def _fitted(drawn: NDArray, weights: NDArray, region: NDArray, scale: NDArray) -
     return result
 
 
-def _unfolded(piece: Piece, z: NDArray, options: StartOptions) -> NDArray[np.complex128] | None:
+def _unfolded(piece: Piece, z: NDArray) -> NDArray[np.complex128] | None:
     """The same, vertices about triangles that are turned over being means of their neighbours; None if that fails."""
     n = piece.n_vertices
     graph = sp.coo_array((np.ones(len(piece.edges)), piece.edges.T), shape=(n, n)).tocsr()
     graph = graph + graph.T
     laplacian = sp.csc_array(sp.diags_array(graph.sum(axis=1)) - graph)
-    for reach in range(1, options.unfolded + 1):
+    for reach in range(1, 7):  # edges
         near = _folded(piece, z)
         if not near.any():
             return z
