@@ -24,7 +24,7 @@ def test_a_loop_of_links(work, one_sentence):
 def test_names_that_are_empty(work, one_sentence):
     result = work.recover(matrix="")
     assert result.exit_code == 2
-    assert "the name of the matrix file is empty" in one_sentence(result)
+    assert "cannot be opened" in one_sentence(result)
     assert work.recover(out="").exit_code == 2
 
 

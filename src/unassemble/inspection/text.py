@@ -10,7 +10,7 @@ from ..tolerances import ROUNDED
 from ..words import count_of
 
 if TYPE_CHECKING:
-    from .inspect import Inspection
+    from .inspection import Inspection
 
 
 def lines_of(facts: Inspection) -> list[tuple[str, str]]:

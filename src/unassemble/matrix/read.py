@@ -14,12 +14,14 @@ import scipy.sparse as sp
 
 from ..errors import InputError, MatrixFileError, UnassembleError
 from ..formats import FORMATS
-from .binary import read_mat, read_mat4, read_mat73, read_npy, read_npz
+from .arrays import read_npy, read_npz
 from .canonical import canonical, inconsistency
 from .check import check_matrix
+from .market import read_market
+from .mat import read_mat, read_mat4, read_mat73
 from .operator import OperatorMatrix
 from .signatures import HEAD, foreign, kind_of
-from .text import read_market, read_triplets
+from .triplets import read_triplets
 
 _READERS: dict[str, tuple[str, Callable[[BinaryIO, str], Any]]] = {
     "market": ("Matrix Market", read_market),
@@ -107,18 +109,11 @@ def _open_path(path: Any) -> BinaryIO:
     if not isinstance(path, (str, bytes, os.PathLike)):
         raise InputError(f"a matrix file is given by its path, '-' or an open file, not by {type(path).__name__}")
     name = os.fsdecode(path)
-    if not name:
-        raise MatrixFileError("the name of the matrix file is empty")
     try:
-        if Path(name).is_dir():
-            raise MatrixFileError(f"{name!r} is a directory: name the matrix file in it")
         return Path(name).open("rb")
-    except FileNotFoundError as error:
-        raise MatrixFileError(f"{name!r} does not exist: check the path") from error
-    except PermissionError as error:
-        raise MatrixFileError(f"{name!r} may not be read: check its permissions") from error
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
-        raise MatrixFileError(f"{name!r} cannot be opened ({getattr(error, 'strerror', None) or error})") from error
+        why = str(getattr(error, "strerror", None) or error).lower()
+        raise MatrixFileError(f"{name!r} cannot be opened: {why}") from error
 
 
 def _rewindable(stream: Any, name: str) -> BinaryIO:

@@ -103,21 +103,11 @@ class Normal:
 
 
 def solve_metric(weights: NDArray, opposite: NDArray, *, polish: bool = True) -> Metric:
-    """Edge lengths of an edge-connected surface whose weights are `weights`, up to a positive factor.
+    """Edge lengths of an edge-connected surface with `weights` (e,), c w for an unknown c > 0.
 
-    Parameters
-    ----------
-    weights : (e,) float64
-        c w, for an unknown c > 0.
-    opposite : (m, 3) int64
-        The edge that faces each corner.
-    polish : bool
-        Go on with Newton's method to the level of rounding.
+    `opposite` (m, 3): the edge that faces each corner; `polish`: go on with Newton's method to the level of rounding.
 
-    Raises
-    ------
-    GeometryError
-        If the program has no solution inside the cone.
+    Raises GeometryError if the program has no solution inside the cone.
     """
     unit = weights / np.abs(weights).max()
     if not np.isfinite(unit).all():
