@@ -51,8 +51,7 @@ def _point_data(recovery: Recovery) -> dict[str, NDArray]:
         told = direction >= 0
         rows[direction[told], node[told]] = np.flatnonzero(told)
         layout = layout_named(recovery.operator)
-        names = "xyz" if layout is None else layout.names
-        data = {f"row_{name}": row for name, row in zip(names, rows, strict=False)}
+        data = {f"row_{name}": row for name, row in zip("xyz" if layout is None else layout.names, rows, strict=False)}
     data |= {"component": recovery.component, "boundary": _boundary_flag(recovery)}
     if recovery.node_status.any():
         data["node_status"] = recovery.node_status.astype(np.int64)
@@ -120,5 +119,4 @@ def _rounded(points: NDArray, digits: int) -> NDArray:
     with np.errstate(divide="ignore"):
         exponent = np.abs(np.floor(np.log10(np.abs(points))))
     fraction = digits - 1 - (exponent >= 10) - ((exponent >= 100) & np.isfinite(exponent))
-    formats = np.array([f"%.{k}e" for k in range(digits)])[fraction]
-    return np.char.mod(formats, points).astype(np.float64)
+    return np.char.mod(np.array([f"%.{k}e" for k in range(digits)])[fraction], points).astype(np.float64)

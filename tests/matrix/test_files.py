@@ -136,19 +136,16 @@ def test_standard_input_that_fails(monkeypatch: pytest.MonkeyPatch, refused) -> 
     refused(MatrixFileError, ("standard input", "closed"), read_matrix, "-")
 
     def fail(*_: Any) -> bytes:
-        raise OSError(5, "Input/output error")
+        raise OSError(5, "input/output error")
 
     monkeypatch.setattr(sys, "stdin", SimpleNamespace(closed=False, seekable=lambda: False, read=fail))
-    refused(MatrixFileError, ("standard input", "Input/output error"), read_matrix, "-")
+    refused(MatrixFileError, ("standard input", "input/output error"), read_matrix, "-")
 
 
 def test_endless_device(refused) -> None:
     if not Path("/dev/zero").exists():
         pytest.skip("no such device")
     refused(MatrixFileError, "binary file", read_matrix, "/dev/zero")
-    with Path("/dev/zero").open("rb") as file:
-        file.read(1)
-        refused(MatrixFileError, "binary file", read_matrix, SimpleNamespace(seekable=lambda: False, read=file.read))
 
 
 def test_paths_that_cannot_be_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused) -> None:
@@ -249,11 +246,11 @@ def test_too_large_for_the_memory(monkeypatch: pytest.MonkeyPatch, refused) -> N
 
 def test_file_that_fails_while_it_is_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, refused) -> None:
     def fail(*_: Any, **__: Any) -> None:
-        raise OSError(5, "Input/output error")
+        raise OSError(5, "input/output error")
 
     (tmp_path / "A.mtx").write_bytes(market())
     monkeypatch.setattr(np, "loadtxt", fail)
-    refused(MatrixFileError, ("A.mtx", "Input/output error"), read_matrix, tmp_path / "A.mtx")
+    refused(MatrixFileError, ("A.mtx", "input/output error"), read_matrix, tmp_path / "A.mtx")
 
 
 def test_load_takes_files_and_matrices(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -87,8 +87,7 @@ def _where_nothing_fits(found: Diagnosis, matrix: OperatorMatrix) -> str:
 
 def explained(error: RecoveryError, matrix: OperatorMatrix) -> RecoveryError:
     """An error of recovery, with what the matrix is in place of what its graph is not."""
-    planar = not isinstance(error, NotPlanarError)
-    found = mass_matrix(matrix, planar=False) or diagnosed(matrix, planar=planar)
+    found = mass_matrix(matrix, planar=False) or diagnosed(matrix, planar=not isinstance(error, NotPlanarError))
     if isinstance(error, NotPlanarError):
         begun = "the graph of the matrix is not planar"
         if found.kind == UNKNOWN:

@@ -68,8 +68,7 @@ def _inspected(matrix: OperatorMatrix) -> Inspection:
         return of(shown)
     if (vector := vector_valued(matrix)) is not None:
         return of_nodes(vector)
-    topology = surfaces(matrix.n, matrix.edges)
-    read = matrix
+    read, topology = matrix, surfaces(matrix.n, matrix.edges)
     if not topology.pieces and (curved := surface_facts(matrix)):
         return of(curved)
     if _left_over(matrix, topology):
@@ -93,8 +92,7 @@ def _inspected(matrix: OperatorMatrix) -> Inspection:
 
 def _not_planar(matrix: OperatorMatrix) -> RecoveryError | None:
     """Why the largest component of the graph is not planar; None where some component is."""
-    parts = components(matrix.n, matrix.edges)
-    errors = []
+    parts, errors = components(matrix.n, matrix.edges), []
     for part in parts:
         try:
             require_planar(len(part.vertices), part.edges)

@@ -1,9 +1,8 @@
 """MATLAB's files of versions 5 to 7.
 
 The reader of scipy (1.17) ends the process by a segmentation fault on some damaged ones; the one here looks at every
-length before it believes it, and unpacks nothing but what may hold a sparse matrix. Format: MathWorks, MAT-File Format
-(the document of that name, level 5). A file is a row of data elements, each with a tag of type and length; a variable
-is an element that holds elements.
+length before it believes it. Format: MathWorks, MAT-File Format (the document of that name, level 5). A file is a row
+of data elements, each with a tag of type and length; a variable is an element that holds elements.
 """
 
 import struct
@@ -39,7 +38,7 @@ def variables(content: bytes) -> Iterator[tuple[str, tuple[int, ...], Any]]:
         raise ValueError("the header does not tell the order of bytes")
     for kind, data in _elements(memoryview(content)[128:], order):
         if kind == _Type.COMPRESSED:
-            kind, data = _unpacked(data, order)
+            kind, data = next(_elements(memoryview(zlib.decompress(data)), order))
         if kind == _Type.MATRIX:
             yield from _variables(data, order)
 
@@ -58,17 +57,6 @@ def _elements(content: memoryview, order: str) -> Iterator[_Element]:
         if end > len(content):
             raise ValueError("a data element ends beyond the file")
         yield word & 0xFFFF if word >> 16 else word, content[start:end]
-
-
-def _unpacked(data: memoryview, order: str) -> _Element:
-    """The element in a compressed one; only its beginning, where that shows that it is of no use."""
-    enough = 4096  # bytes
-    beginning = zlib.decompressobj().decompress(data, enough)
-    # Two tags come before the flags.
-    if len(beginning) < enough or beginning[16 if order == "<" else 19] in (_Type.STRUCT, _Type.SPARSE):
-        return next(_elements(memoryview(zlib.decompress(data)), order))
-    (kind,) = struct.unpack(order + "I", beginning[:4])
-    return kind, memoryview(beginning)[8:]
 
 
 def _variables(data: memoryview, order: str, called: str = "") -> Iterator[tuple[str, tuple[int, ...], Any]]:

@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 from ..certify import chi_square_verdict
 from ..linalg.responses import SamplingOptions, noise_blocks
 from ..matrix import OperatorMatrix
-from .program import Normal, areas_cotangents, blocks_of, summed
+from .heron import areas_cotangents, blocks_of, summed
+from .program import Normal
 
 
 def row_sum_test(matrix: OperatorMatrix, sigma: float) -> dict[str, float]:

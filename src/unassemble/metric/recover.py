@@ -82,8 +82,7 @@ def _recovered(
             deviations = np.full(len(best.squared), np.nan)
             for scale, (rows, opposite) in zip(best.scale, best.mesh.pieces(), strict=True):
                 if np.isfinite(scale):
-                    own = length_deviations(best.squared[rows], opposite)
-                    deviations[rows] = options.noise / abs(scale) * own
+                    deviations[rows] = options.noise / abs(scale) * length_deviations(best.squared[rows], opposite)
     if back:
         best = best.without_last(back)
         notes.append(f"{count_of(back, 'vertex was', 'vertices were')} put back, with the entries that rows lack")
@@ -104,11 +103,9 @@ def _solved(matrix: OperatorMatrix, mesh: SurfaceMesh, clock: Clock, options: Sc
             try:
                 metric: Metric = solve_metric(-sign * entries, opposite, polish=options.refine)
             except GeometryError as error:
-                vertex = mesh.triangles[mesh.piece == label].min()
-                failures.append(f"{error} (piece of row {vertex})")
+                failures.append(f"{error} (piece of row {mesh.triangles[mesh.piece == label].min()})")
                 continue
-        lengths = np.sqrt(metric.squared)
-        squared[order] = metric.squared / lengths.mean() ** 2
+        squared[order] = metric.squared / np.sqrt(metric.squared).mean() ** 2
         scale[label] = sign * metric.scale
     with clock("certify"):
         # Entries with errors tell a scale with an error, which is tested by itself.
@@ -126,14 +123,13 @@ def _report(found: Found, verdict: Verdict, notes: list[str], clock: Clock, devi
     worst, misfits = found.certificate.entries.worst(10 if verdict.uniqueness is None else 0)
     curvature = mesh.curvature(found.squared)
     loop = mesh.loop_of_boundary
-    order = np.argsort(loop, kind="stable")
     return Surface(
         points=np.full((mesh.n, 3), np.nan),
         triangles=mesh.triangles,
         component=mesh.component,
         hinges=mesh.hinges,
         scale=found.scale,
-        boundary=mesh.edges[mesh.boundary[order]],
+        boundary=mesh.edges[mesh.boundary[np.argsort(loop, kind="stable")]],
         boundary_offsets=np.append(0, np.cumsum(np.bincount(loop))),
         node_status=(~np.isfinite(curvature)).astype(np.int8),
         status=verdict.status,
