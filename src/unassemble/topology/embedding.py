@@ -45,7 +45,7 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
 
 
 def _drawings(n: int, edges: NDArray, triangles: NDArray, quads: NDArray) -> Iterator[FaceComplex]:
-    surface = from_cycles(n, edges, [triangles, quads])
+    surface = from_cycles(n, edges, triangles, quads)
     if surface is not None:
         yield surface
     drawing = _with_faces(n, edges, [triangles, quads])
