@@ -225,22 +225,18 @@ def deviations_of(n: int, fits: Sequence[Fitted], placed: Sequence[NDArray], tas
     tensor = task.placement.tensor
     for fit, z in list(zip(fits, placed, strict=True))[::-1]:
         z = np.asarray(tensor.to_laplacian(z)) if tensor else z
-        a, b, c = z[fit.part.piece.triangles].T
-        mirrored = (np.conj(b - a) * (c - a)).imag.sum() < 0
-        z = np.conj(z) if mirrored else z
         parameters = z[: fit.entries.n]
-        stretch = (tensor.root if tensor else np.eye(2)) @ np.diag([1, -1 if mirrored else 1])
         sigma = float(np.sqrt(np.mean(fit.spread**2)))
+        spread = fit.spread / sigma
         if task.noise is None:
             sigma *= float(np.linalg.norm(fit.misfit / fit.spread)) / np.sqrt(max(fit.freedom, 1))
-        spread = fit.spread / np.sqrt(np.mean(fit.spread**2))
         covariance = covariances(
             fit.entries.jacobian(parameters, spread),
             fit.entries.weights(parameters) / spread,
             z,
             distant_pair(parameters),
             free_scale=task.scale is None,
-            stretch=stretch,
+            stretch=tensor.root if tensor else None,
             nodes=fit.entries.nodes,
         )
         result[fit.part.piece.vertices] = sigma / abs(fit.scale) * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
