@@ -101,19 +101,21 @@ def conformal_map(
     weights: NDArray,
     *,
     scale: float | None = None,
+    unit: float | None = None,
     sharp: bool = True,
     options: ConformalOptions | None = None,
 ) -> ConformalMap:
     """Positions and scale of one piece.
 
     `weights` (e,): -A_ij = c w_ij of each edge; `scale`: c, where it is known. Otherwise a value in which most
-    triangles agree, or more of them than in any other, is tried first, or c = 1 if their median allows it. `sharp`: go
-    on until z, not only c, has converged, which a polish does not need.
+    triangles agree, or more of them than in any other, is tried first, or c = 1 if their median allows it. `unit`: a
+    guess of c, where weights are not those of the piece's triangles; c = 1 is then tried once that is near. `sharp`:
+    go on until z, not only c, has converged, which a polish does not need.
 
     Raises GeometryError if no map of positive area is found.
     """
     options = options or ConformalOptions()
-    unit, likely = _estimate(piece, weights)
+    unit, likely = _estimate(piece, weights) if unit is None else (unit, None)
     with np.errstate(over="ignore"):
         relative = weights / unit if unit else np.full_like(weights, np.inf)
     if not np.abs(relative).max() < 1 / ROUNDED or (scale is not None and not ALIKE < abs(scale / unit) < 1 / ALIKE):
@@ -130,15 +132,14 @@ def conformal_map(
     search = ShiftedSearch(pencil, options.krylov_steps)
     z = start = smooth_start(piece.n_vertices, piece.boundary, piece.loop_offsets)
     known = scale if scale is not None else likely
+    spread, whole = None, 1 / unit  # c = 1 is common
     if known is not None:
         z, c, _ = search.at(known / unit * (1 - options.margin), z, steps=2)
         # The quotient is stationary, and accurate to some hundred roundings at any size.
         if scale is not None or abs(c * unit / known - 1) < 1e-13:
             z = search.corrected(z, c)
             return ConformalMap(z, known, search.factorisations, search.solves, True)
-        spread = 1e-2 if c * unit / known > 1 else None  # beyond c the quotients tell nothing
-    else:
-        spread = None
+        spread, whole = 1e-2 if c * unit / known > 1 else None, np.inf  # beyond c the quotients tell nothing
     if spread is None:
         z, c, spread = search.at(options.first_shift, start)
         if c < ALIKE:
@@ -146,8 +147,9 @@ def conformal_map(
     converged = near = False
     while search.factorisations < options.max_factorisations:
         distance = min(max(4 * spread, options.margin), 0.3)
-        z, c, spread = search.at(c * (1 - distance), z)
-        near = distance <= 1e-9
+        one = abs(c / whole - 1) <= distance
+        z, c, spread = search.at(whole * (1 - options.margin) if one else c * (1 - distance), z)
+        near, whole = one or distance <= 1e-9, np.inf if one else whole
         converged = (near or (distance <= 1e-5 and not sharp)) and spread < 1e-12
         if converged:
             break
