@@ -1,10 +1,7 @@
 """The near-null space of a recovered matrix, whichever room it comes from, and files of it for other solvers."""
 
-from __future__ import annotations
-
 from os import PathLike, fspath
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.io
@@ -13,24 +10,16 @@ from numpy.typing import NDArray
 from .errors import FormatError, InputError, OutputError
 from .files import check_target, whole_file
 from .recovery import Recovery
+from .structures.layouts import SOLIDS, Layout, layout_named
 from .words import count_of
-
-if TYPE_CHECKING:
-    from .structures import Layout
 
 
 def modes_of(recovery: Recovery) -> NDArray[np.float64]:
     """Near-null space of a vector-valued matrix, (N, 3) or (N, 6), rows as in the matrix: PyAMG's ``B``.
 
-    Translations, then rotations; nodes without coordinates get what they have without moving.
-
-    Raises
-    ------
-    InputError
-        If the matrix is scalar.
+    Translations, then rotations; nodes without coordinates get what they have without moving. InputError for scalar
+    matrices.
     """
-    from .structures.layouts import layout_named
-
     node, direction = recovery.node_of_row, recovery.direction_of_row
     if node is None or direction is None:
         raise InputError("a scalar matrix has no rigid-body modes: its near-null space is that of the constants")
@@ -60,8 +49,6 @@ def rigid_body_modes(
         Translations, then rotations, row by row of the matrix. Rotations are about the centroid, divided by the radius
         of gyration, so that none swamps another.
     """
-    from .structures.layouts import SOLIDS
-
     layout = layout or SOLIDS[points.shape[1]]
     known = np.asarray(np.isfinite(points).all(axis=1))
     x = points - points[known].mean(axis=0) if known.any() else np.zeros_like(points)
@@ -74,17 +61,11 @@ def rigid_body_modes(
 def save_modes(path: str | PathLike[str], modes: NDArray[np.float64]) -> None:
     """Write a near-null space as numpy's ``.npy``, or as a dense Matrix Market ``.mtx`` (AMGCL's ``-N``).
 
-    Raises
-    ------
-    OutputError
-        If the name ends otherwise, or the file cannot be written.
+    OutputError if the name ends otherwise, or the file cannot be written.
     """
     suffix = check_modes(path)
     with whole_file(path, suffix) as draft:
-        if suffix == ".npy":
-            np.save(draft, modes)
-        else:
-            _write_dense(draft, modes)
+        np.save(draft, modes) if suffix == ".npy" else _write_dense(draft, modes)
 
 
 def check_modes(path: str | PathLike[str]) -> str:

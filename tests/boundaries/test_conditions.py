@@ -59,6 +59,19 @@ def test_eliminated_in_part():
     assert determined(found, points) >= 0.9
 
 
+def test_eliminated_about_holes_that_meet():
+    """Two holes with a vertex in common make one loop, which comes to that vertex twice."""
+    mesh = jittered(seed=4)
+    x, y = mesh.p[:, mesh.t].mean(axis=1)
+    mesh = mesh.remove_elements(
+        np.flatnonzero((np.maximum(np.abs(x - 0.5), np.abs(y - 0.5)) < 0.25) & ((x > 0.5) == (y > 0.5)))
+    )
+    matrix, points = eliminated(mesh, lambda p: (np.abs(p - 0.5) > 0.49).any(axis=0))
+    found = recover(matrix)
+    assert found.certified, found.reason
+    assert determined(found, points) >= 0.8
+
+
 @pytest.mark.parametrize("c", [1.0, -3.0])
 def test_identity_rows(c):
     matrix, points = identity_rows(jittered(seed=2), c)

@@ -83,6 +83,12 @@ def test_any_integers_serve_as_indices(solver):
     assert np.abs(matrix.full() @ factor.solve(np.ones(50)) - 1).max() < 1e-12
 
 
+@pytest.mark.parametrize("columns", [[0, 1, 1, 1], [0, 2, 1, 1], [1, 0, 1, 1], [0, 1, 2, 1]])
+def test_columns_that_pardiso_would_leave_its_memory_with_are_refused(columns):
+    with pytest.raises(ValueError, match="upper triangle"):
+        UpperTriangle(np.ones(4), np.array(columns), np.array([0, 3, 4]))
+
+
 def test_triangle_from_edges_matches_scipy():
     edges = np.array([[0, 1], [0, 3], [2, 3]])
     matrix = upper_from_edges(4, edges, np.array([1.0, 2.0, 3.0]), np.array([9.0, 8.0, 7.0, 6.0]))

@@ -6,9 +6,11 @@ Tutte, "How to draw a graph", Proc. London Math. Soc. 13, 1963.
 """
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse import csgraph
 
-from ..linalg import factorisation, upper_from_edges
+from ..linalg import UpperTriangle, factorisation
 from ..topology import Piece
 
 
@@ -27,28 +29,31 @@ def tutte(piece: Piece, outline: int) -> NDArray[np.complex128]:
         else:
             ends.append(np.column_stack([loop, np.full(len(loop), number)]))
             number += 1
-    edges = np.concatenate(ends)
     z = np.zeros(number, dtype=np.complex128)
     z[circle] = np.exp(2j * np.pi * np.arange(len(circle)) / len(circle))
-    fixed = np.zeros(number, dtype=bool)
-    fixed[circle] = True
-    degree = np.bincount(edges.ravel(), minlength=number).astype(float)
-    pull = np.zeros(number, dtype=np.complex128)
-    for one, other in (edges.T, edges.T[::-1]):
-        pull += np.bincount(one, z[other].real, number) + 1j * np.bincount(one, z[other].imag, number)
-    if not fixed.all():
-        free = np.cumsum(~fixed) - 1
-        inside = free[edges[~fixed[edges].any(axis=1)]]
-        inside = inside[np.lexsort(inside.T[::-1])]
-        matrix = upper_from_edges(int(free[-1]) + 1, inside, -np.ones(len(inside)), degree[~fixed])
-        solver = factorisation(matrix, definite=True)
-        solver.factorise(matrix)
-        right = np.column_stack([pull[~fixed].real, pull[~fixed].imag])
-        z[~fixed] = np.ascontiguousarray(solver.solve(right)) @ np.array([1, 1j])
-        solver.release()
-    z = z[:n]
+    free = np.ones(number, dtype=bool)
+    free[circle] = False
+    z = relaxed(np.concatenate(ends), z, free)[:n]
     area = areas(piece, z)
     return np.asarray((z if area.sum() > 0 else np.conj(z)) / np.sqrt(np.abs(area).mean()))
+
+
+def relaxed(edges: NDArray, z: NDArray[np.complex128], free: NDArray[np.bool_]) -> NDArray[np.complex128]:
+    """The same positions (n,), those that are `free`, (n,) bool, at the means of their neighbours.
+
+    `edges` (e, 2) may repeat one, as a loop does that comes to a vertex twice. Raises SolverError.
+    """
+    graph = sp.coo_array((np.ones(len(edges)), edges.T), shape=(len(z), len(z))).tocsr()
+    laplacian = sp.csr_array(csgraph.laplacian(graph + graph.T))[free]
+    if free.any():
+        matrix = UpperTriangle.of(sp.csr_array(laplacian[:, free]))
+        solver = factorisation(matrix, definite=True)
+        solver.factorise(matrix)
+        pull = -(laplacian[:, ~free] @ z[~free])
+        z = z.copy()
+        z[free] = np.ascontiguousarray(solver.solve(np.column_stack([pull.real, pull.imag]))) @ np.array([1, 1j])
+        solver.release()
+    return z
 
 
 def areas(piece: Piece, z: NDArray) -> NDArray[np.float64]:

@@ -16,7 +16,6 @@ needed, and one factorisation is all there is.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,8 +23,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from ..errors import SolverError
-from ..linalg import Factorisation, UpperTriangle
+from ..errors import GeometryError
+from ..linalg import UpperTriangle, nearly_singular
 from ..topology import Piece
 from .fit import Scale, WholeEntries, jacobian_rows
 
@@ -42,8 +41,8 @@ def determined(
     size = np.bincount(piece.edges.ravel(), np.repeat(length, 2), n) / np.bincount(piece.edges.ravel(), minlength=n)
     gradient = problem.gradient(z, scale) * size[piece.stencil]
     try:
-        checked, free = _Linearised.of(piece, gradient, problem.slopes(z, scale), whole).judged(problem.analysed)
-    except SolverError:
+        checked, free = _Linearised.of(piece, gradient, problem.slopes(z, scale), whole).judged()
+    except GeometryError:
         checked, free = np.zeros_like(whole), np.zeros((n, 0), dtype=np.complex128)
     if not checked.any():
         return np.zeros(n, dtype=bool), checked
@@ -70,42 +69,34 @@ class _Linearised:
         jacobian = jacobian_rows(len(held), [(np.where(entries, gradient, 0), piece.stencil)])
         return cls(jacobian, np.linalg.qr(np.where(entries[:, None], slopes, 0.0))[0], entries, held)
 
-    def judged(
-        self, analyse: Callable[[UpperTriangle], Factorisation]
-    ) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
+    def judged(self) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
         """(e,) entries that others say something about, and (n, k) displacements that leave these as they are.
 
-        The inverse is that of J'J, made definite by a small shift, relative to its typical diagonal entry: eigenvalues
-        less than some hundred times as large count as zero, and entries know displacements to 1e-10 of the length of
-        edges. With c free its columns are projected out, which is a matter of low rank.
+        The inverse is that of J'J, made definite by a small shift: eigenvalues less than some hundred times as large
+        count as zero, so that a larger one, which slivers ask for, counts more as free. With c free its columns are
+        projected out, which is a matter of low rank.
         """
         transposed = self.jacobian.T.tobsr()
-        product = UpperTriangle.of(transposed @ self.jacobian)
-        data, start = product.data.copy(), product.indptr[:-1]
-        typical = float(np.median(np.diagonal(data[start][self.held], axis1=1, axis2=2)))
-        data[start] += np.where(self.held, 1e-14, 1.0)[:, None, None] * typical * np.eye(2)
-        matrix = product.with_data(data)
-        solver = analyse(matrix)
-        solver.factorise(matrix)
-        pull = transposed @ self.slope
-        response = solver.solve(pull) if pull.size else pull
-        left = self.slope.T @ self.slope - pull.T @ response
+        with nearly_singular(UpperTriangle.of(transposed @ self.jacobian)) as solver:
+            pull = transposed @ self.slope
+            response = solver.solve(pull) if pull.size else pull
+            left = self.slope.T @ self.slope - pull.T @ response
 
-        def preimage(y: NDArray) -> NDArray:
-            x = solver.solve(np.ascontiguousarray(transposed @ self._without_slope(y)))
-            return np.asarray(x + response @ np.linalg.lstsq(left, pull.T @ x, rcond=None)[0])
+            def preimage(y: NDArray) -> NDArray:
+                x = solver.solve(np.ascontiguousarray(transposed @ self._without_slope(y)))
+                return np.asarray(x + response @ np.linalg.lstsq(left, pull.T @ x, rcond=None)[0])
 
-        rng, probes = np.random.default_rng(1), 2
-        y = rng.standard_normal((len(self.slope), probes)) * self.entries[:, None]
-        for _ in range(3):  # what the shift leaves, and rounding
-            y = y - self.jacobian @ preimage(y)
-        y = self._without_slope(y)
-        checked = self.entries & (np.abs(y).max(axis=1) > 1e-6)
-        right = rng.standard_normal(y.shape) * (self.entries & ~checked)[:, None]
-        x = rng.standard_normal((2 * len(self.held), probes)) * np.repeat(self.held, 2)[:, None]
-        for _ in range(5):
-            x = x + preimage(right - self.jacobian @ x)
-        return checked, np.ascontiguousarray((x / np.linalg.norm(x, axis=0)).T).view(np.complex128).T
+            rng, probes = np.random.default_rng(1), 2
+            y = rng.standard_normal((len(self.slope), probes)) * self.entries[:, None]
+            for _ in range(3):  # what the shift leaves, and rounding
+                y = y - self.jacobian @ preimage(y)
+            y = self._without_slope(y)
+            checked = self.entries & (np.abs(y).max(axis=1) > 1e-6)
+            right = rng.standard_normal(y.shape) * (self.entries & ~checked)[:, None]
+            x = rng.standard_normal((2 * len(self.held), probes)) * np.repeat(self.held, 2)[:, None]
+            for _ in range(5):
+                x = x + preimage(right - self.jacobian @ x)
+            return checked, np.ascontiguousarray((x / np.linalg.norm(x, axis=0)).T).view(np.complex128).T
 
     def _without_slope(self, image: NDArray) -> NDArray[np.float64]:
         """Columns (e, 2) less their components along the columns of log c."""

@@ -11,7 +11,7 @@ from ..elements.kinds import KINDS
 from ..elements.surface import boundary_loops
 from ..errors import GeometryError, RecoveryError
 from ..linalg import blas_threads
-from ..nodes.anchoring import Request, anchored, near_enough
+from ..nodes.anchoring import Request, anchored
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix, uncoupled
 from ..nodes.numbering import Numbering
 from ..nodes.rounded import known_to
@@ -113,8 +113,9 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     if status == "certified" and found.certified and _without_shear(found):
         status, reason = "uncertified", Reason("elements have no shear stiffness, and any vectors that cancel are such")
     held = request.held(numbering.node_of_row, nodal.dim)
-    points, factor, notes = anchored(placed, component, len(solution.evidence), held)
-    status, reason = near_enough(status, reason, points, placed, component, factor, 1.0)  # mean edges have length one
+    points, factor, notes, (status, reason) = anchored(
+        placed, component, len(solution.evidence), held, (status, reason), edge=1.0
+    )
     lame, scale = _in_units(shown, component, factor, nodal.dim)
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: with a mesh its point reflection fits the matrix as well")

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 class UpperTriangle:
     """Upper triangle, diagonal included, of a Hermitian (or real symmetric) matrix in CSR form.
 
-    Raises ValueError if a row does not start with its diagonal: PARDISO would crash on it.
+    Raises ValueError if a row does not start with its diagonal, or its columns do not increase: PARDISO would write
+    beyond its memory.
     """
 
     data: NDArray  # (nnz,) float64 or complex128, or (nnz, b, b) float64 blocks, those of the diagonal stored whole
@@ -31,6 +32,10 @@ class UpperTriangle:
             raise ValueError(
                 f"row {int(np.argmax(wrong))} of the upper triangle does not start with its diagonal entry"
             )
+        falls = np.diff(self.indices) <= 0
+        falls[start[1:] - 1] = False
+        if falls.any() or (len(self.indices) and self.indices.max() >= self.n):
+            raise ValueError("the columns in a row of the upper triangle repeat one, or do not increase to the last")
 
     @classmethod
     def of(cls, matrix: sp.csr_array | sp.bsr_array) -> UpperTriangle:

@@ -54,64 +54,49 @@ class Request:
 
 
 def anchored(
-    points: NDArray[np.float64], component: NDArray[np.int64], n_pieces: int, anchors: Anchors, *, sized: bool = False
-) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
-    """Move pieces to their anchors; axes stay, and so does the size if pieces are `sized`. With the factor and notes.
+    points: NDArray[np.float64],
+    component: NDArray[np.int64],
+    n_pieces: int,
+    anchors: Anchors,
+    verdict: tuple[str, Reason],
+    edge: float,
+    *,
+    sized: bool = False,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str], tuple[str, Reason]]:
+    """Move pieces to their anchors; axes stay, and so does the size if pieces are `sized`. With factor, notes, verdict.
 
     The factor, (n_pieces,), is that by which each piece was enlarged; negative where it was reflected in a point, NaN
-    where the size is by convention.
+    where the size is by convention. What was certified is not if its coordinates, of that mean `edge`, lost more digits
+    than entries would bear, as they do far from the origin.
     """
     nodes, places = anchors
-    points, factor, notes = points.copy(), np.full(n_pieces, 1.0 if sized else np.nan), []
-    lost = nodes[component[nodes] < 0]
-    if len(lost):
-        notes.append(f"the anchored nodes {', '.join(map(str, lost))} are not determined and were not used")
-    for piece in np.unique(component[nodes]):
-        if piece < 0:
-            continue
-        here = component[nodes] == piece
-        body = component == piece
+    points, factor, notes, lost = points.copy(), np.full(n_pieces, 1.0 if sized else np.nan), [], 0.0
+    adrift = nodes[component[nodes] < 0]
+    if len(adrift):
+        notes.append(f"the anchored nodes {', '.join(map(str, adrift))} are not determined and were not used")
+    for piece in np.unique(component[nodes][component[nodes] >= 0]):
+        here, body, size = component[nodes] == piece, component == piece, 1.0
         found, wanted = points[nodes[here]], places[here]
         x, y = found - found.mean(axis=0), wanted - wanted.mean(axis=0)
         if here.sum() > 1 and not sized:
-            size = float((x * y).sum() / (x * x).sum())
+            factor[piece] = size = float((x * y).sum() / (x * x).sum())
             if size == 0:
                 raise InputError("the anchors lie in one point, or across the line between their nodes")
-            factor[piece] = size
-            points[body] *= size
-        points[body] += wanted.mean(axis=0) - points[nodes[here]].mean(axis=0)
+        before = size * points[body]
+        shift = wanted.mean(axis=0) - (size * found).mean(axis=0)
+        points[body] = before + shift
+        lost = max(lost, float(np.abs((points[body] - shift) - before).max() / abs(size)) / edge)
         misfit = float(np.linalg.norm(points[nodes[here]] - wanted, axis=1).max())
         if here.sum() > 1 and misfit > ALIKE * np.linalg.norm(y, axis=1).max():
             notes.append(f"the anchors do not fit the mesh: one is missed by {misfit:.3g}")
-    return points, factor, notes
-
-
-def near_enough(
-    status: str,
-    reason: Reason,
-    points: NDArray[np.float64],
-    before: NDArray[np.float64],
-    component: NDArray[np.int64],
-    factor: NDArray[np.float64],
-    edge: float,
-) -> tuple[str, Reason]:
-    """Status and reason; what was certified is not if its coordinates lost more digits than entries would bear.
-
-    Moving a mesh far from the origin loses them. `points`, (n, d), and `factor` are those of :func:`anchored`, `before`
-    what it moved, whose mean `edge` is given.
-    """
-    lost = 0.0
-    for piece, size in enumerate(np.where(np.isnan(factor), 1.0, factor)):
-        body = component == piece
-        if body.any():
-            shape = size * before[body]
-            shift = np.median(points[body] - shape, axis=0)  # differences that round to the shift: they hide the errors
-            lost = max(lost, float(np.abs((points[body] - shift) - shape).max() / abs(size)) / edge)
-    if status != "certified" or lost <= SUMMED:
-        return status, reason
-    return "uncertified", Reason.of(
-        f"the anchors lie so far from the origin that coordinates, as written, are off by {lost:.1e} edge lengths: "
-        "they have too few digits left",
-        f"before, {reason.text}",
-        advice="subtract a point near the anchors from all of `anchors`",
-    )
+    if verdict[0] == "certified" and lost > SUMMED:
+        verdict = (
+            "uncertified",
+            Reason.of(
+                f"the anchors lie so far from the origin that coordinates, as written, are off by {lost:.1e} edge "
+                "lengths: they have too few digits left",
+                f"before, {verdict[1].text}",
+                advice="subtract a point near the anchors from all of `anchors`",
+            ),
+        )
+    return points, factor, notes, verdict

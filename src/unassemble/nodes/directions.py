@@ -90,7 +90,7 @@ class _Body:
                     best, most, least = direction, count, total
                 if count <= before or count == hope or not count:
                     break
-                before, known = count, np.where(self._vouched(good), direction, -1)
+                before, known = count, np.where(good, direction, -1)
             if most >= NEARLY_ALL * hope:
                 break
         return best
@@ -101,9 +101,7 @@ class _Body:
             yield given
         if (given >= 0).any() or not len(self._nodes):
             return
-        breadth_first = sp.csgraph.breadth_first_order
-        order = breadth_first(self._pattern, 0, directed=False, return_predecessors=False)
-        order = breadth_first(self._pattern, order[-1], directed=False, return_predecessors=False)
+        order = sp.csgraph.reverse_cuthill_mckee(self._pattern, symmetric_mode=True)
         nodes = self._nodes[np.argsort(np.argsort(order)[self._nodes[:, 0]])]
         for part in _SEEDS:
             known = np.full(len(given), -1)
@@ -138,15 +136,6 @@ class _Body:
             two = np.partition(fit, -2, axis=1)[:, -2:]
             margin[members] = (two[:, 1] - two[:, 0])[:, None]
         return best, margin
-
-    def _vouched(self, good: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """(n,) rows of the largest domain tied together by good ones, which vouch for what they couple to."""
-        n = len(good)
-        entry = sp.coo_array(self._whole)
-        told = good[entry.row] & (np.abs(entry.data) > CANCELLED * self._size[entry.row])
-        link = sp.csr_array((np.ones(told.sum(), np.int8), (entry.row[told] + n, entry.col[told])), shape=(2 * n,) * 2)
-        label = sp.csgraph.connected_components(link, directed=False)[1][:n]
-        return np.asarray(label == np.argmax(np.bincount(label)))
 
 
 def with_least_sums(

@@ -119,12 +119,9 @@ def _by_component(inner: sp.csr_array, direction: NDArray[np.int64], d: int) -> 
     lost = _came_apart(inner, node, direction, d)
     if not (lost & ~open_row).any():
         return Reading(node, direction, open_row)
-    for k in range(2 if inner.shape[0] <= LARGE else 1):
-        group = same_pattern(filled_by_direction(filled(inner) if k else inner, direction, d))
-        node, open_row = nodes_by_component(group, direction, d)
-        lost = _came_apart(inner, node, direction, d)
-        if not (lost.any() or open_row.any()):
-            break
+    group = same_pattern(filled_by_direction(inner, direction, d))
+    node, open_row = nodes_by_component(group, direction, d)
+    lost = _came_apart(inner, node, direction, d)
     if lost.any():  # each belongs to another: these go together one by one between nodes that are known
         node, open_row = nodes_by_component(np.where(lost, len(group), group), direction, d)
     return Reading(node, direction, open_row if open_row.any() else None)

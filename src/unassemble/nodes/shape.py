@@ -80,19 +80,17 @@ def set_aside(null: NDArray, common: int) -> tuple[NDArray, NDArray[np.bool_]]:
     """
     n, _d, k = null.shape
     calm = np.argsort((null**2).sum(axis=(1, 2)), kind="stable")
-    for share in (0.75, 0.5, 0.25, 0.12):
-        some = calm[: max(int(share * n), min(n, common + 1))]
-        _, s, v = svd(null[some].reshape(-1, k), full_matrices=False)
-        if (s > ALIKE * s[0]).sum() == common:
-            own = np.einsum("nak,lk->nal", null, v[s <= ALIKE * s[0]])
-            loose = np.abs(own).max(axis=(1, 2)) > CANCELLED
-            if np.count_nonzero(~loose) * null.shape[1] < common:  # too few are left to carry what they share
-                break
-            fields = np.einsum("nak,lk->nal", null, v[:common])
-            shared = np.zeros_like(fields)  # orthonormal over the others
-            shared[~loose] = np.linalg.qr(fields[~loose].reshape(-1, common))[0].reshape(-1, *fields.shape[1:])
-            return shared, loose
-    return null, np.zeros(n, dtype=bool)
+    _, s, v = svd(null[calm[: max(n // 2, min(n, common + 1))]].reshape(-1, k), full_matrices=False)
+    loose = np.zeros(n, dtype=bool)
+    if (s > ALIKE * s[0]).sum() == common:
+        own = np.einsum("nak,lk->nal", null, v[s <= ALIKE * s[0]])
+        loose = np.abs(own).max(axis=(1, 2)) > CANCELLED
+    if not loose.any() or np.count_nonzero(~loose) * null.shape[1] < common:  # too few to carry what they share
+        return null, np.zeros(n, dtype=bool)
+    fields = np.einsum("nak,lk->nal", null, v[:common])
+    shared = np.zeros_like(fields)  # orthonormal over the others
+    shared[~loose] = np.linalg.qr(fields[~loose].reshape(-1, common))[0].reshape(-1, *fields.shape[1:])
+    return shared, loose
 
 
 def _choose(moving: NDArray, *, exact: bool) -> tuple[NDArray, str]:

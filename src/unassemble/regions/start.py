@@ -1,11 +1,9 @@
 """Positions to start from: the conformal map of entries in units of the factors on both sides."""
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.linalg import splu
 
-from ..boundaries.embedding import areas, tutte
+from ..boundaries.embedding import areas, relaxed, tutte
 from ..boundaries.patch import distance
 from ..errors import GeometryError, SolverError
 from ..planar.conformal import ConformalOptions, conformal_map
@@ -62,10 +60,6 @@ def _fitted(drawn: NDArray, weights: NDArray, region: NDArray, scale: NDArray) -
 
 def _unfolded(piece: Piece, z: NDArray) -> NDArray[np.complex128] | None:
     """The same, vertices about triangles that are turned over being means of their neighbours; None if that fails."""
-    n = piece.n_vertices
-    graph = sp.coo_array((np.ones(len(piece.edges)), piece.edges.T), shape=(n, n)).tocsr()
-    graph = graph + graph.T
-    laplacian = sp.csc_array(sp.diags_array(graph.sum(axis=1)) - graph)
     for reach in range(1, 7):  # edges
         near = _folded(piece, z)
         if not near.any():
@@ -73,10 +67,7 @@ def _unfolded(piece: Piece, z: NDArray) -> NDArray[np.complex128] | None:
         free = distance(piece, near, reach) <= reach
         if free.all():
             break
-        solver = splu(laplacian[free][:, free])
-        pull = -(laplacian[free][:, ~free] @ z[~free])
-        z = z.copy()
-        z[free] = solver.solve(pull.real) + 1j * solver.solve(pull.imag)
+        z = relaxed(piece.edges, z, free)
     return None if _folded(piece, z).any() else z
 
 

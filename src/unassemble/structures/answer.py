@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..nodes.anchoring import Request, anchored, near_enough
+from ..nodes.anchoring import Request, anchored
 from ..nodes.numbering import Numbering
 from ..recovery import Structure
 from ..words import Reason
@@ -36,10 +36,11 @@ def answer(
     Errors are measured in distances of coupled nodes, `edges` (e, 2); `fields` are further ones of a Structure.
     """
     held = request.held(numbering.node_of_row, found.points.shape[1])
-    points, factor, more = anchored(found.points, found.component, len(found.evidence), held, sized=sized)
     length = np.linalg.norm(found.points[edges[:, 0]] - found.points[edges[:, 1]], axis=1)
     edge = float(np.nanmean(length)) if np.nansum(length) > 0 else 1.0
-    status, reason = near_enough(*verdict, points, found.points, found.component, factor, edge)
+    points, factor, more, (status, reason) = anchored(
+        found.points, found.component, len(found.evidence), held, verdict, edge, sized=sized
+    )
     return Structure(
         points=points,
         component=found.component,

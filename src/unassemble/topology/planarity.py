@@ -6,12 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+def too_many(n: int, edges: NDArray) -> bool:
+    """Whether there are more edges than a planar graph can have."""
+    return n >= 3 and len(edges) > 3 * n - 6
+
+
 def rotation_system(n: int, edges: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
     """Half-edges tail -> head, grouped by tail, each group in its cyclic order about it in a planar embedding.
 
     `edges` (e, 2). Returns `tail` and `head` (2 e,), None if the graph is not planar.
     """
-    if n >= 3 and len(edges) > 3 * n - 6:
+    if too_many(n, edges):
         return None
     with suppress(ImportError):  # no wheels for this platform: networkx has the left-right test in pure Python
         return _rotation_by_suite(n, edges)

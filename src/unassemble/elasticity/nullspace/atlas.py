@@ -49,7 +49,7 @@ def null_fields(
     """Least singular fields of all valid identities of a body's nodes, (m,), by charts of no more rows than `patch`."""
     of: Of = partial(identities, nodal, valid, terms=terms)
     size, graph = patch or PATCH[nodal.dim], nodal.graph
-    parts = [body[part] for part in _patches(graph[body][:, body], size)] if len(body) > 1.5 * size else [body]
+    parts = _patches(graph, body, size) if len(body) > 1.5 * size else [body]
     made = [_chart(of, graph, rows, whole=len(parts) == 1) for rows in parts]
     made = [one for one in made if len(one.nodes)] or made[:1]
     if len(made) == 1:
@@ -198,20 +198,10 @@ def _refined(local: Identities, solver: Factorisation, fields: NDArray, values: 
     return (fields.reshape(n * d, k) @ v[::-1].T).reshape(n, d, k), values[::-1]
 
 
-def _patches(graph: sp.csr_array, size: int) -> list[NDArray[np.int64]]:
-    """Cut a graph into halves of so many nodes at most, again and again, by breadth-first distance from one end."""
-    done: list[NDArray[np.int64]] = []
-    open_: list[NDArray[np.int64]] = [np.arange(graph.shape[0])]
-    breadth_first = sp.csgraph.breadth_first_order
-    while open_:
-        nodes = open_.pop()
-        if len(nodes) <= size:
-            done.append(nodes)
-            continue
-        sub = graph[nodes][:, nodes]
-        order = breadth_first(sub, 0, directed=False, return_predecessors=False)
-        order = breadth_first(sub, order[-1], directed=False, return_predecessors=False)
-        order = np.concatenate([order, np.setdiff1d(np.arange(len(nodes)), order)])  # further components follow
-        half = len(order) // 2
-        open_ += [nodes[np.sort(order[half:])], nodes[np.sort(order[:half])]]
-    return done
+def _patches(graph: sp.csr_array, nodes: NDArray[np.int64], size: int) -> list[NDArray[np.int64]]:
+    """Cut nodes of a graph into halves, as they follow each other from one end, until they are so many at most."""
+    if len(nodes) <= size:
+        return [nodes]
+    order = sp.csgraph.reverse_cuthill_mckee(graph[nodes][:, nodes], symmetric_mode=True)
+    halves = np.array_split(order, 2)
+    return [part for half in halves for part in _patches(graph, nodes[np.sort(half)], size)]
