@@ -64,6 +64,14 @@ def test_third_party(name, factors):
         held(mesh_of(mesh["points"][:, :2].astype(float), mesh["triangles"].astype(np.int64)), factors)
 
 
+@needs_shared
+@pytest.mark.parametrize("name", ["anuga_test100", "meshmode_annulus", "skfem_interface"])
+def test_four_materials_that_meet(name):
+    """In the first two several triangles are wrong at once, and putting right any one of them is no better."""
+    mesh = np.load(SHARED / "corpus" / "planar" / f"{name}.npz")
+    held(mesh_of(mesh["points"][:, :2].astype(float), mesh["triangles"].astype(np.int64)), (1.0, 3.0, 0.2, 20.0))
+
+
 def test_a_negative_matrix_with_a_diagonal():
     matrix, points = materials(jittered(3), (1.0, 5.0))
     diagonal = sp.diags_array(np.random.default_rng(0).uniform(1, 2, matrix.shape[0]))

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..linalg import Factorisation, UpperTriangle, factorisation
-from ..planar.cotangent import edge_weights, weight_gradient
+from ..planar.cotangent import edge_weights, halves, weight_gradient
 from ..topology import Piece
 from .shape import ShapePrior
 
@@ -119,8 +119,10 @@ class WholeEntries:
             return np.zeros((len(self.weights), 0))
         if self.region is None:
             return np.asarray(self.weights / scale)[:, None]
-        own = [np.where(self.region == k, c, 0.0) for k, c in enumerate(scale)]
-        return np.column_stack([edge_weights(self.piece, z, one) / self.unit(scale) for one in own])
+        sides = self.piece.opposite
+        part = halves(self.piece, z) * scale[self.region][:, None] / self.unit(scale)[sides]
+        place = sides.ravel(), np.repeat(self.region, 3)
+        return sp.coo_array((part.ravel(), place), shape=(len(self.weights), len(scale))).toarray()
 
     def _scaled(self, scale: Scale, move: NDArray) -> Scale:
         """Factors whose logarithms have changed; where c is known it stays."""

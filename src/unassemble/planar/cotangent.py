@@ -43,6 +43,12 @@ def edge_weights(piece: Piece, z: NDArray, factor: NDArray | None = None) -> NDA
     return _halved(piece, cotangent(*left), cotangent(*right), factor)
 
 
+def halves(piece: Piece, z: NDArray) -> NDArray[np.float64]:
+    """(m, 3) halves of the cotangents of triangles, each with the side that it faces as ``piece.opposite`` has them."""
+    corner = z[piece.triangles]
+    return cotangent(np.roll(corner, -1, axis=1) - corner, np.roll(corner, 1, axis=1) - corner) / 2
+
+
 def left_by_all(
     pieces: Sequence[Piece], weights: NDArray, positions: Sequence[NDArray], scales: NDArray
 ) -> NDArray[np.float64]:

@@ -6,7 +6,10 @@ those numbers between 0 and 1 that make |P (r - sum_t a_t b_t)| least, r the mis
 about 1 where something does. All that is wrong shows at once, as far as it is small.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -17,7 +20,7 @@ from scipy.optimize import lsq_linear
 from ..boundaries.fit import System, WholeEntries
 from ..boundaries.shape import ShapePrior
 from ..errors import SolverError
-from ..planar.cotangent import cotangent
+from ..planar.cotangent import halves
 from .guess import corners_of
 
 
@@ -28,31 +31,35 @@ def exchanges(problem: WholeEntries, z: NDArray[np.complex128], scale: NDArray) 
     """
     piece, region, misfit = problem.piece, problem.region, problem.misfits(z, scale)
     triangle, other = _beside(problem)
-    corner = z[piece.triangles[triangle]]
-    half = cotangent(np.roll(corner, -1, axis=1) - corner, np.roll(corner, 1, axis=1) - corner) / 2
+    half = halves(piece, z)[triangle]
     sides = piece.opposite[triangle]
     column = half * (scale[other] - scale[region[triangle]])[:, None] / problem.unit(scale)[sides]
     score = np.nan_to_num((column * misfit[sides]).sum(axis=1) / np.sqrt((column**2).sum(axis=1)), nan=-np.inf)
+    hot = np.abs(misfit[sides]).max(axis=1)
 
     @cache
-    def shares(only: bool) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        order = np.argsort(-score)[:300]
+    def shares(only: bool) -> tuple[NDArray[np.int64], _Shares]:
+        order = np.argsort(-(score if only else hot))[:300]
         order = order[score[order] > 0] if only else order
-        return order, _shares(problem, z, scale, misfit, column[order], sides[order])
+        return order, _Shares.of(problem, z, scale, misfit, column[order], sides[order])
+
+    def exchanged(which: NDArray[np.int64]) -> NDArray[np.int64]:
+        new = region.copy()
+        new[triangle[which]] = other[which]
+        return new
 
     # above which number triangles change, and whether only those are candidates that entries speak for by themselves
     for least, only in ((0.5, True), (0.5, False), (0.25, True), (0.9, True)):
-        order, share = shares(only)
-        taken = order[share > least]
-        if len(taken):
-            new = region.copy()
-            new[triangle[taken]] = other[taken]
-            yield new
-    # next to the largest misfits one alone: on the boundary positions take up nearly all of a change to first order
-    for one in np.argsort(-np.abs(misfit[sides]).max(axis=1))[:8].tolist():
-        new = region.copy()
-        new[triangle[one]] = other[one]
-        yield new
+        order, found = shares(only)
+        if (found.between > least).any():
+            yield exchanged(order[found.between > least])
+    # One alone, of those next to the largest misfits: the likeliest by direction, and by what all of it would take off;
+    # then the nearest, since on the boundary positions take up nearly all of a change to first order.
+    order, found = shares(False)
+    direction = found.along / np.sqrt(np.maximum(found.square, np.finfo(float).tiny))
+    for rank in (direction, 2 * found.along - found.square, hot[order]):
+        for one in order[np.argsort(-rank, kind="stable")[:6]]:
+            yield exchanged(one)
 
 
 def _beside(problem: WholeEntries) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -65,33 +72,44 @@ def _beside(problem: WholeEntries) -> tuple[NDArray[np.int64], NDArray[np.int64]
     return triangle[change], other[change]
 
 
-def _shares(
-    problem: WholeEntries, z: NDArray, scale: NDArray, misfit: NDArray, column: NDArray, sides: NDArray
-) -> NDArray[np.float64]:
-    """(k,) numbers between 0 and 1 of columns with entries (k, 3) at sides (k, 3)."""
-    count = len(column)
-    if not count:
-        return np.zeros(0)
-    whole = np.ones(len(misfit), dtype=bool)
-    added = sp.csr_array((column.ravel(), sides.ravel(), np.arange(0, 3 * count + 1, 3)), shape=(count, len(misfit)))
-    system = System(problem, z, scale, whole, ShapePrior.of(problem.piece, ~whole), 0.0, misfit, np.zeros(0))
-    matrix = system.damped(1e-10)
-    try:
-        factor = problem.analysed(matrix)
-        factor.factorise(matrix)
-    except SolverError:
-        problem.release()
-        return np.zeros(count)
-    pulled = sp.csr_array((system.jacobian_transposed @ added.T).T)
-    response = factor.solve(system.slope)
-    along = added @ problem.slopes(z, scale) - pulled @ response
-    gram = (added @ added.T).toarray()
-    for first in range(0, count, 32):
-        some = slice(first, first + 32)
-        gram[:, some] -= pulled @ factor.solve(np.ascontiguousarray(pulled[some].T.toarray()))
-    gram -= along @ np.linalg.lstsq(system.size - system.slope.T @ response, along.T, rcond=None)[0]
-    if not np.isfinite(gram).all():
-        return np.zeros(count)
-    value, vector = np.linalg.eigh((gram + gram.T) / 2)
-    root = np.sqrt(np.maximum(value, 1e-8 * value.max()))
-    return np.asarray(lsq_linear((vector * root).T, (vector / root).T @ (added @ misfit), bounds=(0, 1)).x)
+@dataclass(frozen=True, eq=False)
+class _Shares:
+    """What columns say of a misfit once displacements and factors have taken up what they can."""
+
+    between: NDArray[np.float64]  # (k,) numbers between 0 and 1 of all columns together
+    along: NDArray[np.float64]  # (k,) products of what is left of each column with the misfit
+    square: NDArray[np.float64]  # (k,) and with itself
+
+    @classmethod
+    def of(
+        cls, problem: WholeEntries, z: NDArray, scale: NDArray, misfit: NDArray, column: NDArray, sides: NDArray
+    ) -> _Shares:
+        """Of columns with entries (k, 3) at sides (k, 3)."""
+        count = len(column)
+        none = cls(np.zeros(count), np.zeros(count), np.zeros(count))
+        if not count:
+            return none
+        whole = np.ones(len(misfit), dtype=bool)
+        added = sp.csr_array((column.ravel(), sides.ravel(), np.arange(0, 3 * count + 1, 3)), (count, len(misfit)))
+        system = System(problem, z, scale, whole, ShapePrior.of(problem.piece, ~whole), 0.0, misfit, np.zeros(0))
+        matrix = system.damped(1e-10)
+        try:
+            factor = problem.analysed(matrix)
+            factor.factorise(matrix)
+        except SolverError:
+            problem.release()
+            return none
+        pulled = sp.csr_array((system.jacobian_transposed @ added.T).T)
+        response = factor.solve(system.slope)
+        along = added @ problem.slopes(z, scale) - pulled @ response
+        gram = (added @ added.T).toarray()
+        for first in range(0, count, 32):
+            some = slice(first, first + 32)
+            gram[:, some] -= pulled @ factor.solve(np.ascontiguousarray(pulled[some].T.toarray()))
+        gram -= along @ np.linalg.lstsq(system.size - system.slope.T @ response, along.T, rcond=None)[0]
+        if not np.isfinite(gram).all():
+            return none
+        value, vector = np.linalg.eigh((gram + gram.T) / 2)
+        root, right = np.sqrt(np.maximum(value, 1e-8 * value.max())), added @ misfit
+        between = lsq_linear((vector * root).T, (vector / root).T @ right, bounds=(0, 1)).x
+        return cls(between, right, gram.diagonal())

@@ -1,13 +1,16 @@
 """Meshes whose coefficient is constant on regions, from entries to result."""
 
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass
+from heapq import heappop, heappush
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..boundaries.fit import EXACT, Fit, FitOptions, WholeEntries
 from ..boundaries.judge import determined
+from ..budget import SAMPLE
 from ..certify import certify
 from ..clock import Clock
 from ..errors import GeometryError, SolverError
@@ -127,38 +130,48 @@ def _uniform(piece: Piece, weights: NDArray) -> bool:
     return bool(np.sqrt(np.mean(misfit**2)) < 1e-3)  # entries may have errors
 
 
-def _fitted(piece: Piece, weights: NDArray, region: NDArray, scale: NDArray) -> _Regions | None:
-    """All entries of a piece fitted, triangles exchanged where they do not fit; None where that comes to no end."""
+def _fitted(piece: Piece, weights: NDArray, region: NDArray[np.int64], scale: NDArray) -> _Regions | None:
+    """All entries of a piece fitted, triangles exchanged where they do not fit; None where that comes to no end.
+
+    With several triangles wrong, one that is put right may well leave more of a misfit than before: the least misfit of
+    all so far is where exchanges go on from, until it has none left, and in small pieces the next one after it.
+    """
     unit = float(np.median(scale))
     weights = weights / unit
     whole = np.ones(len(weights), dtype=bool)
     problem = WholeEntries(piece, weights, ~whole, region=region)
 
     def fit(region: NDArray, z: NDArray, scale: NDArray, options: FitOptions) -> Fit:
-        kept, problem.region = problem.region, region
-        found = problem.fit(z, scale, whole, 0.0, options)
-        problem.region = kept
-        return found
+        problem.region = region
+        return problem.fit(z, scale, whole, 0.0, options)
 
     try:
         best = fit(region, *started(piece, weights, region, scale / unit), _FIRST)
-        for _ in range(30):
-            _log.debug("%d regions: misfit %.1e", len(scale), best.misfit)
-            if best.misfit <= EXACT:
-                break
-            for other in exchanges(problem, best.z, best.scale):
-                found = fit(other, best.z, best.scale, _NEXT)
-                if found.misfit > EXACT:  # from where wrong regions have bent the mesh, or from a start of its own
-                    anew = fit(other, *started(piece, weights, other, best.scale), _FIRST)
-                    found = anew if anew.misfit < found.misfit else found
-                if found.misfit < 0.98 * best.misfit:
-                    problem.region, best = other, found
+        seen, failed = {region.tobytes()}, 0
+        reached: list[tuple[float, int, NDArray[np.int64], Fit, Iterator[NDArray[np.int64]]]] = [
+            (best.misfit, 0, region, best, exchanges(problem, best.z, best.scale))
+        ]
+        while best.misfit > EXACT and reached and failed < 40:
+            _, _, problem.region, here, others = reached[0]
+            other = next(others, None)
+            if other is None:
+                if piece.n_vertices > SAMPLE:
                     break
-            else:
-                break
+                heappop(reached)
+            elif other.tobytes() not in seen:
+                found = fit(other, here.z, here.scale, _NEXT)
+                if found.misfit > EXACT:  # from where wrong regions have bent the mesh, or from a start of its own
+                    anew = fit(other, *started(piece, weights, other, here.scale), _FIRST)
+                    found = anew if anew.misfit < found.misfit else found
+                failed = 0 if found.misfit < 0.98 * best.misfit else failed + 1
+                if found.misfit < best.misfit:
+                    best, region = found, other
+                    _log.debug("%d exchanges: misfit %.1e", len(seen), best.misfit)
+                heappush(reached, (found.misfit, len(seen), other, found, exchanges(problem, found.z, found.scale)))
+                seen.add(other.tobytes())
         if not best.misfit <= EXACT:
             return None
-        used, place = np.unique(problem.region, return_inverse=True)
+        used, place = np.unique(region, return_inverse=True)
         scale, same = _distinct(best.scale[used])
         problem.region = same[place.ravel()]
         known, _ = determined(problem, best.z, scale, whole)
