@@ -110,7 +110,8 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         status, reason = "uncertified", NOTHING_SHOWN
     if status == "certified" and _flat(placed, component):
         status, reason = "uncertified", Reason("the points lie in one line or plane, and no solid body does")
-    if status == "certified" and found.certified and _without_shear(found):
+    bulk, shear = np.abs(found.lame).T
+    if status == "certified" and (shear <= ALIKE * bulk).any():
         status, reason = "uncertified", Reason("elements have no shear stiffness, and any vectors that cancel are such")
     held = request.held(numbering.node_of_row, nodal.dim)
     points, factor, notes, (status, reason) = anchored(
@@ -166,12 +167,6 @@ def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
             return None
         told.append(read)
     return told[0] if np.ptp([poisson_ratio(one) for one in told]) < ALIKE else None
-
-
-def _without_shear(found: Cells) -> bool:
-    """Whether some cell has no shear modulus."""
-    bulk, shear = np.abs(found.lame).T
-    return bool((shear <= ALIKE * bulk).any())
 
 
 def _flat(points: NDArray[np.float64], component: NDArray[np.int64]) -> bool:

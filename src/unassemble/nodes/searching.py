@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..budget import LARGE, Budget
 from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST, NEARLY_ALL
-from .constants import adding_up, proven_directions, row_sizes, unaccounted, uncoupled_rows, with_penalty
+from .constants import adding_up, proven_directions, row_sizes, unaccounted, with_penalty
 from .directions import spread_directions, with_least_sums
 from .filling import filled, filled_by_direction
 from .grouping import by_direction, by_first_row, pattern_of, same_pattern, without_doubles
@@ -64,7 +64,7 @@ def directions_in_order(
 
 def live_part(matrix: sp.csr_array) -> tuple[NDArray[np.int64], sp.csr_array]:
     """(k,) rows that couple to others, and the matrix of these."""
-    live = np.flatnonzero(~uncoupled_rows(matrix))
+    live = np.flatnonzero(row_sizes(matrix))
     inner = sp.csr_array(matrix[live][:, live])
     inner.sort_indices()
     return live, inner

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..budget import SAMPLE
 from ..errors import GeometryError
 from ..nodes.anchoring import Request
-from ..nodes.constants import uncoupled_rows
+from ..nodes.constants import row_sizes
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix
 from ..nodes.numbering import Numbering
 from ..nodes.orders import ORDERS, regular
@@ -82,7 +82,7 @@ def truss_numbering(
     sizes = [d for d in ((3, 2) if block_size is None else (block_size,)) if order % d == 0 and order >= 2 * d]
     for d, name in product(sizes, ORDERS if kind is None else (kind,)):
         node, direction = regular(order, d, name)
-        numbering = Numbering(d, node, direction, uncoupled_rows(matrix), name, 0.0, 1.0)
+        numbering = Numbering(d, node, direction, row_sizes(matrix) == 0, name, 0.0, 1.0)
         if bars_of(nodal_matrix(matrix, numbering), allowed) is not None:
             return numbering
     return None
