@@ -21,8 +21,10 @@ from ..words import Reason
 from .doubts import about_assumptions, about_cells, about_nodes, guessed_directions, unborne, unconfirmed, with_doubts
 from .materials.cells import Cells, recognise_cells
 from .nullspace.certificate import residuals
+from .nullspace.checked import checked
 from .nullspace.identities import lame_ratio, poisson_ratio
-from .nullspace.placing import Solution, checked, without_springs
+from .nullspace.placing import Solution
+from .nullspace.springs import without_springs
 from .positions import solve
 from .verdict import (
     NOTHING_CHECKED,

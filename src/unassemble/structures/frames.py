@@ -15,12 +15,13 @@ from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SUMMED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
 from .answer import answer, covered
 from .certificate import forces, members_misfits
+from .contradicted import said_of
 from .members import members_and_cells, mispaired
 from .nodes import Nodes, nodes_of
 from .placed import Placed
 from .recognise import StructuralNumbering
 from .straight import Straight, straight_members
-from .turning import said_of, turning_positions
+from .turning import turning_positions
 
 
 def serve_structure(numbering: StructuralNumbering, request: Request) -> Structure:

@@ -36,7 +36,8 @@ from ...nodes.shape import in_gauge, set_aside
 from ...recovery import Evidence
 from ...tolerances import ALIKE, CERTIFIED, SINGULAR
 from ..materials.cells import coupled
-from ..materials.entries import Entries, Model, Pairs
+from ..materials.entries import Entries, Pairs
+from ..materials.model import Model
 from ..nullspace.atlas import null_fields
 from ..nullspace.placing import Solution, pieces_of
 
