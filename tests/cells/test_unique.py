@@ -65,13 +65,6 @@ def test_a_vertex_with_two_places(turn):
     assert (found.uniqueness == "ambiguous") == (turn == 0)
 
 
-@pytest.mark.parametrize("seed", [22, 455])
-def test_a_place_on_a_side_makes_no_other_mesh(seed):
-    """A hole without area between cells that do not match is none."""
-    known, _ = member("integer", seed)
-    assert recover(known.matrix).status in ("certified", "uncertified")
-
-
 def test_right_angle_on_a_mesh_with_vertices_inside():
     """What surplus of entries there is tells on which side a lone edge is joined to the rest."""
     points, triangles = random_mesh(40, seed=1)

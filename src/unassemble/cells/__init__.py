@@ -4,14 +4,13 @@ Where entries vanish the graph alone does not tell: see the page on theory in th
 """
 
 from .completion import completed, guessed
-from .doubt import Attempt, Outcome, in_doubt
+from .doubt import Outcome, in_doubt
 from .undivided import undivided
 from .unique.alternatives import SEARCHED_ROWS, Alternative, alternatives
 
 __all__ = [
     "SEARCHED_ROWS",
     "Alternative",
-    "Attempt",
     "Outcome",
     "alternatives",
     "completed",

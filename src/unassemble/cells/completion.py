@@ -1,6 +1,6 @@
 """Components whose triangles do not explain the matrix: cells looked for, vanished entries put back."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache
 
@@ -13,7 +13,7 @@ from ..matrix import OperatorMatrix
 from ..planar.piece import PieceMesh
 from ..tolerances import LITTLE
 from ..topology import Numbering, Piece, Polygons, Topology, components, located, require_planar
-from ..topology.keys import Grouped, contains, distinct, pair_keys
+from ..topology.keys import contains, distinct, pair_keys
 from .doubt import Attempt, Outcome, Solved, misfits_of, unexplained
 from .judge.labelling import Labelling, add_differing_factors
 from .search.options import SEARCH
@@ -50,7 +50,12 @@ def completed(
     kept = [(piece, attempt(piece)) for piece in topology.pieces if not doubtful[piece.vertices[0]]]
     parts = [_Part(kept)]
     failures: list[RecoveryError] = []
-    components_with_pieces = _with_pieces(matrix.n, matrix.edges, topology.pieces)
+    label, found = np.full(matrix.n, -1), components(matrix.n, matrix.edges)
+    for k, part in enumerate(found):
+        label[part.vertices] = k
+    own: list[list[Piece]] = [[] for _ in found]
+    for piece in topology.pieces:
+        own[label[piece.vertices[0]]].append(piece)
 
     @cache
     def misfit_of_triangles() -> NDArray[np.float64]:
@@ -58,30 +63,16 @@ def completed(
 
     by_graph_alone = matrix.unweighted and scale is None
     budget = Budget(0 if by_graph_alone else SEARCH.worth(matrix.n))
-    for part, own in components_with_pieces:
+    for part, pieces in zip(found, own, strict=True):
         if not doubtful[part.vertices[0]]:
             continue
         try:
-            parts.append(_labelled(matrix, part, own, attempt, misfit_of_triangles, scale, budget))
+            parts.append(_labelled(matrix, part, pieces, attempt, misfit_of_triangles, scale, budget))
         except RecoveryError as error:
-            failures.append(located(error, part, named=len(components_with_pieces) > 1))
+            failures.append(located(error, part, named=len(found) > 1))
     if not any(part.pieces for part in parts):
         raise failures[0]
     return _merged(matrix, topology, parts, tuple(map(str, failures)))
-
-
-def _with_pieces(n: int, edges: NDArray[np.int64], pieces: Sequence[Piece]) -> list[tuple[Numbering, list[Piece]]]:
-    """Each component, the largest first, and its pieces in their order; in linear time.
-
-    `edges` (e, 2): pairs i < j in lexicographic order; `pieces`: none of which belongs to two components.
-    """
-    parts = components(n, edges)
-    label = np.full(n, -1)
-    for k, part in enumerate(parts):
-        label[part.vertices] = k
-    own = Grouped(label[np.array([piece.vertices[0] for piece in pieces], dtype=np.int64)], len(parts))
-    bounds, order = own.start.tolist(), own.order.tolist()
-    return [(part, [pieces[j] for j in order[bounds[k] : bounds[k + 1]]]) for k, part in enumerate(parts)]
 
 
 def guessed(matrix: OperatorMatrix, topology: Topology) -> tuple[OperatorMatrix, Topology]:

@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 
 from ..elements.reference import planar_rules
 from ..errors import GeometryError, SolverError
-from ..planar.conformal import ConformalOptions, smooth_start
+from ..planar.conformal import ConformalOptions, conformal_map
 from ..planar.deviations import covariances
 from ..planar.normal import distant_pair
-from ..planar.pencil import ConformalPencil, ShiftedSearch
 from ..planar.polish import errors_of_one_size, polish
 from ..scalar.solving import Task
-from ..tolerances import AGREED, CERTIFIED, LAST_DIGITS, LITTLE, ROUNDED, SUMMED
+from ..tolerances import AGREED, CERTIFIED, LAST_DIGITS, LITTLE, ROUNDED
 from ..topology.keys import distinct
 from .assembly import Entries
 from .parts import Part
@@ -191,29 +190,11 @@ def _corner_positions(part: Part, weights: NDArray, scale: float | None) -> tupl
     unit = float(np.sign(weights.sum()) * np.median(np.abs(weights[weights != 0]))) if weights.any() else 0.0
     if not unit:
         raise GeometryError("the off-diagonal entries add up to zero, those of a Laplacian cannot")
-    relative = weights / unit
-    sums = np.bincount(edges.ravel(), np.repeat(relative, 2), part.n_corners)
-    if not (np.isfinite(relative).all() and (sums > SUMMED).all()):
-        row = int(part.piece.vertices[np.argmin(sums)])
-        raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
-    piece, options = part.piece, ConformalOptions()
-    pencil = ConformalPencil(part.n_corners, edges, piece.boundary, relative)
-    search = ShiftedSearch(pencil, options.krylov_steps)
-    start = smooth_start(part.n_corners, piece.boundary, piece.loop_offsets)
-    if scale is not None:
-        z, c, _ = search.at(scale / unit * (1 - options.margin), start, steps=2)
-        return search.corrected(z, c), scale
     # Half the energy alone is definite, and from there the cluster of holomorphic maps is seen as one.
-    z, c, spread = search.at(0.0, start)
-    whole = 1 / unit  # c = 1 is common
-    while search.factorisations < options.max_factorisations:
-        distance = min(max(4 * spread, options.margin), 0.3)
-        likely = abs(c / whole - 1) <= distance
-        z, c, spread = search.at(whole * (1 - options.margin) if likely else c * (1 - distance), z)
-        whole = np.inf
-        if (distance <= 1e-9 or likely) and spread < 1e-12:
-            break
-    return search.corrected(z, c), float(c * unit)
+    options = ConformalOptions(first_shift=0.0)
+    corners = replace(part.piece, vertices=part.piece.vertices[: part.n_corners], edges=edges)
+    found = conformal_map(corners, weights, scale=scale, unit=unit, options=options)
+    return found.z, found.scale
 
 
 def deviations_of(n: int, fits: Sequence[Fitted], placed: Sequence[NDArray], task: Task) -> NDArray[np.float64]:
@@ -225,22 +206,18 @@ def deviations_of(n: int, fits: Sequence[Fitted], placed: Sequence[NDArray], tas
     tensor = task.placement.tensor
     for fit, z in list(zip(fits, placed, strict=True))[::-1]:
         z = np.asarray(tensor.to_laplacian(z)) if tensor else z
-        a, b, c = z[fit.part.piece.triangles].T
-        mirrored = (np.conj(b - a) * (c - a)).imag.sum() < 0
-        z = np.conj(z) if mirrored else z
         parameters = z[: fit.entries.n]
-        stretch = (tensor.root if tensor else np.eye(2)) @ np.diag([1, -1 if mirrored else 1])
         sigma = float(np.sqrt(np.mean(fit.spread**2)))
+        spread = fit.spread / sigma
         if task.noise is None:
             sigma *= float(np.linalg.norm(fit.misfit / fit.spread)) / np.sqrt(max(fit.freedom, 1))
-        spread = fit.spread / np.sqrt(np.mean(fit.spread**2))
         covariance = covariances(
             fit.entries.jacobian(parameters, spread),
             fit.entries.weights(parameters) / spread,
             z,
             distant_pair(parameters),
             free_scale=task.scale is None,
-            stretch=stretch,
+            stretch=tensor.root if tensor else None,
             nodes=fit.entries.nodes,
         )
         result[fit.part.piece.vertices] = sigma / abs(fit.scale) * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))

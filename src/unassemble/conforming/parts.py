@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..elements.kinds import Kind
 from ..errors import TopologyError
 from ..topology import Piece
-from ..topology.keys import distinct, numbered, with_sides
+from ..topology.keys import distinct, pair_keys, with_sides
 from ..topology.pieces import planar_pieces
 from .roles import Cells
 from .sets import pairs_of
@@ -127,26 +127,17 @@ def _part(order: NDArray[np.int64], piece: Piece, blocks: Blocks) -> Part:
     number[rest] = len(corners) + np.arange(len(rest))
     local = {kind: number[cells] for kind, cells in blocks.items()}
     count = len(corners) + len(rest)
-    pairs = {kind: pairs_of(count, cells) for kind, cells in local.items()}
-    keys, place = numbered(np.concatenate([some.ravel() for some in pairs.values()]))
-    ends = np.cumsum([some.size for some in pairs.values()])[:-1]
-    places = dict(zip(pairs, np.split(place, ends), strict=True))
-    around = [
-        np.sort(np.stack([cells[:, : kind.corners], np.roll(cells[:, : kind.corners], -1, axis=1)], axis=-1), axis=-1)
-        for kind, cells in local.items()
-    ]
-    sides = distinct(np.concatenate([some.reshape(-1, 2) for some in around]) @ [count, 1])
-    whole = replace(
-        piece,
-        vertices=order[np.concatenate([corners, rest])],
-        edges=np.column_stack([sides // count, sides % count]),
-    )
-    edges = np.column_stack([keys // count, keys % count])
+    pairs = [pairs_of(count, cells) for cells in local.values()]
+    keys, place = np.unique(np.concatenate([some.ravel() for some in pairs]), return_inverse=True)
+    places = np.split(place, np.cumsum([some.size for some in pairs])[:-1])
+    rings = [cells[:, : kind.corners] for kind, cells in local.items()]
+    sides = distinct(np.concatenate([pair_keys(count, ring, np.roll(ring, -1, axis=1)).ravel() for ring in rings]))
+    vertices = order[np.concatenate([corners, rest])]
     return Part(
-        whole,
+        replace(piece, vertices=vertices, edges=np.column_stack([sides // count, sides % count])),
         len(corners),
         piece.n_holes,
         local,
-        edges,
-        {kind: places[kind].reshape(some.shape) for kind, some in pairs.items()},
+        np.column_stack([keys // count, keys % count]),
+        {kind: rows.reshape(some.shape) for kind, rows, some in zip(local, places, pairs, strict=True)},
     )

@@ -105,14 +105,12 @@ def shown_cells(stored: OperatorMatrix, *, mass: bool = False) -> Iterator[Cells
 def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -> ConformingMesh:
     with clock("cells"):
         parts = parts_of(cells)
-    placement, topology = (
-        task.placement,
-        Topology(stored.n, stored.edges, tuple(part.piece for part in parts), "cliques"),
-    )
+    topology = Topology(stored.n, stored.edges, tuple(part.piece for part in parts), "cliques")
     with clock("positions"):
         fits = [_fit(stored, part, task) for part in parts]
     with clock("place"):
-        placed, origins, notes = placement.placed(topology, [fit.nodes for fit in fits], [fit.notes for fit in fits])
+        nodes, remarks = [fit.nodes for fit in fits], [fit.notes for fit in fits]
+        placed, origins, notes = task.placement.placed(topology, nodes, remarks)
         mesh = _Joined(parts, placed, stored.n)
         shift = origins[mesh.component]
         points = mesh.points + np.column_stack([shift.real, shift.imag])
@@ -136,7 +134,7 @@ def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -
         status=status,
         uniqueness=uniqueness,
         reason=reason,
-        operator=placement.operator,
+        operator=task.placement.operator,
         n_holes=sum(part.n_holes for part in parts),
         timings=clock.timings,
         warnings=(*stored.warnings, *notes),
@@ -165,8 +163,7 @@ class _Joined:
         self.points = np.full((n, 2), np.nan)
         self.component = np.full(n, -1, dtype=np.int64)
         self.blocks: dict[str, NDArray[np.int64]] = {}
-        pieces: dict[str, list[NDArray]] = {}
-        blocks: dict[str, list[NDArray]] = {}
+        self.piece: dict[str, NDArray[np.int64]] = {}  # of each cell
         for label in range(len(parts))[::-1]:  # the first part at a hinge comes last
             part, z = parts[label], placed[label]
             self.points[part.piece.vertices] = np.column_stack([z.real, z.imag])
@@ -175,10 +172,9 @@ class _Joined:
             mirrored = (np.conj(b - a) * (c - a)).imag.sum() < 0
             for kind, cells in part.blocks.items():
                 own = part.piece.vertices[cells[:, reversal(kind)] if mirrored else cells]
-                blocks.setdefault(kind.name, []).insert(0, own)
-                pieces.setdefault(kind.name, []).insert(0, np.full(len(own), label))
-        self.blocks = {name: np.concatenate(some) for name, some in blocks.items()}
-        self.piece = {name: np.concatenate(some) for name, some in pieces.items()}
+                piece, name = np.full(len(own), label), kind.name
+                self.blocks[name] = np.concatenate([own, self.blocks.get(name, own[:0])])
+                self.piece[name] = np.concatenate([piece, self.piece.get(name, piece[:0])])
 
     def fields(self) -> dict[str, Any]:
         """Cells and boundary under the names that results have."""

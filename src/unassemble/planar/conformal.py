@@ -37,9 +37,6 @@ class ConformalOptions:
     krylov_steps: int = 8  # most solves with one factorisation
     max_factorisations: int = 8  # factorisations before giving up
     first_shift: float = 0.7  # relative to the estimate of c; any value well inside (0, 1) will do
-    # where triangles agree it is nearer: at least so many times their scatter, and so much, below the estimate
-    scatters: float = 3.0
-    nearest: float = 0.03
     # distance of the last shift below c, relative. Nearer, M would be singular to working accuracy.
     margin: float = 1e-11
 
@@ -64,19 +61,11 @@ def estimate_scale(piece: Piece, weights: NDArray) -> float:
 
     Raises GeometryError if the weights add up to zero.
     """
-    return _estimate(piece, weights).scale
+    return _estimate(piece, weights)[0]
 
 
-@dataclass(frozen=True)
-class _Estimate:
-    """What triangles say of c."""
-
-    scale: float  # their median
-    scatter: float  # the range, relative, of the middle four fifths of them
-    likely: float | None  # what is probably right to all digits: what many of them say, as on grids, or 1
-
-
-def _estimate(piece: Piece, weights: NDArray) -> _Estimate:
+def _estimate(piece: Piece, weights: NDArray) -> tuple[float, float | None]:
+    """A guess of c, and what is probably right to all digits: what many triangles say, as on grids, or 1."""
     sign = np.sign(weights.sum())
     if not sign:
         raise GeometryError("the off-diagonal entries add up to zero, those of a Laplacian cannot")
@@ -84,15 +73,12 @@ def _estimate(piece: Piece, weights: NDArray) -> _Estimate:
     a, b, c = (weights / largest / np.where(piece.inner, 2, 1))[piece.opposite].T
     form = a * b + b * c + c * a
     sizes = 2 * np.sqrt(form[form > 0])  # of triangles of which the three shares belong to a triangle at all
-    if not len(sizes):
-        size, scatter, common = float(np.sqrt(3) * np.abs(weights / largest).mean()), np.inf, None
-    else:
-        size, common = float(np.median(sizes)), _common(sizes)
-        scatter = float(np.ptp(np.quantile(sizes, (0.1, 0.9)))) / size
+    common = _common(sizes) if len(sizes) else None
+    size = float(np.median(sizes)) if len(sizes) else float(np.sqrt(3) * np.abs(weights / largest).mean())
     unit = float(sign * size * largest)
     if common is not None:
-        return _Estimate(unit, scatter, float(sign * common * largest))
-    return _Estimate(unit, scatter, 1.0 if abs(1 / unit - 1) < 0.3 else None)
+        return unit, float(sign * common * largest)
+    return unit, 1.0 if abs(1 / unit - 1) < 0.3 else None
 
 
 def _common(values: NDArray[np.float64]) -> float | None:
@@ -115,20 +101,21 @@ def conformal_map(
     weights: NDArray,
     *,
     scale: float | None = None,
+    unit: float | None = None,
     sharp: bool = True,
     options: ConformalOptions | None = None,
 ) -> ConformalMap:
     """Positions and scale of one piece.
 
     `weights` (e,): -A_ij = c w_ij of each edge; `scale`: c, where it is known. Otherwise a value in which most
-    triangles agree, or more of them than in any other, is tried first, or c = 1 if their median allows it. `sharp`: go
-    on until z, not only c, has converged, which a polish does not need.
+    triangles agree, or more of them than in any other, is tried first, or c = 1 if their median allows it. `unit`: a
+    guess of c, where weights are not those of the piece's triangles; c = 1 is then tried once that is near. `sharp`:
+    go on until z, not only c, has converged, which a polish does not need.
 
     Raises GeometryError if no map of positive area is found.
     """
     options = options or ConformalOptions()
-    estimate = _estimate(piece, weights)
-    unit = estimate.scale
+    unit, likely = _estimate(piece, weights) if unit is None else (unit, None)
     with np.errstate(over="ignore"):
         relative = weights / unit if unit else np.full_like(weights, np.inf)
     if not np.abs(relative).max() < 1 / ROUNDED or (scale is not None and not ALIKE < abs(scale / unit) < 1 / ALIKE):
@@ -144,28 +131,25 @@ def conformal_map(
     pencil = ConformalPencil(piece.n_vertices, piece.edges, piece.boundary, relative)
     search = ShiftedSearch(pencil, options.krylov_steps)
     z = start = smooth_start(piece.n_vertices, piece.boundary, piece.loop_offsets)
-    known = scale if scale is not None else estimate.likely
+    known = scale if scale is not None else likely
+    spread, whole = None, 1 / unit  # c = 1 is common
     if known is not None:
         z, c, _ = search.at(known / unit * (1 - options.margin), z, steps=2)
         # The quotient is stationary, and accurate to some hundred roundings at any size.
         if scale is not None or abs(c * unit / known - 1) < 1e-13:
             z = search.corrected(z, c)
             return ConformalMap(z, known, search.factorisations, search.solves, True)
-        spread = 1e-2 if c * unit / known > 1 else None  # beyond c the quotients tell nothing
-    else:
-        spread = None
+        spread, whole = 1e-2 if c * unit / known > 1 else None, np.inf  # beyond c the quotients tell nothing
     if spread is None:
-        first = max(1 - max(options.scatters * estimate.scatter, options.nearest), options.first_shift)
-        z, c, spread = search.at(first, start)
-        if c < first > options.first_shift:  # not all triangles are wrong in the same sense, but many may be
-            z, c, spread = search.at(options.first_shift, start)
+        z, c, spread = search.at(options.first_shift, start)
         if c < ALIKE:
             raise GeometryError("some maps of positive area have no energy: the entries belong to no planar mesh")
     converged = near = False
     while search.factorisations < options.max_factorisations:
         distance = min(max(4 * spread, options.margin), 0.3)
-        z, c, spread = search.at(c * (1 - distance), z)
-        near = distance <= 1e-9
+        one = abs(c / whole - 1) <= distance
+        z, c, spread = search.at(whole * (1 - options.margin) if one else c * (1 - distance), z)
+        near, whole = one or distance <= 1e-9, np.inf if one else whole
         converged = (near or (distance <= 1e-5 and not sharp)) and spread < 1e-12
         if converged:
             break

@@ -52,20 +52,12 @@ def left_by_all(
 
     `weights` (edges of the whole graph,): -A_ij of each; `positions` sequence of (n,); `scales` (pieces,).
     """
-    c = np.repeat(scales, [len(piece.edge_rows) for piece in pieces])
-    with np.errstate(all="ignore"):
-        fitted = c * weights_of_all(pieces, positions)
-        return np.asarray(weights[np.concatenate([piece.edge_rows for piece in pieces])] - fitted)
-
-
-def weights_of_all(pieces: Sequence[Piece], positions: Sequence[NDArray]) -> NDArray[np.float64]:
-    """The weights of several pieces, each at its positions, one after the other."""
-    if len(pieces) == 1:
-        return edge_weights(pieces[0], positions[0])
     union = Together(pieces)
     corners = np.concatenate(positions)[union.triangles]
     cotangents = cotangent(np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners)
-    return np.bincount(union.opposite.ravel(), cotangents.ravel(), len(union.edge_rows)) / 2
+    w = np.bincount(union.opposite.ravel(), cotangents.ravel(), len(union.edge_rows)) / 2
+    with np.errstate(all="ignore"):
+        return np.asarray(weights[union.edge_rows] - np.repeat(scales, [len(piece.edges) for piece in pieces]) * w)
 
 
 def weight_roundings(piece: Piece, z: NDArray) -> NDArray[np.float64]:

@@ -37,11 +37,10 @@ def piece_notes(remarks: Sequence[Sequence[str]]) -> list[str]:
             pieces.setdefault(remark, []).append(label)
     if len(remarks) == 1:
         return list(pieces)
-    return [f"{_pieces(labels)}: {remark}" for remark, labels in pieces.items()]
-
-
-def _pieces(labels: list[int]) -> str:
-    return f"piece {labels[0]}" if len(labels) == 1 else f"{len(labels):,} pieces ({_some(np.array(labels))})"
+    return [
+        (f"piece {own[0]}" if len(own) == 1 else f"{len(own):,} pieces ({_some(np.array(own))})") + f": {remark}"
+        for remark, own in pieces.items()
+    ]
 
 
 def vanished_notes(topology: Topology) -> list[str]:

@@ -1,6 +1,6 @@
 """The short cycles of a sparse graph: 3-cycles, those with something on both sides, 4-cycles without chords."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,7 +25,6 @@ def three_cycles(n: int, edges: NDArray) -> tuple[NDArray, NDArray]:
     Returns `triangles` (m, 3): vertices, in no particular orientation; `opposite` (m, 3): the row of `edges` that faces
     each corner.
     """
-    e = len(edges)
     degree = np.bincount(edges.ravel(), minlength=n)
     swap = degree[edges[:, 0]] > degree[edges[:, 1]]
     tail = np.where(swap, edges[:, 1], edges[:, 0])
@@ -33,25 +32,25 @@ def three_cycles(n: int, edges: NDArray) -> tuple[NDArray, NDArray]:
     tail = tail[order]
     head = np.where(swap, edges[:, 0], edges[:, 1])[order]
     edge_id = lookup(n, edges)
-    found: list[tuple[NDArray, NDArray, NDArray]] = []
-    first = np.arange(e)
-    step = 1
-    while True:
-        first = first[first + step < e]
-        first = first[tail[first] == tail[first + step]]
-        if not len(first):
-            break
-        second = first + step
+    found = [np.empty((3, 0), np.int64)]
+    for first, second in pairs_in_runs(tail):
         closing = edge_id(head[first], head[second])
-        hit = closing >= 0
-        found.append((first[hit], second[hit], closing[hit]))
+        found.append(np.stack([first, second, closing])[:, closing >= 0])
+    first, second, closing = np.concatenate(found, axis=1)
+    triangles = np.column_stack([tail[first], head[first], head[second]])
+    return triangles, np.column_stack([closing, order[second], order[first]])
+
+
+def pairs_in_runs(label: NDArray) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """All pairs of places (k,) with equal labels among sorted ones, those next to each other first."""
+    first, step = np.arange(len(label)), 1
+    while True:
+        first = first[first + step < len(label)]
+        first = first[label[first] == label[first + step]]
+        if not len(first):
+            return
+        yield first, first + step
         step += 1
-    if not found:
-        return np.empty((0, 3), np.int64), np.empty((0, 3), np.int64)
-    first, second, closing = (np.concatenate(part) for part in zip(*found, strict=True))
-    triangles = np.column_stack([tail[first], head[first], head[second]]).astype(np.int64)
-    opposite = np.column_stack([closing, order[second], order[first]]).astype(np.int64)
-    return triangles, opposite
 
 
 def lookup(n: int, edges: NDArray) -> Callable[[NDArray, NDArray], NDArray]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from .cycles import chordless_four_cycles, not_faces, three_cycles
 from .faces import FaceComplex, around, from_cycles, from_rotation
 from .keys import distinct
-from .planarity import rotation_system
+from .planarity import rotation_system, too_many
 
 
 def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
@@ -20,7 +20,7 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
 
     `edges` (e, 2): pairs i < j in lexicographic order; at least one.
     """
-    if n >= 3 and len(edges) > 3 * n - 6:  # not planar, and may have very many cycles
+    if too_many(n, edges):  # and may have very many cycles
         return
     # 3-cycles and chordless 4-cycles, (m, 3) and (m, 4), that may all be faces: no edge lies on more than two of them.
     triangles, opposite = three_cycles(n, edges)
@@ -45,7 +45,7 @@ def face_complexes(n: int, edges: NDArray) -> Iterator[FaceComplex]:
 
 
 def _drawings(n: int, edges: NDArray, triangles: NDArray, quads: NDArray) -> Iterator[FaceComplex]:
-    surface = from_cycles(n, edges, [triangles, quads])
+    surface = from_cycles(n, edges, triangles, quads)
     if surface is not None:
         yield surface
     drawing = _with_faces(n, edges, [triangles, quads])

@@ -116,16 +116,15 @@ def from_rotation(n: int, edges: NDArray, tail: NDArray, head: NDArray) -> FaceC
     return FaceComplex(n, edges, successor)
 
 
-def from_cycles(n: int, edges: NDArray, cycles: list[NDArray]) -> FaceComplex | None:
+def from_cycles(n: int, edges: NDArray, triangles: NDArray, quads: NDArray) -> FaceComplex | None:
     """The complex whose faces are given cycles and the loops that bound the surface they make.
 
-    `edges` (e, 2); `cycles` list of (m_k, k): triangles, quadrilaterals, ..., in any orientation.
+    `edges` (e, 2); `triangles` (m, 3) and `quads` (k, 4): in any orientation.
 
     Trees that hang on the surface are blocks of their own. None if any other edge lies on no cycle, or one on
     more than two, or the surfaces do not lie on spheres.
     """
-    cycles = _oriented(n, edges, cycles)
-    sides = [around(n, edges, c) for c in cycles]
+    sides = [around(n, edges, cycles) for cycles in _oriented(n, edges, triangles, quads)]
     used = np.bincount(np.concatenate([s.ravel() for s in sides]), minlength=2 * len(edges))
     bare = np.flatnonzero(~used.reshape(-1, 2).any(axis=1))
     hanging = np.zeros(len(edges), dtype=bool)
@@ -160,30 +159,16 @@ def joined(n: int, edges: NDArray, a: NDArray, b: NDArray) -> NDArray[np.bool_]:
     return contains(edges[:, 0] * n + edges[:, 1], pair_keys(n, a, b))
 
 
-def _oriented(n: int, edges: NDArray, cycles: list[NDArray]) -> list[NDArray]:
+def _oriented(n: int, edges: NDArray, triangles: NDArray, quads: NDArray) -> tuple[NDArray, NDArray]:
     """Turn cycles so that neighbours run along common edges in opposite directions, as far as that is possible."""
-    if not sum(map(len, cycles)):
-        return cycles
-    # Fans of triangles, glued along edges of the graph and, within a cycle, along its diagonals.
-    triangles: list[NDArray] = []
-    opposite: list[NDArray] = []
-    first: list[NDArray] = []
-    n_edges, n_triangles = len(edges), 0
-    for c in cycles:
-        t = np.stack([np.broadcast_to(c[:, :1], c[:, 2:].shape), c[:, 1:-1], c[:, 2:]], axis=-1)
-        ends = np.stack([t[:, :, [1, 2]], t[:, :, [2, 0]], t[:, :, [0, 1]]], axis=2)
-        facing = half_edges(n, edges, ends[..., 0].ravel(), ends[..., 1].ravel()).reshape(t.shape) >> 1
-        diagonal = n_edges + np.arange(len(c) * (c.shape[1] - 3)).reshape(len(c), c.shape[1] - 3)
-        facing[:, :-1, 1] = diagonal
-        facing[:, 1:, 2] = diagonal
-        n_edges += diagonal.size
-        first.append(n_triangles + np.arange(len(c)) * (c.shape[1] - 2))
-        n_triangles += len(c) * (c.shape[1] - 2)
-        triangles.append(t.reshape(-1, 3))
-        opposite.append(facing.reshape(-1, 3))
-    gluing = glue(n_edges, np.concatenate(opposite))
-    flip, _, _ = orient(np.concatenate(triangles), gluing)
-    return [np.where(flip[rows][:, None], c[:, ::-1], c) for rows, c in zip(first, cycles, strict=True)]
+    m, k = len(triangles), len(quads)
+    halves = np.concatenate([triangles, quads[:, :3], quads[:, [0, 2, 3]]])
+    if not len(halves):
+        return triangles, quads
+    facing = np.roll(around(n, edges, halves) >> 1, -1, axis=1)
+    facing[m : m + k, 1] = facing[m + k :, 2] = len(edges) + np.arange(k)  # diagonals
+    flip = orient(halves, glue(len(edges) + k, facing))[0][: m + k, None]
+    return np.where(flip[:m], triangles[:, ::-1], triangles), np.where(flip[m:], quads[:, ::-1], quads)
 
 
 def _with_boundary(successor: NDArray) -> NDArray[np.int64]:

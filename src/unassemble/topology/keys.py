@@ -15,16 +15,6 @@ def distinct(values: NDArray) -> NDArray[np.int64]:
     return values[np.append(True, values[1:] != values[:-1])]
 
 
-def numbered(values: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Sorted, each value once; and (k,) the place there of each of the values (k,)."""
-    order = np.argsort(values)
-    values = values[order]
-    new = np.append(True, values[1:] != values[:-1])[: len(values)]
-    place = np.empty(len(values), np.int64)
-    place[order] = np.cumsum(new) - 1
-    return values[new], place
-
-
 def contains(values: NDArray, wanted: NDArray) -> NDArray[np.bool_]:
     """Whether each of `wanted` is among the sorted `values`."""
     return found(values, wanted)[1]

@@ -13,7 +13,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 from ..budget import SAMPLE
 from ..errors import TopologyError
 from ..words import count_of
-from .cycles import lookup, three_cycles
+from .cycles import lookup, pairs_in_runs, three_cycles
 from .numbering import connected
 
 # The program has a few 3-cycles for each neck, and solids of tetrahedra most of theirs.
@@ -152,16 +152,10 @@ def _crowded(cycles: Cycles, edge: int) -> TopologyError:
 
 def in_four_cliques(cycles: Cycles) -> NDArray[np.bool_]:
     """(e,) edges of complete graphs on four vertices, as all those of tetrahedra are, and of cells of four nodes."""
-    m = len(cycles.triangles)
     adjacent = lookup(cycles.n, cycles.edges)
     order = np.argsort(cycles.opposite.ravel(), kind="stable")
     edge, apex = cycles.opposite.ravel()[order], cycles.triangles.ravel()[order]
     found = np.zeros(len(cycles.edges), dtype=bool)
-    first = np.arange(3 * m)
-    for step in range(1, 3 * m):
-        first = first[first + step < 3 * m]
-        first = first[edge[first] == edge[first + step]]
-        if not len(first):
-            break
-        found[edge[first[adjacent(apex[first], apex[first + step]) >= 0]]] = True
+    for first, second in pairs_in_runs(edge):
+        found[edge[first[adjacent(apex[first], apex[second]) >= 0]]] = True
     return found

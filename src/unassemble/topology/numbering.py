@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from .keys import Grouped, runs
+from .keys import Grouped, first_rows, runs
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,21 +63,21 @@ def connected(n: int, one: NDArray, other: NDArray) -> tuple[int, NDArray[np.int
     return int(count), label.astype(np.int64)
 
 
-def breadth_first(graph: sp.csr_array) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Search each component of a symmetric pattern (n, n) from its lowest vertex.
+def breadth_first(graph: sp.csr_array, component: NDArray | None = None) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Search each component of a symmetric pattern (n, n), or of one of directed cycles, from its lowest vertex.
 
-    Returns `order` (n,): vertices in the order in which they are reached; `parent` (n,): -1 at the start of each
-    component.
+    `component` (n,): of each vertex, where it is known. Returns `order` (n,): vertices in the order in which they are
+    reached; `parent` (n,): -1 at the start of each component.
     """
     n = graph.shape[0]
     order, parent = csgraph.breadth_first_order(graph, 0, directed=True)
     if len(order) == n:
         return order, np.maximum(parent, -1)
     # One search from an extra node that is joined to every component, however many there are.
-    n_components, component = csgraph.connected_components(graph, directed=False)
-    first = np.full(n_components, n)
-    np.minimum.at(first, component, np.arange(n))
-    indptr = np.append(graph.indptr, graph.indptr[-1] + n_components)
+    if component is None:
+        component = csgraph.connected_components(graph, directed=False)[1]
+    first = first_rows(component, int(component.max()) + 1)
+    indptr = np.append(graph.indptr, graph.indptr[-1] + len(first))
     joined = sp.csr_array(
         (np.ones(indptr[-1], np.int8), np.append(graph.indices, first.astype(graph.indices.dtype)), indptr),
         shape=(n + 1, n + 1),

@@ -7,7 +7,6 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from .keys import first_rows
 from .numbering import breadth_first
 
 
@@ -65,7 +64,7 @@ def orient(triangles: NDArray, gluing: Gluing) -> tuple[NDArray, NDArray, NDArra
         (np.tile(np.where(clash, 2, 1).astype(np.int8), 2), (np.r_[one, two], np.r_[two, one])), shape=(m, m)
     )
     n_pieces, piece = csgraph.connected_components(dual, directed=False)
-    order, parent = breadth_first(dual)
+    order, parent = breadth_first(dual, piece)
     rows = np.arange(m)
     above = np.where(parent < 0, rows, parent)
     turned = np.asarray(dual[rows, above]).ravel() == 2
@@ -141,14 +140,6 @@ def loops(successor: NDArray) -> tuple[NDArray, NDArray]:
     if not b:
         return np.empty(0, np.int64), np.empty(0, np.int64)
     step = sp.csr_array((np.ones(b, np.int8), successor, np.arange(b + 1)), shape=(b, b))
-    n_loops, loop = csgraph.connected_components(step, directed=True, connection="weak")
-    start = first_rows(loop, n_loops)
-    # Breadth-first from an extra node that points at the first element of each cycle.
-    graph = sp.csr_array(
-        (np.ones(b + n_loops, np.int8), np.append(successor, start), np.append(np.arange(b + 1), b + n_loops)),
-        shape=(b + 1, b + 1),
-    )
-    reached, _ = csgraph.breadth_first_order(graph, b, directed=True)
-    reached = reached[1:]
-    order = reached[np.argsort(loop[reached], kind="stable")]
-    return loop.astype(np.int64), order.astype(np.int64)
+    loop = csgraph.connected_components(step, directed=False)[1]
+    reached, _ = breadth_first(step, loop)
+    return loop.astype(np.int64), reached[np.argsort(loop[reached], kind="stable")].astype(np.int64)

@@ -5,19 +5,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .keys import Grouped, distinct
-from .orientation import Gluing, boundary_corners, following, glue, loops, orient, reglue
+from .keys import Grouped, distinct, first_rows
+from .orientation import boundary_corners, following, glue, loops, orient, reglue
 from .surface import Piece
 
 
 @dataclass(frozen=True, eq=False)
 class _Surfaces:
-    """Oriented triangles with the edges that face their corners, how they are glued, and the piece of each."""
+    """Oriented triangles, how they are glued, and the piece of everything."""
 
     triangles: NDArray[np.int64]
     opposite: NDArray[np.int64]
-    gluing: Gluing
-    piece: NDArray[np.int64]
+    facing: NDArray[np.int64]
+    boundary: NDArray[np.int64]  # loop by loop
+    loop: NDArray[np.int64]  # of each boundary edge
+    at: NDArray[np.int64]  # piece n + vertex for all pairs that occur, increasing
+    of_triangles: NDArray[np.int64]
+    of_edges: NDArray[np.int64]  # -1 for edges of none
+    of_boundary: NDArray[np.int64]
 
 
 def planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray) -> tuple[Piece, ...] | None:
@@ -33,69 +38,59 @@ def planar_pieces(n: int, edges: NDArray, triangles: NDArray, opposite: NDArray)
     flip, piece, orientable = orient(triangles, gluing)
     if not orientable.all():
         return None
-    triangles = np.where(flip[:, None], triangles[:, [0, 2, 1]], triangles)
-    opposite = np.where(flip[:, None], opposite[:, [0, 2, 1]], opposite)
+    triangles, opposite = (np.where(flip[:, None], of[:, [0, 2, 1]], of) for of in (triangles, opposite))
     gluing = reglue(gluing, flip)
     corners = boundary_corners(gluing)
+    if not len(corners):
+        return None
     loop, order = loops(following(triangles, gluing, corners))
+    loop, corners = loop[order], corners[order]
+    boundary = np.column_stack([triangles.ravel()[corners - corners % 3 + (corners + turn) % 3] for turn in (1, 2)])
     if piece.any():  # keys of all pairs that occur; of one piece without sorting
         at = distinct(piece[:, None] * n + triangles)
     else:
         at = np.flatnonzero(np.bincount(triangles.ravel(), minlength=n))
-    glued = _Surfaces(triangles, opposite, gluing, piece)
-    if not _spheres_with_holes(n, glued, at, corners, loop):
-        return None
-    return _cut(n, edges, glued, at, corners[order], loop[order])
+    edge_piece = np.where(gluing.count > 0, piece[gluing.first // 3], -1)
+    whole = _Surfaces(triangles, opposite, gluing.faces, boundary, loop, at, piece, edge_piece, piece[corners // 3])
+    return _cut(n, edges, whole) if _spheres_with_holes(n, whole) else None
 
 
-def _spheres_with_holes(n: int, glued: _Surfaces, at: NDArray, corners: NDArray, loop: NDArray) -> bool:
+def _spheres_with_holes(n: int, whole: _Surfaces) -> bool:
     """Euler's formula for every piece, with a vertex counted once for each fan of triangles about it.
 
     A vertex with p boundary edges leaving it in a piece has p fans, one if p = 0. A second closed
     fan would be missed here, but counting it could only raise v - e + m, which is at most 2 - loops.
     """
-    triangles, gluing, piece = glued.triangles, glued.gluing, glued.piece
-    n_pieces = int(piece.max()) + 1
-    n_loops = np.zeros(n_pieces, dtype=np.int64)
-    n_edges = np.bincount(piece[gluing.first[gluing.count > 0] // 3], minlength=n_pieces)
-    n_triangles = np.bincount(piece, minlength=n_pieces)
-    n_vertices = np.bincount(at // n, minlength=n_pieces)
-    if len(corners):
-        _, one_of_each = np.unique(loop, return_index=True)
-        n_loops = np.bincount(piece[corners[one_of_each] // 3], minlength=n_pieces)
-        tails = triangles.ravel()[3 * (corners // 3) + (corners + 1) % 3]
-        fans = piece[corners // 3] * n + tails
-        n_vertices = n_vertices + np.bincount(fans // n, minlength=n_pieces)
-        n_vertices -= np.bincount(distinct(fans) // n, minlength=n_pieces)
-    return bool(((n_vertices - n_edges + n_triangles == 2 - n_loops) & (n_loops > 0)).all())
+
+    def count(piece: NDArray) -> NDArray[np.int64]:
+        return np.bincount(piece, minlength=int(whole.of_triangles.max()) + 1)
+
+    rim = whole.of_boundary
+    n_loops = count(rim[first_rows(whole.loop, int(whole.loop.max()) + 1)])
+    n_vertices = count(whole.at // n) + count(rim) - count(distinct(rim * n + whole.boundary[:, 0]) // n)
+    n_edges = count(whole.of_edges[whole.of_edges >= 0])
+    return bool(((n_vertices - n_edges + count(whole.of_triangles) == 2 - n_loops) & (n_loops > 0)).all())
 
 
-def _cut(n: int, edges: NDArray, glued: _Surfaces, at: NDArray, corners: NDArray, loop: NDArray) -> tuple[Piece, ...]:
+def _cut(n: int, edges: NDArray, whole: _Surfaces) -> tuple[Piece, ...]:
     """Number each piece by itself: everything is sorted by piece, and pieces are slices of that."""
-    triangles, opposite, gluing, piece = glued.triangles, glued.opposite, glued.gluing, glued.piece
-    base = 3 * (corners // 3)
-    flat = triangles.ravel()
-    boundary = np.column_stack([flat[base + (corners + 1) % 3], flat[base + (corners + 2) % 3]])
-    n_pieces = int(piece.max()) + 1
-    edge_piece = np.where(gluing.count > 0, piece[gluing.first // 3], -1)
-    if n_pieces == 1 and len(at) == n and not (edge_piece < 0).any():
-        offsets = np.append(np.flatnonzero(np.diff(loop, prepend=-1)), len(loop))
-        return (
-            Piece(np.arange(n), np.arange(len(edges)), edges, triangles, opposite, gluing.faces, boundary, offsets),
-        )
+    at, n_pieces = whole.at, int(whole.of_triangles.max()) + 1
+    if n_pieces == 1 and len(at) == n and not (whole.of_edges < 0).any():
+        offsets = np.append(np.flatnonzero(np.diff(whole.loop, prepend=-1)), len(whole.loop))
+        numbered = np.arange(n), np.arange(len(edges)), edges, whole.triangles, whole.opposite
+        return (Piece(*numbered, whole.facing, whole.boundary, offsets),)
     vertex = Grouped(at // n, n_pieces)
-    of_edges = Grouped(edge_piece, n_pieces)
-    of_triangles = Grouped(piece, n_pieces)
-    of_boundary = Grouped(piece[corners // 3], n_pieces)
+    of_edges, of_triangles = Grouped(whole.of_edges, n_pieces), Grouped(whole.of_triangles, n_pieces)
+    of_boundary = Grouped(whole.of_boundary, n_pieces)
+    edge_rows, rows, ring = of_edges.order, of_triangles.order, of_boundary.order
 
     def local(label: NDArray, vertices: NDArray) -> NDArray[np.int64]:
         """The number of each vertex (k, 2 or 3) in its piece (k,)."""
         return np.searchsorted(at, label[:, None] * n + vertices) - vertex.start[label][:, None]
 
-    edge_rows, rows, ring = of_edges.order, of_triangles.order, of_boundary.order
-    facing = gluing.faces[edge_rows]
-    loop_start = np.flatnonzero(np.diff(loop[ring], prepend=-1))
-    of_loops = Grouped(piece[corners // 3][ring[loop_start]], n_pieces)
+    facing = whole.facing[edge_rows]
+    loop_start = np.flatnonzero(np.diff(whole.loop[ring], prepend=-1))
+    of_loops = Grouped(whole.of_boundary[ring[loop_start]], n_pieces)
     # Where the loops of each piece start on its boundary, and where the last one ends.
     start = of_loops.start + np.arange(n_pieces + 1)
     owner = np.repeat(np.arange(n_pieces), np.diff(of_loops.start))
@@ -105,15 +100,12 @@ def _cut(n: int, edges: NDArray, glued: _Surfaces, at: NDArray, corners: NDArray
     parts = (
         (at % n, vertex.start),
         (edge_rows, of_edges.start),
-        (local(edge_piece[edge_rows], edges[edge_rows]), of_edges.start),
-        (local(piece[rows], triangles[rows]), of_triangles.start),
-        (of_edges.rank[opposite[rows]], of_triangles.start),
+        (local(whole.of_edges[edge_rows], edges[edge_rows]), of_edges.start),
+        (local(whole.of_triangles[rows], whole.triangles[rows]), of_triangles.start),
+        (of_edges.rank[whole.opposite[rows]], of_triangles.start),
         (np.where(facing < 0, -1, 3 * of_triangles.rank[facing // 3] + facing % 3), of_edges.start),
-        (local(piece[corners // 3][ring], boundary[ring]), of_boundary.start),
+        (local(whole.of_boundary[ring], whole.boundary[ring]), of_boundary.start),
         (offsets, start),
     )
-    values = [value for value, _ in parts]
-    cuts = [start.tolist() for _, start in parts]
-    return tuple(
-        Piece(*(value[cut[k] : cut[k + 1]] for value, cut in zip(values, cuts, strict=True))) for k in range(n_pieces)
-    )
+    cuts = [np.split(value, start[1:-1]) for value, start in parts]
+    return tuple(Piece(*arrays) for arrays in zip(*cuts, strict=True))

@@ -9,7 +9,7 @@ from ..errors import NotPlanarError, RecoveryError
 from .cycles import not_faces, three_cycles
 from .numbering import Numbering, components
 from .pieces import planar_pieces
-from .planarity import rotation_system
+from .planarity import rotation_system, too_many
 from .surface import Piece, Topology
 
 
@@ -33,7 +33,7 @@ def surfaces(n: int, edges: NDArray, numbering: Numbering | None = None) -> Topo
 def _surfaces_of(part: Numbering) -> list[Piece] | None:
     """None where 3-cycles make no surface, or some are no sphere with holes; edges may be left over."""
     n, edges = len(part.vertices), part.edges
-    if _too_many(n, edges):
+    if too_many(n, edges):
         return None
     triangles, opposite = three_cycles(n, edges)
     if (np.bincount(opposite.ravel(), minlength=1) > 2).any():
@@ -53,15 +53,10 @@ def located(error: RecoveryError, part: Numbering, *, named: bool) -> RecoveryEr
 
 def require_planar(n: int, edges: NDArray) -> None:
     """Do nothing for a planar graph; else raise NotPlanarError."""
-    if _too_many(n, edges):
+    if too_many(n, edges):
         raise _not_planar(f"{len(edges)} edges on {n} rows are more than 3 n - 6")
     if rotation_system(n, edges) is None:
         raise _not_planar()
-
-
-def _too_many(n: int, edges: NDArray) -> bool:
-    """Whether there are more edges than a planar graph can have."""
-    return n >= 3 and len(edges) > 3 * n - 6
 
 
 def _not_planar(why: str = "", where: str = "") -> NotPlanarError:

@@ -11,13 +11,11 @@ one Newton step for each t, q falling with t. The path commits itself to whole l
 """
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...errors import RecoveryError
-from ...linalg import solved
 from ..candidates.candidates import Candidates
-from .sheet import Placed, Sheet, unpinned
+from .sheet import Placed, Sheet
 
 _FIRST, _LAST, _FACTOR = 0.3, 1e-3, 0.75
 """Barriers t, and the ratio of one to the one before."""
@@ -36,34 +34,22 @@ def relaxed(sheet: Sheet, free: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
     try:
         while t > _LAST:
             placed = sheet.mapped(strength, placed)
-            strength[changing] = _step(sheet, placed, strength, free, t)
+            strength[changing] = _step(sheet, placed, strength, changing, t)
             t *= _FACTOR
     except RecoveryError:
         return None
     return strength > 0.5
 
 
-def _step(
-    sheet: Sheet, placed: Placed, strength: NDArray, may_change: NDArray[np.bool_], t: float
-) -> NDArray[np.float64]:
+def _step(sheet: Sheet, placed: Placed, strength: NDArray, changing: NDArray, t: float) -> NDArray[np.float64]:
     """New strengths of the candidates that may change."""
-    s = strength[sheet.chosen][may_change]
-    by_position, by_label, by_scale = sheet.linearised(placed, strength)
-    free = unpinned(placed.z)
-    moving, k = int(free.sum()), len(s)
-    columns = sp.hstack(
-        [by_position[:, free], by_label[:, np.flatnonzero(may_change)], sp.csr_array(by_scale[:, None])]
-    )
-    misfit, slack = sheet.misfit(placed, strength), 0.03 * t / _FIRST
+    s, slack = strength[changing], 0.03 * t / _FIRST
     with np.errstate(divide="ignore"):  # larger misfits than 0.3 count themselves, not by their squares
-        weighted = columns.T @ sp.diags_array(np.minimum(0.3 / np.abs(misfit), 1.0) / slack)
-    held = np.full(moving + k + 1, 1e-9 / slack)  # labels of zero leave vertices free
-    held[-1] += 0.0 if sheet.free_scale else 1.0
-    held[moving : moving + k] = t / s**2 + t / (1 - s) ** 2
-    rhs = weighted @ misfit
-    rhs[moving : moving + k] += 1.0 + t / s - t / (1 - s)  # labels are drawn to 1
-    step = solved((weighted @ columns + sp.diags_array(held)).tocsr(), rhs)
-    return np.clip(s + step[moving : moving + k], 0.1 * s, 1 - 0.1 * (1 - s))  # not all of the way to 0 or 1
+        trust = np.minimum(0.3 / np.abs(sheet.misfit(placed, strength)), 1.0) / slack
+    held = 1e-9 / slack + t / s**2 + t / (1 - s) ** 2
+    pull = 1.0 + t / s - t / (1 - s)  # labels are drawn to 1
+    moved = s + sheet.label_step(placed, strength, changing, trust, held, pull)
+    return np.clip(moved, 0.1 * s, 1 - 0.1 * (1 - s))  # not all of the way to 0 or 1
 
 
 def with_holes(candidates: Candidates, state: NDArray[np.int8]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]] | None:

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ...linalg import solved
 from ...planar.cotangent import corner_gradients, cotangent
 from ...planar.normal import distant_pair
 from ...planar.pencil import ConformalPencil, ShiftedSearch
@@ -46,7 +47,6 @@ class Sheet:
         self.edges, given, self.row = with_sides(n, candidates.edges, self.triangles)
         tails, heads = self.triangles[:, [1, 2, 0]], self.triangles[:, [2, 0, 1]]
         self._sense = np.where(tails < heads, 1.0, -1.0)
-        self._number = np.cumsum(self.chosen) - 1
         self.free_scale = candidates.scale is None
         # (e,) -A_ij in units of the guess, zero for edges that the graph does not have; and their median size
         self.weights = np.zeros(len(self.edges))
@@ -101,33 +101,34 @@ class Sheet:
             shift = c * (1 - min(max(4 * spread, 1e-6), 0.3))
         return Placed(z, c if self.free_scale else 1.0)
 
-    def linearised(self, placed: Placed, strength: NDArray) -> tuple[sp.csr_array, sp.csr_array, NDArray]:
-        """Derivatives of the weights over their spread.
+    def label_step(
+        self, placed: Placed, strength: NDArray, which: NDArray, trust: NDArray, held: NDArray, pull: NDArray | float
+    ) -> NDArray[np.float64]:
+        """Changes of some labels that explain the misfit best, to first order, with displacements and a change of c.
 
-        Returns `by_position` (e, 2 n); `by_label` (e, k): labels of the chosen candidates; `by_scale` (e,): by log c.
+        `which` (k,): candidates; `trust` (e,): weights of the misfit; `held` (k,): weights of the squares of changes;
+        `pull` (k,): half the slope of what else is minimised, downwards. Raises RecoveryError where there is no step.
         """
-        t, z = self.triangles, placed.z
-        at, shape = z[t], (len(self.weights), 2 * len(z))
+        t, z, e = self.triangles, placed.z, len(self.weights)
+        at = z[t]
         gradient = strength[self.cell][:, None] * self.gradients(at)
-        vertex = np.stack([t, t[:, [1, 2, 0]], t[:, [2, 0, 1]]])
-        row = np.broadcast_to(self.row, vertex.shape).ravel()
-        columns = np.concatenate([2 * vertex.ravel(), 2 * vertex.ravel() + 1])
+        vertex = 2 * np.stack([t, t[:, [1, 2, 0]], t[:, [2, 0, 1]]]).ravel()
+        row = np.tile(self.row.ravel(), 6)
         by_position = sp.coo_array(
-            (np.concatenate([gradient.real.ravel(), -gradient.imag.ravel()]), (np.tile(row, 2), columns)), shape=shape
+            (np.r_[gradient.real.ravel(), -gradient.imag.ravel()], (row, np.r_[vertex, vertex + 1])), (e, 2 * len(z))
         )
         by_label = sp.coo_array(
-            (self.cotangents(at).ravel() / 2, (self.row.ravel(), np.repeat(self._number[self.cell], 3))),
-            shape=(shape[0], int(self.chosen.sum())),
-        ).tocsr()
-        spread = self.spread(placed.c)
-        scaled = sp.diags_array(1 / spread)
-        w = by_label @ strength[self.chosen] / spread * (1.0 if self.free_scale else 0.0)
-        return (scaled @ by_position.tocsr()).tocsr(), (scaled @ by_label).tocsr(), w
-
-
-def unpinned(z: NDArray) -> NDArray[np.bool_]:
-    """(2 n,) coordinates of all but two vertices."""
-    free = np.ones(2 * len(z), dtype=bool)
-    pins = distant_pair(z)
-    free[np.r_[2 * pins, 2 * pins + 1]] = False
-    return free
+            (self.cotangents(at).ravel() / 2, (self.row.ravel(), np.repeat(self.cell, 3))), (e, len(strength))
+        ).tocsc()
+        free = np.ones(2 * len(z), dtype=bool)
+        free[2 * distant_pair(z)[:, None] + [0, 1]] = False
+        by_scale = sp.csc_array((by_label @ strength)[:, None] * (1.0 if self.free_scale else 0.0))
+        columns = sp.diags_array(1 / self.spread(placed.c)) @ sp.hstack(
+            [by_position.tocsc()[:, free], by_scale, by_label[:, which]]
+        )
+        loose = np.full(int(free.sum()) + 1, 1e-9 * trust.max())  # labels of zero leave vertices free
+        loose[-1] += 0.0 if self.free_scale else 1.0
+        weighted = columns.T @ sp.diags_array(trust)
+        rhs = weighted @ self.misfit(placed, strength)
+        rhs[len(loose) :] += pull
+        return solved((weighted @ columns + sp.diags_array(np.append(loose, held))).tocsr(), rhs)[len(loose) :]

@@ -10,19 +10,16 @@ labels that take part in the best explanation do.
 """
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...errors import RecoveryError
-from ...linalg import solved
 from ..candidates.choosing import chosen
 from ..judge.labelling import Labelling
-from ..relax.sheet import Sheet, unpinned
+from ..relax.sheet import Sheet
 from .best_first import Judge, better
 from .options import SEARCH
 
 _RIDGE = 0.1
-_HELD = 1e-12
 _CLEAR = 0.35
 """A label that is to change by so much is turned over."""
 
@@ -44,21 +41,14 @@ def leapt(start: Labelling, judge: Judge) -> Labelling:
 
 def _leap(sheet: Sheet, labels: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(cells,) labels with all clear changes made; as they are where there is no map."""
-    strength = labels.astype(np.float64)
+    strength, may_change = labels.astype(np.float64), np.flatnonzero(sheet.chosen)
     try:
-        placed = sheet.mapped(strength)
-        by_position, by_label, by_scale = sheet.linearised(placed, strength)
-        free = unpinned(placed.z)
-        columns = sp.hstack([by_position[:, free], sp.csr_array(by_scale[:, None]), by_label]).tocsr()
-        held = np.append(np.full(int(free.sum()) + 1, _HELD), np.full(by_label.shape[1], _RIDGE**2))
-        held[int(free.sum())] += 0.0 if sheet.free_scale else 1.0
-        solution = solved(
-            (columns.T @ columns + sp.diags_array(held)).tocsr(), columns.T @ sheet.misfit(placed, strength)
-        )
+        trust, held = np.ones(len(sheet.weights)), np.full(len(may_change), _RIDGE**2)
+        step = sheet.label_step(sheet.mapped(strength), strength, may_change, trust, held, 0.0)
     except RecoveryError:
         return labels
     changes = np.zeros(len(labels))
-    changes[sheet.chosen] = np.nan_to_num(solution[-by_label.shape[1] :])
+    changes[may_change] = np.nan_to_num(step)
     gain = np.where(labels, -changes, changes)
     top = float(gain.max(initial=0.0))
     if top <= 0:

@@ -20,9 +20,6 @@ from ...linalg import factorisation
 from ...topology.keys import runs
 from ..relax.sheet import Sheet
 
-_SMALL = 200  # vertices up to which all columns of the inverse are asked for at once
-
-
 Move = tuple[int, ...]
 """Candidates whose labels are turned over together."""
 
@@ -64,7 +61,16 @@ class ChangedMaps:
     def after(self, labels: NDArray[np.bool_], moves: Sequence[Move]) -> NDArray[np.complex128]:
         """(n, moves) positions after each move; NaN where the changed pencil is singular."""
         corner, after, before, side = self._sides(labels, moves)
-        self._ask_for(np.unique(corner))
+        new = np.unique(corner)
+        new = new[self._place[new] < 0]
+        if len(new):  # columns of the inverse
+            unit = np.zeros((self._n - 1, len(new)), dtype=np.complex128)
+            kept = new < self._n - 1
+            unit[new[kept], np.flatnonzero(kept)] = 1
+            columns = np.zeros((len(new), self._n), dtype=np.complex128)
+            columns[:, :-1] = self._factor.solve(unit).T
+            self._place[new] = len(self._columns) + np.arange(len(new))
+            self._columns = np.concatenate([self._columns, columns])
         place = self._place[corner]
         inverse = (
             self._columns[place[:, None, :], after[:, :, None]] - self._columns[place[:, None, :], before[:, :, None]]
@@ -96,20 +102,6 @@ class ChangedMaps:
         side[row, slot] = np.where(labels[cell], 0.25j, -0.25j)[owner]
         return corner, after, before, side
 
-    def _ask_for(self, vertices: NDArray[np.int64]) -> None:
-        new = vertices[self._place[vertices] < 0]
-        if not len(new):
-            return
-        if self._n <= _SMALL:
-            new = np.arange(self._n)
-        unit = np.zeros((self._n - 1, len(new)), dtype=np.complex128)
-        kept = new < self._n - 1
-        unit[new[kept], np.flatnonzero(kept)] = 1
-        columns = np.zeros((len(new), self._n), dtype=np.complex128)
-        columns[:, :-1] = self._factor.solve(unit).T
-        self._place[new] = len(self._columns) + np.arange(len(new))
-        self._columns = np.concatenate([self._columns, columns])
-
 
 def _solved(matrices: NDArray, rhs: NDArray) -> NDArray[np.complex128]:
     """Solutions of many small systems; NaN where one is singular."""
@@ -117,5 +109,4 @@ def _solved(matrices: NDArray, rhs: NDArray) -> NDArray[np.complex128]:
         return np.asarray(np.linalg.solve(matrices, rhs))
     except np.linalg.LinAlgError:  # the end of all others, too
         singular = np.linalg.det(matrices) == 0
-        matrices = np.where(singular[:, None, None], np.eye(matrices.shape[1]), matrices)
-        return np.where(singular[:, None, None], np.nan, np.linalg.solve(matrices, rhs))
+        return np.asarray(np.linalg.solve(np.where(singular[:, None, None], np.nan, matrices), rhs))

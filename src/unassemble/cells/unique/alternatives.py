@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ...errors import RecoveryError
 from ...matrix import OperatorMatrix
-from ...tolerances import ALIKE, CANCELLED
+from ...tolerances import ALIKE
 from ...topology import Numbering, Polygons, components
 from ...topology.embedding import face_complexes
 from ...topology.faces import FaceComplex, from_rotation
@@ -87,7 +87,7 @@ def _other(
     every = (around.regrouped, around.turned_over, _relabelled(around, answer))
     for move in chain.from_iterable(islice(moves, _MOST_SOLVED) for moves in every):
         other = Labelling.of(around.candidates, turned(answer.labels, move))
-        if other.fits and (others := _cells_of(other)) != own and not _cracked(other):
+        if other.fits and (others := _cells_of(other)) != own:
             row = part.vertices.tolist()
             only = own - others, others - own
             return Alternative(*(tuple(sorted(_as_cell([row[v] for v in cell]) for cell in some)) for some in only))
@@ -126,26 +126,3 @@ def _as_cell(corners: list[int] | Cell) -> Cell:
     place = min(range(len(corners)), key=corners.__getitem__)
     cell = (*corners[place:], *corners[:place])
     return cell if cell[1] < cell[-1] else (cell[0], *cell[:0:-1])
-
-
-def _cracked(labelling: Labelling) -> bool:
-    """Whether a hole has no area, and a vertex lies on the side of the cell beyond.
-
-    A slit whose vertices lie in the same places on both sides is none of these: such meshes are made on purpose.
-    """
-    for piece, mesh in zip(labelling.pieces, labelling.meshes, strict=True):
-        if mesh is None:
-            continue
-        begin = piece.loop_offsets[:-1]
-        tail, head = mesh.z[piece.boundary.T]
-        first = np.repeat(tail[begin], np.diff(piece.loop_offsets))
-        area = np.add.reduceat((np.conj(tail - first) * (head - first)).imag / 2, begin)
-        length = np.add.reduceat(np.abs(head - tail), begin)
-        flat = np.abs(area) <= CANCELLED * length**2
-        flat[np.argmax(np.abs(area))] = False  # the outer boundary
-        for k in np.flatnonzero(flat).tolist():
-            places = np.unique(np.round(tail[begin[k] : piece.loop_offsets[k + 1]] / length[k] / ALIKE))
-            # A slit runs along a tree and back: all its edges have both their sides.
-            if 2 * (len(places) - 1) != piece.loop_offsets[k + 1] - begin[k]:
-                return True
-    return False
