@@ -16,7 +16,8 @@ from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
 from .answer import answer, covered
 from .certificate import forces, members_misfits
 from .contradicted import said_of
-from .members import members_and_cells, mispaired
+from .members import members_and_cells
+from .mispaired import mispaired
 from .nodes import Nodes, nodes_of
 from .placed import Placed
 from .recognise import StructuralNumbering

@@ -15,11 +15,7 @@ from ...tolerances import CERTIFIED
 
 @dataclass(frozen=True, eq=False)
 class Entries:
-    """Blocks above the diagonal that complete cells alone explain.
-
-    Entries between two nodes that both miss a neighbour are left out, since cells that lost a node to a support
-    contribute to them. A neighbour that lacks some directions only is none that they miss.
-    """
+    """Blocks above the diagonal that complete cells alone explain; see :func:`.cells.recognise_cells`."""
 
     n: int  # nodes
     key: NDArray[np.int64]  # (e,) pairs i < j as i n + j, increasing
@@ -39,8 +35,7 @@ class Entries:
         sure = np.asarray(valid_pairs(nodal).all(axis=(1, 2)) & alone)
         complete = sure if likely is None else sure | likely & alone
         i, j = nodal.node.astype(np.int64), nodal.indices.astype(np.int64)
-        off = np.abs(nodal.data).max(axis=(1, 2))
-        off[i == j] = 0
+        off = np.where(i == j, 0, np.abs(nodal.data).max(axis=(1, 2)))
         largest = np.maximum.reduceat(off, nodal.indptr[:-1])
         use = (i < j) & (complete[i] | complete[j]) & known[i] & known[j]
         i, j = i[use], j[use]

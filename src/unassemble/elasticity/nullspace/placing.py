@@ -55,19 +55,18 @@ class Solution:
 def placed(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> Solution:
     """Positions piece by piece, from valid identities, (n, d, d) or (n, d, d, d); GeometryError if no piece has any."""
     component, n_pieces = pieces_of(nodal, valid)
-    graph = nodal.graph
-    points = np.full((nodal.n, nodal.dim), np.nan)
+    graph, d = nodal.graph, nodal.dim
+    points = np.full((nodal.n, d), np.nan)
     evidence, freedoms, exact, warnings = [], [], [], []
     failure: GeometryError | None = None
     told = np.asarray(valid.reshape(nodal.n, -1).any(axis=1))
     for piece in range(n_pieces):
         body = np.flatnonzero(component == piece)
         found = null_fields(nodal, valid, body)
-        d, values = nodal.dim, found.values
-        # More than translations satisfies the identities exactly, and not all fields that were looked for.
-        settled = len(values) > d and values[d] <= SINGULAR < values[-1]
-        if found.charts > 1 and not settled:
-            if len(body) <= _WHOLE[nodal.dim]:
+        values = found.values
+        # Unless more than translations satisfies the identities exactly, and not all fields that were looked for.
+        if found.charts > 1 and not (len(values) > d and values[d] <= SINGULAR < values[-1]):
+            if len(body) <= _WHOLE[d]:
                 found = null_fields(nodal, valid, body, patch=len(body))
             else:
                 warnings.append(
