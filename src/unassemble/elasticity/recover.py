@@ -18,7 +18,7 @@ from ..nodes.rounded import known_to
 from ..recovery import Body
 from ..tolerances import ALIKE, LAST_DIGITS
 from ..words import Reason
-from .doubts import about_assumptions, about_cells, about_nodes, guessed_directions, unborne, unconfirmed, with_doubts
+from .doubts import about_assumptions, about_cells, about_nodes, guessed_directions, unborne, unconfirmed
 from .materials.cells import Cells, recognise_cells
 from .nullspace.certificate import residuals
 from .nullspace.checked import checked
@@ -46,9 +46,8 @@ def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Bo
             "the directions are not coupled, as those of a vector Laplacian: these are scalar matrices side by side, "
             "which `operator='laplacian'` recovers"
         )
-    request.held(numbering.node_of_row, numbering.block_size)  # anchors that do not fit, before the long work
     with request.clock("null space"), blas_threads(1):
-        nodal = with_doubts(without_springs(nodal), numbering)
+        nodal = without_springs(nodal)
         try:
             solution = solve(nodal)
         except RecoveryError as error:
@@ -67,7 +66,7 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     cells, rounding = request.cells, request.rounding
 
     def placed_again(matrix: sp.csr_array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        other = with_doubts(without_springs(nodal_matrix(matrix, numbering)), numbering)
+        other = without_springs(nodal_matrix(matrix, numbering))
         with blas_threads(1):
             again = solve(other)
         return again.points, residuals(other, again.valid, again.points)

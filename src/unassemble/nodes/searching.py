@@ -31,8 +31,12 @@ def searched(matrix: sp.csr_array, sizes: tuple[int, ...], *, as_stored: bool = 
     """
     live, inner = live_part(matrix)
     found: list[Numbering] = []
+    row = np.arange(matrix.shape[0])
     for kind, d, reading in _readings(inner, sizes, as_stored):
-        one = measured(matrix, _of_all_rows(reading, live, matrix.shape[0]), d, kind)
+        node, direction = row + len(live), np.zeros(len(row), np.int64)  # a row of the identity is a node by itself
+        node[live], direction[live] = reading.node, reading.direction
+        masks = [None if mask is None else np.isin(row, live[mask]) for mask in reading[2:]]
+        one = measured(matrix, Reading(by_first_row(node), direction, *masks), d, kind)
         found.append(one)
         # Rows of each node couple to the same nodes, or nearly all do, most sums vanish and hardly a node lacks any.
         shows = one.common == 1 or (one.share >= MOST and one.quality > NEARLY_ALL * one.share)
@@ -145,11 +149,3 @@ def _by_equilibrium(inner: sp.csr_array, whole: sp.csr_array, d: int, kind: str)
     else:
         node, open_row = without_doubles(group, direction, d)
     return Reading(node, direction, open_row, ~proven_directions(whole, direction, group, d))
-
-
-def _of_all_rows(reading: Reading, live: NDArray[np.int64], order: int) -> Reading:
-    """The reading of all rows from that of live ones; each row of the identity is a node by itself."""
-    node, direction = np.arange(order) + len(live), np.zeros(order, np.int64)
-    node[live], direction[live] = reading.node, reading.direction
-    masks = [None if mask is None else np.isin(np.arange(order), live[mask]) for mask in reading[2:]]
-    return Reading(by_first_row(node), direction, *masks)

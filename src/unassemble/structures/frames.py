@@ -33,7 +33,6 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
     """
     layout, node = numbering.layout, numbering.node_of_row
     sized, moves = bool(layout.rotations), len(layout.displacements)
-    request.held(node, layout.space)  # anchors that do not fit, before the long work
     whole, rounding = with_exact_sums(request.matrix.csr(), known=(numbering.direction_of_row, layout.block_size))
     spread = rounding.spread if rounding else 0.0
     with request.clock("solve"):

@@ -93,7 +93,6 @@ def truss_numbering(
 def serve_truss(nodal: NodalMatrix, numbering: Numbering, bars: Bars, request: Request) -> Structure:
     """Recover a truss, up to the size of each piece; errors as of :func:`.frames.serve_structure`."""
     rounding = request.rounding
-    request.held(numbering.node_of_row, nodal.dim)  # anchors that do not fit, before the long work
     with request.clock("solve"):
         found = _place_joints(bars, nodal.n, rounding.spread if rounding else CERTIFIED)
     with request.clock("certify"):
