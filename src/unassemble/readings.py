@@ -68,17 +68,14 @@ class ScalarReadings:
             found = recover_elements_with_terms(self.matrix, of_cells, self.clock, anchored=anchored)
             return None if found is None or found.status == "uncertified" else found
 
-        order = [plainly] if self.placement.tensor else [plainly, with_terms]
-        if len(order) > 1 and less_mass(self.matrix) is not None:  # told by entries that are zero without a mass term
-            order.reverse()
-        nearest: PlanarMesh | None = None
-        for reading in order:
-            found = reading()
-            # One that is off by 1e-10, because of an entry that stands out, lacks no term.
-            if found is not None and (found.status != "uncertified" or found.backward_error <= CERTIFIED):
-                return found
-            nearest = nearest or found
-        return nearest if nearest is not None and nearest.backward_error < LITTLE else None
+        terms = not self.placement.tensor
+        told = terms and less_mass(self.matrix) is not None  # by entries that are zero without a mass term
+        found = (with_terms() if told else None) or plainly()
+        # One that is off by 1e-10, because of an entry that stands out, lacks no term.
+        near = found is not None and (found.status != "uncertified" or found.backward_error <= CERTIFIED)
+        if terms and not (told or near):
+            found = with_terms() or found
+        return found if found and (found.status != "uncertified" or found.backward_error < LITTLE) else None
 
     def likeliest(self) -> PlanarMesh:
         """The mesh of the first reading that fits, or else of the first that comes near.

@@ -6,16 +6,15 @@ from pathlib import PurePath
 
 import matplotlib
 import numpy as np
-import scipy.sparse as sp
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from ..files import whole_file
 from ..recovery import PlanarMesh
+from ..topology.numbering import connected
 from . import style
 
 
@@ -87,9 +86,7 @@ def footer(figure: Figure, handles: Sequence[Artist]) -> None:
 def laid_out(mesh: PlanarMesh) -> NDArray[np.float64]:
     """(n, 2) points of a mesh for the eye; what hangs together, by edges or in hinges, stays together."""
     triangles = mesh.divided()[0]
-    sides = (triangles[:, [0, 0]].ravel(), triangles[:, 1:].ravel())
-    graph = sp.coo_array((np.ones(len(sides[0]), np.int8), sides), shape=(mesh.n_points,) * 2)
-    label = csgraph.connected_components(graph, directed=False)[1]
+    label = connected(mesh.n_points, triangles[:, [0, 0]].ravel(), triangles[:, 1:].ravel())[1]
     used = np.unique(triangles)
     part = np.full(mesh.n_points, -1)
     part[used] = np.unique(label[used], return_inverse=True)[1]
