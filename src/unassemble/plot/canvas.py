@@ -8,7 +8,6 @@ import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -32,16 +31,13 @@ def panels(extents: Sequence[NDArray]) -> tuple[Figure, list[Axes]]:
     sizes = np.maximum(sizes, 1e-3 * max(float(sizes.max()), 1e-300))
     gap = style.PAGE.margin * 2 * (len(extents) - 1)
     room = np.array(style.PAGE.largest) * (1 + 0.4 * (len(extents) > 1), 1)
-    scale = min((room[0] - gap) / sizes[:, 0].sum(), room[1] / sizes[:, 1].max())
-    sizes = sizes * scale
+    sizes *= min((room[0] - gap) / sizes[:, 0].sum(), room[1] / sizes[:, 1].max())
     height = float(sizes[:, 1].max())
     content = float(sizes[:, 0].sum() + gap)
     width = max(content, style.PAGE.narrowest)
     total = np.array([width + 2 * style.PAGE.margin, height + style.PAGE.header + style.PAGE.footer])
     figure = Figure(figsize=(float(total[0]), float(total[1])), facecolor="white")
-    FigureCanvasAgg(figure)
-    axes = []
-    left = style.PAGE.margin + (width - content) / 2
+    axes, left = [], style.PAGE.margin + (width - content) / 2
     for (low, high), size in zip(extents, sizes, strict=True):
         bottom = style.PAGE.footer + (height - size[1]) / 2
         ax = figure.add_axes((left / total[0], bottom / total[1], size[0] / total[0], size[1] / total[1]))
@@ -99,8 +95,6 @@ def apart(points: NDArray[np.float64], part: NDArray[np.int64]) -> NDArray[np.fl
     Parts are numbered by `part`, (n,), which is negative for points of none.
     """
     count = int(part.max(initial=-1)) + 1
-    if count < 2:
-        return points
     used = (part >= 0) & np.isfinite(points).all(axis=1)
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(low, part[used], points[used])
