@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .boundaries import (
     recover_lattice,
     recover_partial,
+    recover_partial_elements,
     recover_without_boundary_terms,
     with_boundary_edges,
     with_diagonals,
@@ -89,6 +90,7 @@ class ScalarReadings:
         if replaced or not self.matrix.adds_up.all():  # else nothing was taken out
             order.append((1 if replaced or incomplete else 3, self._partial))
             order.append((0, self._without_boundary_terms))
+            order.append((1 if self.crowded else 3, self._partial_elements))
         if not replaced:
             linear = [self._regions, self._linear] if uneven(self.matrix) else [self._linear, self._regions]
             order += [(1 if self.crowded else 3, lambda: self.other_elements), *((2, reading) for reading in linear)]
@@ -118,6 +120,9 @@ class ScalarReadings:
         matrix = with_boundary_edges(with_diagonals(self.matrix))
         whole = None if matrix.replaced is None else np.asarray(~matrix.replaced[matrix.edges].all(axis=1))
         return recover_partial(matrix, whole, self.placement, self.clock, self.options)
+
+    def _partial_elements(self) -> PlanarMesh | None:
+        return recover_partial_elements(self.matrix, self.placement, self.clock, self.options)
 
     def _regions(self) -> PlanarMesh | None:
         return recover_regions(with_diagonals(self.matrix, everywhere=True), self.placement, self.clock, self.options)
