@@ -17,7 +17,7 @@ from ...planar.normal import distant_pair
 from ...planar.pencil import ConformalPencil, ShiftedSearch
 from ...topology.keys import with_sides
 from ..candidates.candidates import Candidates
-from ..judge.labelling import fans
+from ..judge.fans import fans
 
 STEEPEST = 1e5
 """Cotangents beyond belong to flat triangles."""
