@@ -130,7 +130,7 @@ def conformal_map(
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     pencil = ConformalPencil(piece.n_vertices, piece.edges, piece.boundary, relative)
     search = ShiftedSearch(pencil, options.krylov_steps)
-    z = start = smooth_start(piece.n_vertices, piece.boundary, piece.loop_offsets)
+    z = start = _smooth_start(piece)
     known = scale if scale is not None else likely
     spread, whole = None, 1 / unit  # c = 1 is common
     if known is not None:
@@ -159,18 +159,16 @@ def conformal_map(
     return ConformalMap(z, float(c * unit), search.factorisations, search.solves, converged)
 
 
-def smooth_start(n: int, boundary: NDArray, loop_offsets: NDArray) -> NDArray:
+def _smooth_start(piece: Piece) -> NDArray[np.complex128]:
     """An ellipse on each boundary loop, smooth and of positive area, and a little noise everywhere.
 
     An ellipse has both senses of rotation: which one belongs to the mesh depends on whether the loop is the outer one
     or a hole. Without the ellipses on other loops than the longest, the inversion of a ring would hide the ring from
     the Krylov space. The noise breaks symmetries that would hide the answer from every such space.
-
-    `boundary` and `loop_offsets`: as :class:`~unassemble.topology.Piece` has them.
     """
-    z = 0.01 * np.random.default_rng(0).standard_normal((n, 2)).view(np.complex128).ravel()
-    length = np.diff(loop_offsets)
+    z = 0.01 * np.random.default_rng(0).standard_normal((piece.n_vertices, 2)).view(np.complex128).ravel()
+    length = np.diff(piece.loop_offsets)
     loop, place = runs(length)
     angle, size = 2 * np.pi * place / length[loop], (length / length.max())[loop]
-    np.add.at(z, boundary[:, 0], size * (np.exp(1j * angle) + 0.5 * np.exp(-1j * angle)))
+    np.add.at(z, piece.boundary[:, 0], size * (np.exp(1j * angle) + 0.5 * np.exp(-1j * angle)))
     return z
