@@ -115,7 +115,9 @@ def conformal_map(
     Raises GeometryError if no map of positive area is found.
     """
     options = options or ConformalOptions()
-    unit, likely = _estimate(piece, weights) if unit is None else (unit, None)
+    likely, whole = None, 1 / unit if unit else np.inf
+    if unit is None:
+        unit, likely = _estimate(piece, weights)
     with np.errstate(over="ignore"):
         relative = weights / unit if unit else np.full_like(weights, np.inf)
     if not np.abs(relative).max() < 1 / ROUNDED or (scale is not None and not ALIKE < abs(scale / unit) < 1 / ALIKE):
@@ -132,14 +134,14 @@ def conformal_map(
     search = ShiftedSearch(pencil, options.krylov_steps)
     z = start = _smooth_start(piece)
     known = scale if scale is not None else likely
-    spread, whole = None, 1 / unit  # c = 1 is common
+    spread = None
     if known is not None:
         z, c, _ = search.at(known / unit * (1 - options.margin), z, steps=2)
         # The quotient is stationary, and accurate to some hundred roundings at any size.
         if scale is not None or abs(c * unit / known - 1) < 1e-13:
             z = search.corrected(z, c)
             return ConformalMap(z, known, search.factorisations, search.solves, True)
-        spread, whole = 1e-2 if c * unit / known > 1 else None, np.inf  # beyond c the quotients tell nothing
+        spread = 1e-2 if c * unit / known > 1 else None  # beyond c the quotients tell nothing
     if spread is None:
         z, c, spread = search.at(options.first_shift, start)
         if c < ALIKE:
