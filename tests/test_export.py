@@ -17,7 +17,8 @@ import pytest
 from handmade import lake, quadratic, solid, with_loose_row
 from unassemble.elements import KINDS
 from unassemble.errors import FormatError, OutputError
-from unassemble.export import STATUS, UNIQUENESS, check_output, save, to_meshio
+from unassemble.exchange import STATUS, UNIQUENESS, to_meshio
+from unassemble.export import check_output, save
 from unassemble.formats import FORMATS, MeshFormat, lacks_worth
 from unassemble.recovery import Recovery
 

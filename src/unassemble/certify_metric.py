@@ -24,23 +24,10 @@ class MetricCertificate:
 def certify_metric(
     edges: NDArray, entries: NDArray, diagonal: NDArray, lengths: NDArray, triangles: NDArray, factor: NDArray
 ) -> MetricCertificate:
-    """Re-assemble factor * Laplacian from edge lengths alone and compare off-diagonal entries.
+    """Re-assemble factor * Laplacian from edge lengths (e,) alone and compare entries (e,), by triangle in its plane.
 
-    Each triangle is laid into the plane, and assembled there; see :func:`certify`.
-
-    Parameters
-    ----------
-    edges : (e, 2) int64
-        Pairs i < j of the matrix, in lexicographic order.
-    entries : (e,) float64
-        A_ij.
-    diagonal : (n,) float64
-        A_ii.
-    lengths : (e,) float64
-        NaN for edges of no triangle.
-    triangles : (m, 3) int64
-    factor : (m,) float64
-        The factor c of each triangle's piece.
+    `edges` (e, 2) are pairs i < j in lexicographic order, with lengths of NaN where they belong to no triangle;
+    `diagonal` (n,) is A_ii, and `factor` (m,) the c of each triangle's piece.
     """
     n = len(diagonal)
     key = edges[:, 0] * n + edges[:, 1]

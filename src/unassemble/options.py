@@ -5,6 +5,7 @@ Each is checked when it is made, before any work: what is refused here has no me
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ class OperatorOptions:
 
     def __post_init__(self) -> None:
         _known("operator", self.operator, ("auto", "laplacian", "elasticity", "surface"))
-        _whole("block_size", self.block_size)
+        _number("block_size", self.block_size, Integral)
         if self.operator in ("laplacian", "surface") and self.names_nodes:
             raise InputError(
                 f"`block_size` and `numbering` are for vector-valued matrices, not `operator={self.operator!r}`"
@@ -107,10 +108,9 @@ class ScalarOptions:
 
     def __post_init__(self) -> None:
         _known("method", self.method, ("conformal", "angles"))
-        _whole("threads", self.threads)
-        for name, value in (("scale", self.scale), ("noise", self.noise)):
-            if value is not None and not _is_number(value):
-                raise InputError(f"`{name}` is a number, not {value!r}")
+        _number("threads", self.threads, Integral)
+        _number("scale", self.scale)
+        _number("noise", self.noise)
         if self.scale is not None and not (self.scale and np.isfinite(self.scale)):
             raise InputError(f"`scale` is a finite nonzero number, not {self.scale}")
         if self.noise is not None and not (self.noise > 0 and np.isfinite(self.noise)):
@@ -162,10 +162,6 @@ def _known(name: str, value: str, words: tuple[str, ...]) -> None:
         raise InputError(f"`{name}={value}` is unknown: use {' or '.join(map(repr, words))}")
 
 
-def _whole(name: str, value: Any) -> None:
-    if value is not None and (isinstance(value, bool) or not isinstance(value, (int, np.integer))):
-        raise InputError(f"`{name}` is a whole number, not {value!r}")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+def _number(name: str, value: Any, sort: type = Real) -> None:
+    if value is not None and (isinstance(value, bool) or not isinstance(value, sort)):
+        raise InputError(f"`{name}` is a {'whole ' if sort is Integral else ''}number, not {value!r}")

@@ -6,7 +6,8 @@ from html import escape
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from .export import save, to_meshio
+from .exchange import to_meshio
+from .export import save
 from .modes import modes_of
 from .progress import quiet_libraries
 from .recovery import Body, ConformingMesh, PlanarMesh, Recovery, Structure, Surface

@@ -22,13 +22,10 @@ _SHARED = (
 
 
 def build_report(recovery: Recovery) -> dict[str, Any]:
-    """Everything but the mesh, made of what JSON knows; numbers that are not finite become None.
-
-    The keys are those of the section on reports in the manual, some for all kinds of answer and some for one.
-    """
+    """Everything but the mesh, by the keys that the manual lists; numbers that are not finite become None."""
     known: dict[str, Any] = {name: getattr(recovery, name) for name in _SHARED}
     known |= {
-        "n_holes": None,
+        "n_holes": getattr(recovery, "n_holes", None),
         "n_hinges": len(recovery.hinges),
         "n_undetermined": np.count_nonzero(recovery.node_status),
         "n_boundary_edges": len(recovery.boundary),
@@ -38,15 +35,13 @@ def build_report(recovery: Recovery) -> dict[str, Any]:
         ],
     }
     if isinstance(recovery, PlanarMesh):
-        for name in ("n_holes", "chi_square", "estimated_noise", "n_entries", "n_fitting"):
-            known[name] = getattr(recovery, name)
+        known |= {name: getattr(recovery, name) for name in ("chi_square", "estimated_noise", "n_entries", "n_fitting")}
         known |= {
             "largest_standard_deviation": recovery.largest_deviation,
             "suspects": [{"row": i, "column": j} for i, j in recovery.suspects],
             "alternatives": [asdict(other) for other in recovery.alternatives],
         }
-    if isinstance(recovery, ConformingMesh):
-        known["quadrature"] = recovery.quadrature
+    known |= {"quadrature": recovery.quadrature} if isinstance(recovery, ConformingMesh) else {}
     if isinstance(recovery, Surface):
         deviations = recovery.length_deviations
         known |= {
@@ -95,21 +90,18 @@ def write_report(recovery: Recovery | Mapping[str, Any], path: str | os.PathLike
     """Write a report, or that of a recovery, as ``.json``, whole or not at all; errors as :func:`check_report`."""
     check_report(path)
     report = recovery if isinstance(recovery, Mapping) else build_report(recovery)
-    text = json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False)
     with whole_file(path, ".json") as draft:
-        draft.write_text(text + "\n", encoding="utf-8")
+        draft.write_text(json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def _plain(value: Any) -> Any:
     """Nothing but dict, list, str, bool, int, finite float and None."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.ndarray | np.generic):
         return _plain(value.tolist())
     if isinstance(value, (list, tuple)):
         return [_plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return _plain(value.item())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

@@ -192,7 +192,7 @@ def test_summary_goes_to_a_pipe_that_closes(work, monkeypatch):
     from unassemble.cli import status
 
     duplicated = []
-    monkeypatch.setattr(status.os, "dup2", lambda *pair: duplicated.append(pair))
+    monkeypatch.setattr("os.dup2", lambda *pair: duplicated.append(pair))
     monkeypatch.setattr("sys.stdout", Closed())
     status.say("text")
     assert duplicated[0][1] == 99

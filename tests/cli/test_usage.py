@@ -95,7 +95,7 @@ def test_a_folder_in_place_of_a_matrix(work, one_sentence):
     (work.folder / "in").mkdir()
     result = work.run("in")
     assert result.exit_code == 2
-    assert "is a directory: name the matrix file in it" in one_sentence(result)
+    assert "cannot be opened: is a directory" in one_sentence(result)
 
 
 @pytest.mark.parametrize("words", [["A.mtx"], ["recover", "A.mtx"], ["recover", "./A.mtx"]])

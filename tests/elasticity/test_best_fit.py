@@ -6,8 +6,6 @@ import skfem
 from assembled import box, error, permuted_nodes, recover_elasticity, stiffness
 from skfem.helpers import ddot, sym_grad, trace
 
-from unassemble.elasticity.nullspace import placing
-
 GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3)
 RULES = {  # one point fewer in each direction than the element needs
     "quad-q1": (np.full((2, 1), 0.5), np.ones(1)),
@@ -53,13 +51,12 @@ def test_evidence_tells_a_poor_fit():
     assert 0.1 < error(found.points, given.points) < 0.2
 
 
-def test_bodies_too_large_for_one_factorisation_say_so(monkeypatch):
-    monkeypatch.setitem(placing._WHOLE, 3, 500)
-    given = stiffness("hex-q1", box("hex-q1", (8, 8, 9), perturb=0.2), form=layers(0.3))
-    found = recover_elasticity(given.matrix, patch=200, cells=False)
+@pytest.mark.slow
+def test_bodies_too_large_for_one_factorisation_say_so():
+    given = stiffness("tet-p1", box("tet-p1", (31, 31, 33), perturb=0.2), form=layers(0.3))
+    found = recover_elasticity(given.matrix, cells=False)
     assert found.status == "uncertified"
     assert any("too large for the best fit" in text for text in found.warnings)
-    assert found.evidence[0].residual > 0.05
 
 
 def reduced(kind, counts, perturb):

@@ -136,32 +136,29 @@ def test_standard_input_that_fails(monkeypatch: pytest.MonkeyPatch, refused) -> 
     refused(MatrixFileError, ("standard input", "closed"), read_matrix, "-")
 
     def fail(*_: Any) -> bytes:
-        raise OSError(5, "Input/output error")
+        raise OSError(5, "input/output error")
 
     monkeypatch.setattr(sys, "stdin", SimpleNamespace(closed=False, seekable=lambda: False, read=fail))
-    refused(MatrixFileError, ("standard input", "Input/output error"), read_matrix, "-")
+    refused(MatrixFileError, ("standard input", "input/output error"), read_matrix, "-")
 
 
 def test_endless_device(refused) -> None:
     if not Path("/dev/zero").exists():
         pytest.skip("no such device")
     refused(MatrixFileError, "binary file", read_matrix, "/dev/zero")
-    with Path("/dev/zero").open("rb") as file:
-        file.read(1)
-        refused(MatrixFileError, "binary file", read_matrix, SimpleNamespace(seekable=lambda: False, read=file.read))
 
 
 def test_paths_that_cannot_be_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused) -> None:
-    refused(MatrixFileError, ("none.mtx", "does not exist"), read_matrix, tmp_path / "none.mtx")
+    refused(MatrixFileError, ("none.mtx", "cannot be opened: no such file"), read_matrix, tmp_path / "none.mtx")
     refused(MatrixFileError, "directory", read_matrix, tmp_path)
-    refused(MatrixFileError, "empty", read_matrix, "")
+    refused(MatrixFileError, "cannot be opened", read_matrix, "")
     refused(MatrixFileError, "cannot be opened", read_matrix, "a\0b")
     refused(MatrixFileError, "cannot be opened", read_matrix, "n" * 300)
     (tmp_path / "A.mtx").write_bytes(VALID["A.mtx"])
     refused(MatrixFileError, "cannot be opened", read_matrix, tmp_path / "A.mtx" / "B.mtx")
     refused(InputError, "path", read_matrix, 7)
     monkeypatch.setattr(Path, "open", _forbidden)
-    refused(MatrixFileError, "permissions", read_matrix, tmp_path / "A.mtx")
+    refused(MatrixFileError, "permission", read_matrix, tmp_path / "A.mtx")
 
 
 def _forbidden(*_: Any, **__: Any) -> None:
@@ -186,13 +183,13 @@ def _forbidden(*_: Any, **__: Any) -> None:
         (bytes(2000), "binary"),
         (pickle.dumps(A), "pickle"),
         (pickle.dumps(A, 0), "pickle"),
-        (tar(), "tar archive"),
-        (gzipped(tar()), "tar archive"),
+        (tar(), "an archive"),
+        (gzipped(tar()), "an archive"),
         (gzipped(b""), "is empty"),
         (gzipped(b"hello"), "'hello'"),
-        (bz2.compress(market()), "bzip2"),
-        (lzma.compress(market()), "xz"),
-        (b"7z\xbc\xaf\x27\x1c" + bytes(9), "7z"),
+        (bz2.compress(market()), "compressed"),
+        (lzma.compress(market()), "compressed"),
+        (b"7z\xbc\xaf\x27\x1c" + bytes(9), "an archive"),
         (market().decode().encode("utf-16"), "UTF-16"),
         (b"\xfe\xff" + market().decode().encode("utf-16-be"), "UTF-16"),
         (b"version https://git-lfs.github.com/spec/v1\noid sha256:1", "git lfs pull"),
@@ -249,11 +246,11 @@ def test_too_large_for_the_memory(monkeypatch: pytest.MonkeyPatch, refused) -> N
 
 def test_file_that_fails_while_it_is_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, refused) -> None:
     def fail(*_: Any, **__: Any) -> None:
-        raise OSError(5, "Input/output error")
+        raise OSError(5, "input/output error")
 
     (tmp_path / "A.mtx").write_bytes(market())
     monkeypatch.setattr(np, "loadtxt", fail)
-    refused(MatrixFileError, ("A.mtx", "Input/output error"), read_matrix, tmp_path / "A.mtx")
+    refused(MatrixFileError, ("A.mtx", "input/output error"), read_matrix, tmp_path / "A.mtx")
 
 
 def test_load_takes_files_and_matrices(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from meshes import random_mesh, specimen
-from unassemble import GeometryError, recover
-from unassemble.planar import piece as pieces
-from unassemble.readings import ScalarReadings
-from unassemble.scalar import solving
+from unassemble import recover
+from unassemble.matrix import check_matrix
+from unassemble.planar import collapsed
+from unassemble.topology import surfaces
 
-KNOWN = specimen(*random_mesh(80, seed=1))
 SPOILT = {
     "points coincide": lambda z: np.where(np.arange(len(z)) < 7, z[0], z),
     "all points lie in a line": lambda z: z.real * (1 + 2j),
@@ -20,20 +19,13 @@ SPOILT = {
 
 
 @pytest.mark.parametrize("why", SPOILT)
-@pytest.mark.parametrize("refine", [False, True])
-def test_positions_that_are_no_mesh(monkeypatch, why, refine):
-    def spoilt(*args, **options):
-        mesh = found(*args, **options)
-        return pieces.PieceMesh(SPOILT[why](mesh.z), mesh.scale)
-
-    where, name = (solving, "refined") if refine else (solving, "_start")
-    found = getattr(where, name)
-    monkeypatch.setattr(where, name, spoilt)
-    if not refine:
-        monkeypatch.setattr(solving, "in_doubt", lambda _, topology, *args: np.zeros(len(topology.pieces), dtype=bool))
-    monkeypatch.setattr(ScalarReadings, "other_elements", None)  # which would have another way to positions
-    with pytest.raises(GeometryError, match=why):
-        recover(KNOWN.matrix, refine=refine)
+def test_positions_that_are_no_mesh(why):
+    known = specimen(*random_mesh(80, seed=1))
+    checked = check_matrix(known.matrix)
+    piece = surfaces(checked.n, checked.edges).pieces[0]
+    z = known.points[piece.vertices] @ [1, 1j]
+    assert not collapsed(piece, z)
+    assert collapsed(piece, SPOILT[why](z)) == why
 
 
 def test_very_fine_and_very_flat_meshes_are_meshes():

@@ -2,8 +2,9 @@
 
 from .kinds import PLANAR, Diagnosis
 from .mass import mass_matrix, refuse_masses
-from .scalar import diagnosed, explained, further_terms, judged
+from .scalar import diagnosed, explained, judged
 from .structural import indefinite
+from .sums import further_terms
 
 __all__ = [
     "PLANAR",

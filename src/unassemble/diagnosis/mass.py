@@ -123,8 +123,7 @@ def _bounds(M: sp.csr_array) -> tuple[float, float] | None:
         return None
     # The share of masses is 0.94 and more; that of as much stiffness beside them 0.8. Biquadratic and triquadratic
     # elements have couplings of both signs, and equal weights come to 0.97 of the largest eigenvalue instead.
-    constant = M.sum() / M.diagonal().sum()
-    if together < NEARLY_ALL * all_of_them and constant < NEARLY_ALL * (1 + together):
+    if together < NEARLY_ALL * all_of_them and M.sum() / M.diagonal().sum() < NEARLY_ALL * (1 + together):
         return None
     # Masses of beams have 0.08, of hexahedra 1/8, of quadrilaterals 1/4, of triangles and tetrahedra 1/2.
     least = _extreme(scaled, "SA", _blocks(scaled))
@@ -139,8 +138,7 @@ def _unknowns(M: sp.csr_array) -> str:
     n_parts = len(components(M.shape[0], edges))
     if (cells.nodes, cells.shared) in CELLS and n_parts == 1:
         return f" of {CELLS[cells.nodes, cells.shared][1]}, with little stiffness at most"
-    several = n_parts > 1 or often(cells.twins) or nodes_of_pattern(M) is not None
-    if not several:
+    if not (n_parts > 1 or often(cells.twins) or nodes_of_pattern(M) is not None):
         return ", or another matrix of inner products, since no cells show in its graph"
     # Stiffnesses of a body that is held all around keep as far from zero while it has a few dozen nodes.
     return " of several unknowns per node" + (_OR_HELD if M.shape[0] < 150 else "")

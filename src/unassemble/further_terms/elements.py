@@ -88,10 +88,8 @@ def _settled(
     As many rounds as `patience` are mixed, and may pass without a better one.
     """
     blocks, area = cells.blocks, float(RowSums(matrix).values.sum())  # times s
-    x, ends = (
-        np.concatenate([some.ravel() for some in start.values()]),
-        np.cumsum([some.size for some in start.values()]),
-    )
+    x = np.concatenate([some.ravel() for some in start.values()])
+    ends = np.cumsum([some.size for some in start.values()])
     best, least, since, rounds = None, np.inf, 0, list[tuple[NDArray, NDArray]]()
     while True:
         parts = zip(start.items(), np.split(x, ends[:-1]), strict=True)
@@ -115,12 +113,10 @@ def _settled(
     if best is None:
         return None
     found, reaction = best
-    notes = [size_note(reaction)]
-    if patience:  # not told by entries, but found
-        found = replace(found, uniqueness="searched" if found.uniqueness == "proved" else found.uniqueness)
-        notes += ["that no other mesh, with another mass, fits as well is not proved"] if found.certified else []
     operator, terms = "c L + s M, M the consistent mass matrix,", Terms(matrix.diagonal, reaction)
-    return Held(matrix).with_terms(found, terms, operator, *notes)
+    # Where entries tell it the mass is not found, but read off.
+    unproved = "that no other mesh, with another mass, fits as well is not proved" if patience else ""
+    return Held(matrix).with_terms(found, terms, operator, size_note(reaction), unproved=unproved)
 
 
 def _in_one_size(found: PlanarMesh, sums: NDArray[np.float64], blocks: Blocks) -> PlanarMesh:

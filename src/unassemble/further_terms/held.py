@@ -52,8 +52,11 @@ class Held:
     matrix: OperatorMatrix
     tensor: tuple[float, float, float] | None = None
 
-    def with_terms(self, found: PlanarMesh, terms: Terms, operator: str, *notes: str) -> PlanarMesh:
-        """The mesh of the Laplacian as that of the whole matrix, if it gives that back."""
+    def with_terms(self, found: PlanarMesh, terms: Terms, operator: str, *notes: str, unproved: str = "") -> PlanarMesh:
+        """The mesh of the Laplacian as that of the whole matrix, if it gives that back; `unproved`: what is not."""
+        if unproved:
+            notes += (unproved,) if found.certified else ()
+            found = replace(found, uniqueness="searched" if found.uniqueness == "proved" else found.uniqueness)
         held = self._held(found, terms)
         good = held.backward_error <= CERTIFIED and not len(held.flipped)
         fits = f"{operator} re-assembled on this mesh gives the matrix back to {held.backward_error:.1e} (relative)"

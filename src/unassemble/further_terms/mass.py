@@ -76,15 +76,12 @@ def with_consistent_mass(
     )
     found = plain(laplacian, metric.u)
     reaction = sums.sign * float(metric.areas.sum() / _areas_of(found).sum())
-    found = replace(found, uniqueness="searched" if found.uniqueness == "proved" else found.uniqueness)
-    terms = Terms(matrix.diagonal, reaction)
-    notes = [size_note(reaction)]
-    if found.certified:
-        notes.append(
-            "that no other areas, with another c, fit as well is not proved: the fit of edge lengths was started once, "
-            "and at its end the equations determine all of them"
-        )
-    return held.with_terms(found, terms, "c L + s M, M the consistent mass matrix,", *notes)
+    terms, operator = Terms(matrix.diagonal, reaction), "c L + s M, M the consistent mass matrix,"
+    unproved = (
+        "that no other areas, with another c, fit as well is not proved: the fit of edge lengths was started once, and "
+        "at its end the equations determine all of them"
+    )
+    return held.with_terms(found, terms, operator, size_note(reaction), unproved=unproved)
 
 
 def with_lumped_mass(held: Held, found: PlanarMesh, sums: RowSums) -> PlanarMesh:
@@ -94,8 +91,7 @@ def with_lumped_mass(held: Held, found: PlanarMesh, sums: RowSums) -> PlanarMesh
     areas, share = _areas_of(found), np.zeros(held.matrix.n)
     np.add.at(share, found.divided()[0], areas[:, None] / 3)
     reaction = float(sums.values.sum() / areas.sum())
-    allowed = ALIKE * np.abs(reaction * share) + sums.rounding
-    if not (np.abs(sums.values - reaction * share) <= allowed).all():
+    if not (np.abs(sums.values - reaction * share) <= ALIKE * np.abs(reaction * share) + sums.rounding).all():
         return found
     terms = Terms(held.matrix.diagonal, reaction, lumped=True)
     again = held.with_terms(found, terms, "c L + s M, M the lumped mass matrix,", size_note(reaction))

@@ -6,7 +6,7 @@ to a factor that only c could tell it from. With an unknown D there is no such v
 diagonal than coordinates and factors.
 """
 
-from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -45,29 +45,22 @@ def recover_with_terms(
         return plain(matrix)
     with clock("topology"):
         topology = surfaces(matrix.n, matrix.edges)
-    held = Held(matrix, tensor)
-    if not topology.pieces or len(topology.bare_edges) or not topology.multiplicity.all():
-        # Sides of cells have vanished, or this is no mesh: scaled or not shows by itself.
-        return (None if sums.sign else _or_none(lambda: unscaled(held, plain, clock))) or plain(matrix)
-    with clock("conformal"):
-        laplacian = _is_laplacian(matrix, topology)
-    if laplacian:
-        found = plain(matrix)
-        return with_lumped_mass(held, found, sums) if sums.sign else found
-    if not sums.sign:
-        return _or_none(lambda: unscaled(held, plain, clock)) or plain(matrix)
-    skeleton = Skeleton.of(matrix.n, matrix.edges, topology.pieces)
-    found_or_none = _or_none(
-        lambda: mass_alone(held, topology, skeleton, sums) or with_consistent_mass(held, skeleton, sums, plain, clock)
-    )
-    return found_or_none or plain(matrix)
-
-
-def _or_none(reading: Callable[[], PlanarMesh | None]) -> PlanarMesh | None:
-    try:
-        return reading()
-    except RecoveryError:
-        return None
+    held, found = Held(matrix, tensor), None
+    # Else sides of cells have vanished, or this is no mesh: scaled or not shows by itself.
+    triangles = topology.pieces and not len(topology.bare_edges) and topology.multiplicity.all()
+    if triangles:
+        with clock("conformal"):
+            laplacian = _is_laplacian(matrix, topology)
+        if laplacian:
+            return with_lumped_mass(held, plain(matrix), sums) if sums.sign else plain(matrix)
+    with suppress(RecoveryError):
+        if not sums.sign:
+            found = unscaled(held, plain, clock)
+        elif triangles:
+            skeleton = Skeleton.of(matrix.n, matrix.edges, topology.pieces)
+            found = mass_alone(held, topology, skeleton, sums)
+            found = found or with_consistent_mass(held, skeleton, sums, plain, clock)
+    return found or plain(matrix)
 
 
 def _is_laplacian(matrix: OperatorMatrix, topology: Topology) -> bool:
@@ -94,8 +87,7 @@ def unscaled(held: Held, plain: Plain, clock: Clock) -> PlanarMesh | None:
         return None
     null = null / np.exp(np.log(null).mean())
     i, j = matrix.edges.T
-    left = replace(matrix, entries=matrix.entries * null[i] * null[j], diagonal=matrix.diagonal * null**2)
-    found = plain(left)
+    found = plain(replace(matrix, entries=matrix.entries * null[i] * null[j], diagonal=matrix.diagonal * null**2))
     note = "S and c are known up to a factor that one could give the other: the geometric mean of S is 1"
     jacobi = np.ptp(matrix.diagonal) <= SUMMED * np.abs(matrix.diagonal).max()
     more = ("the diagonal is constant, as Jacobi scaling leaves it",) if jacobi else ()
@@ -122,5 +114,4 @@ def _positive_null_vector(matrix: OperatorMatrix) -> NDArray[np.float64] | None:
     if not np.isfinite(x).all():
         return None
     x = x * np.sign(x[0])
-    size = abs(scaled) @ np.abs(x)
-    return unit * x if (x > 0).all() and (np.abs(scaled @ x) <= SUMMED * size).all() else None
+    return unit * x if (x > 0).all() and (np.abs(scaled @ x) <= SUMMED * (abs(scaled) @ np.abs(x))).all() else None

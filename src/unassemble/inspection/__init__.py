@@ -1,5 +1,6 @@
 """What a matrix is, and what can be recovered from it, without recovering it."""
 
-from .inspect import Inspection, inspect_matrix
+from .inspect import inspect_matrix
+from .inspection import Inspection
 
 __all__ = ["Inspection", "inspect_matrix"]

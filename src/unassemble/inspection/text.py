@@ -10,7 +10,7 @@ from ..tolerances import ROUNDED
 from ..words import count_of
 
 if TYPE_CHECKING:
-    from .inspect import Inspection
+    from .inspection import Inspection
 
 
 def lines_of(facts: Inspection) -> list[tuple[str, str]]:
@@ -59,15 +59,11 @@ def _planar(facts: Inspection) -> str:
 
 def mesh_text(facts: Inspection) -> str:
     """The cells; likely ones where they are not the graph's triangles."""
-    cells = []
-    if facts.n_triangles or not (facts.n_polygons or facts.n_quads):
-        cells.append(count_of(facts.n_triangles, "triangle"))
-    if facts.n_quads:
-        cells.append(count_of(facts.n_quads, "quadrilateral"))
-    if facts.n_polygons:
-        cells.append(f"{count_of(facts.n_polygons, 'cell')} of more than three vertices")
-    likely = facts.cells_from == "entries" and not facts.element
-    return ("likely " if likely else "") + " and ".join(cells)
+    several = f"{count_of(facts.n_polygons, 'cell')} of more than three vertices" if facts.n_polygons else ""
+    quads = count_of(facts.n_quads, "quadrilateral") if facts.n_quads else ""
+    triangles = count_of(facts.n_triangles, "triangle") if facts.n_triangles or not (several or quads) else ""
+    cells = filter(None, (triangles, quads, several))
+    return "likely " * (facts.cells_from == "entries" and not facts.element) + " and ".join(cells)
 
 
 ELEMENTS = {
@@ -83,9 +79,7 @@ ELEMENTS = {
 def _cells(facts: Inspection) -> str:
     if facts.cells_from == "graph":
         return "the cycles of three edges; recovery holds them against the entries, and leaves some open if it has to"
-    gone = []
-    if facts.n_polygons:
-        gone.append(f"the diagonals of {count_of(facts.n_polygons, 'cell')}")
+    gone = [f"the diagonals of {count_of(facts.n_polygons, 'cell')}"] if facts.n_polygons else []
     if facts.n_vanished_sides:
         gone.append(f"{count_of(facts.n_vanished_sides, 'side')} of the boundary, facing right angles")
     vanished = f"; no entry on {' and on '.join(gone)}" if gone else ""
@@ -93,13 +87,10 @@ def _cells(facts: Inspection) -> str:
 
 
 def _mesh(facts: Inspection) -> str:
-    text = (
-        f"{mesh_text(facts)}, {count_of(facts.n_faces, 'face')} with the outside and the holes, "
-        f"{count_of(facts.n_boundary_edges, 'boundary edge')}"
-    )
-    if facts.n_bare_edges:
-        text += f"; {count_of(facts.n_bare_edges, 'edge')} of no cell"
-    return text + (f"; {count_of(facts.n_undetermined, 'row')} of no cell" if facts.n_undetermined else "")
+    faces, sides = count_of(facts.n_faces, "face"), count_of(facts.n_boundary_edges, "boundary edge")
+    left_over = {"edge": facts.n_bare_edges, "row": facts.n_undetermined}
+    more = [f"; {count_of(count, one)} of no cell" for one, count in left_over.items() if count]
+    return "".join([f"{mesh_text(facts)}, {faces} with the outside and the holes, {sides}", *more])
 
 
 def _scale(facts: Inspection) -> str:

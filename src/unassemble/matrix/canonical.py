@@ -44,16 +44,15 @@ def as_csr(A: Any) -> sp.csr_array:
     Raises MatrixError if it is none.
     """
     kind = f"an object of type {type(A).__name__}"
-    if not sp.issparse(A):
-        try:
-            A = np.asarray(A)
-        except Exception as error:  # foreign types convert with any exception they like
-            raise MatrixError(f"{kind} cannot be taken for a matrix ({error})") from error
-        if A.dtype.kind not in "biufc":
-            raise MatrixError(
-                f"{kind} (as an array: {A.dtype}) is not a matrix of numbers: "
-                "pass a scipy sparse matrix, a numpy array or a path"
-            )
+    try:
+        A = A if sp.issparse(A) else np.asarray(A)
+    except Exception as error:  # foreign types convert with any exception they like
+        raise MatrixError(f"{kind} cannot be taken for a matrix ({error})") from error
+    if A.dtype.kind not in "biufc":
+        raise MatrixError(
+            f"{kind}, with entries of type {A.dtype}, is not a matrix of numbers: pass a scipy sparse matrix, a numpy "
+            "array or a path"
+        )
     if A.ndim != 2:
         raise MatrixError(f"a matrix has two dimensions, not {A.ndim}")
     rows, columns = A.shape
@@ -66,8 +65,6 @@ def as_csr(A: Any) -> sp.csr_array:
             "the matrix has a pattern only (its type is bool) and no numbers: the shape of the mesh is in the "
             "numbers, so pass the matrix with its values"
         )
-    if A.dtype.kind not in "iufc":
-        raise MatrixError(f"the entries of the matrix are of type {A.dtype}, not numbers: convert them to float64")
     csr = canonical(A if sp.issparse(A) else _stored(A))
     finite = np.isfinite(csr.data)
     if not finite.all():

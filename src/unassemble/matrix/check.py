@@ -1,5 +1,6 @@
 """The checks at the door: any matrix in, a clean symmetric operator or one clear sentence out."""
 
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
     >>> matrix.n, matrix.edges.tolist(), matrix.entries.tolist()
     (2, [[0, 1]], [-1.0])
     """
-    number = not isinstance(drop_zeros, bool) and isinstance(drop_zeros, (int, float, np.integer, np.floating))
+    number = isinstance(drop_zeros, Real) and not isinstance(drop_zeros, bool)
     if drop_zeros is not None and not (number and 0 <= drop_zeros < 1):
         raise InputError(f"`drop_zeros` is a relative tolerance, at least 0 and below 1 (say 1e-12), not {drop_zeros}")
     if noise is not None and not (noise >= 0 and np.isfinite(noise)):

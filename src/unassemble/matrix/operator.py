@@ -23,8 +23,7 @@ class OperatorMatrix:
     edges: NDArray[np.int64]
     entries: NDArray[np.float64]  # (e,) A_ij of each pair, the mean of both triangles
     diagonal: NDArray[np.float64]  # (n,) absent entries are zero
-    # largest difference between an entry and its transpose, relative to the largest off-diagonal entry of the two rows;
-    # at rounding level
+    # largest difference between an entry and its transpose, relative to the largest off-diagonal entry of the two rows
     asymmetry: float = 0.0
     warnings: tuple[str, ...] = ()  # what was changed on the way, in sentences
     # (e,) standard deviations of the errors of the entries, where they are known; 0 for those that have vanished
@@ -57,8 +56,7 @@ class OperatorMatrix:
     @property
     def unweighted(self) -> bool:
         """Whether all entries are equal and all rows add up to zero: the numbers tell no cell from a hole."""
-        size = np.abs(self.entries).max(initial=0.0)
-        alike = len(self.entries) > 0 and np.ptp(self.entries) <= ROUNDED * size
+        alike = len(self.entries) > 0 and np.ptp(self.entries) <= ROUNDED * np.abs(self.entries).max()
         return bool(alike and self.adds_up.all())
 
     @property

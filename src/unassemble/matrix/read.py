@@ -14,12 +14,14 @@ import scipy.sparse as sp
 
 from ..errors import InputError, MatrixFileError, UnassembleError
 from ..formats import FORMATS
-from .binary import read_mat, read_mat4, read_mat73, read_npy, read_npz
+from .arrays import read_npy, read_npz
 from .canonical import canonical, inconsistency
 from .check import check_matrix
+from .market import read_market
+from .mat import read_mat, read_mat4, read_mat73
 from .operator import OperatorMatrix
 from .signatures import HEAD, foreign, kind_of
-from .text import read_market, read_triplets
+from .triplets import read_triplets
 
 _READERS: dict[str, tuple[str, Callable[[BinaryIO, str], Any]]] = {
     "market": ("Matrix Market", read_market),
@@ -64,7 +66,7 @@ def read_matrix(source: str | os.PathLike[str] | IO[Any], *, variable: str | Non
             raise MatrixFileError(f"{name} asks for more memory than there is: it is too large, or damaged") from error
         except Exception as error:  # readers of binary formats fail in any way on damaged bytes
             if isinstance(error, OSError) and error.strerror:
-                raise MatrixFileError(f"{name} cannot be read ({error.strerror})") from error
+                raise _unreadable(name, "read", error) from error
             why = re.split(r"[;\n]", str(error))[0][:120] or type(error).__name__
             raise MatrixFileError(f"{name} is truncated or damaged ({why}): write or download it again") from error
 
@@ -98,27 +100,20 @@ def _opened(source: Any) -> Iterator[tuple[BinaryIO, str]]:
         elif hasattr(source, "read"):
             name = getattr(source, "name", "the file")
             stream, name = source, name if isinstance(name, str) else "the file"  # a pipe has a number
+        elif isinstance(source, (str, bytes, os.PathLike)):
+            name = os.fsdecode(source)
+            try:
+                stream = stack.enter_context(Path(name).open("rb"))
+            except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
+                raise _unreadable(repr(name), "opened", error) from error
         else:
-            stream, name = stack.enter_context(_open_path(source)), os.fsdecode(source)
+            raise InputError(f"a matrix file is given by its path, '-' or an open file, not by {type(source).__name__}")
         yield _rewindable(stream, name), name
 
 
-def _open_path(path: Any) -> BinaryIO:
-    if not isinstance(path, (str, bytes, os.PathLike)):
-        raise InputError(f"a matrix file is given by its path, '-' or an open file, not by {type(path).__name__}")
-    name = os.fsdecode(path)
-    if not name:
-        raise MatrixFileError("the name of the matrix file is empty")
-    try:
-        if Path(name).is_dir():
-            raise MatrixFileError(f"{name!r} is a directory: name the matrix file in it")
-        return Path(name).open("rb")
-    except FileNotFoundError as error:
-        raise MatrixFileError(f"{name!r} does not exist: check the path") from error
-    except PermissionError as error:
-        raise MatrixFileError(f"{name!r} may not be read: check its permissions") from error
-    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
-        raise MatrixFileError(f"{name!r} cannot be opened ({getattr(error, 'strerror', None) or error})") from error
+def _unreadable(name: str, what: str, error: Exception) -> MatrixFileError:
+    """A refusal of the system, in its words."""
+    return MatrixFileError(f"{name} cannot be {what}: {str(getattr(error, 'strerror', None) or error).lower()}")
 
 
 def _rewindable(stream: Any, name: str) -> BinaryIO:
@@ -126,15 +121,10 @@ def _rewindable(stream: Any, name: str) -> BinaryIO:
     try:
         if not isinstance(stream, io.TextIOBase) and stream.seekable() and stream.tell() == 0:
             return stream
-        head = stream.read(HEAD)
-        text = isinstance(head, str)
-        begun = head.encode("utf-8", "replace") if text else head or b""
-        if kind_of(begun) is None and len(begun) >= HEAD:  # refuse an endless device before reading on
-            raise MatrixFileError(f"{name} {foreign(begun)}")
-        rest = stream.read()
-        return io.BytesIO(begun + (rest.encode("utf-8", "replace") if text else rest or b""))
+        content = stream.read()
+        return io.BytesIO(content.encode("utf-8", "replace") if isinstance(content, str) else content or b"")
     except (OSError, ValueError) as error:
-        raise MatrixFileError(f"{name} cannot be read ({getattr(error, 'strerror', None) or error})") from error
+        raise _unreadable(name, "read", error) from error
 
 
 def load(source: Any, *, variable: str | None = None, drop_zeros: float | None = None) -> OperatorMatrix:
@@ -142,8 +132,7 @@ def load(source: Any, *, variable: str | None = None, drop_zeros: float | None =
 
     Options and errors are those of :func:`read_matrix` and :func:`check_matrix`.
     """
-    matrix = read_matrix(source, variable=variable) if is_file(source) else source
-    return check_matrix(matrix, drop_zeros=drop_zeros)
+    return check_matrix(read_matrix(source, variable=variable) if is_file(source) else source, drop_zeros=drop_zeros)
 
 
 def is_file(source: Any) -> bool:

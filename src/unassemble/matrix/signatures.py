@@ -11,14 +11,11 @@ _UTF8_MARK = b"\xef\xbb\xbf"
 # What people hand over by mistake: (offset, bytes there, what it is and what to do).
 _PICKLE = "is a Python pickle, which can run any code and is never loaded: save with scipy.sparse.save_npz"
 _UTF16 = "is text in the encoding UTF-16: save it as ASCII or UTF-8"
-_PACKED = "is compressed by {}: unpack it first, or use gzip"
+_PACKED = "is compressed, or an archive: unpack it and pass the matrix file in it (compressed by gzip, if need be)"
 _FOREIGN: tuple[tuple[int, bytes | tuple[bytes, ...], str], ...] = (
     (0, (b"\xff\xfe", b"\xfe\xff"), _UTF16),
-    (0, b"BZh", _PACKED.format("bzip2")),
-    (0, b"\xfd7zXZ", _PACKED.format("xz")),
-    (0, b"\x28\xb5\x2f\xfd", _PACKED.format("zstd")),
-    (0, b"7z\xbc\xaf", "is a 7z archive: unpack it and pass the matrix file in it"),
-    (257, b"ustar", "is a tar archive: unpack it and pass the .mtx file in it"),
+    (0, (b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"7z\xbc\xaf"), _PACKED),  # bzip2, xz, zstd, 7z
+    (257, b"ustar", _PACKED),
     (0, b"version https://git-lfs", "is only a Git LFS pointer: fetch the file itself with 'git lfs pull'"),
     (0, (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05"), _PICKLE),
     (0, (b"ccopy_reg\n", b"(dp0\n", b"(lp0\n", b"cscipy.sparse"), _PICKLE),

@@ -1,8 +1,9 @@
 """Edge lengths of curved surfaces: a convex program, and what the lengths say."""
 
 from .flat import could_be_planar, flattened, perhaps_planar, unless_planar
+from .heron import angles, areas_cotangents, heron, longest_step
 from .noise import length_deviations
-from .program import angles, areas_cotangents, heron, longest_step, solve_metric
+from .program import solve_metric
 from .realise import realised
 from .recover import recover_surface
 

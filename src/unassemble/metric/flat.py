@@ -17,8 +17,7 @@ def could_be_planar(surface: Surface) -> bool:
     """
     if not (surface.flat and surface.orientable.all()):
         return False
-    ends = np.bincount(surface.boundary.ravel(), minlength=surface.n_points)
-    if (ends > 2).any():
+    if (np.bincount(surface.boundary.ravel(), minlength=surface.n_points) > 2).any():
         return True
     first, last = surface.boundary_offsets[:-1], surface.boundary_offsets[1:]
     vertices = [np.unique(surface.boundary[a:b]) for a, b in zip(first, last, strict=True)]

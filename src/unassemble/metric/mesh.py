@@ -14,7 +14,7 @@ from ..topology.keys import Grouped
 from ..topology.manifold import Cycles
 from ..topology.numbering import local_numbering
 from ..topology.orientation import glue, orient
-from .program import angles
+from .heron import angles
 
 
 @dataclass(frozen=True, eq=False)

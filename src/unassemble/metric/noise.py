@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 from ..certify import chi_square_verdict
 from ..linalg.responses import SamplingOptions, noise_blocks
 from ..matrix import OperatorMatrix
-from .program import Normal, areas_cotangents, blocks_of, summed
+from .heron import areas_cotangents, blocks_of, summed
+from .program import Normal
 
 
 def row_sum_test(matrix: OperatorMatrix, sigma: float) -> dict[str, float]:
@@ -35,16 +36,10 @@ def length_deviations(
 ) -> NDArray[np.float64]:
     """Standard deviations (e,) of edge lengths of mean 1, for errors of standard deviation 1 in the weights A_ij / c.
 
+    Of one piece, from the squared lengths (e,) and the edge that faces each corner (m, 3).
+
     With F twice the area and w = F', errors a in the weights change u by the solution d of F'' d = a - w (a.u) / (w.u),
     which fixes the change of c, and lengths by d / 2 l, without a change of their mean.
-
-    Parameters
-    ----------
-    squared : (e,) float64
-        Of one piece, mean length 1.
-    opposite : (m, 3) int64
-        The edge that faces each corner.
-    options : SamplingOptions, optional
     """
     sides = squared[opposite]
     area, cotangents = areas_cotangents(sides)

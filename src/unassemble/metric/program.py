@@ -26,44 +26,10 @@ from numpy.typing import NDArray
 
 from ..errors import GeometryError, SolverError
 from ..linalg import Factorisation, UpperTriangle, factorisation
+from .heron import areas_cotangents, blocks_of, heron, longest_step, summed
 
 _STEPS = 120  # in all, before the method gives up; hard meshes take some thirty
 _NONE = "no edge lengths were found that have these entries: the triangles that come nearest have no area"
-
-# d(u_1 + u_2 - u_0)/du and so on: sums that are four areas times the cotangents.
-_SIGNS = np.array([[-1, 1, 1], [1, -1, 1], [1, 1, -1]], dtype=np.float64)
-
-
-def heron(sides: NDArray) -> NDArray[np.float64]:
-    """(m,) 16 times the squared area of triangles with squared side lengths (m, 3); negative where there is none.
-
-    As a difference of two squares that share the shortest side, which loses the fewest digits.
-    """
-    low, middle, high = np.sort(sides, axis=1).T
-    return np.asarray(4 * low * middle - (high - low - middle) ** 2)
-
-
-def areas_cotangents(sides: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Areas (m,), and cotangents (m, 3) of the angles that face the sides."""
-    area = np.sqrt(heron(sides)) / 4
-    return area, np.asarray(sides @ _SIGNS / (4 * area)[:, None])
-
-
-def angles(sides: NDArray) -> NDArray[np.float64]:
-    """(m, 3) angles that face the sides."""
-    return np.arctan2(np.sqrt(heron(sides))[:, None], sides @ _SIGNS)
-
-
-def longest_step(sides: NDArray, change: NDArray) -> float:
-    """The least t > 0 at which sides + t change is a triangle without area: Heron's formula is a quadratic in t."""
-
-    def product(a: NDArray, b: NDArray) -> NDArray:
-        return a.sum(axis=1) * b.sum(axis=1) - 2 * (a * b).sum(axis=1)
-
-    constant, half, square = heron(sides), product(sides, change), product(change, change)
-    slope = np.sqrt(np.maximum(half**2 - constant * square, 0)) - half
-    with np.errstate(divide="ignore"):
-        return float(np.min(np.where(slope > 0, constant / slope, np.inf)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,21 +69,11 @@ class Normal:
 
 
 def solve_metric(weights: NDArray, opposite: NDArray, *, polish: bool = True) -> Metric:
-    """Edge lengths of an edge-connected surface whose weights are `weights`, up to a positive factor.
+    """Edge lengths of an edge-connected surface with `weights` (e,), c w for an unknown c > 0.
 
-    Parameters
-    ----------
-    weights : (e,) float64
-        c w, for an unknown c > 0.
-    opposite : (m, 3) int64
-        The edge that faces each corner.
-    polish : bool
-        Go on with Newton's method to the level of rounding.
+    `opposite` (m, 3): the edge that faces each corner; `polish`: go on with Newton's method to the level of rounding.
 
-    Raises
-    ------
-    GeometryError
-        If the program has no solution inside the cone.
+    Raises GeometryError if the program has no solution inside the cone.
     """
     unit = weights / np.abs(weights).max()
     if not np.isfinite(unit).all():
@@ -134,13 +90,7 @@ def solve_metric(weights: NDArray, opposite: NDArray, *, polish: bool = True) ->
     finally:
         normal.release()
     _, cotangents = areas_cotangents(u[opposite])
-    own = summed(opposite, cotangents / 2, len(u))
-    return Metric(u / u.mean(), float((weights @ u) / (own @ u)), tuple(history))
-
-
-def summed(opposite: NDArray, values: NDArray, size: int) -> NDArray[np.float64]:
-    """(size,) sums over the corners that face each edge."""
-    return np.asarray(np.bincount(opposite.ravel(), values.ravel(), size), np.float64)
+    return Metric(u / u.mean(), float((weights @ u) / (summed(opposite, cotangents / 2, len(u)) @ u)), tuple(history))
 
 
 def _central_path(w: NDArray, opposite: NDArray, normal: Normal) -> tuple[NDArray, int]:
@@ -161,8 +111,7 @@ def _central_path(w: NDArray, opposite: NDArray, normal: Normal) -> tuple[NDArra
         second = -ratio * first / root
         gradient = summed(opposite, first[:, None] * cotangents / 4, len(u))
         blocks = blocks_of(sides, area, cotangents, first, second - first)
-        scaled = normal.factorised(blocks).solve(np.column_stack([gradient * u, w * u]))
-        solved = u[:, None] * scaled
+        solved = u[:, None] * normal.factorised(blocks).solve(np.column_stack([gradient * u, w * u]))
         change = solved[:, 0] - (w @ solved[:, 0]) / (w @ solved[:, 1]) * solved[:, 1]
         if not np.isfinite(change).all():
             break
@@ -173,17 +122,6 @@ def _central_path(w: NDArray, opposite: NDArray, normal: Normal) -> tuple[NDArra
                 return u, count
             barrier, reference = 0.1 * barrier, np.sqrt(heron(u[opposite])) / 4
     raise GeometryError(_NONE)
-
-
-def blocks_of(sides: NDArray, area: NDArray, cotangents: NDArray, first: NDArray, outer: NDArray) -> NDArray:
-    """(m, 3, 3) minus second derivatives of phi(S), in units of the sides.
-
-    S'' = (signs - cot cot') / 16 S, S' = cot / 4; `outer` is S phi'' - phi'.
-    """
-    unit = sides / np.sqrt(16 * area)[:, None]
-    flat = cotangents * unit
-    second = first[:, None, None] * (_SIGNS * unit[:, :, None] * unit[:, None, :])
-    return np.asarray(-second - outer[:, None, None] * (flat[:, :, None] * flat[:, None, :]))
 
 
 def _newton(w: NDArray, opposite: NDArray, normal: Normal, u: NDArray, steps: int) -> tuple[NDArray, list[float]]:
@@ -207,8 +145,7 @@ def _newton(w: NDArray, opposite: NDArray, normal: Normal, u: NDArray, steps: in
         if len(history) > 1 and history[-1] < 1e-9 and history[-1] > 0.1 * history[-2]:
             break
         ones = np.ones(len(area))
-        blocks = 2 * blocks_of(sides, area, cotangents, ones, -ones)
-        change = u * normal.factorised(blocks, 1e-10).solve(misfit * u)
+        change = u * normal.factorised(2 * blocks_of(sides, area, cotangents, ones, -ones), 1e-10).solve(misfit * u)
         change -= u * ((own @ change) / (own @ u))
         u = u + min(1.0, 0.9 * longest_step(sides, change[opposite])) * change
     return best, history

@@ -72,8 +72,7 @@ def _starts(n: int, edges: NDArray, lengths: NDArray, count: int) -> list[NDArra
     table = np.array(distances)
     starts = []
     for k in range(count):
-        bent = table ** (1 - 0.15 * k)
-        square = bent**2
+        square = (table ** (1 - 0.15 * k)) ** 2
         own = square[:, marks[: len(table)]]
         centre = own.mean(axis=1)
         value, vector = np.linalg.eigh(-0.5 * (own - centre[:, None] - centre + own.mean()))

@@ -19,14 +19,12 @@ def with_vertices_back(matrix: OperatorMatrix) -> OperatorMatrix | None:
     """
     n, edges, lacking = matrix.n, matrix.edges, matrix.incomplete_rows
     _, opposite = three_cycles(n, edges)
-    on_rim = lacking[edges].all(axis=1) & (np.bincount(opposite.ravel(), minlength=len(edges)) == 1)
-    rim = edges[on_rim]
+    rim = edges[lacking[edges].all(axis=1) & (np.bincount(opposite.ravel(), minlength=len(edges)) == 1)]
     graph = sp.coo_array((np.ones(len(rim), np.int8), rim.T), shape=(n, n))
     loop = csgraph.connected_components(graph, directed=False)[1]
     twice = np.bincount(rim.ravel(), minlength=n) == 2
     degree = np.bincount(edges.ravel(), minlength=n)
-    size = np.bincount(loop)
-    closed = (np.bincount(loop, ~twice) == 0) & (size <= degree[~lacking].max(initial=0))
+    closed = (np.bincount(loop, ~twice) == 0) & (np.bincount(loop) <= degree[~lacking].max(initial=0))
     rows = np.flatnonzero(closed[loop])
     if not len(rows):
         return None

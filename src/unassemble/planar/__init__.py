@@ -7,7 +7,7 @@ from .frame import canonical_frame, collinear, fit_similarity
 from .hinges import join
 from .normal import WeightJacobian
 from .pencil import ConformalPencil, ShiftedSearch
-from .piece import PieceMesh, refined
+from .piece import PieceMesh, collapsed, refined
 from .polish import CAREFUL, PolishOptions, count_flipped, polish
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "ShiftedSearch",
     "WeightJacobian",
     "canonical_frame",
+    "collapsed",
     "collinear",
     "conformal_map",
     "coordinate_covariances",

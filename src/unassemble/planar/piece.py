@@ -73,16 +73,11 @@ def refined(
 def _polished(
     piece: Piece, weights: NDArray, start: NDArray, scale: float | None, spread: NDArray | None
 ) -> PolishedMesh:
-    """By the chord iteration; where it fails, by small steps from the better of start and result.
+    """By the chord iteration; where it comes to no end, by small steps from the better of start and result.
 
-    Rounding in the normal equations of long thin pieces is one reason to fail.
+    Rounding in the normal equations of long thin pieces is one reason for that.
     """
-    try:
-        found = polish(piece, weights, start, scale=scale, spread=spread)
-    except SolverError:  # steps that led to flat triangles; small ones do not
-        if piece.n_vertices > MOST_CAREFUL:
-            raise
-        return polish(piece, weights, start, scale=scale, spread=spread, options=CAREFUL)
+    found = polish(piece, weights, start, scale=scale, spread=spread)
     finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
     flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
     if (found.converged and not flipped) or piece.n_vertices > MOST_CAREFUL:

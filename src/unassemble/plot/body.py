@@ -67,8 +67,7 @@ def _faces(recovery: Recovery) -> list[NDArray]:
         return list(cells.values())
     if recovery.dim == 2:
         return [planar_outlines(kind, some) for kind, some in cells.items()]
-    facets = outer_facets(cells) if cells else []
-    return [some[_normals(recovery.points[some]) @ _TOWARDS > 0] for some in facets]
+    return [some[_normals(recovery.points[some]) @ _TOWARDS > 0] for some in (outer_facets(cells) if cells else [])]
 
 
 def _normals(corners: NDArray) -> NDArray:

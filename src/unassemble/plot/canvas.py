@@ -14,14 +14,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
-from ..files import check_plot, whole_file
+from ..files import whole_file
 from ..recovery import PlanarMesh
 from . import style
 
 
 def write_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
     """Write a figure, whole or not at all; without the date, so that the same mesh gives the same file."""
-    check_plot(path)
     suffix = PurePath(path).suffix.lower()
     metadata = dict.fromkeys({".svg": ["Date"], ".pdf": ["CreationDate"]}.get(suffix, []))
     with whole_file(path, suffix) as draft, matplotlib.rc_context({"svg.hashsalt": "unassemble"}):
@@ -115,5 +114,4 @@ def apart(points: NDArray[np.float64], part: NDArray[np.int64]) -> NDArray[np.fl
     size = np.maximum(high - low, 0)
     row, column = np.divmod(np.arange(count), int(np.ceil(np.sqrt(count))))
     corner = np.column_stack([column, -row]) * (1.06 * size.max(axis=0))
-    shift = (corner - np.where(size > 0, low, 0))[part]
-    return points + np.where(part[:, None] >= 0, shift, 0)
+    return points + np.where(part[:, None] >= 0, (corner - np.where(size > 0, low, 0))[part], 0)

@@ -31,7 +31,9 @@ def draw_mesh(ax: Axes, mesh: PlanarMesh, points: NDArray, outer: NDArray) -> li
         return []
     rings = [points[mesh.boundary[a:b, 0]] for a, b in pairwise(mesh.boundary_offsets)]
     _fill(ax, rings)
-    width = _line_width(ax, start, stop)
+    # A small part of a typical edge, in points, so that fine meshes are shades and do not drown in ink.
+    inches = ax.get_window_extent().width / ax.figure.dpi * np.median(np.linalg.norm(stop - start, axis=1))
+    width = float(np.clip(0.045 * 72 * inches / np.ptp(ax.get_xlim()), 0.05, 0.6))
     draw_lines(ax, np.stack([start, stop], axis=1), style.EDGE, width, capstyle="round")
     for is_outer, colour in ((False, style.HOLE), (True, style.OUTER)):
         chosen = [np.vstack([ring, ring[:1]]) for ring, flag in zip(rings, outer, strict=True) if flag == is_outer]
@@ -44,8 +46,7 @@ def draw_mesh(ax: Axes, mesh: PlanarMesh, points: NDArray, outer: NDArray) -> li
 def draw_lines(ax: Axes, lines: Iterable[NDArray], colour: str, width: float, **more: Any) -> None:
     """Lines through points (k, 2) each."""
     lines = list(lines)
-    many = len(lines) > style.MOST_VECTOR
-    drawn = LineCollection(lines, colors=colour, linewidths=width, rasterized=many, **more)
+    drawn = LineCollection(lines, colors=colour, linewidths=width, rasterized=len(lines) > style.MOST_VECTOR, **more)
     ax.add_collection(drawn, autolim=False)
 
 
@@ -61,7 +62,7 @@ def draw_hinges(ax: Axes, points: NDArray) -> list[Line2D]:
 def draw_worst(ax: Axes, points: NDArray, pairs: NDArray) -> list[Line2D]:
     """Mark the entries of the matrix that fit worst, as edges with a ring around."""
     ends = points[pairs]
-    ends = ends[np.isfinite(ends).all(axis=(1, 2))] if len(pairs) else np.empty((0, 2, 2))
+    ends = ends[np.isfinite(ends).all(axis=(1, 2))]
     if not len(ends):
         return []
     draw_lines(ax, ends, style.WORST, 1.8, capstyle="round", zorder=6)
@@ -89,8 +90,7 @@ def outer_loops(mesh: PlanarMesh) -> NDArray[np.bool_]:
     loop = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     origin = mesh.points[boundary[offsets[:-1], 0]][loop]
     a, b = mesh.points[boundary[:, 0]] - origin, mesh.points[boundary[:, 1]] - origin
-    area = np.bincount(loop, a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], len(offsets) - 1)
-    return np.asarray(area > 0)
+    return np.asarray(np.bincount(loop, a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], len(offsets) - 1) > 0)
 
 
 def _fill(ax: Axes, rings: list[NDArray]) -> None:
@@ -101,11 +101,3 @@ def _fill(ax: Axes, rings: list[NDArray]) -> None:
     codes[np.append(0, ends[:-1])] = Path.MOVETO
     codes[ends - 1] = Path.CLOSEPOLY
     ax.add_patch(PathPatch(Path(vertices, codes), facecolor=style.FILL, edgecolor="none"))
-
-
-def _line_width(ax: Axes, start: NDArray, stop: NDArray) -> float:
-    """In points; a small part of a typical edge, so that fine meshes are shades and do not drown in ink."""
-    line = stop - start
-    box = ax.get_window_extent()
-    pixels = np.median(np.hypot(line[:, 0], line[:, 1])) * box.width / np.ptp(ax.get_xlim())
-    return float(np.clip(0.045 * pixels * 72 / ax.figure.dpi, 0.05, 0.6))

@@ -12,6 +12,7 @@ from ..clock import Clock
 from ..errors import FormatError, InputError
 from ..files import check_plot
 from ..metric import realised
+from ..planar import fit_similarity
 from ..recovery import Body, ConformingMesh, Mechanical, PlanarMesh, Recovery, Surface
 from ..summary import counted_cells, scale_text
 from ..words import count_of
@@ -106,9 +107,7 @@ def plot_comparison(true_points: ArrayLike, recovery: Recovery, path: str | os.P
         handles = draw_mesh(ax, recovery, points, outer)
         ax.set_title(name, color=style.TEXT, size=9.5, style="italic", pad=3)
     headline = f"{recovery.status}, largest error {largest_error(aligned, truth):.1e} of the diameter"
-    sizes = [count_of(recovery.n_points, "point"), *counted_cells(recovery)]
-    said = "  ·  ".join([*sizes, f"backward error {recovery.backward_error:.1e}"])
-    header(figure, headline, said, style.STATUS.get(recovery.status, style.TEXT))
+    header(figure, headline, _details(recovery), style.STATUS.get(recovery.status, style.TEXT))
     footer(figure, handles)
     if path is not None:
         write_figure(figure, path)
@@ -121,12 +120,9 @@ def align(points: NDArray, truth: NDArray, component: NDArray) -> NDArray[np.flo
     for label in np.unique(component[component >= 0]):
         rows = component == label
         source, target = points[rows] @ [1, 1j], truth[rows] @ [1, 1j]
-        centre = target.mean()
-        source, target = source - source.mean(), target - centre
-        size = float(np.vdot(source, source).real) or 1.0
-        images = [np.vdot(s, target) / size * s for s in (source, source.conj())]
-        best = min(images, key=lambda image: float(np.linalg.norm(image - target))) + centre
-        aligned[rows] = np.column_stack([best.real, best.imag])
+        fits = [fit_similarity(source, target, mirror=mirror) for mirror in (False, True)]
+        moved = min(fits, key=lambda fit: fit[1])[0](source)
+        aligned[rows] = np.column_stack([moved.real, moved.imag])
     return aligned
 
 

@@ -4,7 +4,8 @@ Files, reports, pictures and near-null spaces are made of a result from above, i
 """
 
 from .base import ELEMENT_NAMES, Recovery
-from .kinds import Body, ConformingMesh, Evidence, Mechanical, PlanarMesh, Structure, Surface
+from .mechanical import Body, Evidence, Mechanical, Structure
+from .scalar import ConformingMesh, PlanarMesh, Surface
 
 __all__ = [
     "ELEMENT_NAMES",

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cells import Alternative
-from ..certify import Certificate, without_spare_equations
+from ..certify import Certificate
+from ..certify_spare import without_spare_equations
 from ..matrix import OperatorMatrix
 from ..tolerances import ALIKE, MAGNIFIED, PLACED
 from ..words import Reason

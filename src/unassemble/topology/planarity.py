@@ -1,12 +1,9 @@
 """Planarity by the edge-addition method, through ``planarity`` where it is installed, else networkx."""
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
-
-try:
-    import planarity as _suite
-except ImportError:  # no wheels for this platform: networkx has the left-right test in pure Python
-    _suite = None
 
 
 def too_many(n: int, edges: NDArray) -> bool:
@@ -21,7 +18,7 @@ def rotation_system(n: int, edges: NDArray) -> tuple[NDArray[np.int64], NDArray[
     """
     if too_many(n, edges):
         return None
-    if _suite is not None:
+    with suppress(ImportError):  # no wheels for this platform: networkx has the left-right test in pure Python
         return _rotation_by_suite(n, edges)
     import networkx
 
@@ -34,6 +31,8 @@ def rotation_system(n: int, edges: NDArray) -> tuple[NDArray[np.int64], NDArray[
 
 def _rotation_by_suite(n: int, edges: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
     """The suite takes and gives adjacency lists as text; its vertices count from 1, and 0 ends a list."""
+    import planarity
+
     both = np.concatenate([edges, edges[:, ::-1]])
     both = both[np.lexsort((both[:, 1], both[:, 0]))]
     degree = np.bincount(both[:, 0], minlength=n)
@@ -43,12 +42,12 @@ def _rotation_by_suite(n: int, edges: NDArray) -> tuple[NDArray[np.int64], NDArr
     numbers[np.arange(len(both)) + 2 * both[:, 0] + 1] = both[:, 1] + 1
     words = np.array(list(map(str, numbers.tolist())), dtype=object)
     words[start] += ":"
-    graph = _suite.Graph()
+    graph = planarity.Graph()
     graph.gp_ReadFromString(f"N={n}\n" + " ".join(words.tolist()) + "\n")
-    if graph.gp_Embed(_suite.EMBEDFLAGS_PLANAR) != _suite.OK:
+    if graph.gp_Embed(planarity.EMBEDFLAGS_PLANAR) != planarity.OK:
         return None
     graph.gp_SortVertices()  # back from the order of its depth-first search
-    text = graph.gp_WriteToString(_suite.WRITE_ADJLIST)
+    text = graph.gp_WriteToString(planarity.WRITE_ADJLIST)
     lists = np.array(text.partition("\n")[2].replace(":", " ").split(), dtype=np.int64)
     end = np.flatnonzero(lists == 0)
     head = np.delete(lists, np.r_[0, end[:-1] + 1, end]) - 1
