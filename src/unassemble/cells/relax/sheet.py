@@ -62,23 +62,14 @@ class Sheet:
             found = cotangent(at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at)
         return np.clip(np.nan_to_num(found, posinf=STEEPEST, neginf=-STEEPEST), -STEEPEST, STEEPEST)
 
-    @staticmethod
-    def gradients(at: NDArray) -> NDArray[np.complex128]:
-        """(3, m, 3) derivatives of half the cotangents by the corner itself, the next one and the one after."""
-        with np.errstate(all="ignore"):
-            at_u, at_w = corner_gradients(at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at)
-        gradient = np.stack([-at_u - at_w, at_u, at_w])
-        gradient[:, ~(np.abs(gradient) < STEEPEST**2).all(axis=0)] = 0
-        return gradient
-
     def around(self, strength: NDArray) -> NDArray[np.float64]:
         """(e,) the boundary of all candidates, each times its strength: as whole labels have it, so is their map."""
         sides = (self._sense * strength[self.cell][:, None]).ravel()
         return np.asarray(np.bincount(self.row.ravel(), sides, len(self.weights)), dtype=np.float64)
 
-    def pencil(self, strength: NDArray, unit: float = 1.0) -> ConformalPencil:
+    def pencil(self, strength: NDArray) -> ConformalPencil:
         """The conformal pencil for fractional labels, of weights over some c; each edge may be on the boundary."""
-        return ConformalPencil(self.n_vertices, self.edges, self.edges, self.weights / unit, self.around(strength))
+        return ConformalPencil(self.n_vertices, self.edges, self.edges, self.weights, self.around(strength))
 
     def mapped(self, strength: NDArray, start: PieceMesh | None = None) -> PieceMesh:
         """The conformal map for fractional labels; raises RecoveryError if there is none."""
@@ -103,7 +94,11 @@ class Sheet:
         """
         t, z, e = self.triangles, placed.z, len(self.weights)
         at = z[t]
-        gradient = strength[self.cell][:, None] * self.gradients(at)
+        with np.errstate(all="ignore"):
+            at_u, at_w = corner_gradients(at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at)
+        gradient = np.stack([-at_u - at_w, at_u, at_w])  # by the corner itself, the next one and the one after
+        gradient[:, ~(np.abs(gradient) < STEEPEST**2).all(axis=0)] = 0
+        gradient *= strength[self.cell][:, None]
         vertex = 2 * np.stack([t, t[:, [1, 2, 0]], t[:, [2, 0, 1]]]).ravel()
         row = np.tile(self.row.ravel(), 6)
         by_position = sp.coo_array(
