@@ -10,7 +10,7 @@ from ..elements.surface import boundary_loops
 from .parts import Part, reversal
 
 
-class Joined:
+class JoinedParts:
     """Parts put together in the numbering of the matrix, those that are mirrored turned over."""
 
     def __init__(self, parts: Sequence[Part], placed: Sequence[NDArray], n: int):

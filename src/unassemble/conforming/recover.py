@@ -22,7 +22,7 @@ from ..tolerances import SMALL
 from ..topology import Topology, local_numbering
 from ..topology.keys import found, pair_keys
 from .fit import Fitted, deviations_of, fitted
-from .joined import Joined
+from .joined import JoinedParts
 from .parts import Part, parts_of
 from .roles import Cells, ordered_cells
 from .sets import node_sets
@@ -88,16 +88,22 @@ def _ambiguous(one: ConformingMesh, other: ConformingMesh) -> ConformingMesh:
     )
 
 
-def shown_cells(stored: OperatorMatrix, *, mass: bool = False) -> Iterator[Cells]:
-    """Cells that the rows may form, the likeliest first; without or with a mass term."""
+def shown_cells(
+    stored: OperatorMatrix, *, mass: bool = False, lost: NDArray[np.bool_] | None = None
+) -> Iterator[Cells]:
+    """Cells that the rows may form, the likeliest first; with a mass term, or others `lost` at some rows, (n,) bool."""
     numbering = local_numbering(stored.n, stored.edges)
     order = numbering.vertices
     near = OperatorMatrix(
-        stored.n, numbering.edges, stored.entries[numbering.edge_rows], stored.diagonal[numbering.vertices]
+        stored.n,
+        numbering.edges,
+        stored.entries[numbering.edge_rows],
+        stored.diagonal[order],
+        replaced=None if stored.replaced is None else stored.replaced[order],
     )
-    for sets in node_sets(near):
+    for sets in node_sets(near, None if lost is None else lost[order]):
         with suppress(TopologyError):
-            for blocks, told in ordered_cells(near, sets, mass=mass):
+            for blocks, told in ordered_cells(near, sets, mass=mass, lost=lost is not None):
                 yield Cells({kind: order[cells] for kind, cells in blocks.items()}, told, order, sets.even)
 
 
@@ -110,7 +116,7 @@ def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -
     with clock("place"):
         nodes, remarks = [fit.nodes for fit in fits], [fit.notes for fit in fits]
         placed, origins, notes = task.placement.placed(topology, nodes, remarks)
-        mesh = Joined(parts, placed, stored.n)
+        mesh = JoinedParts(parts, placed, stored.n)
         shift = origins[mesh.component]
         points = mesh.points + np.column_stack([shift.real, shift.imag])
     with clock("certify"):
@@ -155,7 +161,7 @@ def _fit(stored: OperatorMatrix, part: Part, task: Task) -> Fitted:
     return fitted(part, weights, scale=task.scale, noise=noise, refine=task.options.refine)
 
 
-def _held(stored: OperatorMatrix, mesh: Joined, points: NDArray, fits: Sequence[Fitted], task: Task) -> Held:
+def _held(stored: OperatorMatrix, mesh: JoinedParts, points: NDArray, fits: Sequence[Fitted], task: Task) -> Held:
     """A mesh with these points against the matrix, and against the errors of its entries."""
     tensor = task.placement.tensor
     if tensor:  # div(K grad) is a Laplacian in coordinates that K stretches
