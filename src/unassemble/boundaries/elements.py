@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from ..certify_elements import certify_elements
 from ..clock import Clock
+from ..conforming.joined import JoinedParts
 from ..conforming.parts import Part, parts_of
-from ..conforming.recover import JoinedParts, shown_cells
+from ..conforming.recover import shown_cells
 from ..conforming.sets import pairs_of
 from ..errors import TopologyError
 from ..matrix import OperatorMatrix

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,20 +10,20 @@ from numpy.typing import NDArray
 from ..cells import SEARCHED_ROWS, Alternative
 from ..certify_elements import certify_elements
 from ..clock import Clock
-from ..elements.surface import boundary_loops
 from ..errors import GeometryError, SolverError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..recovery import ConformingMesh
+from ..scalar.held import Held
 from ..scalar.noise import Noise
 from ..scalar.placement import Placement
 from ..scalar.solving import Task
-from ..scalar.verdict import Held
 from ..tolerances import SMALL
 from ..topology import Topology, local_numbering
 from ..topology.keys import found, pair_keys
 from .fit import Fitted, deviations_of, fitted
-from .parts import Part, parts_of, reversal
+from .joined import JoinedParts
+from .parts import Part, parts_of
 from .roles import Cells, ordered_cells
 from .sets import node_sets
 from .verdict import verdict
@@ -160,38 +159,6 @@ def _fit(stored: OperatorMatrix, part: Part, task: Task) -> Fitted:
         noise = task.noise.sigma * np.where(there, task.noise.spread[place], SMALL)
     weights = -np.where(there, stored.entries[place], 0.0)
     return fitted(part, weights, scale=task.scale, noise=noise, refine=task.options.refine)
-
-
-class JoinedParts:
-    """Parts put together in the numbering of the matrix, those that are mirrored turned over."""
-
-    def __init__(self, parts: Sequence[Part], placed: Sequence[NDArray], n: int):
-        self.points = np.full((n, 2), np.nan)
-        self.component = np.full(n, -1, dtype=np.int64)
-        self.blocks: dict[str, NDArray[np.int64]] = {}
-        self.piece: dict[str, NDArray[np.int64]] = {}  # of each cell
-        for label in range(len(parts))[::-1]:  # the first part at a hinge comes last
-            part, z = parts[label], placed[label]
-            self.points[part.piece.vertices] = np.column_stack([z.real, z.imag])
-            self.component[part.piece.vertices] = label
-            a, b, c = z[part.piece.triangles].T
-            mirrored = (np.conj(b - a) * (c - a)).imag.sum() < 0
-            for kind, cells in part.blocks.items():
-                own = part.piece.vertices[cells[:, reversal(kind)] if mirrored else cells]
-                piece, name = np.full(len(own), label), kind.name
-                self.blocks[name] = np.concatenate([own, self.blocks.get(name, own[:0])])
-                self.piece[name] = np.concatenate([piece, self.piece.get(name, piece[:0])])
-
-    def fields(self) -> dict[str, Any]:
-        """Cells and boundary under the names that results have."""
-        fields: dict[str, Any] = {}
-        for name, cells in self.blocks.items():
-            corners = 3 if name.startswith("triangle") else 4
-            fields["triangles" if corners == 3 else "quads"] = np.ascontiguousarray(cells[:, :corners])
-            if cells.shape[1] > corners:
-                fields["mid_nodes"] = np.ascontiguousarray(cells[:, corners:])
-        boundary, offsets = boundary_loops(self.blocks)
-        return fields | {"boundary": boundary, "boundary_offsets": offsets}
 
 
 def _held(stored: OperatorMatrix, mesh: JoinedParts, points: NDArray, fits: Sequence[Fitted], task: Task) -> Held:
