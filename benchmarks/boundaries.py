@@ -3,9 +3,10 @@
     python benchmarks/boundaries.py [FOLDER] [--conditions eliminated robin] [--meshes NAME] [--most 3000]
     python benchmarks/boundaries.py --bound [--conditions eliminated identity]
     python benchmarks/boundaries.py --random 20000 90000 [--runs 3]
+    python benchmarks/boundaries.py ../shared/corpus/quad --element Q1 --conditions eliminated identity
 
-Every mesh of the folder (npz with points and triangles; ``../shared/corpus/planar`` unless told) gets each boundary
-condition as scikit-fem puts it in, in random order of the rows. Printed are the share of the points that are
+Every mesh of the folder (npz with points and triangles, or quads; ``../shared/corpus/planar`` unless told) gets each
+boundary condition as scikit-fem puts it in, in random order of the rows. Printed are the share of the points that are
 determined, the largest error among them after the best similarity, relative to the diameter of their piece, and
 processor time in direct solves with the same matrix. The last lines count meshes with 70, and with 90 per cent
 determined. With ``--random``, meshes of random points around two holes are taken instead, all boundary vertices
@@ -22,10 +23,12 @@ import argparse
 import sys
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
+import skfem
 
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "boundaries")]
@@ -51,6 +54,14 @@ CONDITIONS = {
     "two-materials": lambda mesh: materials(mesh, (1.0, 5.0)),
     "four-materials": lambda mesh: materials(mesh, (1.0, 3.0, 0.2, 20.0)),
 }
+ELEMENTS = {
+    "P1": skfem.ElementTriP1(),
+    "P2": skfem.ElementTriP2(),
+    "P3": skfem.ElementTriP3(),
+    "Q1": skfem.ElementQuad1(),
+    "Q2": skfem.ElementQuad2(),
+}
+FEWEST = 20  # rows of matrices that are worth a line
 WRONG = 1e-8
 
 
@@ -64,6 +75,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, nargs="?", default=ROOT.parent / "shared" / "corpus" / "planar")
     parser.add_argument("--conditions", nargs="+", choices=CONDITIONS, default=list(CONDITIONS))
+    parser.add_argument(
+        "--element", choices=ELEMENTS, default="P1", help="those but P1 are eliminated or identity only"
+    )
     parser.add_argument("--meshes", nargs="+", help="these only")
     parser.add_argument("--most", type=int, default=10**9, help="vertices of the meshes that are used")
     parser.add_argument("--bound", action="store_true", help="print what the mesh itself determines")
@@ -72,11 +86,15 @@ def main() -> int:
     arguments = parser.parse_args()
     if arguments.random:
         return int(max(timed(n, arguments.runs) for n in arguments.random) > WRONG)
-    wrong = False
+    wrong, element = False, ELEMENTS[arguments.element]
     for condition in arguments.conditions:
         shares = []
-        for name, mesh in meshes(arguments.folder, arguments.meshes, arguments.most):
-            share, error, line = (bound if arguments.bound else measured)(*CONDITIONS[condition](mesh))
+        put = CONDITIONS[condition] if arguments.element == "P1" else partial(CONDITIONS[condition], element=element)
+        for name, mesh in meshes(arguments.folder, arguments.meshes, arguments.most, element.refdom.nnodes):
+            matrix, points = put(mesh)
+            if matrix.shape[0] < FEWEST:
+                continue
+            share, error, line = (bound if arguments.bound else measured)(matrix, points)
             shares.append(share)
             wrong |= error > WRONG
             print(f"{condition:14s} {name:36s} {line}{'   WRONG' if error > WRONG else ''}", flush=True)
@@ -86,13 +104,14 @@ def main() -> int:
     return int(wrong)
 
 
-def meshes(folder: Path, names: list[str] | None, most: int) -> Iterator:
-    """Names and meshes, without vertices of no triangle."""
+def meshes(folder: Path, names: list[str] | None, most: int, corners: int) -> Iterator:
+    """Names and meshes of triangles or quadrilaterals, without vertices of no cell."""
     for file in sorted(folder.glob("*.npz")):
         given = np.load(file)
-        used, triangles = np.unique(given["triangles"].astype(np.int64), return_inverse=True)
+        cells = given["triangles" if corners == 3 else "quads"].astype(np.int64)
+        used, cells = np.unique(cells, return_inverse=True)
         if (names is None or file.stem in names) and len(used) <= most:
-            yield file.stem, mesh_of(given["points"][used, :2].astype(float), triangles.reshape(-1, 3))
+            yield file.stem, mesh_of(given["points"][used, :2].astype(float), cells.reshape(-1, corners))
 
 
 def measured(matrix: sp.csr_array, points: np.ndarray) -> tuple[float, float, str]:

@@ -289,11 +289,8 @@ def boundary_conditions():
 def test_rows_of_the_identity_are_no_noise(which):
     A = shuffled(boundary_conditions()[2][which])
     found, said = outcome(A)
+    assert found is not None
     assert "noise" not in said
-    if found is None:  # recovery has not learnt to read them
-        assert "of the identity" in said
-        with pytest.raises(MatrixError, match="of the identity"):
-            inspect_matrix(A)
 
 
 def test_rows_and_columns_of_the_identity():

@@ -85,20 +85,15 @@ def mesh_for(recovery: Recovery, mesh_format: MeshFormat) -> meshio.Mesh:
     """The mesh with exactly what the format can hold, so that meshio has nothing to drop."""
     import meshio
 
-    data: dict[str, NDArray] = {}
-    if mesh_format.data == "all":
-        data = _point_data(recovery)
-    elif mesh_format.data == "boundary":
+    data = _point_data(recovery) if mesh_format.data == "all" else {}
+    if mesh_format.data == "boundary":
         data = {f"{mesh_format.name}:ref": _boundary_flag(recovery)}
     points = np.zeros((recovery.n_points, max(mesh_format.dimension, recovery.dim)))
     points[:, : recovery.points.shape[1]] = recovery.points
     blocks = list(cells_of(recovery).items())
     if mesh_format.polygons and isinstance(recovery, PlanarMesh) and recovery.n_polygons:
-        corners, start, size = (
-            recovery.polygons_data,
-            recovery.polygons_offsets[:-1],
-            np.diff(recovery.polygons_offsets),
-        )
+        corners, start = recovery.polygons_data, recovery.polygons_offsets[:-1]
+        size = np.diff(recovery.polygons_offsets)
         same = [("polygon", corners[start[size == k, None] + np.arange(k)]) for k in np.unique(size)]
         blocks = [*recovery.cells.items(), *same]
     mesh = meshio.Mesh(points, blocks, point_data=data)

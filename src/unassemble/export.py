@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import FormatError, OutputError
+from .errors import FormatError
 from .exchange import cells_of, mesh_for
 from .files import check_target, whole_file
 from .formats import MeshFormat, format_of
@@ -25,10 +25,8 @@ _log = logging.getLogger(__name__)
 
 def check_output(path: str | os.PathLike[str]) -> None:
     """Raise OutputError, before long work, where a file cannot be written, or FormatError where it can hold no mesh."""
-    if os.path.isdir(path):  # noqa: PTH112 - which takes any name, however long
-        raise OutputError(f"cannot write {os.fspath(path)!r}: it is a folder, so name a file in it, such as mesh.vtu")
-    format_of(path)
     check_target(path)
+    format_of(path)
 
 
 def save(recovery: Recovery, path: str | os.PathLike[str]) -> None:

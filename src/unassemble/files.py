@@ -55,7 +55,7 @@ def check_target(path: str | os.PathLike[str]) -> None:
     try:
         target = Path(path).resolve()
         if target.is_dir():
-            raise OutputError(f"cannot write {name!r}: it is a folder")
+            raise OutputError(f"cannot write {name!r}: it is a folder, so name a file in it")
         if target.exists() and not target.is_file():
             raise OutputError(f"cannot write {name!r}: it is not a regular file")
         if not target.parent.is_dir():

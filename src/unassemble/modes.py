@@ -70,8 +70,7 @@ def save_modes(path: str | PathLike[str], modes: NDArray[np.float64]) -> None:
 
 def check_modes(path: str | PathLike[str]) -> str:
     """Find out, before long work, whether modes can be written; returns the extension."""
-    suffix = PurePath(path).suffix.lower()
-    if suffix not in (".npy", ".mtx"):
+    if (suffix := PurePath(path).suffix.lower()) not in (".npy", ".mtx"):
         raise OutputError(f"rigid-body modes are a .npy or .mtx file, not {fspath(path)!r}")
     check_target(path)
     return suffix
@@ -101,8 +100,7 @@ def _write_dense(path: Path, values: NDArray[np.float64]) -> None:
 
 
 def _determined(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    loose = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if len(loose):
+    if len(loose := np.flatnonzero(~np.isfinite(points).all(axis=1))):
         raise FormatError(
             f"{count_of(len(loose), 'node has', 'nodes have')} no coordinates (node {loose[0]} for one), and this "
             "format has no way to say so: write the .npz, or the modes, in which such nodes have translations only"

@@ -24,8 +24,8 @@ from .nodes.unknowns import (
 )
 from .structures import Beam, StructuralNumbering, find_structure, given_structure, truss_numbering
 from .structures.beams import MOST, find_beam
+from .structures.gaps import directions_with_gaps
 from .structures.layouts import SPACE
-from .structures.recognise import directions_with_gaps
 from .tolerances import CANCELLED
 from .topology import components
 

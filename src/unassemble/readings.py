@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .boundaries import (
     recover_lattice,
     recover_partial,
+    recover_partial_elements,
     recover_without_boundary_terms,
     with_boundary_edges,
     with_diagonals,
@@ -68,17 +69,14 @@ class ScalarReadings:
             found = recover_elements_with_terms(self.matrix, of_cells, self.clock, anchored=anchored)
             return None if found is None or found.status == "uncertified" else found
 
-        order = [plainly] if self.placement.tensor else [plainly, with_terms]
-        if len(order) > 1 and less_mass(self.matrix) is not None:  # told by entries that are zero without a mass term
-            order.reverse()
-        nearest: PlanarMesh | None = None
-        for reading in order:
-            found = reading()
-            # One that is off by 1e-10, because of an entry that stands out, lacks no term.
-            if found is not None and (found.status != "uncertified" or found.backward_error <= CERTIFIED):
-                return found
-            nearest = nearest or found
-        return nearest if nearest is not None and nearest.backward_error < LITTLE else None
+        terms = not self.placement.tensor
+        told = terms and less_mass(self.matrix) is not None  # by entries that are zero without a mass term
+        found = (with_terms() if told else None) or plainly()
+        # One that is off by 1e-10, because of an entry that stands out, lacks no term.
+        near = found is not None and (found.status != "uncertified" or found.backward_error <= CERTIFIED)
+        if terms and not (told or near):
+            found = with_terms() or found
+        return found if found and (found.status != "uncertified" or found.backward_error < LITTLE) else None
 
     def likeliest(self) -> PlanarMesh:
         """The mesh of the first reading that fits, or else of the first that comes near.
@@ -92,6 +90,7 @@ class ScalarReadings:
         if replaced or not self.matrix.adds_up.all():  # else nothing was taken out
             order.append((1 if replaced or incomplete else 3, self._partial))
             order.append((0, self._without_boundary_terms))
+            order.append((1 if self.crowded else 3, self._partial_elements))
         if not replaced:
             linear = [self._regions, self._linear] if uneven(self.matrix) else [self._linear, self._regions]
             order += [(1 if self.crowded else 3, lambda: self.other_elements), *((2, reading) for reading in linear)]
@@ -121,6 +120,9 @@ class ScalarReadings:
         matrix = with_boundary_edges(with_diagonals(self.matrix))
         whole = None if matrix.replaced is None else np.asarray(~matrix.replaced[matrix.edges].all(axis=1))
         return recover_partial(matrix, whole, self.placement, self.clock, self.options)
+
+    def _partial_elements(self) -> PlanarMesh | None:
+        return recover_partial_elements(self.matrix, self.placement, self.clock, self.options)
 
     def _regions(self) -> PlanarMesh | None:
         return recover_regions(with_diagonals(self.matrix, everywhere=True), self.placement, self.clock, self.options)

@@ -28,6 +28,8 @@ def recover_vector(
     """
     numbering, rounding = reading.numbering, reading.rounding
     request = Request(matrix, clock, anchors, cells, reading.why, rounding)
+    space = numbering.layout.space if isinstance(numbering, StructuralNumbering) else numbering.block_size
+    request.held(numbering.node_of_row, space)  # anchors that do not fit, before the long work
     if isinstance(numbering, Beam):
         return serve_beam(numbering, request)
     if isinstance(numbering, StructuralNumbering):

@@ -7,7 +7,19 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from skfem import Basis, BilinearForm, ElementTriP0, ElementTriP1, FacetBasis, MeshTri, condense, enforce
+from skfem import (
+    Basis,
+    BilinearForm,
+    Element,
+    ElementTriP0,
+    ElementTriP1,
+    FacetBasis,
+    Mesh,
+    MeshQuad,
+    MeshTri,
+    condense,
+    enforce,
+)
 from skfem.helpers import dot, grad
 from skfem.models import laplace, mass
 
@@ -15,12 +27,14 @@ from meshes import largest_error
 from unassemble import PlanarMesh
 
 Given = tuple[sp.csr_array, NDArray]
+LINEAR = ElementTriP1()
 
 
-def mesh_of(points: NDArray, triangles: NDArray) -> MeshTri:
+def mesh_of(points: NDArray, cells: NDArray) -> Mesh:
     """Centred and of size 1: shares of Robin terms and convection then do not depend on units."""
     points = (points - points.mean(axis=0)) / np.ptp(points)
-    return MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(triangles.T))
+    kind = MeshTri if cells.shape[1] == 3 else MeshQuad
+    return kind(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
 
 
 def jittered(levels: int = 3, seed: int = 0) -> MeshTri:
@@ -40,18 +54,19 @@ def shuffled(matrix: sp.csr_array, points: NDArray, seed: int = 0) -> Given:
     return moved.tocsr(), points[order]
 
 
-def eliminated(mesh: MeshTri, part: Callable[[NDArray], NDArray] | None = None) -> Given:
-    """Rows and columns of boundary vertices, or of those that `part` marks, taken out."""
-    matrix = laplace.assemble(Basis(mesh, ElementTriP1()))
-    gone = mesh.boundary_nodes() if part is None else mesh.boundary_nodes()[part(mesh.p[:, mesh.boundary_nodes()])]
-    inside = np.setdiff1d(np.arange(mesh.nvertices), gone)
-    return shuffled(condense(matrix, D=gone, expand=False), mesh.p.T[inside])
+def eliminated(mesh: Mesh, part: Callable[[NDArray], NDArray] | None = None, element: Element = LINEAR) -> Given:
+    """Rows and columns of unknowns on the boundary, or of those that `part` marks by their place, taken out."""
+    basis = Basis(mesh, element)
+    gone = basis.get_dofs().all()
+    gone = gone if part is None else gone[part(basis.doflocs[:, gone])]
+    inside = np.setdiff1d(np.arange(basis.N), gone)
+    return shuffled(condense(laplace.assemble(basis), D=gone, expand=False), basis.doflocs.T[inside])
 
 
-def identity_rows(mesh: MeshTri, c: float = 1.0) -> Given:
-    """Rows of boundary vertices replaced, columns kept."""
-    matrix = c * laplace.assemble(Basis(mesh, ElementTriP1()))
-    return shuffled(enforce(matrix, D=mesh.boundary_nodes()), mesh.p.T)
+def identity_rows(mesh: Mesh, c: float = 1.0, element: Element = LINEAR) -> Given:
+    """Rows of unknowns on the boundary replaced, columns kept."""
+    basis = Basis(mesh, element)
+    return shuffled(enforce(c * laplace.assemble(basis), D=basis.get_dofs().all()), basis.doflocs.T)
 
 
 def robin(mesh: MeshTri, alpha: float) -> Given:

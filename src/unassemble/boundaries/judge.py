@@ -36,20 +36,38 @@ def determined(
 
     At positions z and a scale with which whole entries, (e,) bool, fit.
     """
-    piece, n = problem.piece, problem.piece.n_vertices
+    piece = problem.piece
+    jacobian = jacobian_rows(piece.n_vertices, [(problem.gradient(z, scale), piece.stencil)])
+    return determined_by(jacobian, problem.slopes(z, scale), whole, z, piece)
+
+
+def determined_by(
+    jacobian: sp.bsr_array, slopes: NDArray, whole: NDArray[np.bool_], z: NDArray, piece: Piece
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """The same by the derivatives of entries, (e, 2 n) in blocks of x and y, and theirs by log c, (e, k).
+
+    Of the piece only its edges and its boundary matter, between the n vertices.
+    """
+    n = len(z)
     length = np.abs(z[piece.edges[:, 1]] - z[piece.edges[:, 0]])
     size = np.bincount(piece.edges.ravel(), np.repeat(length, 2), n) / np.bincount(piece.edges.ravel(), minlength=n)
-    gradient = problem.gradient(z, scale) * size[piece.stencil]
+    row = np.repeat(np.arange(len(whole)), np.diff(jacobian.indptr))
+    held = np.zeros(n, dtype=bool)
+    held[jacobian.indices[whole[row]]] = True
+    data = jacobian.data * (size[jacobian.indices] * whole[row])[:, None, None]
+    scaled = sp.bsr_array((data, jacobian.indices, jacobian.indptr), shape=jacobian.shape)
+    basis = np.linalg.qr(np.where(whole[:, None], slopes, 0.0))[0]
     try:
-        checked, free = _Linearised.of(piece, gradient, problem.slopes(z, scale), whole).judged()
+        checked, free = _Linearised(scaled, basis, whole, held).judged()
     except GeometryError:
         checked, free = np.zeros_like(whole), np.zeros((n, 0), dtype=np.complex128)
     if not checked.any():
         return np.zeros(n, dtype=bool), checked
     held = np.zeros(n, dtype=bool)
-    held[piece.stencil[:, checked]] = True
+    held[jacobian.indices[checked[row]]] = True
     vertices = _moving_alike(piece, z, free * size[:, None], size, held)
-    return vertices, checked & vertices[piece.stencil].all(axis=0)
+    loose = np.bincount(row, ~vertices[jacobian.indices], len(whole)) > 0
+    return vertices, checked & ~loose
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,14 +78,6 @@ class _Linearised:
     slope: NDArray[np.float64]  # (e, k), an orthonormal basis
     entries: NDArray[np.bool_]
     held: NDArray[np.bool_]  # (n,) vertices that some of the entries depend on
-
-    @classmethod
-    def of(cls, piece: Piece, gradient: NDArray, slopes: NDArray, entries: NDArray[np.bool_]) -> _Linearised:
-        """For gradients (4, e) over the stencils of edges, and what entries change by with log c, (e, k)."""
-        held = np.zeros(piece.n_vertices, dtype=bool)
-        held[piece.stencil[:, entries]] = True
-        jacobian = jacobian_rows(len(held), [(np.where(entries, gradient, 0), piece.stencil)])
-        return cls(jacobian, np.linalg.qr(np.where(entries[:, None], slopes, 0.0))[0], entries, held)
 
     def judged(self) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
         """(e,) entries that others say something about, and (n, k) displacements that leave these as they are.
@@ -108,7 +118,7 @@ def _moving_alike(piece: Piece, z: NDArray, free: NDArray, size: NDArray, held: 
 
     Beyond a neck others may move by another one.
     """
-    n = piece.n_vertices
+    n = len(z)
     graph = sp.coo_array((np.ones(len(piece.edges), np.int8), piece.edges.T), shape=(n, n)).tocsr()
     graph = graph + graph.T
     outside = np.union1d(piece.boundary.ravel(), np.flatnonzero(~held))

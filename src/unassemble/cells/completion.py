@@ -1,8 +1,6 @@
 """Components whose triangles do not explain the matrix: cells looked for, vanished entries put back."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,17 +55,13 @@ def completed(
     for piece in topology.pieces:
         own[label[piece.vertices[0]]].append(piece)
 
-    @cache
-    def misfit_of_triangles() -> NDArray[np.float64]:
-        return misfits_of(matrix, [(piece, attempt(piece)) for piece in topology.pieces])
-
     by_graph_alone = matrix.unweighted and scale is None
     budget = Budget(0 if by_graph_alone else SEARCH.worth(matrix.n))
     for part, pieces in zip(found, own, strict=True):
         if not doubtful[part.vertices[0]]:
             continue
         try:
-            parts.append(_labelled(matrix, part, pieces, attempt, misfit_of_triangles, scale, budget))
+            parts.append(_labelled(matrix, part, pieces, attempt, scale, budget))
         except RecoveryError as error:
             failures.append(located(error, part, named=len(found) > 1))
     if not any(part.pieces for part in parts):
@@ -97,7 +91,6 @@ def _labelled(
     numbering: Numbering,
     own: list[Piece],
     attempt: Attempt,
-    misfit_of_triangles: Callable[[], NDArray[np.float64]],
     scale: float | None,
     budget: Budget,
 ) -> _Part:
@@ -107,17 +100,18 @@ def _labelled(
     labelling = label_cells(len(numbering.vertices), numbering.edges, weights, scale, errors, budget)
     if labelling is not None and labelling.fits:
         return _part(matrix, numbering, labelling)
-    misfit = misfit_of_triangles().copy()
-    if solved := [(piece, mesh) for piece in own if isinstance(mesh := attempt(piece), PieceMesh)]:
-        add_differing_factors(solved, misfit, scale)
-    before = float(np.sqrt(np.mean(misfit[numbering.edge_rows] ** 2)))
-    if labelling is not None and labelling.size < LITTLE * before and labelling.misfit.max() < 1:
+    before = _Part([(piece, attempt(piece)) for piece in own])
+    misfit = misfits_of(matrix, before.pieces)
+    if placed := [(piece, mesh) for piece, mesh in before.pieces if isinstance(mesh, PieceMesh)]:
+        add_differing_factors(placed, misfit, scale)
+    size = float(np.sqrt(np.mean(misfit[numbering.edge_rows] ** 2)))
+    if labelling is not None and labelling.size < LITTLE * size and labelling.misfit.max() < 1:
         return _part(matrix, numbering, labelling)
     n, e = len(numbering.vertices), len(numbering.edges)
     if labelling is None or not own:
         require_planar(n, numbering.edges)
     if own:
-        return _Part([(piece, attempt(piece)) for piece in own])
+        return before
     if labelling is None:
         raise GeometryError(
             f"no cells can be put on the graph of the matrix ({n} rows, {e} entries above the diagonal)"

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from ..errors import InputError, OutputError, RecoveryError, UnassembleError
+from ..errors import InputError, OutputError, RecoveryError
 
 if TYPE_CHECKING:
     from ..recovery import Recovery
@@ -108,8 +108,6 @@ def verdict(error: BaseException) -> tuple[int, str]:
             status, sentence = Exit.USAGE, str(error)
         case RecoveryError():
             status, sentence = Exit.NOTHING, str(error)
-        case UnassembleError():
-            sentence = str(error)
         case OSError():  # without its number
             sentence = (error.strerror or str(error)).lower()
             named = isinstance(error.filename, (str, bytes))

@@ -16,7 +16,7 @@ from ..budget import SAMPLE
 from ..elements.kinds import Kind
 from ..elements.reference import exact_rule, shape_functions, shape_gradients
 from ..matrix import OperatorMatrix
-from ..tolerances import LITTLE
+from ..tolerances import ALIKE, LITTLE
 from ..topology.keys import found
 from .sets import pairs_of
 
@@ -80,6 +80,25 @@ class ElementEntries:
             mine = own[some[0]]
             found[some] = self._values[some][:, a[mine], b[mine]] @ np.linalg.pinv(columns[mine])[3]
         return found
+
+
+def expected(
+    places: Mapping[Kind, NDArray[np.int64]], shares: NDArray, trust: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(e,) entries of cells that are affine, each with nearly those shares, (e,), of its pairs of nodes.
+
+    `places`: rows of the pairs of each cell, (m, pairs); `trust` (e,): weights of the shares.
+    """
+    total = np.zeros(len(shares))
+    for kind, own in places.items():
+        columns = _components(kind, False)[np.triu_indices(kind.nodes, 1)]
+        normal = np.einsum("mp,pr,ps->mrs", trust[own], columns, columns, optimize=True)
+        size = np.trace(normal, axis1=1, axis2=2)[:, None, None]
+        normal = normal + (ALIKE * size + np.finfo(float).tiny) * np.eye(3)
+        right = np.einsum("mp,pr->mr", trust[own] * shares[own], columns)
+        cells = np.linalg.solve(normal, right[..., None])[..., 0] @ columns.T
+        total += np.bincount(own.ravel(), cells.ravel(), len(shares))
+    return total
 
 
 def typical_misfit(matrix: OperatorMatrix, blocks: Mapping[Kind, NDArray[np.int64]]) -> float:

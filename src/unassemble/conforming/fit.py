@@ -74,7 +74,7 @@ def fitted(
 
     Raises GeometryError, SolverError.
     """
-    z, c = _corner_positions(part, weights, scale)
+    z, c = corner_positions(part, weights, scale)
     trials = []  # with straight sides: the quadrature that fits best, of those that fit alike the first
     for rule in _rules(part, straight=True):
         trials.append(_with_rule(part, weights, z, c, noise, rule, straight=True))
@@ -123,12 +123,20 @@ def _left_by(noise: NDArray | None, c: float) -> float:
 def _with_rule(
     part: Part, weights: NDArray, z: NDArray, c: float, noise: NDArray | None, rule: dict[str, str], *, straight: bool
 ) -> Fitted:
-    rules = {kind: planar_rules(kind)[rule[kind.name]] for kind in part.blocks}
-    entries = Entries(part, rules, straight=straight)
+    entries = _entries(part, rule, straight=straight)
     spread = entries.roundings(z) if noise is None else noise
     with np.errstate(invalid="ignore", over="ignore"):  # cells without an area; see `flipped`
         misfit = weights - c * entries.weights(z)
     return Fitted(part, weights, entries, z, c, rule, straight, spread, misfit)
+
+
+def entries_by_rule(part: Part) -> Iterator[tuple[dict[str, str], Entries]]:
+    """Entries of straight cells by every quadrature."""
+    return ((rule, _entries(part, rule, straight=True)) for rule in _rules(part, straight=True))
+
+
+def _entries(part: Part, rule: dict[str, str], *, straight: bool) -> Entries:
+    return Entries(part, {kind: planar_rules(kind)[rule[kind.name]] for kind in part.blocks}, straight=straight)
 
 
 def _rules(part: Part, *, straight: bool) -> Iterator[dict[str, str]]:
@@ -184,7 +192,7 @@ def _among_corners(part: Part, weights: NDArray) -> tuple[NDArray[np.int64], NDA
     return edges, -np.asarray(reduced[edges[:, 0], edges[:, 1]]).ravel()
 
 
-def _corner_positions(part: Part, weights: NDArray, scale: float | None) -> tuple[NDArray[np.complex128], float]:
+def corner_positions(part: Part, weights: NDArray, scale: float | None) -> tuple[NDArray[np.complex128], float]:
     """Positions of corners up to a similarity, and c."""
     edges, weights = _among_corners(part, weights)
     unit = float(np.sign(weights.sum()) * np.median(np.abs(weights[weights != 0]))) if weights.any() else 0.0

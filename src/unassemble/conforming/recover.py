@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,20 +10,20 @@ from numpy.typing import NDArray
 from ..cells import SEARCHED_ROWS, Alternative
 from ..certify_elements import certify_elements
 from ..clock import Clock
-from ..elements.surface import boundary_loops
 from ..errors import GeometryError, SolverError, TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
 from ..recovery import ConformingMesh
+from ..scalar.held import Held
 from ..scalar.noise import Noise
 from ..scalar.placement import Placement
 from ..scalar.solving import Task
-from ..scalar.verdict import Held
 from ..tolerances import SMALL
 from ..topology import Topology, local_numbering
 from ..topology.keys import found, pair_keys
 from .fit import Fitted, deviations_of, fitted
-from .parts import Part, parts_of, reversal
+from .joined import JoinedParts
+from .parts import Part, parts_of
 from .roles import Cells, ordered_cells
 from .sets import node_sets
 from .verdict import verdict
@@ -89,16 +88,22 @@ def _ambiguous(one: ConformingMesh, other: ConformingMesh) -> ConformingMesh:
     )
 
 
-def shown_cells(stored: OperatorMatrix, *, mass: bool = False) -> Iterator[Cells]:
-    """Cells that the rows may form, the likeliest first; without or with a mass term."""
+def shown_cells(
+    stored: OperatorMatrix, *, mass: bool = False, lost: NDArray[np.bool_] | None = None
+) -> Iterator[Cells]:
+    """Cells that the rows may form, the likeliest first; with a mass term, or others `lost` at some rows, (n,) bool."""
     numbering = local_numbering(stored.n, stored.edges)
     order = numbering.vertices
     near = OperatorMatrix(
-        stored.n, numbering.edges, stored.entries[numbering.edge_rows], stored.diagonal[numbering.vertices]
+        stored.n,
+        numbering.edges,
+        stored.entries[numbering.edge_rows],
+        stored.diagonal[order],
+        replaced=None if stored.replaced is None else stored.replaced[order],
     )
-    for sets in node_sets(near):
+    for sets in node_sets(near, None if lost is None else lost[order]):
         with suppress(TopologyError):
-            for blocks, told in ordered_cells(near, sets, mass=mass):
+            for blocks, told in ordered_cells(near, sets, mass=mass, lost=lost is not None):
                 yield Cells({kind: order[cells] for kind, cells in blocks.items()}, told, order, sets.even)
 
 
@@ -111,7 +116,7 @@ def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -
     with clock("place"):
         nodes, remarks = [fit.nodes for fit in fits], [fit.notes for fit in fits]
         placed, origins, notes = task.placement.placed(topology, nodes, remarks)
-        mesh = _Joined(parts, placed, stored.n)
+        mesh = JoinedParts(parts, placed, stored.n)
         shift = origins[mesh.component]
         points = mesh.points + np.column_stack([shift.real, shift.imag])
     with clock("certify"):
@@ -156,39 +161,7 @@ def _fit(stored: OperatorMatrix, part: Part, task: Task) -> Fitted:
     return fitted(part, weights, scale=task.scale, noise=noise, refine=task.options.refine)
 
 
-class _Joined:
-    """Parts put together in the numbering of the matrix, those that are mirrored turned over."""
-
-    def __init__(self, parts: Sequence[Part], placed: Sequence[NDArray], n: int):
-        self.points = np.full((n, 2), np.nan)
-        self.component = np.full(n, -1, dtype=np.int64)
-        self.blocks: dict[str, NDArray[np.int64]] = {}
-        self.piece: dict[str, NDArray[np.int64]] = {}  # of each cell
-        for label in range(len(parts))[::-1]:  # the first part at a hinge comes last
-            part, z = parts[label], placed[label]
-            self.points[part.piece.vertices] = np.column_stack([z.real, z.imag])
-            self.component[part.piece.vertices] = label
-            a, b, c = z[part.piece.triangles].T
-            mirrored = (np.conj(b - a) * (c - a)).imag.sum() < 0
-            for kind, cells in part.blocks.items():
-                own = part.piece.vertices[cells[:, reversal(kind)] if mirrored else cells]
-                piece, name = np.full(len(own), label), kind.name
-                self.blocks[name] = np.concatenate([own, self.blocks.get(name, own[:0])])
-                self.piece[name] = np.concatenate([piece, self.piece.get(name, piece[:0])])
-
-    def fields(self) -> dict[str, Any]:
-        """Cells and boundary under the names that results have."""
-        fields: dict[str, Any] = {}
-        for name, cells in self.blocks.items():
-            corners = 3 if name.startswith("triangle") else 4
-            fields["triangles" if corners == 3 else "quads"] = np.ascontiguousarray(cells[:, :corners])
-            if cells.shape[1] > corners:
-                fields["mid_nodes"] = np.ascontiguousarray(cells[:, corners:])
-        boundary, offsets = boundary_loops(self.blocks)
-        return fields | {"boundary": boundary, "boundary_offsets": offsets}
-
-
-def _held(stored: OperatorMatrix, mesh: _Joined, points: NDArray, fits: Sequence[Fitted], task: Task) -> Held:
+def _held(stored: OperatorMatrix, mesh: JoinedParts, points: NDArray, fits: Sequence[Fitted], task: Task) -> Held:
     """A mesh with these points against the matrix, and against the errors of its entries."""
     tensor = task.placement.tensor
     if tensor:  # div(K grad) is a Laplacian in coordinates that K stretches

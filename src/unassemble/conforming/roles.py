@@ -17,6 +17,7 @@ from ..budget import SAMPLE
 from ..elements.kinds import KINDS, Kind
 from ..errors import TopologyError
 from ..matrix import OperatorMatrix
+from ..tolerances import ROUNDED
 from ..topology.keys import found, pair_keys
 from .affine import ElementEntries
 from .sets import NodeSets, pairs_of
@@ -58,16 +59,19 @@ class _Sides:
 
 
 def ordered_cells(
-    matrix: OperatorMatrix, found: NodeSets, *, mass: bool = False
+    matrix: OperatorMatrix, found: NodeSets, *, mass: bool = False, lost: bool = False
 ) -> Iterator[tuple[dict[Kind, NDArray[np.int64]], bool]]:
     """Cells of sets of rows, the likeliest first; then with some quadrilaterals in their second likeliest order.
 
-    With each, whether the graph alone tells them. With a mass term nothing else stands on the diagonal.
+    With each, whether the graph alone tells them. With a mass term nothing else stands on the diagonal, nor where cells
+    are lost; of rows that were replaced it says nothing.
 
     Raises TopologyError if the sets do not overlap as cells do.
     """
     sums = np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n)
-    size = np.abs(matrix.diagonal if mass else sums)
+    size = np.abs(matrix.diagonal if mass or lost else sums)
+    if matrix.replaced is not None:  # those inside, between a corner that was replaced and another, are larger
+        size = np.where(matrix.replaced, ROUNDED * np.abs(sums), size)
     sides = _sides_between(matrix.n, found, size)
     every = np.sort(np.concatenate([pairs_of(matrix.n, sets).ravel() for sets in found.sets]))
     blocks: dict[Kind, NDArray[np.int64]] = {}

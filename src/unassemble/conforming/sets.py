@@ -39,12 +39,14 @@ class Common:
     Nodes on opposite sides of a cell have those of the cell in common and no others.
     """
 
-    def __init__(self, matrix: OperatorMatrix):
+    def __init__(self, matrix: OperatorMatrix, lost: NDArray[np.bool_] | None = None):
         size = matrix.row_size[matrix.edges].min(axis=1)
         self.n = matrix.n
         self.keys = pair_keys(matrix.n, *matrix.edges.T)
         self.graph = self._graph_of(self.keys)
-        self.stored = self.keys[np.abs(matrix.entries) > ROUNDED * size]
+        stored = np.abs(matrix.entries) > ROUNDED * size
+        self.stored = self.keys[stored]
+        self.asked = self.stored if lost is None else self.keys[stored & ~lost[matrix.edges].any(axis=1)]  # for a cell
 
     @cached_property
     def nonzero(self) -> Graph:
@@ -89,8 +91,9 @@ class Common:
         both = sp.csr_array(self.closed[i].multiply(self.closed[j]))
         both.sort_indices()
         rows = both.indices.reshape(-1, k).astype(np.int64)
+        # What two cells have left of which others are lost may have as many rows, some with few neighbours among them.
         rest = rows[(rows != i[:, None]) & (rows != j[:, None])].reshape(-1, k - 2)
-        return rows[self._absent(rest) <= _ABSENT[k]]
+        return rows[(self._absent(rest).sum(axis=1) <= 2 * _ABSENT[k]) & (2 * self._absent(rows) < k).all(axis=1)]
 
     def bubbles(self) -> NDArray[np.int64]:
         """(m, 10) cubic triangles that lack many entries, by the node inside.
@@ -138,14 +141,16 @@ class Common:
             rows = several[size == 7].indices.reshape(-1, 7)
             rows = [several[size == 6].indices.reshape(-1, 6), *(np.delete(rows, k, axis=1) for k in range(7))]
             new = once(np.concatenate(rows).astype(np.int64))
-            found = once(np.concatenate([found, new[self._absent(new) <= _ABSENT[6] + right_angles]]))
+            found = once(np.concatenate([found, new[self._absent(new).sum(axis=1) <= 2 * (_ABSENT[6] + right_angles)]]))
         return found
 
     def _absent(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(m,) pairs of each set that are not coupled."""
-        absent = np.zeros(len(rows), np.int64)
+        """(m, k) how many others of its set each row is not coupled to."""
+        absent = np.zeros(rows.shape, np.int64)
         for a, b in combinations(range(rows.shape[1]), 2):
-            absent += ~contains(self.keys, rows[:, a] * self.n + rows[:, b])
+            apart = ~contains(self.keys, rows[:, a] * self.n + rows[:, b])
+            absent[:, a] += apart
+            absent[:, b] += apart
         return absent
 
 
@@ -162,15 +167,16 @@ def pairs_of(n: int, cells: NDArray[np.int64]) -> NDArray[np.int64]:
     return pair_keys(n, cells[:, a], cells[:, b])
 
 
-def node_sets(matrix: OperatorMatrix) -> Iterator[NodeSets]:
+def node_sets(matrix: OperatorMatrix, lost: NDArray[np.bool_] | None = None) -> Iterator[NodeSets]:
     """Sets that cover all entries, for each order of elements that the graph allows, greatest first.
 
-    Linear ones are quadrilaterals only: triangles beside them follow once diagonals are known.
+    Linear ones are quadrilaterals only: triangles beside them follow once diagonals are known. Where cells are `lost`
+    at some rows, (n,) bool, entries of these need no cell.
     """
     degree = np.bincount(matrix.edges.ravel(), minlength=1).astype(float)
     if not 0 < len(matrix.edges) <= _DENSEST * matrix.n or (degree**2).sum() > SAMPLE * matrix.n:
         return  # too dense, or with a row that is coupled to nearly all others
-    common = Common(matrix)
+    common = Common(matrix, lost)
     for order, k in ((3, 10), (2, 9), (2, 8), (2, 6)):
         found = common.sets(k)
         if _cover(common, [found]):
@@ -251,8 +257,8 @@ def _beside(common: Common, quads: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _cover(common: Common, sets: list[NDArray[np.int64]]) -> bool:
-    """Whether each entry that is not zero belongs to a cell."""
+    """Whether each entry that is not zero, and has to, belongs to a cell."""
     if not sum(map(len, sets)):
         return False
     covered = distinct(np.concatenate([pairs_of(common.n, cells).ravel() for cells in sets]))
-    return bool(contains(covered, common.stored).all())
+    return bool(contains(covered, common.asked).all())

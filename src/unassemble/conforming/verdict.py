@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..matrix import OperatorMatrix
+from ..scalar.held import Held
 from ..scalar.solving import Task
-from ..scalar.verdict import Held
 from ..tolerances import CERTIFIED, CONFIDENCE, LARGEST_NOISE
 from ..topology.keys import contains, pair_keys
 from ..words import count_of, sentences

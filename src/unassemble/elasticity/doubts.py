@@ -1,7 +1,6 @@
 """What is not sure about nodes, which of them elements show to be right all the same, and what is said of it."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,16 +11,6 @@ from ..nodes.numbering import Numbering
 from ..words import count_of
 from .materials.cells import Cells
 from .nullspace.placing import Solution
-
-
-def with_doubts(nodal: NodalMatrix, numbering: Numbering) -> NodalMatrix:
-    """Mark nodes that lack a direction and have a row that may be another node's: none says that others lack it."""
-    if numbering.open_row is None:
-        return nodal
-    doubtful = np.zeros(nodal.n, dtype=bool)
-    doubtful[numbering.node_of_row[numbering.open_row]] = True
-    doubtful &= (nodal.row_of < 0).any(axis=1)
-    return replace(nodal, doubtful=doubtful)
 
 
 def unconfirmed(

@@ -60,14 +60,13 @@ def _with_planes(nodal: NodalMatrix, found: Solution | None, valid: NDArray[np.b
         other = replace(placed(*completed), planes=True, valid=valid)
     except GeometryError:
         return found
-    if not other.exact or (found is not None and other.rank <= found.rank):
+    if not other.exact:
         return found
-    if not other.unique:
-        return other
-    hanging = determined(other.points)
-    if found is not None and found.unique:
-        hanging &= ~determined(found.points)
-    other = replace(other, hanging=hanging if hanging.any() else None)
+    if other.unique:
+        hanging = determined(other.points)
+        if found is not None and found.unique:
+            hanging &= ~determined(found.points)
+        other = replace(other, hanging=hanging if hanging.any() else None)
     return found if found is not None and other.rank <= found.rank else other
 
 

@@ -18,11 +18,13 @@ from ..nodes.rounded import known_to
 from ..recovery import Body
 from ..tolerances import ALIKE, LAST_DIGITS
 from ..words import Reason
-from .doubts import about_assumptions, about_cells, about_nodes, guessed_directions, unborne, unconfirmed, with_doubts
+from .doubts import about_assumptions, about_cells, about_nodes, guessed_directions, unborne, unconfirmed
 from .materials.cells import Cells, recognise_cells
 from .nullspace.certificate import residuals
+from .nullspace.checked import checked
 from .nullspace.identities import lame_ratio, poisson_ratio
-from .nullspace.placing import Solution, checked, without_springs
+from .nullspace.placing import Solution
+from .nullspace.springs import without_springs
 from .positions import solve
 from .verdict import (
     NOTHING_CHECKED,
@@ -44,9 +46,8 @@ def serve_body(nodal: NodalMatrix, numbering: Numbering, request: Request) -> Bo
             "the directions are not coupled, as those of a vector Laplacian: these are scalar matrices side by side, "
             "which `operator='laplacian'` recovers"
         )
-    request.held(numbering.node_of_row, numbering.block_size)  # anchors that do not fit, before the long work
     with request.clock("null space"), blas_threads(1):
-        nodal = with_doubts(without_springs(nodal), numbering)
+        nodal = without_springs(nodal)
         try:
             solution = solve(nodal)
         except RecoveryError as error:
@@ -65,7 +66,7 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     cells, rounding = request.cells, request.rounding
 
     def placed_again(matrix: sp.csr_array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        other = with_doubts(without_springs(nodal_matrix(matrix, numbering)), numbering)
+        other = without_springs(nodal_matrix(matrix, numbering))
         with blas_threads(1):
             again = solve(other)
         return again.points, residuals(other, again.valid, again.points)
@@ -110,7 +111,8 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         status, reason = "uncertified", NOTHING_SHOWN
     if status == "certified" and _flat(placed, component):
         status, reason = "uncertified", Reason("the points lie in one line or plane, and no solid body does")
-    if status == "certified" and found.certified and _without_shear(found):
+    bulk, shear = np.abs(found.lame).T
+    if status == "certified" and (shear <= ALIKE * bulk).any():
         status, reason = "uncertified", Reason("elements have no shear stiffness, and any vectors that cancel are such")
     held = request.held(numbering.node_of_row, nodal.dim)
     points, factor, notes, (status, reason) = anchored(
@@ -166,12 +168,6 @@ def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
             return None
         told.append(read)
     return told[0] if np.ptp([poisson_ratio(one) for one in told]) < ALIKE else None
-
-
-def _without_shear(found: Cells) -> bool:
-    """Whether some cell has no shear modulus."""
-    bulk, shear = np.abs(found.lame).T
-    return bool((shear <= ALIKE * bulk).any())
 
 
 def _flat(points: NDArray[np.float64], component: NDArray[np.int64]) -> bool:

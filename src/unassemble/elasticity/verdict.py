@@ -58,9 +58,9 @@ def about_made_up_nodes(nodal: NodalMatrix, numbering: Numbering, solution: Solu
     Fields that are left then move rows of one direction only, as if there were more nodes; and the points that belong
     to rows of several nodes are none of the body's.
     """
-    odd = _came_apart(nodal) if any(solution.freedoms) and numbering.open_row is None else 0
-    if odd:
-        return f"{_lacking(odd)}, so that rows were not joined to nodes as they should be"
+    lacking = _lacking(nodal) if any(solution.freedoms) and numbering.open_row is None else ""
+    if lacking:
+        return f"{lacking}, so that rows were not joined to nodes as they should be"
     if not solution.exact and rounding is None and numbering.incomplete and (numbering.odd or numbering.common < 1):
         return "none fit the matrix exactly, as where constraints tie unknowns together"
     return ""
@@ -175,17 +175,15 @@ def _to_identities(nodal: NodalMatrix, solution: Solution, numbering: Numbering)
             "only elements that re-assemble to the matrix would show that it is right",
             advice=GIVE_NUMBERING,
         )
-    odd = _came_apart(nodal)
-    return Reason(f"{_lacking(odd)}: its rows belong to other nodes", GIVE_NUMBERING) if odd else None
+    lacking = _lacking(nodal)
+    return Reason(f"{lacking}: its rows belong to other nodes", GIVE_NUMBERING) if lacking else None
 
 
-def _came_apart(nodal: NodalMatrix) -> int:
-    """How many nodes lack directions without a trace, doubtful ones aside, which get no coordinates."""
-    return int(np.count_nonzero(without_trace(nodal).any(axis=1) & ~nodal.doubtful))
-
-
-def _lacking(odd: int) -> str:
-    return f"{count_of(odd, 'node lacks', 'nodes lack')} directions although no row next to it misses anything"
+def _lacking(nodal: NodalMatrix) -> str:
+    """How many nodes lack directions without a trace, doubtful ones aside, which get no coordinates; empty for none."""
+    odd = int(np.count_nonzero(without_trace(nodal).any(axis=1) & ~nodal.doubtful))
+    nodes = count_of(odd, "node lacks", "nodes lack")
+    return f"{nodes} directions although no row next to it misses anything" if odd else ""
 
 
 def _torn(nodal: NodalMatrix, solution: Solution) -> bool:

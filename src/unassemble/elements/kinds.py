@@ -1,6 +1,11 @@
 """Kinds of cells by meshio's names: how many nodes, in which order."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
 
 _TRIANGLE = ((0, 1), (1, 2), (2, 0))
 _THIRDS = ((0, 0, 1), (0, 1, 1), (1, 1, 2), (1, 2, 2), (2, 2, 0), (2, 0, 0), (0, 1, 2))
@@ -45,6 +50,13 @@ class Kind:
     def degree(self) -> int:
         """Polynomial degree along a side."""
         return 1 + sum(set(some) == {0, 1} for some in self.between)
+
+    @cached_property
+    def on_one_side(self) -> NDArray[np.bool_]:
+        """(k (k - 1) / 2,) whether two nodes of a plane cell share a side, in the order of numpy.triu_indices."""
+        sides = [{s, (s + 1) % self.corners} for s in range(self.corners)]
+        on = [side | {k for k, some in enumerate(self.between, self.corners) if set(some) == side} for side in sides]
+        return np.array([any({a, b} <= side for side in on) for a, b in combinations(range(self.nodes), 2)])
 
 
 KINDS = {

@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 
 from ..certify import Terms
 from ..clock import Clock
-from ..errors import RecoveryError
-from ..linalg import UpperTriangle, factorisation
+from ..errors import GeometryError, RecoveryError
+from ..linalg import UpperTriangle, nearly_singular
 from ..linalg.definite import STEPS
 from ..matrix import OperatorMatrix
 from ..planar.conformal import conformal_map
 from ..planar.cotangent import edge_weights
 from ..reaction import Skeleton
 from ..recovery import PlanarMesh
-from ..tolerances import ALIKE, LAST_DIGITS, SUMMED
+from ..tolerances import ALIKE, SUMMED
 from ..topology import Topology, surfaces
 from .held import Held, Plain, RowSums
 from .mass import mass_alone, with_consistent_mass, with_lumped_mass
@@ -57,9 +57,8 @@ def recover_with_terms(
         if not sums.sign:
             found = unscaled(held, plain, clock)
         elif triangles:
-            skeleton = Skeleton.of(matrix.n, matrix.edges, topology.pieces)
-            found = mass_alone(held, topology, skeleton, sums)
-            found = found or with_consistent_mass(held, skeleton, sums, plain, clock)
+            cells = Skeleton.of(matrix.n, matrix.edges, topology.pieces)
+            found = mass_alone(held, topology, cells, sums) or with_consistent_mass(held, cells, sums, plain, clock)
     return found or plain(matrix)
 
 
@@ -89,9 +88,7 @@ def unscaled(held: Held, plain: Plain, clock: Clock) -> PlanarMesh | None:
     i, j = matrix.edges.T
     found = plain(replace(matrix, entries=matrix.entries * null[i] * null[j], diagonal=matrix.diagonal * null**2))
     note = "S and c are known up to a factor that one could give the other: the geometric mean of S is 1"
-    jacobi = np.ptp(matrix.diagonal) <= SUMMED * np.abs(matrix.diagonal).max()
-    more = ("the diagonal is constant, as Jacobi scaling leaves it",) if jacobi else ()
-    return held.with_terms(found, Terms(matrix.diagonal, scaling=1 / null), "S c L S", note, *more)
+    return held.with_terms(found, Terms(matrix.diagonal, scaling=1 / null), "S c L S", note)
 
 
 def _positive_null_vector(matrix: OperatorMatrix) -> NDArray[np.float64] | None:
@@ -101,17 +98,11 @@ def _positive_null_vector(matrix: OperatorMatrix) -> NDArray[np.float64] | None:
         return None
     unit = 1 / np.sqrt(np.abs(matrix.diagonal))
     scaled = sp.csr_array(sp.diags_array(unit) @ (sign[0] * matrix.csr()) @ sp.diags_array(unit))
-    shifted = UpperTriangle.of(sp.csr_array(scaled + LAST_DIGITS * sp.eye_array(matrix.n)))
-    factor = factorisation(shifted)
+    x = np.ones(matrix.n)
     try:
-        factor.factorise(shifted)
-        x = np.ones(matrix.n)
-        for _ in range(STEPS + 1):
-            x = factor.solve(x)
-            x = x / np.abs(x).max()
-    finally:
-        factor.release()
-    if not np.isfinite(x).all():
+        with nearly_singular(UpperTriangle.of(scaled)) as solver:
+            for _ in range(STEPS + 1):
+                x = (y := solver.solve(x)) / np.abs(y).max()
+    except GeometryError:  # it has eigenvalues of both signs
         return None
-    x = x * np.sign(x[0])
     return unit * x if (x > 0).all() and (np.abs(scaled @ x) <= SUMMED * (abs(scaled) @ np.abs(x))).all() else None

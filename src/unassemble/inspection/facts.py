@@ -5,9 +5,7 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from ..conforming.affine import typical_misfit
 from ..conforming.parts import parts_of
@@ -25,6 +23,7 @@ from ..structures.trusses import bars_of
 from ..tolerances import ROUNDED, SUMMED
 from ..topology import Piece, Topology
 from ..topology.manifold import Cycles, surface_readings
+from ..topology.numbering import connected
 from ..words import kind_text
 
 _LIKE = 0.3  # misfit of cells that are nearly affine; of other matrices with rows that form cells it is nearer to 1
@@ -34,14 +33,13 @@ def matrix_facts(matrix: OperatorMatrix) -> dict[str, Any]:
     """Of any matrix."""
     degree = np.bincount(matrix.edges.ravel(), minlength=matrix.n)
     size = matrix.row_size
-    graph = sp.csr_array((np.ones(len(matrix.edges), np.int8), matrix.edges.T), shape=(matrix.n, matrix.n))
     n_isolated = int(np.count_nonzero(degree == 0))
     smaller = np.minimum(size[matrix.edges[:, 0]], size[matrix.edges[:, 1]])
     return {
         "n_rows": matrix.n,
         "n_edges": len(matrix.edges),
         "asymmetry": float(matrix.asymmetry),
-        "n_connected": int(csgraph.connected_components(graph, directed=False)[0]) - n_isolated,
+        "n_connected": connected(matrix.n, *matrix.edges.T)[0] - n_isolated,
         "n_isolated": n_isolated,
         "n_vanished": int(np.count_nonzero(np.abs(matrix.entries) <= ROUNDED * smaller)),
         "n_zero_sums": int(np.count_nonzero((np.abs(matrix.row_sums) <= SUMMED * size) & (degree > 0))),

@@ -24,10 +24,7 @@ STEPS = 3
 def nearly_singular(matrix: UpperTriangle) -> Iterator[Factorisation]:
     """Cholesky factor of a real semidefinite matrix plus the least multiple of the identity that rounding allows.
 
-    Raises
-    ------
-    GeometryError
-        If a pivot vanishes even with the largest.
+    Raises GeometryError if a pivot vanishes even with the largest.
     """
     block = matrix.block
     start = matrix.indptr[:-1]

@@ -57,12 +57,9 @@ def check_matrix(A: Any, *, drop_zeros: float | None = None, noise: float | None
     csr, warnings = _real(as_csr(A))
     pairs, n, diagonal = triangles(csr), csr.shape[0], csr.diagonal()
     if not len(pairs.edges):
-        lumped = diagonal.any() and (diagonal >= 0).all()
         raise MatrixError(
             "the matrix is diagonal, as a lumped mass matrix is: it tells how much mass each unknown has, and no mesh "
             "edge. Pass the stiffness matrix of the same mesh"
-            if lumped
-            else "the matrix is diagonal: it has no off-diagonal entry, and so no mesh edge"
         )
     pairs, replaced, kept = from_columns(diagonal, pairs)
     entries, asymmetry, changed = symmetric_entries(csr, pairs, noise)

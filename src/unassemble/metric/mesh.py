@@ -6,13 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from ..topology.keys import Grouped
 from ..topology.manifold import Cycles
-from ..topology.numbering import local_numbering
+from ..topology.numbering import connected, local_numbering
 from ..topology.orientation import glue, orient
 from .heron import angles
 
@@ -90,9 +88,8 @@ class SurfaceMesh:
         row, corner = row[order], corner[order]
         ends = self.fan[row, (corner + 1) % 3], self.fan[row, (corner + 2) % 3]
         size = int(self.fan.max(initial=-1)) + 1
-        graph = sp.coo_array((np.ones(len(row), np.int8), ends), shape=(size, size))
-        label = csgraph.connected_components(graph, directed=False)[1][ends[0]]
-        return np.unique(label, return_inverse=True)[1].astype(np.int64)
+        label = connected(size, *ends)[1][ends[0]]
+        return np.unique(label, return_inverse=True)[1]
 
     @property
     def loops(self) -> NDArray[np.int64]:
@@ -136,5 +133,4 @@ def _fans(triangles: NDArray, opposite: NDArray) -> NDArray[np.int64]:
     order = np.lexsort((vertex, side))
     side, vertex, ends = side[order], vertex[order], ends[order]
     same = (side[1:] == side[:-1]) & (vertex[1:] == vertex[:-1])
-    graph = sp.coo_array((np.ones(same.sum(), np.int8), (ends[:-1][same], ends[1:][same])), shape=(corner.size,) * 2)
-    return csgraph.connected_components(graph, directed=False)[1].reshape(-1, 3).astype(np.int64)
+    return connected(corner.size, ends[:-1][same], ends[1:][same])[1].reshape(-1, 3)

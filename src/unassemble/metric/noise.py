@@ -18,10 +18,12 @@ def row_sum_test(matrix: OperatorMatrix, sigma: float) -> dict[str, float]:
     """
     count = np.bincount(matrix.edges.ravel(), minlength=matrix.n) + 1
     used = count > 1
-    total = matrix.diagonal + np.bincount(matrix.edges.ravel(), np.repeat(matrix.entries, 2), matrix.n)
     shared = 2 * float((1 / count[matrix.edges].prod(axis=1)).sum())
     return chi_square_verdict(
-        (total / (sigma * np.sqrt(count)))[used], int(used.sum()), sigma, repeats=1 + shared / float(used.sum())
+        (matrix.row_sums / (sigma * np.sqrt(count)))[used],
+        int(used.sum()),
+        sigma,
+        repeats=1 + shared / float(used.sum()),
     )
 
 

@@ -12,6 +12,7 @@ from ..errors import SolverError
 from ..linalg import UpperTriangle, factorisation
 from ..recovery import Surface
 from ..tolerances import CERTIFIED
+from ..topology.numbering import connected
 
 
 def realised(surface: Surface, clock: Clock, starts: int = 4) -> Surface:
@@ -23,11 +24,8 @@ def realised(surface: Surface, clock: Clock, starts: int = 4) -> Surface:
     """
     with clock("realise"):
         points = np.full((surface.n_points, 3), np.nan)
-        graph = sp.coo_array(
-            (surface.edge_lengths, surface.edges.T), shape=(surface.n_points, surface.n_points)
-        ).tocsr()
         known = np.isfinite(surface.edge_lengths)
-        _, part = csgraph.connected_components(graph, directed=False)
+        _, part = connected(surface.n_points, *surface.edges.T)
         per_start: NDArray[np.float64] = np.zeros((starts, len(surface.edges)))
         for label in np.unique(part[surface.edges[known, 0]]):
             rows = np.flatnonzero(known & (part[surface.edges[:, 0]] == label))

@@ -3,12 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse import csgraph
 
 from ..matrix import OperatorMatrix
 from ..topology.cycles import three_cycles
 from ..topology.keys import pair_keys
+from ..topology.numbering import connected
 
 
 def with_vertices_back(matrix: OperatorMatrix) -> OperatorMatrix | None:
@@ -20,8 +19,7 @@ def with_vertices_back(matrix: OperatorMatrix) -> OperatorMatrix | None:
     n, edges, lacking = matrix.n, matrix.edges, matrix.incomplete_rows
     _, opposite = three_cycles(n, edges)
     rim = edges[lacking[edges].all(axis=1) & (np.bincount(opposite.ravel(), minlength=len(edges)) == 1)]
-    graph = sp.coo_array((np.ones(len(rim), np.int8), rim.T), shape=(n, n))
-    loop = csgraph.connected_components(graph, directed=False)[1]
+    loop = connected(n, *rim.T)[1]
     twice = np.bincount(rim.ravel(), minlength=n) == 2
     degree = np.bincount(edges.ravel(), minlength=n)
     closed = (np.bincount(loop, ~twice) == 0) & (np.bincount(loop) <= degree[~lacking].max(initial=0))

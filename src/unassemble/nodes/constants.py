@@ -5,17 +5,13 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..tolerances import CANCELLED
+from .grouping import by_direction, pattern_of
 
 PENALTY = 1e3  # a diagonal entry this many times the rest of its row is a penalty
 
 
-def uncoupled_rows(matrix: sp.csr_array) -> NDArray[np.bool_]:
-    """(N,) rows without an entry off the diagonal, as those of the identity."""
-    return row_sizes(matrix) == 0
-
-
 def row_sizes(matrix: sp.csr_array) -> NDArray[np.float64]:
-    """(N,) sums of absolute entries off the diagonal, on which there may be a penalty."""
+    """(N,) sums of absolute entries off the diagonal, where there may be a penalty; zero for rows of the identity."""
     entry = matrix.tocoo()
     off = np.where(entry.row == entry.col, 0.0, np.abs(entry.data))
     return np.asarray(np.bincount(entry.row, off, matrix.shape[0]), dtype=np.float64)
@@ -45,20 +41,18 @@ def adding_up(matrix: sp.csr_array, size: NDArray[np.float64]) -> NDArray[np.boo
     return np.asarray(np.abs(np.asarray(matrix.sum(axis=1)).ravel()) <= CANCELLED * size)
 
 
-def annihilated_share(
-    matrix: sp.csr_array, identity: NDArray, direction: NDArray, d: int, *, searched: bool = False
-) -> float:
+def annihilated_share(matrix: sp.csr_array, direction: NDArray, d: int, *, searched: bool = False) -> float:
     """Share of pairs (row, direction) that annihilate constants.
 
     Only rows count that annihilate their own direction and another one to which they do couple: sums of nothing are
     no evidence. Where no row couples to another direction, as in vector Laplacians, none needs to, unless the
     directions are the result of a search, which would find any halves of any mesh.
     """
-    live = ~identity
+    size = row_sizes(matrix)
+    live = size > 0
     if not live.any():
         return 0.0
-    ones = np.eye(d)[direction] * live[:, None]
-    size = row_sizes(matrix)[live]
+    ones, size = np.eye(d)[direction] * live[:, None], size[live]
     zero = np.abs(matrix @ ones)[live] <= CANCELLED * size[:, None]
     own = zero[np.arange(len(size)), direction[live]]
     other = np.arange(d) != direction[live][:, None]
@@ -88,33 +82,26 @@ def proven_directions(
     entry = matrix.tocoo()
     strong = np.abs(entry.data) > least[entry.row]
     pattern = sp.csr_array((strong.astype(float), (entry.row, entry.col)), shape=matrix.shape)
-    count = np.zeros_like(failing)
-    np.add.at(count, group, own)
-    telling = (failing == 0) & (count > 0).all(axis=1, keepdims=True)
+    telling = (failing == 0) & (by_direction(group, direction, d) > 0).all(axis=1, keepdims=True)
     vanishing = telling[group] & ~excused & (pattern @ own.astype(float) > 0)
     seen = pattern.T @ vanishing.astype(float) > 0
     return np.asarray((seen & own).any(axis=1) | (seen | own).all(axis=1))
 
 
 def unaccounted(
-    matrix: sp.csr_array,
-    node: NDArray[np.int64],
-    direction: NDArray[np.int64],
-    d: int,
-    live: NDArray[np.bool_] | None = None,
+    matrix: sp.csr_array, node: NDArray[np.int64], direction: NDArray[np.int64], d: int
 ) -> NDArray[np.bool_]:
     """(n, d) directions that nodes lack although all rows coupled to them annihilate constants of that direction.
 
-    Of rows that are `live`, (N,), if these are given: those of the identity do not count. A penalty is no trace.
+    Rows of the identity do not count, and a penalty is no trace.
     """
-    order = len(node)
-    live = np.ones(order, dtype=bool) if live is None else live
-    labels = np.eye(d)[direction] * live[:, None]
+    order, off = len(node), row_sizes(matrix)
+    live = off[:, None] > 0
+    labels = np.eye(d)[direction] * live
     size = np.asarray(abs(matrix).sum(axis=1)).ravel()
-    missing = (np.abs(matrix @ labels) > CANCELLED * size[:, None]) & live[:, None]
-    missing[np.arange(order), direction] &= ~with_penalty(matrix, row_sizes(matrix))
-    pattern = sp.csr_array((np.ones(matrix.nnz, np.int32), matrix.indices, matrix.indptr), shape=matrix.shape)
+    missing = (np.abs(matrix @ labels) > CANCELLED * size[:, None]) & live
+    missing[np.arange(order), direction] &= ~with_penalty(matrix, off)
     onto = sp.csr_array((np.ones(order, np.int32), (node, np.arange(order))))
-    missed = onto @ (pattern @ missing.astype(np.int32))
+    missed = onto @ (pattern_of(matrix) @ missing.astype(np.float32))
     present = (onto @ labels) > 0
     return np.asarray(~present & (missed == 0) & present.any(axis=1)[:, None])

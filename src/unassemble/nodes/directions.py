@@ -101,7 +101,9 @@ class _Body:
             yield given
         if (given >= 0).any() or not len(self._nodes):
             return
-        order = sp.csgraph.reverse_cuthill_mckee(self._pattern, symmetric_mode=True)
+        breadth_first = sp.csgraph.breadth_first_order
+        order = breadth_first(self._pattern, 0, directed=False, return_predecessors=False)
+        order = breadth_first(self._pattern, order[-1], directed=False, return_predecessors=False)
         nodes = self._nodes[np.argsort(np.argsort(order)[self._nodes[:, 0]])]
         for part in _SEEDS:
             known = np.full(len(given), -1)

@@ -46,14 +46,13 @@ def filled_by_direction(matrix: sp.csr_array, direction: NDArray[np.int64], d: i
     matrix = _shared(matrix, label)
     while True:
         pattern, reached = pattern_of(matrix), _reach(matrix)
-        first, second = [np.arange(n)], [n + label]
+        pairs = [(np.arange(n), n + label)]
         for c, b in combinations([own for own in rows if len(own)], 2):
             cross = pattern[c][:, b]
             near = sp.coo_array(cross @ pattern[b][:, b] + pattern[c][:, c] @ cross)
-            r, s = _likest_pairs(reached, c[near.row], b[near.col])
-            first.append(r)
-            second.append(s)
-        linked = joined(np.concatenate(first), np.concatenate(second), 2 * n)[:n]
+            pairs.append(_likest_pairs(reached, c[near.row], b[near.col]))
+        first, second = map(np.concatenate, zip(*pairs, strict=True))
+        linked = joined(first, second, 2 * n)[:n]
         more = _shared(matrix, by_first_row(linked))
         if more.nnz == matrix.nnz:
             return matrix

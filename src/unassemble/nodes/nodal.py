@@ -25,7 +25,8 @@ class NodalMatrix:
     row_of: NDArray[np.int64]  # (n, d) of the matrix, -1 where there is none
     size: NDArray[np.float64]  # (n,) mean absolute sum of a node's off-diagonal blocks, the unit of its equations
     penalised: NDArray[np.bool_]  # (n, d) unknowns with a penalty on the diagonal
-    doubtful: NDArray[np.bool_]  # (n,) nodes whose rows, or directions, may be others
+    # (n,) nodes that lack a direction and have a row that may be another node's: none says that others lack it
+    doubtful: NDArray[np.bool_]
 
     @property
     def n(self) -> int:
@@ -77,7 +78,11 @@ def nodal_matrix(matrix: sp.csr_array, numbering: Numbering) -> NodalMatrix:
     at = np.flatnonzero(own)[node]
     data[at, direction, direction] = 0  # before the rest is added up: it would be lost beside the penalty
     data[at, direction, direction] = -np.add.reduceat(data, indptr[:-1])[node, direction, direction]
-    return NodalMatrix(indptr, indices, data, row_of.reshape(n, d), size, penalised, np.zeros(n, dtype=bool))
+    rows, doubtful = row_of.reshape(n, d), np.zeros(n, dtype=bool)
+    if numbering.open_row is not None:
+        doubtful[numbering.node_of_row[numbering.open_row]] = True
+        doubtful &= (rows < 0).any(axis=1)
+    return NodalMatrix(indptr, indices, data, rows, size, penalised, doubtful)
 
 
 def valid_pairs(nodal: NodalMatrix) -> NDArray[np.bool_]:

@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..tolerances import HARDLY_ANY, MOST, NEARLY_ALL
-from .constants import annihilated_share, unaccounted, uncoupled_rows
+from .constants import annihilated_share, row_sizes, unaccounted
 from .grouping import coupled_in_common
 from .orders import ORDERS, Reading
 
@@ -72,8 +72,8 @@ class Numbering:
 def measured(matrix: sp.csr_array, reading: Reading, d: int, kind: str, *, searched: bool = True) -> Numbering:
     """A numbering and what speaks for it; of one that was `searched` for more is asked."""
     node, direction = reading.node, reading.direction
-    identity = uncoupled_rows(matrix)
-    share = annihilated_share(matrix, identity, direction, d, searched=searched)
+    share = annihilated_share(matrix, direction, d, searched=searched)
     common = coupled_in_common(matrix, node)
-    odd = int(unaccounted(matrix, node, direction, d, ~identity).any(axis=1).sum()) if searched else 0
+    odd = int(unaccounted(matrix, node, direction, d).any(axis=1).sum()) if searched else 0
+    identity = row_sizes(matrix) == 0
     return Numbering(d, node, direction, identity, kind, share, common, odd, reading.open_row, reading.unnamed)

@@ -13,11 +13,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..budget import LARGE, Budget
-from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST, NEARLY_ALL
-from .constants import adding_up, proven_directions, row_sizes, unaccounted, uncoupled_rows, with_penalty
+from ..tolerances import HARDLY_ANY, LITTLE, MOST, NEARLY_ALL
+from .constants import adding_up, proven_directions, row_sizes, unaccounted, with_penalty
 from .directions import spread_directions, with_least_sums
 from .filling import filled, filled_by_direction
-from .grouping import by_direction, by_first_row, pattern_of, same_pattern, without_doubles
+from .grouping import by_first_row, pattern_of, same_pattern, without_doubles
 from .numbering import Numbering, measured
 from .orders import Reading, directions_by_component, nodes_by_component, nodes_in_runs
 
@@ -31,8 +31,12 @@ def searched(matrix: sp.csr_array, sizes: tuple[int, ...], *, as_stored: bool = 
     """
     live, inner = live_part(matrix)
     found: list[Numbering] = []
+    row = np.arange(matrix.shape[0])
     for kind, d, reading in _readings(inner, sizes, as_stored):
-        one = measured(matrix, _of_all_rows(reading, live, matrix.shape[0]), d, kind)
+        node, direction = row + len(live), np.zeros(len(row), np.int64)  # a row of the identity is a node by itself
+        node[live], direction[live] = reading.node, reading.direction
+        masks = [None if mask is None else np.isin(row, live[mask]) for mask in reading[2:]]
+        one = measured(matrix, Reading(by_first_row(node), direction, *masks), d, kind)
         found.append(one)
         # Rows of each node couple to the same nodes, or nearly all do, most sums vanish and hardly a node lacks any.
         shows = one.common == 1 or (one.share >= MOST and one.quality > NEARLY_ALL * one.share)
@@ -64,7 +68,7 @@ def directions_in_order(
 
 def live_part(matrix: sp.csr_array) -> tuple[NDArray[np.int64], sp.csr_array]:
     """(k,) rows that couple to others, and the matrix of these."""
-    live = np.flatnonzero(~uncoupled_rows(matrix))
+    live = np.flatnonzero(row_sizes(matrix))
     inner = sp.csr_array(matrix[live][:, live])
     inner.sort_indices()
     return live, inner
@@ -96,11 +100,8 @@ def _readings(inner: sp.csr_array, sizes: tuple[int, ...], as_stored: bool) -> I
         group = same_pattern(whole)
         for d in sizes:
             shown = put_back or (large and not as_stored) or np.mean(_of_runs(group, d) >= 0) > 0.5
-            if kind == "interleaved" and not shown:
-                continue
-            reading = _by_equilibrium(inner, whole, d, kind)
-            if reading is not None:
-                yield kind, d, reading
+            if kind == "pattern" or shown:
+                yield kind, d, _by_equilibrium(inner, whole, d, kind)
 
 
 def _in_turn(matrix: sp.csr_array) -> bool:
@@ -134,14 +135,12 @@ def _came_apart(
     return np.asarray(unaccounted(matrix, node, direction, d).any(axis=1))[node]
 
 
-def _by_equilibrium(inner: sp.csr_array, whole: sp.csr_array, d: int, kind: str) -> Reading | None:
-    """Directions spread from whole nodes, and nodes; None where translations are not annihilated."""
+def _by_equilibrium(inner: sp.csr_array, whole: sp.csr_array, d: int, kind: str) -> Reading:
+    """Directions spread from whole nodes, and nodes."""
     group = same_pattern(whole)
     known = _of_runs(group, d) if kind == "interleaved" else np.full(len(group), -1)
     direction = spread_directions(whole, group, d, known)
     direction = with_least_sums(whole, group, direction, d, Budget(_WORK))
-    if kind == "pattern" and _annihilated(whole, direction, d) <= NEARLY_ALL:
-        return None
     if whole is not inner:
         whole = filled_by_direction(whole, direction, d)
         group = same_pattern(whole)
@@ -149,31 +148,4 @@ def _by_equilibrium(inner: sp.csr_array, whole: sp.csr_array, d: int, kind: str)
         node, open_row = nodes_in_runs(inner, group, direction, d), None
     else:
         node, open_row = without_doubles(group, direction, d)
-        if _even(inner, group, direction, d) <= MOST:
-            return None
     return Reading(node, direction, open_row, ~proven_directions(whole, direction, group, d))
-
-
-def _annihilated(matrix: sp.csr_array, direction: NDArray[np.int64], d: int) -> float:
-    """Share of the rows that add up to zero over all directions together which do so over each."""
-    size = row_sizes(matrix)
-    whole = adding_up(matrix, size) & ~with_penalty(matrix, size)
-    sums = np.abs(matrix @ np.eye(d)[direction])
-    return float((sums <= CANCELLED * size[:, None]).all(axis=1)[whole].mean()) if whole.any() else 0.0
-
-
-def _even(matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], d: int) -> float:
-    """Share of whole rows whose pattern has as many in each direction: two of three taken for one annihilate, too."""
-    size = row_sizes(matrix)
-    adds_up = adding_up(matrix, size) | with_penalty(matrix, size)
-    count = by_direction(group, direction, d)
-    whole = (np.bincount(group, ~adds_up) == 0)[group]
-    return float((count == count[:, :1]).all(axis=1)[group[whole]].mean()) if whole.any() else 0.0
-
-
-def _of_all_rows(reading: Reading, live: NDArray[np.int64], order: int) -> Reading:
-    """The reading of all rows from that of live ones; each row of the identity is a node by itself."""
-    node, direction = np.arange(order) + len(live), np.zeros(order, np.int64)
-    node[live], direction[live] = reading.node, reading.direction
-    masks = [None if mask is None else np.isin(np.arange(order), live[mask]) for mask in reading[2:]]
-    return Reading(by_first_row(node), direction, *masks)

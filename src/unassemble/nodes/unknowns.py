@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, RecoveryError
 from ..tolerances import MOST, NEARLY_ALL
-from .constants import uncoupled_rows
+from .constants import row_sizes
 from .grouping import by_first_row, coupled_in_common, made_up, same_pattern
 from .numbering import Numbering, measured
 from .orders import ORDERS, Reading, regular
@@ -65,13 +65,10 @@ def numbering_at_sight(matrix: sp.csr_array) -> Numbering | None:
     if best is not None and best.clear:
         return best
     if best is None or best.common <= NEARLY_ALL:
-        group = same_pattern(matrix, uncoupled_rows(matrix))
+        group = same_pattern(matrix, row_sizes(matrix) == 0)
         if 2 * np.count_nonzero(np.bincount(group)[group] > 1) <= len(group):  # several nodes may share a pattern
             return None
-    try:
-        return find_numbering(matrix)
-    except RecoveryError:
-        return None
+    return _best([best, *searched(matrix, (3, 2))])
 
 
 def nodes_of_pattern(matrix: sp.csr_array) -> tuple[int, int] | None:
@@ -83,7 +80,7 @@ def nodes_of_pattern(matrix: sp.csr_array) -> tuple[int, int] | None:
     for d, kind in product((3, 2), ORDERS):
         if order % d == 0 and coupled_in_common(matrix, regular(order, d, kind)[0]) > NEARLY_ALL:
             return order // d, d
-    group = same_pattern(matrix, uncoupled_rows(matrix))
+    group = same_pattern(matrix, row_sizes(matrix) == 0)
     of_size = np.bincount(np.bincount(group)[group], minlength=4)
     d = 3 if of_size[3] > of_size[2] else 2
     return (int(group.max()) + 1, d) if of_size[d] > NEARLY_ALL * order else None

@@ -115,7 +115,9 @@ def conformal_map(
     Raises GeometryError if no map of positive area is found.
     """
     options = options or ConformalOptions()
-    unit, likely = _estimate(piece, weights) if unit is None else (unit, None)
+    likely, whole = None, 1 / unit if unit else np.inf
+    if unit is None:
+        unit, likely = _estimate(piece, weights)
     with np.errstate(over="ignore"):
         relative = weights / unit if unit else np.full_like(weights, np.inf)
     if not np.abs(relative).max() < 1 / ROUNDED or (scale is not None and not ALIKE < abs(scale / unit) < 1 / ALIKE):
@@ -130,16 +132,16 @@ def conformal_map(
         raise GeometryError(f"the entries do not make a positive energy in row {row}: they belong to no planar mesh")
     pencil = ConformalPencil(piece.n_vertices, piece.edges, piece.boundary, relative)
     search = ShiftedSearch(pencil, options.krylov_steps)
-    z = start = smooth_start(piece.n_vertices, piece.boundary, piece.loop_offsets)
+    z = start = _smooth_start(piece)
     known = scale if scale is not None else likely
-    spread, whole = None, 1 / unit  # c = 1 is common
+    spread = None
     if known is not None:
         z, c, _ = search.at(known / unit * (1 - options.margin), z, steps=2)
         # The quotient is stationary, and accurate to some hundred roundings at any size.
         if scale is not None or abs(c * unit / known - 1) < 1e-13:
             z = search.corrected(z, c)
             return ConformalMap(z, known, search.factorisations, search.solves, True)
-        spread, whole = 1e-2 if c * unit / known > 1 else None, np.inf  # beyond c the quotients tell nothing
+        spread = 1e-2 if c * unit / known > 1 else None  # beyond c the quotients tell nothing
     if spread is None:
         z, c, spread = search.at(options.first_shift, start)
         if c < ALIKE:
@@ -159,18 +161,16 @@ def conformal_map(
     return ConformalMap(z, float(c * unit), search.factorisations, search.solves, converged)
 
 
-def smooth_start(n: int, boundary: NDArray, loop_offsets: NDArray) -> NDArray:
+def _smooth_start(piece: Piece) -> NDArray[np.complex128]:
     """An ellipse on each boundary loop, smooth and of positive area, and a little noise everywhere.
 
     An ellipse has both senses of rotation: which one belongs to the mesh depends on whether the loop is the outer one
     or a hole. Without the ellipses on other loops than the longest, the inversion of a ring would hide the ring from
     the Krylov space. The noise breaks symmetries that would hide the answer from every such space.
-
-    `boundary` and `loop_offsets`: as :class:`~unassemble.topology.Piece` has them.
     """
-    z = 0.01 * np.random.default_rng(0).standard_normal((n, 2)).view(np.complex128).ravel()
-    length = np.diff(loop_offsets)
+    z = 0.01 * np.random.default_rng(0).standard_normal((piece.n_vertices, 2)).view(np.complex128).ravel()
+    length = np.diff(piece.loop_offsets)
     loop, place = runs(length)
     angle, size = 2 * np.pi * place / length[loop], (length / length.max())[loop]
-    np.add.at(z, boundary[:, 0], size * (np.exp(1j * angle) + 0.5 * np.exp(-1j * angle)))
+    np.add.at(z, piece.boundary[:, 0], size * (np.exp(1j * angle) + 0.5 * np.exp(-1j * angle)))
     return z

@@ -30,8 +30,7 @@ class PieceMesh:
 def positions(piece: Piece, weights: NDArray, *, scale: float | None, sharp: bool) -> PieceMesh:
     """Conformal solve; `sharp` where no polish follows."""
     found = conformal_map(piece, weights, scale=scale, sharp=sharp)
-    notes = () if found.converged else ("the conformal solve did not converge",)
-    return PieceMesh(found.z, found.scale, notes)
+    return PieceMesh(found.z, found.scale, () if found.converged else ("the conformal solve did not converge",))
 
 
 def refined(
@@ -50,9 +49,7 @@ def refined(
     and more likely to be such noise. Without it the noise is known, and tested.
     """
     noise = None if noise is None or (noise == 1).all() else noise
-    with np.errstate(divide="ignore", invalid="ignore"):
-        flat = not np.isfinite(edge_weights(piece, mesh.z)).all()
-    if flat:
+    if not np.isfinite(edge_weights(piece, mesh.z)).all():
         return replace(mesh, notes=(*mesh.notes, "no polish: triangles are flat"))
     spread = weight_roundings(piece, mesh.z) if rounding else noise
     try:
@@ -63,8 +60,8 @@ def refined(
             found = _polished(piece, weights, found.z, scale, spread)
     except SolverError as error:
         shortest = _shortest(piece, mesh.z)
-        too_far = f"the start is too far off, with edges of {shortest:.0e} of its size"
-        return replace(mesh, notes=(*mesh.notes, f"no polish: {too_far if shortest < LAST_DIGITS else error}"))
+        why = f"the start is too far off, with edges of {shortest:.0e} of its size" if shortest < LAST_DIGITS else error
+        return replace(mesh, notes=(*mesh.notes, f"no polish: {why}"))
     if not (np.isfinite(found.z).all() and np.isfinite(found.scale)):
         return replace(mesh, notes=(*mesh.notes, "the polish did not stay finite and was left out"))
     if found.converged:
@@ -83,9 +80,7 @@ def _polished(
     found = polish(piece, weights, start, scale=scale, spread=spread)
     finite = np.isfinite(found.z).all() and np.isfinite(found.scale)
     flipped = count_flipped(piece, found.z) if finite else len(piece.triangles)
-    if found.converged and not flipped:
-        return found
-    if piece.n_vertices > MOST_CAREFUL:
+    if (found.converged and not flipped) or piece.n_vertices > MOST_CAREFUL:
         return found
     nearest = found.z if flipped <= count_flipped(piece, start) else start
     again = polish(piece, weights, nearest, scale=scale, spread=spread, options=CAREFUL)
@@ -97,11 +92,10 @@ def collapsed(piece: Piece, z: NDArray) -> str:
     if not np.isfinite(z).all():
         return "positions are not finite"
     d = z - z.mean()
-    size = float(np.abs(d).max())
-    if not size > 0 or not _shortest(piece, z) > LAST_DIGITS:
+    if not d.any() or not _shortest(piece, z) > LAST_DIGITS:
         return "points coincide"
     across = (np.exp(-0.5j * np.angle((d * d).sum())) * d).imag
-    return "all points lie in a line" if np.abs(across).max() <= LAST_DIGITS * size else ""
+    return "all points lie in a line" if np.abs(across).max() <= LAST_DIGITS * np.abs(d).max() else ""
 
 
 def _shortest(piece: Piece, z: NDArray) -> float:

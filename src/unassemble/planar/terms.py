@@ -52,8 +52,11 @@ def lacking_term(
     try:
         jacobian = WeightJacobian(piece, z, spread)
         equations = NormalEquations(jacobian, distant_pair(z))
-        both = _unmoved(jacobian, equations, np.column_stack([weights / scale / spread - fitted, terms, fitted]))
+        both = np.column_stack([weights / scale / spread - fitted, terms, fitted])
+        moves = equations.solve(np.column_stack([jacobian.transpose(column) for column in both.T]))
         equations.release()
+        # What displacements cannot explain of these changes of the weights.
+        both -= np.column_stack([jacobian.forward(np.ascontiguousarray(move)) for move in moves.T])
     except SolverError:
         return None
     if free_scale and (size := float(np.linalg.norm(both[:, -1]))) > 0:  # less what a change of scale explains
@@ -101,9 +104,3 @@ def _terms(piece: Piece, z: NDArray) -> tuple[NDArray, NDArray[np.float64]]:
     varying = [summed(halves * factor[:, None]) for factor in powers]
     names = np.array([*([MASS] * len(mass)), *([COEFFICIENT] * len(varying)), ONE_SIGN])
     return names, np.column_stack([*mass, *varying, np.ones(len(piece.edges))])
-
-
-def _unmoved(jacobian: WeightJacobian, equations: NormalEquations, changes: NDArray) -> NDArray:
-    """What displacements cannot explain of some changes of the weights (e, k)."""
-    moves = equations.solve(np.column_stack([jacobian.transpose(column) for column in changes.T]))
-    return changes - np.column_stack([jacobian.forward(np.ascontiguousarray(move)) for move in moves.T])

@@ -6,16 +6,14 @@ from pathlib import PurePath
 
 import matplotlib
 import numpy as np
-import scipy.sparse as sp
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from scipy.sparse import csgraph
 
 from ..files import whole_file
 from ..recovery import PlanarMesh
+from ..topology.numbering import connected
 from . import style
 
 
@@ -33,16 +31,13 @@ def panels(extents: Sequence[NDArray]) -> tuple[Figure, list[Axes]]:
     sizes = np.maximum(sizes, 1e-3 * max(float(sizes.max()), 1e-300))
     gap = style.PAGE.margin * 2 * (len(extents) - 1)
     room = np.array(style.PAGE.largest) * (1 + 0.4 * (len(extents) > 1), 1)
-    scale = min((room[0] - gap) / sizes[:, 0].sum(), room[1] / sizes[:, 1].max())
-    sizes = sizes * scale
+    sizes *= min((room[0] - gap) / sizes[:, 0].sum(), room[1] / sizes[:, 1].max())
     height = float(sizes[:, 1].max())
     content = float(sizes[:, 0].sum() + gap)
     width = max(content, style.PAGE.narrowest)
     total = np.array([width + 2 * style.PAGE.margin, height + style.PAGE.header + style.PAGE.footer])
     figure = Figure(figsize=(float(total[0]), float(total[1])), facecolor="white")
-    FigureCanvasAgg(figure)
-    axes = []
-    left = style.PAGE.margin + (width - content) / 2
+    axes, left = [], style.PAGE.margin + (width - content) / 2
     for (low, high), size in zip(extents, sizes, strict=True):
         bottom = style.PAGE.footer + (height - size[1]) / 2
         ax = figure.add_axes((left / total[0], bottom / total[1], size[0] / total[0], size[1] / total[1]))
@@ -87,9 +82,7 @@ def footer(figure: Figure, handles: Sequence[Artist]) -> None:
 def laid_out(mesh: PlanarMesh) -> NDArray[np.float64]:
     """(n, 2) points of a mesh for the eye; what hangs together, by edges or in hinges, stays together."""
     triangles = mesh.divided()[0]
-    sides = (triangles[:, [0, 0]].ravel(), triangles[:, 1:].ravel())
-    graph = sp.coo_array((np.ones(len(sides[0]), np.int8), sides), shape=(mesh.n_points,) * 2)
-    label = csgraph.connected_components(graph, directed=False)[1]
+    label = connected(mesh.n_points, triangles[:, [0, 0]].ravel(), triangles[:, 1:].ravel())[1]
     used = np.unique(triangles)
     part = np.full(mesh.n_points, -1)
     part[used] = np.unique(label[used], return_inverse=True)[1]
@@ -102,8 +95,6 @@ def apart(points: NDArray[np.float64], part: NDArray[np.int64]) -> NDArray[np.fl
     Parts are numbered by `part`, (n,), which is negative for points of none.
     """
     count = int(part.max(initial=-1)) + 1
-    if count < 2:
-        return points
     used = (part >= 0) & np.isfinite(points).all(axis=1)
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(low, part[used], points[used])

@@ -1,18 +1,6 @@
 """Colours and sizes of the pictures."""
 
-from dataclasses import dataclass
-
-
-@dataclass(frozen=True)
-class Page:
-    """Lengths in inches: the box that a mesh is fitted into, what a line of text needs, and the rims."""
-
-    largest: tuple[float, float]
-    narrowest: float
-    margin: float
-    header: float
-    footer: float
-
+from types import SimpleNamespace
 
 FILL = "#edf3fa"
 EDGE = "#4f7cac"
@@ -25,4 +13,5 @@ STATUS = {"certified": "#2a7f4f", "ambiguous": "#b3441e", "uncertified": "#b3441
 
 MOST_VECTOR = 20_000  # shapes in a vector format; more become an image in it
 DPI = 160
-PAGE = Page(largest=(9.0, 7.2), narrowest=6.2, margin=0.25, header=0.76, footer=0.42)
+PAGE = SimpleNamespace(largest=(9.0, 7.2), narrowest=6.2, margin=0.25, header=0.76, footer=0.42)
+"""Lengths in inches: the box that a mesh is fitted into, what a line of text needs, and the rims."""

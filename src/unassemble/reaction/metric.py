@@ -140,6 +140,8 @@ def areas_of_mass(skeleton: Skeleton, entries: NDArray, diagonal: NDArray) -> ND
     """
     matrix = sp.csr_array(sp.vstack([skeleton.at_edges / 12, skeleton.at_vertices / 6]))
     given = np.concatenate([entries, diagonal])
+    if not given.all():  # those of a mass matrix are all positive
+        return None
     size = 1 / np.maximum(np.abs(given), np.finfo(float).tiny)  # graded meshes: all to the same number of digits
     weighted = sp.csr_array(sp.diags_array(size) @ matrix)
     unit = 1 / np.sqrt(np.asarray(weighted.multiply(weighted).sum(axis=0)).ravel())

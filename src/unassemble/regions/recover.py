@@ -19,9 +19,9 @@ from ..options import ScalarOptions
 from ..planar.conformal import conformal_map
 from ..planar.cotangent import edge_weights
 from ..recovery import PlanarMesh
+from ..scalar.held import Held
 from ..scalar.joined import JoinedMesh
 from ..scalar.placement import Placement
-from ..scalar.verdict import Held
 from ..tolerances import CERTIFIED
 from ..topology import Piece, local_numbering, surfaces
 from .exchange import exchanges

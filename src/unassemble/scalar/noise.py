@@ -32,11 +32,8 @@ class Noise:
         """That of a given standard deviation, or else of entries that have been rounded."""
         if sigma is not None:
             return cls(sigma, np.ones(len(matrix.edges)))
-        digits = Digits.of(matrix.entries)
-        return None if digits is None else cls._of_rounding(matrix, digits)
-
-    @classmethod
-    def _of_rounding(cls, matrix: OperatorMatrix, digits: Digits) -> Noise:
+        if (digits := Digits.of(matrix.entries)) is None:
+            return None
         # Zeros, and what cancelling leaves, are exact to the rounding of assembly, which that of larger entries tells.
         unit = digits.unit
         largest = row_sizes(matrix.n, matrix.edges, unit)[matrix.edges].min(axis=1)
@@ -50,9 +47,8 @@ class Noise:
         return cls(sigma, error / sigma, digits.name, float(repeats), float(different))
 
     def __str__(self) -> str:
-        return (
-            f"rounding to {self.digits}" if self.digits else f"noise of standard deviation {self.sigma:.3g} (absolute)"
-        )
+        size = f"noise of standard deviation {self.sigma:.3g} (absolute)"
+        return f"rounding to {self.digits}" if self.digits else size
 
     def at(self, pairs: NDArray[np.int64], stored: OperatorMatrix) -> NDArray[np.float64]:
         """(k,) standard deviations of entries at `pairs` (k, 2), those that are stored among them."""

@@ -18,12 +18,13 @@ from ..tolerances import SIGMAS
 from ..topology import Polygons, local_numbering, surfaces
 from ..topology.numbering import connected
 from .evidence import pooled_noise, weigh
+from .held import Held
 from .joined import JoinedMesh
 from .noise import Noise
 from .notes import vanished_notes
 from .placement import Placement
 from .solving import Solved, Task, solve
-from .verdict import Findings, Held, Verdict, verdict
+from .verdict import Findings, Verdict, verdict
 
 
 def recover_scalar(

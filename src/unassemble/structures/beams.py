@@ -156,7 +156,6 @@ def serve_beam(beam: Beam, request: Request) -> Structure:
     known, is free.
     """
     n, bending = beam.n_nodes, beam.direction_of_row > 0
-    request.held(beam.node_of_row, beam.layout.dim)  # anchors that do not fit, before the long work
     with request.clock("solve"):
         x = _along(n, beam.members, beam.steps)
         points = np.column_stack([x - x.mean(), np.zeros(n)])

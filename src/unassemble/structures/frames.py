@@ -15,12 +15,14 @@ from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SUMMED
 from ..words import GIVE_NUMBERING, WITHOUT_SUPPORTS, Reason, count_of
 from .answer import answer, covered
 from .certificate import forces, members_misfits
-from .members import members_and_cells, mispaired
+from .contradicted import said_of
+from .members import members_and_cells
+from .mispaired import mispaired
 from .nodes import Nodes, nodes_of
 from .placed import Placed
 from .recognise import StructuralNumbering
 from .straight import Straight, straight_members
-from .turning import said_of, turning_positions
+from .turning import turning_positions
 
 
 def serve_structure(numbering: StructuralNumbering, request: Request) -> Structure:
@@ -31,7 +33,6 @@ def serve_structure(numbering: StructuralNumbering, request: Request) -> Structu
     """
     layout, node = numbering.layout, numbering.node_of_row
     sized, moves = bool(layout.rotations), len(layout.displacements)
-    request.held(node, layout.space)  # anchors that do not fit, before the long work
     whole, rounding = with_exact_sums(request.matrix.csr(), known=(numbering.direction_of_row, layout.block_size))
     spread = rounding.spread if rounding else 0.0
     with request.clock("solve"):

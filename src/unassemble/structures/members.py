@@ -1,4 +1,4 @@
-"""Members between two nodes: what a structure consists of, and whether they show that its rows were joined rightly.
+"""Members between two nodes, and shell cells between more: what a structure consists of.
 
 What a straight member between two nodes transmits balances by itself, whatever its section; what a pair of corners of a
 shell element transmits does not. So each pair of coupled nodes tells what it is.
@@ -11,10 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..elements.cliques import Graph, shared_cliques, simplices
-from ..nodes.constants import row_sizes
 from ..nodes.nodal import determined
-from ..tolerances import CANCELLED
-from .layouts import PLANE
 from .nodes import Nodes
 from .straight import blocks_at
 
@@ -31,7 +28,7 @@ def members_and_cells(nodes: Nodes, points: NDArray[np.float64], allowed: float)
     """
     pairs = np.column_stack(sp.triu(nodes.graph, 1).nonzero()).astype(np.int64)
     pairs = pairs[determined(points)[pairs].all(axis=1)]
-    alone = np.logical_and(*_balanced(nodes, points, pairs[:, 0], pairs[:, 1], allowed))
+    alone = np.logical_and(*balanced(nodes, points, pairs[:, 0], pairs[:, 1], allowed))
     graph = _graph_of(nodes.n, pairs[~alone])
     quads, triangles = _around(points, shared_cliques(graph, 4)), simplices(graph, 2)
     inside = _graph_of(nodes.n, quads).cliques(triangles)  # all sides are those of quadrilaterals, or diagonals
@@ -72,49 +69,7 @@ def _counter_clockwise(points: NDArray[np.float64], cells: NDArray[np.int64]) ->
     return np.where(clockwise[:, None], cells[:, ::-1], cells)
 
 
-def mispaired(
-    nodes: Nodes, points: NDArray[np.float64], inner: NDArray[np.bool_], allowed: float
-) -> tuple[int, int] | None:
-    """Two nodes that are not coupled as elements couple them, if there are any.
-
-    The equations for coordinates add up the columns of each direction, and so hardly tell which row of one direction
-    and which of another are one node's. The couplings do: elements join whole nodes, so that two nodes meet in several
-    directions or in none. In space each coordinate acts on two directions, which contradict each other where their rows
-    are not one node's; the coordinates of a plate act on one direction. Those of a plane frame have a direction each,
-    so that all depends on the pairing: its nodes have to be joined by members, and no two of them to have the same
-    neighbours. What was condensed joins the nodes next to it otherwise; these need a member to another node. `inner`
-    (n,) are nodes whose forces are touched neither by supports nor by what was condensed.
-    """
-    n, b = nodes.n, nodes.layout.block_size
-    coo, size = nodes.matrix.tocoo(), np.minimum(np.abs(nodes.matrix.diagonal()), row_sizes(nodes.matrix))
-    real = np.abs(coo.data) > CANCELLED * np.sqrt(size[coo.row] * size[coo.col])  # penalties are no measure
-    (i, one), (j, other) = np.divmod(coo.row[real], b), np.divmod(coo.col[real], b)
-    near, meeting = _counts(i, j, n), _counts(i[one == other], j[one == other], n)
-    first, second = sp.triu(near, 1).nonzero()
-    shared = (nodes.present[first] & nodes.present[second]).sum(axis=1)
-    known = determined(points)
-    strange = np.asarray(meeting[first, second]).ravel() < np.minimum(shared, 2)
-    if not nodes.layout.rotations:  # bars along an axis have one direction
-        strange &= ~_balanced(nodes, points, first, second, allowed)[0]
-    if nodes.layout == PLANE:
-        pattern = (near > 0).astype(np.int32)
-        degree, common = np.diff(near.indptr), np.asarray((pattern @ pattern)[first, second]).ravel()
-        twins = (common == degree[first]) & (common == degree[second])
-        balanced, whole = _balanced(nodes, points, first, second, allowed)
-        joined = np.zeros(n, dtype=bool)
-        joined[first[whole & balanced]] = joined[second[whole & balanced]] = True
-        excused = ~inner[first] & ~inner[second] & joined[first] & joined[second]
-        strange |= twins | (whole & ~balanced & ~excused)
-    strange &= known[first] | known[second]
-    k = int(np.argmax(strange)) if strange.any() else None
-    return None if k is None else (int(first[k]), int(second[k]))
-
-
-def _counts(i: NDArray, j: NDArray, n: int) -> sp.csr_array:
-    return sp.csr_array((np.ones(len(i), np.int32), (i, j)), shape=(n, n))
-
-
-def _balanced(nodes: Nodes, points: NDArray, i: NDArray, j: NDArray, allowed: float) -> tuple[NDArray, NDArray]:
+def balanced(nodes: Nodes, points: NDArray, i: NDArray, j: NDArray, allowed: float) -> tuple[NDArray, NDArray]:
     """Pairs whose block is a member's, whatever its section; and those that are known as a whole.
 
     Forces at both ends balance for every motion of one of them: with T the motion of node i that goes with one of node

@@ -1,35 +1,18 @@
 """Positions of all pieces that linear equations hold together, from equations that others would contradict."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..budget import REFINEMENTS
 from ..errors import GeometryError
-from ..linalg import Factorisation, UpperTriangle, nearly_singular
-from ..linalg.definite import STEPS
 from ..nodes.nodal import determined
-from ..nodes.shape import MOST_FIELDS, in_gauge, shape
 from ..recovery import Evidence
-from ..tolerances import CERTIFIED, LAST_DIGITS, SINGULAR
+from ..tolerances import CERTIFIED
 from ..words import count_of
-
-_PROBES = 3
-
-
-class Piece(NamedTuple):
-    """Equations that share no node with others."""
-
-    nodes: NDArray[np.int64]  # (k,), increasing
-    rows: NDArray[np.int64]  # (m,) of the equations of all pieces
-    operator: sp.csr_array  # (m, k d)
-    edges: NDArray[np.int64]  # (e, 2) coupled nodes, by their place in `nodes`
-
+from .connected import Piece, pieces
 
 # Points (k, d) of a piece, NaN where loose, its evidence, and equations (m,) that a disturbance would change without
 # being noticed; see :mod:`.turning`.
@@ -117,95 +100,3 @@ def placed(
         except GeometryError:
             return every
     return best if best.null_dimension <= every.null_dimension else every
-
-
-def pieces(
-    operator: sp.csr_array, d: int, edges: NDArray[np.int64], rows: NDArray[np.int64] | None = None
-) -> Iterator[Piece]:
-    """Connected pieces, in the order of their first nodes, of equations (m, n d); nodes in no equation are in none.
-
-    The work is that of one pass over the equations, however many pieces there are. Coupled nodes, `edges` (e, 2), of
-    different pieces are left out; `rows` (k,) are the equations to use, all by default.
-    """
-    rows = np.arange(operator.shape[0]) if rows is None else rows
-    operator = sp.csr_array(operator[rows])
-    m, n = operator.shape[0], operator.shape[1] // d
-    node = operator.indices // d
-    row = np.repeat(np.arange(m), np.diff(operator.indptr))
-    incidence = sp.csr_array((np.ones(len(node), np.int8), (row, m + node)), shape=(m + n, m + n))
-    count, label = sp.csgraph.connected_components(incidence, directed=False)
-    of_row, of_node = label[:m], label[m:]
-    inside = edges[of_node[edges[:, 0]] == of_node[edges[:, 1]]]
-    bodies, equations, links = (_groups(one, count) for one in (of_node, of_row, of_node[inside[:, 0]]))
-    place = np.empty(n, np.int64)
-    for body in bodies:
-        place[body] = np.arange(len(body))
-    used = [k for k in range(count) if len(bodies[k]) and len(equations[k])]
-    for k in sorted(used, key=lambda k: bodies[k][0]):
-        part = sp.csr_array(operator[equations[k]])
-        columns = place[part.indices // d] * d + part.indices % d
-        local = sp.csr_array((part.data, columns, part.indptr), shape=(len(equations[k]), len(bodies[k]) * d))
-        yield Piece(bodies[k], rows[equations[k]], local, place[inside[links[k]]])
-
-
-def _groups(label: NDArray, count: int) -> list[NDArray[np.int64]]:
-    """Indices of each label, increasing."""
-    order = np.argsort(label, kind="stable")
-    return np.split(order, np.cumsum(np.bincount(label, minlength=count))[:-1])
-
-
-def up_to_size(piece: Piece, d: int) -> tuple[NDArray[np.float64], Evidence, NDArray[np.float64]]:
-    """Points of a piece whose equations leave the size free, evidence, and residuals (m, k) of random right-hand sides.
-
-    GeometryError if more is free than translations and size.
-    """
-    n, m = len(piece.nodes), len(piece.rows)
-    _, residuals, fields, values, gap = least_squares(piece.operator, np.zeros(m), d)
-    one = shape(fields, values, np.zeros(n, dtype=bool))
-    links = sp.csr_array((np.ones(len(piece.edges)), piece.edges.T), shape=(n, n))
-    return in_gauge(one.points, links), Evidence(one.dimension, float(values[d]), gap, m), residuals[:, 1:]
-
-
-def least_squares(
-    operator: sp.csr_array, right: NDArray[np.float64], d: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]:
-    """Solve equations for n nodes with d coordinates each, and see what they leave free and which of them are spare.
-
-    The solution (n d,) for the right-hand side, the first if there are several, without what is free; residuals (m, k)
-    of all and of random ones; orthonormal fields (n, d, k), all null fields and some more, and their singular values,
-    increasing; and the least of these that is none of a null field. GeometryError if far more is free than translations
-    and enlargements.
-    """
-    random = np.random.default_rng(0).standard_normal((len(right), _PROBES))
-    sides = np.column_stack([right, random])
-    normal = operator.T @ operator
-    stored = sp.eye_array(normal.shape[0]) * np.finfo(float).tiny  # coordinates in no equation have a diagonal too
-    with nearly_singular(UpperTriangle.of(sp.csr_array(normal + stored))) as solver:
-        fields, values = _least_fields(operator, solver, d)
-        free = fields[..., values <= SINGULAR].reshape(operator.shape[1], -1)
-        x = np.zeros((operator.shape[1], sides.shape[1]))
-        for _ in range(REFINEMENTS):
-            step = solver.solve(operator.T @ (sides - operator @ x))
-            step -= free @ (free.T @ step)
-            x += step
-            if np.abs(step[:, 0]).max() <= LAST_DIGITS * np.abs(x[:, 0]).max():
-                break
-    gap = float(values[values > SINGULAR].min(initial=np.inf))
-    return x[:, 0], sides - operator @ x, fields, values, gap
-
-
-def _least_fields(operator: sp.csr_array, solver: Factorisation, d: int) -> tuple[NDArray, NDArray]:
-    """Fields (n, d, k) that the operator maps to least, and their singular values."""
-    order = operator.shape[1]
-    count = min(4 * d, order)
-    while True:
-        x = np.random.default_rng(0).standard_normal((order, count))
-        for _ in range(STEPS):
-            x = np.linalg.qr(solver.solve(x))[0]
-        _, values, v = scipy.linalg.svd(np.linalg.qr(operator @ x, mode="r"))
-        values = np.concatenate([values, np.zeros(count - len(values))])[::-1]
-        if values[-1] > SINGULAR or count == order:
-            return (x @ v[::-1].T).reshape(-1, d, count), values
-        if count >= MOST_FIELDS:
-            raise GeometryError("the equations away from supports leave most of the structure free")
-        count = min(2 * count, order)

@@ -4,7 +4,7 @@ The displacements of one direction, all the same, cost nothing: a row away from 
 all the same and without displacements, bend everything. This tells the layouts from one another, and from solids.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,8 +16,8 @@ from ..errors import InputError
 from ..nodes.grouping import by_first_row, pattern_of
 from ..nodes.orders import ORDERS, regular
 from ..tolerances import CANCELLED, HARDLY_ANY, LITTLE, MOST
+from .gaps import continued, with_gaps
 from .layouts import LAYOUTS, SOLIDS, SPACE, Layout
-from .straight import shown_by_members
 
 # On regular meshes some of a solid's rows annihilate whatever is asked; read as what it is it has more of them.
 _KNOWN = (*SOLIDS.values(), *LAYOUTS)
@@ -68,10 +68,11 @@ def find_structure(
     usual = {(b, name): regular(order, b, name) for b in sizes for name in orders}
     best = _best(matrix, usual, block_size)
     if (best is None or best.share < MOST) and kind != "by component" and matrix.diagonal().all():
-        other = _best(matrix, {(b, "interleaved"): _with_gaps(matrix, b) for b in (3, 6)}, block_size)
+        other = _best(matrix, {(b, "interleaved"): with_gaps(matrix, b) for b in (3, 6)}, block_size)
         best = max((one for one in (best, other) if one is not None), key=lambda one: one.told, default=None)
         if best is other and best is not None and best.layout.rotations:
-            best = _continued(matrix, best)
+            node, direction = continued(matrix, best.layout, best.node_of_row, best.direction_of_row)
+            best = replace(best, node_of_row=node, direction_of_row=direction)
     return _beside(matrix, best) if best is not None and best.layout.rotations else None
 
 
@@ -158,95 +159,3 @@ def _share(matrix: sp.csr_array, layout: Layout, direction: NDArray) -> float:
         return share
     twisting = max(axis < layout.dim for axis in layout.rotations) / len(layout.rotations)  # a line, about its own axis
     return 0.0 if own[turning].mean() > (LITTLE + twisting) * share else share
-
-
-def directions_with_gaps(matrix: sp.csr_array) -> Iterator[tuple[NDArray[np.int64], int]]:
-    """Directions of rows (N,) where some nodes lack unknowns, -1 where not told, and how many there are."""
-    if matrix.diagonal().all():
-        for b in (6, 3):
-            yield _with_gaps(matrix, b)[1], b
-
-
-def _with_gaps(matrix: sp.csr_array, b: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Nodes and directions (N,) of rows that stand node by node; -1 for those of nodes that lack some of b unknowns."""
-    shown = [shown_by_members(matrix, layout) for layout in LAYOUTS if layout.block_size == b]
-    node = _shortest_runs(matrix, b, np.any(shown, axis=0))
-    within = np.arange(len(node)) - np.searchsorted(node, node)
-    return node, np.where(np.bincount(node)[node] == b, within, -1)
-
-
-def _shortest_runs(matrix: sp.csr_array, most: int, begins: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(N,) nodes of neighbouring rows, each of at most so many; a node of so many `begins` with some rows, (N,).
-
-    A matrix cut into nodes is written down with one index for each unknown that a node couples to, and one number for
-    each of its own unknowns beside it. Rows of one node couple to nearly the same unknowns, so that hardly a number is
-    a zero and the indices are shared; rows of two nodes share few. The shortest description is found by dynamic
-    programming. What it takes for one node is one unknown to couple to for the next, as long as fewer nodes come of it:
-    rows of nodes some of whose directions are not coupled, as in flat shells along an axis, meet the same nodes.
-    """
-    order = matrix.shape[0]
-    pattern = sp.csr_array(pattern_of(matrix))
-    node = np.arange(order)
-    while True:
-        onto = sp.csr_array((np.ones(order, np.float32), (np.arange(order), node)))
-        cut = _cut(sp.csr_array(pattern @ onto), most, begins)
-        if cut[-1] >= node[-1]:
-            return node
-        node = cut
-
-
-def _cut(pattern: sp.csr_array, most: int, begins: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(N,) runs of rows for which (columns in any of them) (rows + 1) is least in all; those known cost nothing."""
-    order = pattern.shape[0]
-    cost = np.full((order, most), np.inf)
-    union = pattern
-    for k in range(min(most, order)):
-        if k:
-            union = sp.csr_array(union[:-1] + pattern[k:])
-        cost[: order - k, k] = (k + 2.0) * np.diff(union.indptr)
-    cost[np.flatnonzero(begins), most - 1] = 0
-    least, length = np.zeros(order + most), np.ones(order, dtype=np.int64)
-    for row in range(order - 1, -1, -1):
-        ways = cost[row] + least[row + 1 : row + 1 + most]
-        length[row] = ways.argmin() + 1
-        least[row] = ways[length[row] - 1]
-    starts = [0]
-    while starts[-1] < order:
-        starts.append(starts[-1] + int(length[starts[-1]]))
-    return np.repeat(np.arange(len(starts) - 1), np.diff(starts))
-
-
-def _continued(matrix: sp.csr_array, one: StructuralNumbering) -> StructuralNumbering:
-    """The same where rows between whole nodes are as many as other nodes have, and sums show that they are such nodes.
-
-    Rows of a node that couple to different nodes, as directions do along the axes of flat parts, were cut apart. Each
-    of its displacements has to complete the sums of some row; and all of its cuts to meet more than half of its
-    neighbours, as those of two nodes do not.
-    """
-    b, node, given = one.block_size, one.node_of_row, one.direction_of_row
-    moves = len(one.layout.displacements)
-    open_row = np.append(given < 0, False)
-    first = np.flatnonzero(open_row & ~np.append(False, open_row[:-1]))
-    last = np.flatnonzero(~open_row & np.append(False, open_row[:-1]))
-    stretches = [(a, z) for a, z in zip(first, last, strict=True) if (z - a) % b == 0]
-    starts = np.array([start for a, z in stretches for start in range(a, z, b)], dtype=np.int64)
-    rows = starts[:, None] + np.arange(b)
-    joined = node.copy()
-    joined[rows] = node[rows[:, :1]]
-    pattern = pattern_of(matrix)
-    onto, whole = (sp.csr_array((np.ones(len(given), np.float32), (np.arange(len(given)), k))) for k in (node, joined))
-    met, all_met = (np.diff(sp.csr_array(of.T @ pattern @ whole).indptr) for of in (onto, whole))
-    rows = rows[(2 * met[node[rows]] > all_met[joined[rows]]).all(axis=1)]
-    while len(rows):
-        direction = given.copy()
-        direction[rows] = np.arange(b)
-        labels = (direction[:, None] == np.arange(moves)).astype(float)
-        size = abs(matrix) @ labels
-        good = (np.abs(matrix @ labels) <= CANCELLED * size).all(axis=1)
-        shown = (good.astype(float) @ pattern)[rows[:, :moves]].all(axis=1)
-        if shown.all():
-            joined = node.copy()
-            joined[rows] = node[rows[:, :1]]
-            return replace(one, node_of_row=by_first_row(joined), direction_of_row=direction)
-        rows = rows[shown]
-    return one

@@ -38,8 +38,7 @@ def straight_members(nodes: Nodes, allowed: float = SUMMED, ends: NDArray[np.int
     if not nodes.layout.rotations:
         return Straight(np.empty((0, 2), np.int64), np.empty((0, nodes.layout.dim)), np.empty((0, b, b)))
     bsr = nodes.matrix.tobsr((b, b))
-    i = np.repeat(np.arange(nodes.n), np.diff(bsr.indptr))
-    j = bsr.indices.astype(np.int64)
+    i, j = np.repeat(np.arange(nodes.n), np.diff(bsr.indptr)), bsr.indices.astype(np.int64)
     upper = (i < j) & whole[i] & whole[j]
     pairs, blocks = np.column_stack([i[upper], j[upper]]), bsr.data[upper]
     vectors = told_by_blocks(blocks, nodes.layout)
@@ -96,22 +95,6 @@ def _along(vectors: NDArray) -> NDArray:
 def _relative(off: NDArray, part: NDArray) -> NDArray[np.float64]:
     size = np.abs(part).max(axis=(1, 2))
     return np.asarray(np.where(size > 0, np.abs(off).max(axis=(1, 2)) / np.where(size > 0, size, 1), np.inf))
-
-
-def shown_by_members(matrix: sp.csr_array, layout: Layout) -> NDArray[np.bool_]:
-    """(N,) rows with which a node begins whose unknowns stand in order: those of members show it."""
-    order, b = matrix.shape[0], layout.block_size
-    entry = matrix.tocoo()
-    some = (entry.col >= entry.row + b) & (entry.col <= order - b) & (entry.data < 0)
-    i, j = entry.row[some].astype(np.int64), entry.col[some].astype(np.int64)
-    for k in range(1, len(layout.displacements)):
-        some = entries_at(matrix, i + k, j + k) < 0
-        i, j = i[some], j[some]
-    blocks = blocks_at(matrix, i, j, b)
-    good = misfits(blocks, told_by_blocks(blocks, layout), layout) <= SUMMED
-    begins = np.zeros(order, dtype=bool)
-    begins[i[good]] = begins[j[good]] = True
-    return begins
 
 
 def blocks_at(matrix: sp.csr_array, i: NDArray[np.int64], j: NDArray[np.int64], b: int) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..budget import SAMPLE
 from ..errors import GeometryError
 from ..nodes.anchoring import Request
-from ..nodes.constants import uncoupled_rows
+from ..nodes.constants import row_sizes
 from ..nodes.nodal import NodalMatrix, determined, nodal_matrix
 from ..nodes.numbering import Numbering
 from ..nodes.orders import ORDERS, regular
@@ -25,7 +25,9 @@ from ..recovery import Evidence, Structure
 from ..tolerances import ALIKE, CANCELLED, CERTIFIED, SMALL
 from ..words import Reason, count_of
 from .answer import answer, covered
-from .placed import Piece, Placed, placed, up_to_size, without_free
+from .connected import Piece
+from .least_squares import up_to_size
+from .placed import Placed, placed, without_free
 
 
 class Bars(NamedTuple):
@@ -82,7 +84,7 @@ def truss_numbering(
     sizes = [d for d in ((3, 2) if block_size is None else (block_size,)) if order % d == 0 and order >= 2 * d]
     for d, name in product(sizes, ORDERS if kind is None else (kind,)):
         node, direction = regular(order, d, name)
-        numbering = Numbering(d, node, direction, uncoupled_rows(matrix), name, 0.0, 1.0)
+        numbering = Numbering(d, node, direction, row_sizes(matrix) == 0, name, 0.0, 1.0)
         if bars_of(nodal_matrix(matrix, numbering), allowed) is not None:
             return numbering
     return None
@@ -91,7 +93,6 @@ def truss_numbering(
 def serve_truss(nodal: NodalMatrix, numbering: Numbering, bars: Bars, request: Request) -> Structure:
     """Recover a truss, up to the size of each piece; errors as of :func:`.frames.serve_structure`."""
     rounding = request.rounding
-    request.held(numbering.node_of_row, nodal.dim)  # anchors that do not fit, before the long work
     with request.clock("solve"):
         found = _place_joints(bars, nodal.n, rounding.spread if rounding else CERTIFIED)
     with request.clock("certify"):

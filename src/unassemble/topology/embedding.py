@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cycles import chordless_four_cycles, not_faces, three_cycles
-from .faces import FaceComplex, around, from_cycles, from_rotation
+from .drawn import from_cycles, from_rotation
+from .faces import FaceComplex, around
 from .keys import distinct
 from .planarity import rotation_system, too_many
 

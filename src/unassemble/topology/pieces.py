@@ -1,6 +1,7 @@
 """From glued triangles to oriented pieces, each in a numbering of its own."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,10 +62,7 @@ def _spheres_with_holes(n: int, whole: _Surfaces) -> bool:
     A vertex with p boundary edges leaving it in a piece has p fans, one if p = 0. A second closed
     fan would be missed here, but counting it could only raise v - e + m, which is at most 2 - loops.
     """
-
-    def count(piece: NDArray) -> NDArray[np.int64]:
-        return np.bincount(piece, minlength=int(whole.of_triangles.max()) + 1)
-
+    count = partial(np.bincount, minlength=int(whole.of_triangles.max()) + 1)
     rim = whole.of_boundary
     n_loops = count(rim[first_rows(whole.loop, int(whole.loop.max()) + 1)])
     n_vertices = count(whole.at // n) + count(rim) - count(distinct(rim * n + whole.boundary[:, 0]) // n)
@@ -79,9 +77,8 @@ def _cut(n: int, edges: NDArray, whole: _Surfaces) -> tuple[Piece, ...]:
         offsets = np.append(np.flatnonzero(np.diff(whole.loop, prepend=-1)), len(whole.loop))
         numbered = np.arange(n), np.arange(len(edges)), edges, whole.triangles, whole.opposite
         return (Piece(*numbered, whole.facing, whole.boundary, offsets),)
-    vertex = Grouped(at // n, n_pieces)
-    of_edges, of_triangles = Grouped(whole.of_edges, n_pieces), Grouped(whole.of_triangles, n_pieces)
-    of_boundary = Grouped(whole.of_boundary, n_pieces)
+    labels = at // n, whole.of_edges, whole.of_triangles, whole.of_boundary
+    vertex, of_edges, of_triangles, of_boundary = (Grouped(label, n_pieces) for label in labels)
     edge_rows, rows, ring = of_edges.order, of_triangles.order, of_boundary.order
 
     def local(label: NDArray, vertices: NDArray) -> NDArray[np.int64]:

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import RecoveryError
+from ...planar.piece import PieceMesh
 from ..candidates.candidates import Candidates
-from .sheet import Placed, Sheet
+from .sheet import Sheet
 
 _FIRST, _LAST, _FACTOR = 0.3, 1e-3, 0.75
 """Barriers t, and the ratio of one to the one before."""
@@ -41,7 +42,7 @@ def relaxed(sheet: Sheet, free: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
     return strength > 0.5
 
 
-def _step(sheet: Sheet, placed: Placed, strength: NDArray, changing: NDArray, t: float) -> NDArray[np.float64]:
+def _step(sheet: Sheet, placed: PieceMesh, strength: NDArray, changing: NDArray, t: float) -> NDArray[np.float64]:
     """New strengths of the candidates that may change."""
     s, slack = strength[changing], 0.03 * t / _FIRST
     with np.errstate(divide="ignore"):  # larger misfits than 0.3 count themselves, not by their squares

@@ -5,8 +5,6 @@ candidate k had the conductivity s_k, and the area form is that of the candidate
 map is found as ever.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -15,26 +13,20 @@ from ...linalg import solved
 from ...planar.cotangent import corner_gradients, cotangent
 from ...planar.normal import distant_pair
 from ...planar.pencil import ConformalPencil, ShiftedSearch
+from ...planar.piece import PieceMesh
 from ...topology.keys import with_sides
 from ..candidates.candidates import Candidates
-from ..judge.labelling import fans
+from ..judge.fans import fans
 
 STEEPEST = 1e5
 """Cotangents beyond belong to flat triangles."""
 
 
-@dataclass(frozen=True, eq=False)
-class Placed:
-    """Positions of a sheet."""
-
-    z: NDArray[np.complex128]  # (n,)
-    c: float  # scale in units of the sheet's
-
-
 class Sheet:
     """Candidates of one embedding, triangulated once.
 
-    `unit`: a guess of c; `chosen` (cells,): candidates that may be cells, all that can be unless given.
+    `unit`: a guess of c, in units of which its maps have their scales; `chosen` (cells,): candidates that may be cells,
+    all that can be unless given.
     """
 
     def __init__(self, candidates: Candidates, unit: float, chosen: NDArray[np.bool_] | None = None):
@@ -57,11 +49,11 @@ class Sheet:
         """(e,) by which misfits are divided."""
         return np.asarray((np.abs(self.weights) + self.typical) / c)
 
-    def misfit(self, placed: Placed, strength: NDArray) -> NDArray[np.float64]:
+    def misfit(self, placed: PieceMesh, strength: NDArray) -> NDArray[np.float64]:
         """(e,) what is left of the weights, divided by their spread."""
         halves = strength[self.cell][:, None] * self.cotangents(placed.z[self.triangles]) / 2
         w = np.bincount(self.row.ravel(), halves.ravel(), len(self.weights))
-        return np.asarray((self.weights / placed.c - w) / self.spread(placed.c))
+        return np.asarray((self.weights / placed.scale - w) / self.spread(placed.scale))
 
     @staticmethod
     def cotangents(at: NDArray) -> NDArray[np.float64]:
@@ -70,39 +62,30 @@ class Sheet:
             found = cotangent(at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at)
         return np.clip(np.nan_to_num(found, posinf=STEEPEST, neginf=-STEEPEST), -STEEPEST, STEEPEST)
 
-    @staticmethod
-    def gradients(at: NDArray) -> NDArray[np.complex128]:
-        """(3, m, 3) derivatives of half the cotangents by the corner itself, the next one and the one after."""
-        with np.errstate(all="ignore"):
-            at_u, at_w = corner_gradients(at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at)
-        gradient = np.stack([-at_u - at_w, at_u, at_w])
-        gradient[:, ~(np.abs(gradient) < STEEPEST**2).all(axis=0)] = 0
-        return gradient
-
     def around(self, strength: NDArray) -> NDArray[np.float64]:
         """(e,) the boundary of all candidates, each times its strength: as whole labels have it, so is their map."""
         sides = (self._sense * strength[self.cell][:, None]).ravel()
         return np.asarray(np.bincount(self.row.ravel(), sides, len(self.weights)), dtype=np.float64)
 
-    def pencil(self, strength: NDArray, unit: float = 1.0) -> ConformalPencil:
+    def pencil(self, strength: NDArray) -> ConformalPencil:
         """The conformal pencil for fractional labels, of weights over some c; each edge may be on the boundary."""
-        return ConformalPencil(self.n_vertices, self.edges, self.edges, self.weights / unit, self.around(strength))
+        return ConformalPencil(self.n_vertices, self.edges, self.edges, self.weights, self.around(strength))
 
-    def mapped(self, strength: NDArray, start: Placed | None = None) -> Placed:
+    def mapped(self, strength: NDArray, start: PieceMesh | None = None) -> PieceMesh:
         """The conformal map for fractional labels; raises RecoveryError if there is none."""
         search = ShiftedSearch(self.pencil(strength), 8)
         noise = np.random.default_rng(0).standard_normal((self.n_vertices, 2)).view(np.complex128).ravel()
-        z, c = (start.z, start.c) if start else (noise, 1.0)
+        z, c = (start.z, start.scale) if start else (noise, 1.0)
         shift = 0.7 * c
         for _ in range(4):
             z, c, spread = search.at(shift, z)
             if spread < 1e-9:
                 break
             shift = c * (1 - min(max(4 * spread, 1e-6), 0.3))
-        return Placed(z, c if self.free_scale else 1.0)
+        return PieceMesh(z, c if self.free_scale else 1.0)
 
     def label_step(
-        self, placed: Placed, strength: NDArray, which: NDArray, trust: NDArray, held: NDArray, pull: NDArray | float
+        self, placed: PieceMesh, strength: NDArray, which: NDArray, trust: NDArray, held: NDArray, pull: NDArray | float
     ) -> NDArray[np.float64]:
         """Changes of some labels that explain the misfit best, to first order, with displacements and a change of c.
 
@@ -111,7 +94,11 @@ class Sheet:
         """
         t, z, e = self.triangles, placed.z, len(self.weights)
         at = z[t]
-        gradient = strength[self.cell][:, None] * self.gradients(at)
+        with np.errstate(all="ignore"):
+            at_u, at_w = corner_gradients(at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at)
+        gradient = np.stack([-at_u - at_w, at_u, at_w])  # by the corner itself, the next one and the one after
+        gradient[:, ~(np.abs(gradient) < STEEPEST**2).all(axis=0)] = 0
+        gradient *= strength[self.cell][:, None]
         vertex = 2 * np.stack([t, t[:, [1, 2, 0]], t[:, [2, 0, 1]]]).ravel()
         row = np.tile(self.row.ravel(), 6)
         by_position = sp.coo_array(
@@ -123,7 +110,7 @@ class Sheet:
         free = np.ones(2 * len(z), dtype=bool)
         free[2 * distant_pair(z)[:, None] + [0, 1]] = False
         by_scale = sp.csc_array((by_label @ strength)[:, None] * (1.0 if self.free_scale else 0.0))
-        columns = sp.diags_array(1 / self.spread(placed.c)) @ sp.hstack(
+        columns = sp.diags_array(1 / self.spread(placed.scale)) @ sp.hstack(
             [by_position.tocsc()[:, free], by_scale, by_label[:, which]]
         )
         loose = np.full(int(free.sum()) + 1, 1e-9 * trust.max())  # labels of zero leave vertices free

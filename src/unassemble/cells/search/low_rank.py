@@ -46,7 +46,7 @@ class ChangedMaps:
         placed = sheet.mapped(strength)
         pencil = sheet.pencil(strength)
         self._cells = sheet.candidates.cells
-        self._shift = (1 - near) * placed.c
+        self._shift = (1 - near) * placed.scale
         self._n = sheet.n_vertices
         matrix = pencil.matrix(self._shift)
         self._factor = factorisation(matrix)

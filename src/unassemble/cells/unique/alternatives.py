@@ -24,8 +24,9 @@ from ...errors import RecoveryError
 from ...matrix import OperatorMatrix
 from ...tolerances import ALIKE
 from ...topology import Numbering, Polygons, components
+from ...topology.drawn import from_rotation
 from ...topology.embedding import face_complexes
-from ...topology.faces import FaceComplex, from_rotation
+from ...topology.faces import FaceComplex
 from ...topology.keys import contains, pair_keys
 from ..candidates.candidates import Candidates
 from ..judge.labelling import Labelling

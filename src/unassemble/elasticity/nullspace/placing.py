@@ -1,20 +1,18 @@
 """Positions piece by piece: the least singular fields of the identities, and the coordinates among them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...errors import GeometryError
-from ...linalg import UpperTriangle, nearly_singular
-from ...linalg.definite import STEPS
-from ...nodes.nodal import NodalMatrix, determined, valid_pairs
+from ...nodes.nodal import NodalMatrix, determined
 from ...nodes.shape import in_gauge, shape
 from ...recovery import Evidence
-from ...tolerances import ALIKE, SINGULAR, SMALL
-from .atlas import PATCH, null_fields
-from .identities import identities
+from ...tolerances import SINGULAR
+from .atlas import null_fields
+from .springs import drawn_together
 
 # Nodes of a body whose best fit, where none is exact, one factorisation finds. Charts are no help there: each fits in
 # its own way, and where two of them meet the joined field has a kink that costs far more than the misfit itself.
@@ -57,19 +55,18 @@ class Solution:
 def placed(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> Solution:
     """Positions piece by piece, from valid identities, (n, d, d) or (n, d, d, d); GeometryError if no piece has any."""
     component, n_pieces = pieces_of(nodal, valid)
-    graph = nodal.graph
-    points = np.full((nodal.n, nodal.dim), np.nan)
+    graph, d = nodal.graph, nodal.dim
+    points = np.full((nodal.n, d), np.nan)
     evidence, freedoms, exact, warnings = [], [], [], []
     failure: GeometryError | None = None
     told = np.asarray(valid.reshape(nodal.n, -1).any(axis=1))
     for piece in range(n_pieces):
         body = np.flatnonzero(component == piece)
         found = null_fields(nodal, valid, body)
-        d, values = nodal.dim, found.values
-        # More than translations satisfies the identities exactly, and not all fields that were looked for.
-        settled = len(values) > d and values[d] <= SINGULAR < values[-1]
-        if found.charts > 1 and not settled:
-            if len(body) <= _WHOLE[nodal.dim]:
+        values = found.values
+        # Unless more than translations satisfies the identities exactly, and not all fields that were looked for.
+        if found.charts > 1 and not (len(values) > d and values[d] <= SINGULAR < values[-1]):
+            if len(body) <= _WHOLE[d]:
                 found = null_fields(nodal, valid, body, patch=len(body))
             else:
                 warnings.append(
@@ -91,7 +88,7 @@ def placed(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> Solution:
         evidence.append(Evidence(one.dimension, float(found.values[d]), gap, found.rows))
         freedoms.append(one.freedom)
         exact.append(one.exact)
-    points[_drawn_together(nodal, valid, points)] = np.nan
+    points[drawn_together(nodal, valid, points)] = np.nan
     if not exact:
         raise failure or GeometryError("no row annihilates constants: no node has a valid equation")
     component = np.where(determined(points), component, -1)
@@ -113,88 +110,3 @@ def pieces_of(nodal: NodalMatrix, valid: NDArray[np.bool_]) -> tuple[NDArray[np.
     order = np.full(len(told), -1)
     order[kept] = np.arange(len(kept))
     return order[label].astype(np.int64), len(kept)
-
-
-def checked(nodal: NodalMatrix, solution: Solution) -> NDArray[np.bool_]:
-    """(n,) nodes of the largest piece that identities determine each of which others would contradict if it were wrong.
-
-    A disturbance of the entries of one node adds some e to the right-hand side of its identities. It shows unless the
-    coordinates can follow it: unless P e = 0, where P projects on what no coordinates reach. Those e that show are
-    spanned by what is left of random right-hand sides g there, P g. Of bodies with more nodes than a chart all are
-    taken for such: their normal matrix is never factorised as a whole.
-    """
-    known = determined(solution.firm_points)
-    while nodal.n <= PATCH[nodal.dim] and len(lone := _unnoticed(nodal, solution)):
-        valid = solution.valid.copy()
-        valid[lone] = False
-        try:
-            solution = placed(nodal, valid)
-        except GeometryError:
-            return np.zeros_like(known)
-        if not solution.unique:
-            return np.zeros_like(known)
-        largest = np.bincount(solution.component[solution.component >= 0]).argmax()
-        known &= determined(solution.points) & (solution.component == largest)
-    return known
-
-
-def _unnoticed(nodal: NodalMatrix, solution: Solution) -> NDArray[np.int64]:
-    """Nodes with identities that a disturbance might change without being noticed."""
-    d = nodal.dim
-    blind = nodal.graph @ (~determined(solution.firm_points)).astype(float) > 0
-    local = identities(nodal, solution.valid, np.flatnonzero(~blind))
-    n, m = len(local.columns), len(local.rows)
-    if not m:
-        return local.rows
-    many = d**3 + 5  # more than a node has identities, so that they span what there is by a safe margin
-    g = np.random.default_rng(0).standard_normal((m, d, d, d, many)) * local.valid[..., None]
-    left = local.outside_terms(g)
-    with nearly_singular(UpperTriangle.of(local.normal_matrix())) as solver:
-        for _ in range(STEPS):
-            x = solver.solve(local.gradient(left).reshape(n * d, -1))
-            left = left - local.residual(x.reshape(n, d, -1))
-    size = np.linalg.svd(left.reshape(m, d**3, -1), compute_uv=False)
-    least = np.take_along_axis(size, local.equations[:, None] - 1, axis=1)[:, 0]
-    return local.rows[least <= SMALL]
-
-
-def without_springs(nodal: NodalMatrix) -> NodalMatrix:
-    """The matrix without blocks between two nodes that have no neighbour in common, and what they add to diagonals.
-
-    A spring adds a block S to the rows of its two nodes, and takes it off between them. In the identities it stands for
-    S (x_i - x_j), which vanishes for nodes in one place and is wrong for all others, since no linear field knows a
-    spring. So a node that hangs on springs alone would be drawn onto its neighbours; it has no position. Two nodes of
-    an element are coupled to its other nodes, too: a pair with no neighbour in common belongs to none.
-
-    One of the two has whole rows, at least: next to eliminated nodes the neighbours in common may be gone.
-    """
-    i, j = nodal.node, nodal.indices
-    graph = sp.csr_array((np.ones(len(j), dtype=np.int32), j, nodal.indptr), shape=(nodal.n, nodal.n))
-    common = sp.csr_array((graph @ graph).multiply(graph))
-    common.sort_indices()  # as those of the graph, so that places are the same
-    alone = (common.data <= 2) & (i != j) & (nodal.data != 0).any(axis=(1, 2))  # each of the two is its own neighbour
-    if not alone.any():
-        return nodal
-    whole = np.asarray(valid_pairs(nodal).all(axis=(1, 2)))
-    alone &= whole[i] | whole[j]
-    data = nodal.data.copy()
-    np.add.at(data, np.flatnonzero(i == j)[i[alone]], data[alone])
-    data[alone] = 0
-    held = np.bincount(i, (data != 0).any(axis=(1, 2)) & (i != j), nodal.n) > 0
-    return replace(nodal, data=data, size=np.where(held, nodal.size, 0.0))
-
-
-def _drawn_together(nodal: NodalMatrix, valid: NDArray[np.bool_], points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(n,) nodes in the place of one that they are coupled to, without whole rows that couple to nodes elsewhere.
-
-    A web of springs that touches a body in one node is drawn there, whatever its nodes have in common. Bodies in
-    contact have nodes upon each other that have rows of elements. Mean edges of the points have length one.
-    """
-    i, j, present = nodal.node, nodal.indices, nodal.row_of >= 0
-    live = (i != j) & (nodal.data != 0).any(axis=(1, 2))
-    away = np.abs(points[i] - points[j]).max(axis=1)
-    near = live & (away <= ALIKE)
-    near &= (present[i] & present[j]).any(axis=1)  # those with no direction in common may be halves of one node
-    elsewhere = np.bincount(i, live & (away > ALIKE), nodal.n) > 0
-    own = valid.reshape(nodal.n, -1).all(axis=1) & elsewhere
-    return np.asarray((np.bincount(i, near, nodal.n) > 0) & ~own & determined(points))

@@ -1,0 +1,132 @@
+"""Meshes of any planar element that lost cells at the boundary, fitted to the entries that are whole.
+
+Rows that were taken out leave cells of which all nodes are there beside cells of which some are not, and only the
+former are looked for. Two nodes on one side of a cell are in two cells, others in one; entries of as many cells are
+whole, and so are those in rows at which no cell is lost. What is guessed of the others holds what whole entries do not,
+with less and less weight; in the end it is what the mesh itself has there, so that nothing pulls at a mesh that fits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..certify_elements import certify_elements
+from ..clock import Clock
+from ..conforming.joined import JoinedParts
+from ..conforming.parts import Part, parts_of
+from ..conforming.recover import shown_cells
+from ..conforming.sets import pairs_of
+from ..errors import TopologyError
+from ..matrix import OperatorMatrix
+from ..options import ScalarOptions
+from ..recovery import ConformingMesh
+from ..scalar.placement import Placement
+from ..tolerances import CERTIFIED, ROUNDED
+from ..topology import Topology
+from ..topology.keys import contains, distinct, pair_keys
+from ..words import count_of
+from .guessed import FittedPart, fitted_part
+
+_MOST = 3  # sets of cells, the likeliest ones
+
+
+def recover_partial_elements(
+    matrix: OperatorMatrix, placement: Placement, clock: Clock, options: ScalarOptions
+) -> ConformingMesh | None:
+    """The mesh of the cells that are complete; None where they show none that whole entries determine.
+
+    Cells are straight. Entries between rows that were replaced are taken for unknown.
+    """
+    if options.noise is not None:
+        return None
+    lost = matrix.incomplete_rows if matrix.replaced is None else matrix.replaced
+    if not lost.any():
+        return None
+    stretch = placement.tensor.root_determinant if placement.tensor else 1.0
+    scale = None if options.scale is None else options.scale * stretch
+    for cells in islice(shown_cells(matrix, lost=lost), _MOST):
+        with clock("inside"):
+            try:
+                parts = parts_of(cells)
+            except TopologyError:
+                continue
+            near = _near_lost(matrix, lost, parts)
+            fits = [fitted_part(matrix, part, near, scale) for part in parts]
+        if any(fit is not None and fit.known.any() for fit in fits):
+            return _report(matrix, [fit for fit in fits if fit is not None], placement, clock, options)
+    return None
+
+
+def _near_lost(matrix: OperatorMatrix, lost: NDArray[np.bool_], parts: Sequence[Part]) -> NDArray[np.bool_]:
+    """(n,) rows of cells that are not complete: they do not add up, or have entries that no complete cell has."""
+    covered = [pairs_of(matrix.n, part.piece.vertices[some]).ravel() for part in parts for some in part.blocks.values()]
+    bare = ~contains(distinct(np.concatenate(covered)), matrix.edges @ [matrix.n, 1])
+    bare &= np.abs(matrix.entries) > ROUNDED * matrix.row_size[matrix.edges].min(axis=1)
+    near = lost.copy()
+    near[matrix.edges[bare]] = True
+    return near
+
+
+def _report(
+    matrix: OperatorMatrix, fits: list[FittedPart], placement: Placement, clock: Clock, options: ScalarOptions
+) -> ConformingMesh | None:
+    """The mesh, if it is certified."""
+    parts = [fit.part for fit in fits]
+    topology = Topology(matrix.n, matrix.edges, tuple(part.piece for part in parts), "cliques")
+    with clock("place"):
+        nodes = [fit.entries.nodes(fit.z) for fit in fits]
+        placed, origins, notes = placement.placed(topology, nodes, [() for _ in fits])
+        mesh = JoinedParts(parts, placed, matrix.n)
+        shift = origins[mesh.component]
+        points = mesh.points + np.column_stack([shift.real, shift.imag])
+    status = np.ones(matrix.n, np.int8)
+    for fit in fits:
+        rows = fit.part.piece.vertices
+        status[rows[status[rows] == 1]] = 2
+        status[rows[fit.known_nodes]] = 0
+    scale, tensor = np.array([fit.scale for fit in fits]), placement.tensor
+    with clock("certify"):
+        drawn = points
+        if tensor:  # div(K grad) is a Laplacian in coordinates that K stretches
+            z = tensor.to_laplacian(points @ [1, 1j])
+            drawn = np.column_stack([z.real, z.imag])
+        rules = {name: rule for fit in fits for name, rule in fit.rule.items()}
+        factors = {name: scale[piece] for name, piece in mesh.piece.items()}
+        found = certify_elements(matrix.edges, matrix.entries, np.nan_to_num(drawn), mesh.blocks, factors, rules)
+        pairs = np.concatenate([fit.part.piece.vertices[fit.part.edges[fit.judged]] for fit in fits])
+        key, wanted = found.pairs @ [matrix.n, 1], pair_keys(matrix.n, *pairs.T)
+        error = float(found.misfits[np.searchsorted(key, wanted)].max(initial=0.0))
+        spare = min(int(fit.used.sum()) - 2 * int(fit.known.sum()) + 3 for fit in fits if fit.known.any())
+    if len(found.flipped) or not (error <= CERTIFIED and spare > 0):
+        return None
+    known, plausible = int((status == 0).sum()), int((status == 2).sum())
+    notes = [*matrix.warnings, *notes]
+    if plausible:
+        notes.append(f"{count_of(plausible, 'position is', 'positions are')} plausible and no more (`node_status` 2)")
+    if options.standard_deviations:
+        notes.append("error bars are not computed where cells of these elements are lost")
+    return ConformingMesh(
+        points=points,
+        **mesh.fields(),
+        component=mesh.component,
+        hinges=topology.hinges,
+        scale=scale / (tensor.root_determinant if tensor else 1.0),
+        node_status=status,
+        status="certified",
+        uniqueness="searched",
+        reason=(
+            f"{known:,} of {matrix.n:,} points are determined by {len(pairs):,} whole entries, which the operator "
+            f"re-assembled on them gives back to {error:.1e} (relative)"
+        ),
+        operator=placement.operator,
+        backward_error=error,
+        n_holes=sum(part.n_holes for part in parts),
+        timings=clock.timings,
+        warnings=tuple(notes),
+        quadrature=", ".join(dict.fromkeys(rule for fit in fits for rule in fit.rule.values())),
+        straight=True,
+    )

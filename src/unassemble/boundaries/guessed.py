@@ -1,0 +1,141 @@
+"""Positions of cells from whole entries, and guesses of the others that weigh less and less."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..conforming.affine import expected
+from ..conforming.assembly import Entries
+from ..conforming.fit import corner_positions, entries_by_rule
+from ..conforming.parts import Part
+from ..errors import GeometryError, SolverError
+from ..matrix import OperatorMatrix
+from ..planar.polish import PolishOptions, polish
+from ..tolerances import ALIKE, LITTLE, SMALL
+from ..topology.keys import found, pair_keys
+from .fit import EXACT
+from .judge import determined_by
+
+_AT_FIRST, _THEN = (1.0, 0.1, 0.01), (1e-3, 1e-4, *[1e-5] * 5)  # weights of what is guessed
+_TO_THE_END = PolishOptions(settled=0.0)  # misfits of guesses are no noise
+
+
+@dataclass(frozen=True, eq=False)
+class FittedPart:
+    """A part whose whole entries fit."""
+
+    part: Part
+    entries: Entries
+    rule: dict[str, str]
+    z: NDArray[np.complex128]  # (corners,)
+    scale: float
+    known: NDArray[np.bool_]  # (corners,) that are determined
+    whole: NDArray[np.bool_]  # (e,) pairs of the part
+    used: NDArray[np.bool_]  # (e,) that determine and check what is known
+    twins: NDArray[np.bool_]  # (n,) nodes that could change places with another one
+
+    @property
+    def known_nodes(self) -> NDArray[np.bool_]:
+        """(n,) nodes between known corners that are told from each other."""
+        return np.asarray((self.part.from_corners() @ ~self.known == 0) & ~self.twins)
+
+    @property
+    def judged(self) -> NDArray[np.bool_]:
+        """(e,) whole entries of cells whose corners are all known."""
+        loose = np.zeros(len(self.whole), dtype=bool)
+        for kind, cells in self.part.blocks.items():
+            loose[self.part.places[kind][~self.known[cells[:, : kind.corners]].all(axis=1)]] = True
+        return self.whole & ~loose
+
+
+def fitted_part(matrix: OperatorMatrix, part: Part, near: NDArray[np.bool_], scale: float | None) -> FittedPart | None:
+    """The part with positions that have its whole entries; None where none are found."""
+    rows = part.piece.vertices[part.edges]
+    place, there = found(matrix.edges @ [matrix.n, 1], pair_keys(matrix.n, *rows.T))
+    weights = -np.where(there, matrix.entries[place], 0.0)
+    count, most = np.zeros((2, len(weights)), dtype=np.int64)
+    for kind, places in part.places.items():
+        count += np.bincount(places.ravel(), minlength=len(weights))
+        most[places] = np.where(kind.on_one_side, 2, 1)
+    alone = near[rows].all(axis=1)  # entries of which other cells may have a part
+    whole = np.asarray(~alone | (count == most) if matrix.replaced is None else ~alone)
+    if whole.sum() <= 2 * part.n_corners - 3:
+        return None
+    trust = np.where(whole, np.where(count == 1, 1.0, LITTLE**2), np.where(there, SMALL, 0.0))
+    shared = expected(part.places, weights / count, trust)
+    for guess in (np.where(whole, weights, shared), np.where(whole, weights, weights / 2)):
+        try:
+            start, c = corner_positions(part, guess, None)  # the energy of guesses is not that of c
+        except (GeometryError, SolverError):
+            continue
+        rules = list(entries_by_rule(part))  # much alike: which it is shows near the end
+        begun = _faded(_Guessed(rules[0][1], guess, whole, start, c, np.inf), _AT_FIRST, scale)
+        trials = [(_faded(replace(begun, entries=entries), _THEN[:1], scale), rule) for rule, entries in rules]
+        for near_end, rule in sorted(trials, key=lambda one: one[0].misfit)[:2]:
+            fit = _faded(near_end, _THEN, scale)
+            if not fit.misfit <= EXACT or fit.entries.flipped(fit.z):
+                continue
+            w = fit.entries.weights(fit.z)
+            jacobian = fit.entries.jacobian(fit.z, np.ones(len(w))).matrix
+            slopes = np.zeros((len(w), 0)) if scale is not None else w[:, None]
+            known, used = determined_by(jacobian, slopes, whole, fit.z, part.piece)
+            twins = _twins(part, weights / fit.scale, whole, near[part.piece.vertices])
+            known &= ~twins[: part.n_corners]
+            return FittedPart(part, fit.entries, rule, fit.z, fit.scale, known, whole, used, twins)
+    return None
+
+
+def _twins(part: Part, weights: NDArray, whole: NDArray[np.bool_], near: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(n,) nodes `near` what is lost that have the same whole entries as another one of the same cells."""
+    times = np.bincount(np.concatenate([cells.ravel() for cells in part.blocks.values()]), minlength=part.n)
+    alike = []
+    for kind, cells in part.blocks.items():
+        k = kind.nodes
+        own, given = np.zeros((len(cells), k, k)), np.zeros((len(cells), k, k), dtype=bool)
+        for i, j in (np.triu_indices(k, 1), np.triu_indices(k, 1)[::-1]):
+            own[:, i, j], given[:, i, j] = weights[part.places[kind]], whole[part.places[kind]]
+        for a, b in combinations(range(k), 2):
+            others = [c for c in range(k) if c not in (a, b)]
+            differ = np.where(given[:, a] | given[:, b], np.abs(own[:, a] - own[:, b]), 0.0)[:, others].max(axis=1)
+            alike.append(np.sort(cells[differ <= ALIKE][:, [a, b]], axis=1))
+    pairs, count = np.unique(np.concatenate(alike), axis=0, return_counts=True)
+    one, other = pairs.T
+    some = near[one] & near[other] & (count == times[one]) & (count == times[other])
+    twins = np.zeros(part.n, dtype=bool)
+    twins[one[some]] = twins[other[some]] = True
+    return twins
+
+
+@dataclass(frozen=True, eq=False)
+class _Guessed:
+    """Positions fitted to whole entries and, as these do not tell all, to guesses of the others."""
+
+    entries: Entries
+    weights: NDArray[np.float64]  # (e,) given or guessed
+    whole: NDArray[np.bool_]  # (e,) those that are given
+    z: NDArray[np.complex128]
+    scale: float
+    misfit: float  # root mean square over whole entries, relative to c
+
+
+def _faded(start: _Guessed, fading: Sequence[float], scale: float | None) -> _Guessed:
+    """One fit after the other, with such weights of what is guessed; small ones only hold the mesh where it is."""
+    fit = start
+    for weight in fading:
+        spread = np.where(fit.whole, 1.0, 1 / weight)
+        try:
+            found = polish(fit.entries, fit.weights, fit.z, scale=scale, spread=spread, options=_TO_THE_END)
+        except SolverError:
+            break
+        own = fit.entries.weights(found.z)
+        misfit = float(np.sqrt(np.mean((fit.weights / found.scale - own)[fit.whole] ** 2)))
+        if not np.isfinite(misfit) or (weight == _THEN[-1] and misfit > fit.misfit / 2):
+            break
+        weights = np.where(fit.whole, fit.weights, found.scale * own) if weight <= SMALL else fit.weights
+        fit = replace(fit, weights=weights, z=found.z, scale=found.scale, misfit=misfit)
+    return fit
