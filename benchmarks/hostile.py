@@ -118,7 +118,11 @@ def agree(
     row, column = difference.coords
     wrong = np.abs(difference.data) > MISFIT * np.minimum(largest[row], largest[column])
     lost = lost | ((off != 0) @ (~known).astype(int) > 0)
-    lost = lost[row] & lost[column] & (cells_of_pairs(cells, off.shape)[row, column] < 2)
+    shared = cells_of_pairs(cells, off.shape)
+    if any(some.shape[1] > 4 for some in cells.values()):  # nodes on sides need not be coupled to those that are gone
+        bare = (off != 0).astype(int) - ((off != 0).multiply(shared > 0)).astype(int)
+        lost = lost | (bare @ lost.astype(int) > 0)
+    lost = lost[row] & lost[column] & (shared[row, column] < 2)
     return not (wrong & known[row] & known[column] & ~lost).any()
 
 

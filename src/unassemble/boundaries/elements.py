@@ -62,7 +62,12 @@ def recover_partial_elements(
 
 
 def _near_lost(matrix: OperatorMatrix, lost: NDArray[np.bool_], parts: Sequence[Part]) -> NDArray[np.bool_]:
-    """(n,) rows of cells that are not complete: they do not add up, or have entries that no complete cell has."""
+    """(n,) rows of cells that are not complete: they do not add up, or have entries that no complete cell has.
+
+    Of linear elements the former are all. Of others, a node of a lost cell need not be coupled to those that are gone.
+    """
+    if all(part.degree == 1 for part in parts):
+        return lost
     covered = [pairs_of(matrix.n, part.piece.vertices[some]).ravel() for part in parts for some in part.blocks.values()]
     bare = ~contains(distinct(np.concatenate(covered)), matrix.edges @ [matrix.n, 1])
     bare &= np.abs(matrix.entries) > ROUNDED * matrix.row_size[matrix.edges].min(axis=1)

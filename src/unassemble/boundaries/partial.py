@@ -67,7 +67,7 @@ def recover_partial(
     if not any(mesh is not None and mesh.determined.any() for mesh in meshes):
         return None
     pairs = list(zip(topology.pieces, meshes, strict=True))
-    if whole is None and all(mesh is not None and _nothing_gone(piece, matrix, mesh, scale) for piece, mesh in pairs):
+    if whole is None and all(mesh is None or _nothing_gone(piece, matrix, mesh, scale) for piece, mesh in pairs):
         return None
     with clock("place"):
         placed = _Placed.of(topology, meshes, placement, stretch)
