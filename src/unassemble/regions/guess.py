@@ -40,9 +40,9 @@ def uneven(matrix: OperatorMatrix) -> bool:
 def guessed_regions(piece: Piece, weights: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Regions (m,) of triangles, edge-connected, and their factors (k,), from -A_ij (e,)."""
     share = weights / (piece.inner + 1.0)
-    a, b, c = share[piece.opposite].T
-    tiny = 1e-6 * np.abs(share).max() + np.finfo(float).tiny
-    own = np.log(2 * np.sqrt(np.maximum(a * b + b * c + c * a, tiny**2)))
+    unit = np.abs(share).max() + np.finfo(float).tiny
+    a, b, c = share[piece.opposite].T / unit
+    own = np.log(unit) + np.log(2 * np.sqrt(np.maximum(a * b + b * c + c * a, 1e-12)))
     corners = corners_of(piece)
     touching = sp.csr_array(corners @ corners.T)
     smooth = own
