@@ -70,6 +70,44 @@ def test_anchors_and_tensor():
     assert np.abs(found.points - points)[known].max() <= 1e-9
 
 
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_vertex_that_only_one_of_two_pieces_determines(seed, order):
+    """Its place in the other one is no more than plausible."""
+    first, second = quadrilaterals(9, 8, seed), quadrilaterals(8, 9, seed + 50)
+    top = int(np.argmin(np.linalg.norm(first.p.T - [np.median(first.p[0]), first.p[1].max()], axis=1)))
+    corner = int(np.argmin(second.p.sum(axis=0)))
+    place = np.insert(np.arange(second.nvertices - 1) + first.nvertices, corner, top)
+    n = first.nvertices + second.nvertices - 1
+    whole, points = sp.csr_array((n, n)), np.zeros((n, 2))
+    for mesh, rows in ((second, place), (first, np.arange(first.nvertices))):
+        part = sp.coo_array(laplace.assemble(Basis(mesh, ElementQuad1())))
+        whole = whole + sp.coo_array((part.data, (rows[part.row], rows[part.col])), shape=(n, n))
+        points[rows] = mesh.p.T - mesh.p.T[np.flatnonzero(rows == top)]
+    sides = first.facets[:, first.boundary_facets()]
+    beside = sides[:, (sides == top).any(axis=0)].ravel()
+    gone = np.setdiff1d(first.boundary_nodes(), [top, beside[beside != top][0]])
+    kept = np.setdiff1d(np.arange(n), gone)[::order]
+    found = recover(sp.csr_array(whole[kept][:, kept]))
+    assert found.certified, found.reason
+    assert determined(found, points[kept]) >= 0.9
+
+
+def test_anchors_of_points_that_are_not_determined():
+    mesh = quadrilaterals(9, 8)
+    sides = mesh.facets[:, mesh.boundary_facets()].T
+    gone = np.setdiff1d(mesh.boundary_nodes(), [*sides[3], *sides[len(sides) // 2]])  # two sides stay
+    inside = np.setdiff1d(np.arange(mesh.nvertices), gone)
+    whole = laplace.assemble(Basis(mesh, ElementQuad1()))
+    matrix, points = shuffled(sp.csr_array(whole[inside][:, inside]), mesh.p.T[inside])
+    status = recover(matrix).node_status
+    loose, firm = np.flatnonzero(status == 2), np.flatnonzero(status == 0)[[0, 9, 20]]
+    assert len(loose)
+    found = recover(matrix, anchors=[(row, *points[row]) for row in (*firm, loose[0])])
+    assert any("anchors were not used" in note for note in found.warnings)
+    assert np.abs(found.points - points)[status == 0].max() <= 1e-9
+
+
 def share_at_most(matrix: sp.csr_array, points: np.ndarray) -> float:
     """Of the points that are said to be determined, after a check that they are right; none where there is no mesh."""
     try:

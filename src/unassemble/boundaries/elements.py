@@ -30,6 +30,7 @@ from ..topology import Topology
 from ..topology.keys import contains, distinct, pair_keys
 from ..words import count_of
 from .guessed import FittedPart, fitted_part
+from .judge import node_status
 
 _MOST = 3  # sets of cells, the likeliest ones
 
@@ -82,17 +83,15 @@ def _report(
     """The mesh, if it is certified."""
     parts = [fit.part for fit in fits]
     topology = Topology(matrix.n, matrix.edges, tuple(part.piece for part in parts), "cliques")
+    told = [(part.piece.vertices, fit.known_nodes) for part, fit in zip(parts, fits, strict=True)]
+    placement, said = placement.upon(matrix.n, told)
     with clock("place"):
         nodes = [fit.entries.nodes(fit.z) for fit in fits]
         placed, origins, notes = placement.placed(topology, nodes, [() for _ in fits])
         mesh = JoinedParts(parts, placed, matrix.n)
         shift = origins[mesh.component]
         points = mesh.points + np.column_stack([shift.real, shift.imag])
-    status = np.ones(matrix.n, np.int8)
-    for fit in fits:
-        rows = fit.part.piece.vertices
-        status[rows[status[rows] == 1]] = 2
-        status[rows[fit.known_nodes]] = 0
+    status = node_status(mesh.component, told)
     scale, tensor = np.array([fit.scale for fit in fits]), placement.tensor
     with clock("certify"):
         drawn = points
@@ -105,11 +104,15 @@ def _report(
         pairs = np.concatenate([fit.part.piece.vertices[fit.part.edges[fit.judged]] for fit in fits])
         key, wanted = found.pairs @ [matrix.n, 1], pair_keys(matrix.n, *pairs.T)
         error = float(found.misfits[np.searchsorted(key, wanted)].max(initial=0.0))
-        spare = min(int(fit.used.sum()) - 2 * int(fit.known.sum()) + 3 for fit in fits if fit.known.any())
-    if len(found.flipped) or not (error <= CERTIFIED and spare > 0):
+        few = 3 if options.scale is None else 4
+        spare = min(
+            int((fit.used & fit.judged).sum()) - 2 * int(fit.known.sum()) + few for fit in fits if fit.known.any()
+        )
+        claimed = np.concatenate([(status[some] == 0).all(axis=1) for some in mesh.blocks.values()])
+    if claimed[found.flipped].any() or not (error <= CERTIFIED and spare > 0):
         return None
     known, plausible = int((status == 0).sum()), int((status == 2).sum())
-    notes = [*matrix.warnings, *notes]
+    notes = [*matrix.warnings, *said, *notes]
     if plausible:
         notes.append(f"{count_of(plausible, 'position is', 'positions are')} plausible and no more (`node_status` 2)")
     if options.standard_deviations:

@@ -16,6 +16,7 @@ needed, and one factorisation is all there is.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,6 +69,19 @@ def determined_by(
     vertices = _moving_alike(piece, z, free * size[:, None], size, held)
     loose = np.bincount(row, ~vertices[jacobian.indices], len(whole)) > 0
     return vertices, checked & ~loose
+
+
+def node_status(component: NDArray[np.int64], parts: Sequence[tuple[NDArray, NDArray]]) -> NDArray[np.int8]:
+    """(n,) as in :class:`..recovery.Recovery`: what the piece says of a row whose component, (n,), it is in.
+
+    `parts`: rows (k,) of each piece, and whether each is determined there, (k,) bool. A vertex of two pieces may be
+    determined in one of them only.
+    """
+    status = np.ones(len(component), np.int8)
+    for label, (rows, known) in enumerate(parts):
+        own = component[rows] == label
+        status[rows[own]] = np.where(known[own], 0, 2)
+    return status
 
 
 @dataclass(frozen=True, eq=False)

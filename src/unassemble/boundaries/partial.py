@@ -25,6 +25,7 @@ from ..tolerances import ALIKE, CERTIFIED
 from ..topology import Piece, Topology, local_numbering, surfaces
 from ..words import count_of
 from .inside import InsideMesh, fit_inside
+from .judge import node_status
 
 
 def recover_partial(
@@ -121,16 +122,15 @@ class _Placed:
         """Placed by anchors, or in the canonical frame of each."""
         found = [(piece, mesh) for piece, mesh in zip(topology.pieces, meshes, strict=True) if mesh is not None]
         topology = Topology(topology.n_vertices, topology.edges, tuple(piece for piece, _ in found), topology.method)
-        status = np.ones(topology.n_vertices, np.int8)
-        for piece, mesh in found:
-            status[piece.vertices[status[piece.vertices] == 1]] = 2
-            status[piece.vertices[mesh.determined]] = 0
+        parts = [(piece.vertices, mesh.determined) for piece, mesh in found]
+        placement, said = placement.upon(topology.n_vertices, parts)
         placed = [placement.apply(piece, mesh.z) for piece, mesh in found]
         scales = np.array([mesh.scale for _, mesh in found])
         positions = [z for z, _ in placed]
         joined = JoinedMesh.of(topology, positions, scales / stretch)
         notes = [*piece_notes([some for _, some in placed]), *placement.unused(topology), *topology_notes(topology)]
-        return cls(topology, [mesh for _, mesh in found], positions, joined, status, notes)
+        status = node_status(joined.component, parts)
+        return cls(topology, [mesh for _, mesh in found], positions, joined, status, [*said, *notes])
 
     def deviations(self, matrix: OperatorMatrix, placement: Placement, *, known_scale: bool) -> NDArray[np.float64]:
         """(n, 2) standard deviations, by what entries leave of each other; in several pieces those of the first."""

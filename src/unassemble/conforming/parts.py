@@ -70,6 +70,11 @@ def parts_of(shown: Cells) -> list[Part]:
     number = np.empty(n, dtype=np.int64)
     number[shown.order] = np.arange(n)
     blocks = {kind: number[cells] for kind, cells in shown.blocks.items()}
+    corner, between = np.zeros((2, n), dtype=bool)
+    for kind, cells in blocks.items():
+        corner[cells[:, : kind.corners]], between[cells[:, kind.corners :]] = True, True
+    if (corner & between).any():
+        raise TopologyError("rows are corners of some cells and lie between corners of others")
     triangles, owner = _divided(blocks)
     edges, _, opposite = with_sides(n, np.empty((0, 2), np.int64), triangles)
     pieces = planar_pieces(n, edges, triangles, opposite)

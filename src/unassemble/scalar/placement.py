@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,6 +120,24 @@ class Placement:
             said.append((*remarks[label], *more))
         notes = [*piece_notes(said), *self.unused(topology), *topology_notes(topology)]
         return join(topology, placed, known), origins, notes
+
+    def upon(self, n: int, parts: Sequence[tuple[NDArray, NDArray]]) -> tuple[Placement, list[str]]:
+        """The same without what is known of points that are not determined, and what is to be said about that.
+
+        `parts`: rows (k,) of each piece, and whether each is determined there, (k,) bool.
+        """
+        firm = np.ones(n, dtype=bool)
+        for rows, known in parts:
+            firm[rows[~known]] = False
+        anchors = tuple(anchor for anchor in self.anchors if firm[anchor[0]])
+        kept = replace(self, anchors=anchors)
+        notes = []
+        if loose := [str(row) for row, _, _ in self.anchors if not firm[row]]:
+            notes.append(f"entries do not determine the points of rows {', '.join(loose)}: their anchors were not used")
+        if self.direction and not firm[list(self.direction[:2])].all():
+            notes.append("entries do not determine the points that `direction` joins: it was not used")
+            kept = replace(kept, direction=None)
+        return kept, notes
 
     def _directed(self, piece: Piece) -> bool:
         return self.direction is not None and bool(np.isin(self.direction[:2], piece.vertices).all())
