@@ -19,7 +19,6 @@ from ..clock import Clock
 from ..conforming.joined import JoinedParts
 from ..conforming.parts import Part, parts_of
 from ..conforming.recover import shown_cells
-from ..conforming.sets import pairs_of
 from ..errors import TopologyError
 from ..matrix import OperatorMatrix
 from ..options import ScalarOptions
@@ -69,7 +68,7 @@ def _near_lost(matrix: OperatorMatrix, lost: NDArray[np.bool_], parts: Sequence[
     """
     if all(part.degree == 1 for part in parts):
         return lost
-    covered = [pairs_of(matrix.n, part.piece.vertices[some]).ravel() for part in parts for some in part.blocks.values()]
+    covered = [pair_keys(matrix.n, *part.rows.T) for part in parts]
     bare = ~contains(distinct(np.concatenate(covered)), matrix.edges @ [matrix.n, 1])
     bare &= np.abs(matrix.entries) > ROUNDED * matrix.row_size[matrix.edges].min(axis=1)
     near = lost.copy()
@@ -101,7 +100,7 @@ def _report(
         rules = {name: rule for fit in fits for name, rule in fit.rule.items()}
         factors = {name: scale[piece] for name, piece in mesh.piece.items()}
         found = certify_elements(matrix.edges, matrix.entries, np.nan_to_num(drawn), mesh.blocks, factors, rules)
-        pairs = np.concatenate([fit.part.piece.vertices[fit.part.edges[fit.judged]] for fit in fits])
+        pairs = np.concatenate([fit.part.rows[fit.judged] for fit in fits])
         key, wanted = found.pairs @ [matrix.n, 1], pair_keys(matrix.n, *pairs.T)
         error = float(found.misfits[np.searchsorted(key, wanted)].max(initial=0.0))
         few = 3 if options.scale is None else 4

@@ -17,7 +17,6 @@ from ..errors import GeometryError, SolverError
 from ..matrix import OperatorMatrix
 from ..planar.polish import PolishOptions, polish
 from ..tolerances import ALIKE, LITTLE, SMALL
-from ..topology.keys import found, pair_keys
 from .fit import EXACT
 from .judge import determined_by
 
@@ -55,14 +54,13 @@ class FittedPart:
 
 def fitted_part(matrix: OperatorMatrix, part: Part, near: NDArray[np.bool_], scale: float | None) -> FittedPart | None:
     """The part with positions that have its whole entries; None where none are found."""
-    rows = part.piece.vertices[part.edges]
-    place, there = found(matrix.edges @ [matrix.n, 1], pair_keys(matrix.n, *rows.T))
+    place, there = part.stored_in(matrix)
     weights = -np.where(there, matrix.entries[place], 0.0)
     count, most = np.zeros((2, len(weights)), dtype=np.int64)
     for kind, places in part.places.items():
         count += np.bincount(places.ravel(), minlength=len(weights))
         most[places] = np.where(kind.on_one_side, 2, 1)
-    alone = near[rows].all(axis=1)  # entries of which other cells may have a part
+    alone = near[part.rows].all(axis=1)  # entries of which other cells may have a part
     whole = np.asarray(~alone | (count == most) if matrix.replaced is None else ~alone)
     if whole.sum() <= 2 * part.n_corners - 3:
         return None

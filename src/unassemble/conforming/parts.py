@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from ..elements.kinds import Kind
 from ..errors import TopologyError
+from ..matrix import OperatorMatrix
 from ..topology import Piece
-from ..topology.keys import distinct, pair_keys, with_sides
+from ..topology.keys import distinct, found, pair_keys, with_sides
 from ..topology.pieces import planar_pieces
 from .roles import Cells
 from .sets import pairs_of
@@ -39,6 +40,15 @@ class Part:
     def degree(self) -> int:
         """Of the elements, along a side."""
         return max(kind.degree for kind in self.blocks)
+
+    @property
+    def rows(self) -> NDArray[np.int64]:
+        """(e, 2) rows of the matrix that the edges join."""
+        return self.piece.vertices[self.edges]
+
+    def stored_in(self, matrix: OperatorMatrix) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """(e,) places of the edges among those of a matrix, and whether they are there."""
+        return found(matrix.edges @ [matrix.n, 1], pair_keys(matrix.n, *self.rows.T))
 
     def from_corners(self) -> sp.csr_array:
         """(n, n_corners) nodes of straight cells as means of corners."""
@@ -81,13 +91,13 @@ def parts_of(shown: Cells) -> list[Part]:
     if not pieces:
         raise TopologyError("the cells that the rows form do not glue together to a surface in the plane")
     label = np.random.default_rng(0).integers(0, 2**63, n, dtype=np.uint64)  # the sum of three tells a triangle
-    found = np.concatenate([piece.vertices[piece.triangles] for piece in pieces])
-    row = np.empty(len(found), np.int64)
-    row[np.argsort(label[found].sum(axis=1))] = np.argsort(label[triangles].sum(axis=1))
+    glued = np.concatenate([piece.vertices[piece.triangles] for piece in pieces])
+    row = np.empty(len(glued), np.int64)
+    row[np.argsort(label[glued].sum(axis=1))] = np.argsort(label[triangles].sum(axis=1))
     which, turned = np.empty(len(triangles), np.int64), np.empty(len(triangles), dtype=bool)
     which[row] = np.repeat(np.arange(len(pieces)), [len(piece.triangles) for piece in pieces])
-    start = (found == triangles[row, :1]).argmax(axis=1)
-    turned[row] = found[np.arange(len(row)), (start + 1) % 3] != triangles[row, 1]
+    start = (glued == triangles[row, :1]).argmax(axis=1)
+    turned[row] = glued[np.arange(len(row)), (start + 1) % 3] != triangles[row, 1]
     oriented, piece_of, first = {}, {}, 0
     for kind, cells in blocks.items():
         representative = first + np.flatnonzero(np.diff(owner[first:], prepend=-1) != 0)[: len(cells)]

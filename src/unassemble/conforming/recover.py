@@ -20,7 +20,6 @@ from ..scalar.placement import Placement
 from ..scalar.solving import Task
 from ..tolerances import SMALL
 from ..topology import Topology, local_numbering
-from ..topology.keys import found, pair_keys
 from .fit import Fitted, deviations_of, fitted
 from .joined import JoinedParts
 from .parts import Part, parts_of
@@ -152,8 +151,7 @@ def _recovered(stored: OperatorMatrix, cells: Cells, clock: Clock, task: Task) -
 
 def _fit(stored: OperatorMatrix, part: Part, task: Task) -> Fitted:
     """A part with the positions that its entries give."""
-    rows = part.piece.vertices[part.edges]
-    place, there = found(stored.edges @ [stored.n, 1], pair_keys(stored.n, *rows.T))
+    place, there = part.stored_in(stored)
     noise = None
     if task.noise is not None:
         noise = task.noise.sigma * np.where(there, task.noise.spread[place], SMALL)

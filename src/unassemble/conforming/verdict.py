@@ -74,7 +74,7 @@ def _obstacle(fits: Sequence[Fitted], near: Held, task: Task) -> str:
 
 def _bare(stored: OperatorMatrix, fits: Sequence[Fitted]) -> str:
     """A stored entry of no cell; empty if there is none."""
-    covered = [pair_keys(stored.n, *fit.part.piece.vertices[fit.part.edges].T) for fit in fits]
+    covered = [pair_keys(stored.n, *fit.part.rows.T) for fit in fits]
     bare = np.flatnonzero(~contains(np.sort(np.concatenate(covered)), stored.edges @ [stored.n, 1]))
     if not len(bare):
         return ""
