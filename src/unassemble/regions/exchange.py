@@ -110,6 +110,8 @@ class _Shares:
         if not np.isfinite(gram).all():
             return none
         value, vector = np.linalg.eigh((gram + gram.T) / 2)
+        if not value.max() > 0:  # displacements and factors take all of them up
+            return none
         root, right = np.sqrt(np.maximum(value, 1e-8 * value.max())), added @ misfit
         between = lsq_linear((vector * root).T, (vector / root).T @ right, bounds=(0, 1)).x
         return cls(between, right, gram.diagonal())

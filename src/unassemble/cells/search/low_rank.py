@@ -16,6 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ...errors import GeometryError
 from ...linalg import factorisation
 from ...topology.keys import runs
 from ..relax.sheet import Sheet
@@ -54,6 +55,8 @@ class ChangedMaps:
         z = placed.z - placed.z[-1]  # the last vertex is pinned
         y = np.append(self._factor.solve(pencil.area_form(z)[:-1]), 0)
         size = np.abs(y).max()
+        if not size > 0:
+            raise GeometryError("the map covers no area")
         self._z, self._y = z / size, y / size
         self._place = np.full(self._n, -1)
         self._columns = np.empty((0, self._n), dtype=np.complex128)
