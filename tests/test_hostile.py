@@ -33,9 +33,11 @@ def test_the_same_of_what_takes_longer(kind):
     assert outcome not in ("WRONG", "CRASH", "SLOW"), f"--kinds {kind} --first 0\n{said}"
 
 
-@pytest.mark.parametrize("found", [(601, 1363), (601, 1385), (602, 151), (5001, 4876), (6001, 1687), (9001, 1650), (9001, 18772)])
+@pytest.mark.parametrize(
+    "found", [(601, 1363), (601, 1385), (602, 151), (5001, 4876), (6001, 1687), (9001, 1650), (9001, 18772)]
+)
 def test_what_went_wrong_before(found):
-    """Entries that nothing checks; cells held together by an assumption, of 1e-200 the others, flat; maps of no area."""
+    """Entries that nothing checks; cells held together by an assumption, of 1e-200 the others, flat; no area."""
     _, _, outcome, _, said = tried(*found)
     assert outcome not in ("WRONG", "CRASH", "SLOW"), said
 
