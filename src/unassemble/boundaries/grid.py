@@ -93,8 +93,8 @@ class _Rows:
         good = (apart[:, 1:] != apart[:, :-1]).all(axis=1)
         return cls(graph, rows[good], pairs[good])
 
-    def ring(self) -> dict[int, tuple[int, int]]:
-        """Coordinates of the first row, at the origin, and of its neighbours."""
+    def ring(self) -> dict[int, tuple[int, int]] | None:
+        """Coordinates of the first row, at the origin, and of its neighbours; None where they are none of a grid."""
         row, pairs = int(self.rows[0]), self.pairs[0].tolist()
         near = {v: set(_neighbours(self.graph, v)) for v in _neighbours(self.graph, row)}
         if len(pairs) == 3:
@@ -102,6 +102,8 @@ class _Rows:
             (b, not_b), (c, not_c) = (p if p[0] in near[a] else p[::-1] for p in pairs[1:])
             return {row: (0, 0), a: (1, 0), b: (0, 1), not_c: (-1, 1), not_a: (-1, 0), not_b: (0, -1), c: (1, -1)}
         sides = [p for p in pairs if sum(len(near[v] & near.keys()) for v in p) == 8]
+        if len(sides) != 2:
+            return None
         (a, not_a), (b, not_b) = sides
         at = {row: (0, 0), a: (1, 0), b: (0, 1), not_a: (-1, 0), not_b: (0, -1)}
         corners = {v: [at[w] for w in near[v] & at.keys() if w != row] for v in near.keys() - at.keys()}
@@ -117,7 +119,8 @@ def _spread(seed: _Rows, n: int) -> NDArray[np.int64] | None:
     at, known = np.zeros((n, 2), np.int64), np.zeros(n, dtype=bool)
     number = np.full(n, -1)
     number[seed.rows] = np.arange(len(seed.rows))
-    start = seed.ring()
+    if (start := seed.ring()) is None:
+        return None
     new = np.array(list(start))
     at[new], known[new] = list(start.values()), True
     indptr, indices = seed.graph.indptr, seed.graph.indices

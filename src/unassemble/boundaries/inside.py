@@ -59,9 +59,12 @@ def fit_inside(
         if core is None:
             return None
         exact = core[0].misfit <= EXACT
-        fit, rim = _grown(problem, *core) if exact else core
-        if exact:  # what is left is rounding after one step more
-            last = FitOptions(last_steps=1, trials=1, damping=1e-15)
+        fit, rim, before = *core, 0
+        if exact:
+            while before < rim.whole.sum() and not rim.left.all():  # from a larger core to one larger still
+                before = rim.whole.sum()
+                fit, rim = _grown(problem, fit, rim)
+            last = FitOptions(last_steps=1, trials=1, damping=1e-15)  # what is left is rounding after one step more
             fit = problem.fit(fit.z, fit.scale, rim.whole, 0.0, last)
         z, whole = fit.z, rim.whole
         known, entries = np.zeros(len(z), dtype=bool), np.zeros_like(whole)
@@ -147,33 +150,42 @@ def _tried(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> Fit:
 
 
 def _grown(problem: WholeEntries, core: Fit, rim: Rim) -> tuple[Fit, Rim]:
-    """A core that fits, and what fits of the vertices outside of it: first by themselves, then with the core."""
+    """A core that fits, and what fits of the vertices outside of it: by themselves first, then with the core.
+
+    What the core determines stays where it is. All else moves, inside the core too: what fits there is one of many.
+    """
     piece, z = problem.piece, core.z
-    movable = ~rim.inside
+    movable = ~determined(problem, z, core.scale, rim.whole)[0]
+    keep = np.logical_not(movable[piece.triangles].any(axis=1))
     folded = np.zeros(piece.n_vertices, dtype=bool)
     folded[piece.triangles[areas(piece, z) <= 0]] = True
-    grown = Rim(piece, rim.given, rim.left | ~folded[piece.triangles].any(axis=1))
+    grown = Rim(piece, rim.given, keep | ~folded[piece.triangles].any(axis=1))
     free = movable
     for _ in range(24):
         if not free.any():
             break
-        z = fit_near(problem, z, core.scale, grown.whole, free, ((1e-3, 5), (0.0, 20)))
-        misfit = np.abs(problem.misfits(z, core.scale)) / weight_roundings(piece, z)
-        bad = grown.whole & ~(misfit <= 1e-12)
+        z = fit_near(problem, z, core.scale, grown.whole, free, ((1e-5, 5), (0.0, 20)))
+        misfit = np.abs(problem.misfits(z, core.scale))
+        relative = misfit / weight_roundings(piece, z)
+        bad = grown.whole & ~(relative <= 1e-12)
         _log.debug("grown to %d whole entries: %d do not fit", grown.whole.sum(), bad.sum())
         if not bad.any():
             break
-        less = grown.peeled(np.where(bad, misfit, 0.0), 0.0, keep=rim.left)
+        less = grown.peeled(np.where(bad, relative, 0.0), 0.0, keep=keep)
         if less is None:
             return core, rim
         near = np.zeros(piece.n_vertices, dtype=bool)
         near[piece.edges[bad]] = True
         grown, free = less, movable & (distance(piece, near, 3) <= 3)
+        if misfit[grown.whole].max() < 1e-3:  # steps of all vertices come to the end that those of some do not
+            fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
+            if fit.misfit <= EXACT:
+                return fit, grown
     for _ in range(4):
         fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
         if fit.misfit <= EXACT:
             return fit, grown
-        less = _less(problem, grown, fit, 0.25, keep=rim.left)
+        less = _less(problem, grown, fit, 0.25, keep=keep)
         if less is None:
             break
         grown = less
