@@ -87,12 +87,14 @@ class ScalarReadings:
             return self._plain(self.matrix)
         order: list[tuple[int, Callable[[], PlanarMesh | None]]] = [(0, lambda: self.lattice)]
         replaced, incomplete = self.matrix.replaced is not None, self.matrix.incomplete_rows.any()
+        spread = uneven(self.matrix)
         if replaced or not self.matrix.adds_up.all():  # else nothing was taken out
-            order.append((1 if replaced or incomplete else 3, self._partial))
+            partial = [self._partial_regions, self._partial] if spread else [self._partial, self._partial_regions]
+            order += [(1 if replaced or incomplete else 3, reading) for reading in partial]
             order.append((0, self._without_boundary_terms))
             order.append((1 if self.crowded else 3, self._partial_elements))
         if not replaced:
-            linear = [self._regions, self._linear] if uneven(self.matrix) else [self._linear, self._regions]
+            linear = [self._regions, self._linear] if spread else [self._linear, self._regions]
             order += [(1 if self.crowded else 3, lambda: self.other_elements), *((2, reading) for reading in linear)]
         nearest: PlanarMesh | None = None
         failure: RecoveryError | None = None
@@ -116,16 +118,25 @@ class ScalarReadings:
             return None
         return recover_without_boundary_terms(self.matrix, self._plain, self.options.scale)
 
-    def _partial(self) -> PlanarMesh | None:
+    @property
+    def _given(self) -> tuple[OperatorMatrix, NDArray[np.bool_] | None]:
+        """The matrix with what entries it lacks, and those that are whole, where rows were replaced."""
         matrix = with_boundary_edges(with_diagonals(self.matrix))
-        whole = None if matrix.replaced is None else np.asarray(~matrix.replaced[matrix.edges].all(axis=1))
-        return recover_partial(matrix, whole, self.placement, self.clock, self.options)
+        return matrix, None if matrix.replaced is None else np.asarray(~matrix.replaced[matrix.edges].all(axis=1))
+
+    def _partial(self) -> PlanarMesh | None:
+        return recover_partial(*self._given, self.placement, self.clock, self.options)
+
+    def _partial_regions(self) -> PlanarMesh | None:
+        return recover_regions(*self._given, self.placement, self.clock, self.options)
 
     def _partial_elements(self) -> PlanarMesh | None:
         return recover_partial_elements(self.matrix, self.placement, self.clock, self.options)
 
     def _regions(self) -> PlanarMesh | None:
-        return recover_regions(with_diagonals(self.matrix, everywhere=True), self.placement, self.clock, self.options)
+        matrix = with_diagonals(self.matrix, everywhere=True)
+        every = np.ones(len(matrix.edges), dtype=bool)
+        return recover_regions(matrix, every, self.placement, self.clock, self.options)
 
     def _linear(self) -> PlanarMesh:
         return recover_with_terms(self.matrix, self._plain, self.clock, self.placement.coefficients)

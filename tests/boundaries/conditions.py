@@ -99,11 +99,17 @@ def largest_error_of(found: PlanarMesh, points: NDArray, known: NDArray) -> floa
     return max(largest_error(found.points[rows], points[rows]) for rows in pieces if rows.sum() > 2)
 
 
-def materials(mesh: MeshTri, factors: Sequence[float], at: Callable[[NDArray], NDArray] | None = None) -> Given:
-    """With a factor for each of two halves, or four quarters, or for what `at` tells from the centres of triangles."""
+def materials(
+    mesh: MeshTri,
+    factors: Sequence[float],
+    at: Callable[[NDArray], NDArray] | None = None,
+    outside: Callable[..., sp.csr_array] | None = None,
+) -> Given:
+    """With a factor for each of two halves, or four quarters, or for what `at` tells from the centres of triangles.
+
+    Boundary unknowns are those of `outside`, ``condense`` or ``enforce``.
+    """
     centre = mesh.p[:, mesh.t].mean(axis=1)
-    beyond = centre > np.median(centre, axis=1, keepdims=True)
-    label = beyond[0] + (2 * beyond[1] if len(factors) > 2 else 0) if at is None else at(centre)
 
     @BilinearForm
     def form(u, v, w):
@@ -111,5 +117,29 @@ def materials(mesh: MeshTri, factors: Sequence[float], at: Callable[[NDArray], N
 
     flat = Basis(mesh, ElementTriP0())
     values = flat.zeros()
-    values[flat.element_dofs[0]] = np.array(factors)[label.astype(int)]
-    return shuffled(form.assemble(Basis(mesh, ElementTriP1()), k=flat.interpolate(values)), mesh.p.T)
+    values[flat.element_dofs[0]] = np.array(factors)[(at or parts(mesh, len(factors)))(centre).astype(int)]
+    matrix = form.assemble(Basis(mesh, ElementTriP1()), k=flat.interpolate(values))
+    if outside is enforce:
+        return shuffled(enforce(matrix, D=mesh.boundary_nodes()), mesh.p.T)
+    if outside is condense:
+        matrix = condense(matrix, D=mesh.boundary_nodes(), expand=False)
+        return shuffled(matrix, mesh.p.T[mesh.interior_nodes()])
+    return shuffled(matrix, mesh.p.T)
+
+
+def parts(mesh: MeshTri, count: int) -> Callable[[NDArray], NDArray]:
+    """Which of two halves, or four quarters, of the triangles of a mesh points (2, k) are in."""
+    middle = np.median(mesh.p[:, mesh.t].mean(axis=1), axis=1) + 1e-9 * np.ptp(mesh.p)  # whatever rounding does
+
+    def at(points: NDArray) -> NDArray:
+        right, above = points > middle[:, None]
+        return right + (2 * above if count > 2 else 0)
+
+    return at
+
+
+def determined_factors(found: PlanarMesh, points: NDArray) -> tuple[NDArray, NDArray]:
+    """Factors of triangles with three points that are determined, and the true centres of these triangles, (2, k)."""
+    known = (found.node_status == 0)[found.triangles].all(axis=1)
+    assert found.region is not None
+    return found.scale[found.region[known]], points[found.triangles[known]].mean(axis=1).T

@@ -25,7 +25,9 @@ def first_fits(problem: WholeEntries, rim: Rim, newton: FitOptions) -> Iterator[
 
     Steps `newton` are those of all vertices of a large mesh.
     """
-    conformal = _conformal(problem, _guessed(problem, rim.given))
+    given = np.where(problem.guessed, problem.weights, 0.5)
+    weights = guessed(problem.piece, given, rim.given, estimate_scale(problem.piece, given))
+    conformal = _conformal(problem, weights)
     fit = _settled(problem, rim, conformal, newton)
     if fit is not None:
         yield fit, True
@@ -35,15 +37,12 @@ def first_fits(problem: WholeEntries, rim: Rim, newton: FitOptions) -> Iterator[
             yield problem.faded(first.z, first.scale, rim.whole, fading[1:]), False
 
 
-def _guessed(problem: WholeEntries, whole: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """(e,) weights, guessed where they are not whole.
+def guessed(piece: Piece, given: NDArray[np.float64], whole: NDArray[np.bool_], c: float) -> NDArray[np.float64]:
+    """(e,) weights, guessed where they are not whole, from what is given there, and c.
 
     Halves of weights are about those g of one triangle, and g1 g2 + g2 g3 + g3 g1 = c^2 / 4 in each. With guesses that
     are too low some map has no energy at the rim, and the conformal map a fold there: of two the larger one counts.
     """
-    piece = problem.piece
-    given = np.where(problem.guessed, problem.weights, 0.5)
-    c = estimate_scale(piece, given)
     triangle, place = np.divmod(piece.facing[:, 0], 3)
     one, other = (given[piece.opposite[triangle, (place + turn) % 3]] / 2 for turn in (1, 2))
     third = np.clip((c**2 / 4 - one * other) / np.maximum(one + other, 0.05), 0.0, 2.0)

@@ -22,7 +22,7 @@ _ROUNDS = 8  # fits with fewer vertices at the rim each
 
 # Steps of all vertices that start near: smooth displacements are stiff only in the fourth power of their length, so
 # that any damping would hold them.
-_NEWTON = FitOptions(steps=1, last_steps=8, damping=1e-15, exact=EXACT, near=0.05, shortest=1.0)
+NEWTON = FitOptions(steps=1, last_steps=8, damping=1e-15, exact=EXACT, near=0.05, shortest=1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +30,17 @@ class InsideMesh:
     """Positions, and how much they are worth."""
 
     z: NDArray[np.complex128]
-    scale: float
+    scale: NDArray[np.float64]  # (k,) factors of regions, or the only one
+    region: NDArray[np.int64]  # (m,)
     given: NDArray[np.bool_]  # (e,) entries that were said to be whole
     entries: NDArray[np.bool_]  # (e,) those that determine and check vertices
     exact: bool  # whether all that were fitted fit
     determined: NDArray[np.bool_]  # (n,) vertices, up to a similarity of all; none where entries do not fit
+
+    @property
+    def factor(self) -> NDArray[np.float64]:
+        """(m,) of each triangle."""
+        return self.scale[self.region]
 
 
 def fit_inside(
@@ -58,32 +64,42 @@ def fit_inside(
         core = _core(problem, rim)
         if core is None:
             return None
-        exact = core[0].misfit <= EXACT
-        fit, rim, before = *core, 0
-        if exact:
-            while before < rim.whole.sum() and not rim.left.all():  # from a larger core to one larger still
-                before = rim.whole.sum()
-                fit, rim = _grown(problem, fit, rim)
-            last = FitOptions(last_steps=1, trials=1, damping=1e-15)  # what is left is rounding after one step more
-            fit = problem.fit(fit.z, fit.scale, rim.whole, 0.0, last)
-        z, whole = fit.z, rim.whole
-        known, entries = np.zeros(len(z), dtype=bool), np.zeros_like(whole)
-        if exact:
-            known, entries = determined(problem, z, fit.scale, whole)
+        return finished(problem, *core, unit)
     finally:
         problem.release()
-    if entries.sum() <= 2 * known.sum() - (4 if scale is not None else 3):  # nothing that checks them as a whole
-        known, entries = np.zeros_like(known), np.zeros_like(entries)
-    return InsideMesh(z, fit.scale * unit, given, entries, exact, known)
+
+
+def finished(problem: WholeEntries, fit: Fit, rim: Rim, unit: float) -> InsideMesh:
+    """A fit with what fits of the vertices taken off, and its verdict; c was in this unit."""
+    exact, before = fit.misfit <= EXACT, 0
+    if exact:
+        while before < rim.whole.sum() and not rim.left.all():  # from a larger core to one larger still
+            before = rim.whole.sum()
+            fit, rim = _grown(problem, fit, rim)
+        last = FitOptions(last_steps=1, trials=1, damping=1e-15)  # what is left is rounding after one step more
+        fit = problem.fit(fit.z, fit.scale, rim.whole, 0.0, last)
+    known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(rim.whole)
+    if exact:
+        known, entries = determined(problem, fit.z, fit.scale, rim.whole)
+    scale, region = np.atleast_1d(fit.scale) * unit, problem.region
+    region = np.zeros(len(problem.piece.triangles), np.int64) if region is None else region
+    if entries.sum() <= unknowns(known, 0 if problem.known_scale is not None else len(scale)):
+        known, entries = np.zeros_like(known), np.zeros_like(entries)  # nothing checks them as a whole
+    return InsideMesh(fit.z, scale, region, rim.given, entries, exact, known)
+
+
+def unknowns(known: NDArray[np.bool_], factors: int) -> int:
+    """Coordinates of determined vertices, of which one has no entry, and factors, less a similarity."""
+    return 2 * max(int(known.sum()), 2) - 4 + factors
 
 
 def _core(problem: WholeEntries, rim: Rim) -> tuple[Fit, Rim] | None:
     """A fit of all entries that some rim has whole, or else the last one; None where there is no drawing."""
     found = None
-    for again, (fit, near) in enumerate(first_fits(problem, rim, _NEWTON)):
+    for again, (fit, near) in enumerate(first_fits(problem, rim, NEWTON)):
         # What comes to a bad end with one part of the largest misfit for peaks often does not with another. A small
         # mesh loses more of its rim where that is taken off as a whole, and is peeled a few times before.
-        found = _shrunk(problem, rim, fit, 0 if near else 3, 0.35 if again else 0.25)
+        found = shrunk(problem, rim, fit, 0 if near else 3, 0.35 if again else 0.25)
         if found[0].misfit <= EXACT:
             break
     return found
@@ -95,10 +111,10 @@ def _bare(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> tuple[Fit,
     for _ in range(_ROUNDS):
         if bare.whole.sum() <= 2.3 * bare.inside.sum():  # two to a vertex determine, far inside there are three
             return None
-        found = problem.fit(found.z, found.scale, bare.whole, 0.0, _NEWTON)
+        found = problem.fit(found.z, found.scale, bare.whole, 0.0, NEWTON)
         if found.misfit <= EXACT:
             break
-        less = _less(problem, bare, found, peaks)
+        less = peeled(problem, bare, found, peaks)
         if less is None:
             return None
         bare = less
@@ -110,7 +126,7 @@ def _bare(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> tuple[Fit,
     return replace(found, z=moved), bare
 
 
-def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, peaks: float) -> tuple[Fit, Rim]:
+def shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, peaks: float) -> tuple[Fit, Rim]:
     """Fits with fewer vertices at the rim each, until one has all whole entries; after a few without the rim."""
     for turn in range(_ROUNDS):
         _log.debug("%d whole entries: misfit %.1e", rim.whole.sum(), fit.misfit)
@@ -120,14 +136,16 @@ def _shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, peaks: flo
             return bare
         if fit.misfit <= EXACT:
             break
-        peeled = _less(problem, rim, fit, peaks)
-        if peeled is None or not (peeled := peeled.pruned()).whole.any():
+        less = peeled(problem, rim, fit, peaks)
+        if less is None or not (less := less.pruned()).whole.any():
             break
-        rim, fit = peeled, problem.faded(fit.z, fit.scale, peeled.whole, (0.03, 1e-3, 0.0))
+        rim, fit = less, problem.faded(fit.z, fit.scale, less.whole, (0.03, 1e-3, 0.0))
     return fit, rim
 
 
-def _less(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float, keep: NDArray[np.bool_] | None = None) -> Rim | None:
+def peeled(
+    problem: WholeEntries, rim: Rim, fit: Fit, peaks: float, keep: NDArray[np.bool_] | None = None
+) -> Rim | None:
     """Without vertices of the rim next to peaks of misfit."""
     misfit = np.abs(problem.misfits(fit.z, fit.scale))
     return rim.peeled(misfit, peaks * float(misfit[rim.whole].max(initial=0.0)), keep)
@@ -144,7 +162,7 @@ def _tried(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> Fit:
         if 2 * turn >= tries and 2 * fit.misfit > first:
             break
         z = fit_anew(problem, fit.z, fit.scale, rim.whole, places, rng)
-        found = problem.fit(z, fit.scale, rim.whole, 0.0, _NEWTON)
+        found = problem.fit(z, fit.scale, rim.whole, 0.0, NEWTON)
         fit = found if found.misfit < fit.misfit else fit
     return fit
 
@@ -178,14 +196,14 @@ def _grown(problem: WholeEntries, core: Fit, rim: Rim) -> tuple[Fit, Rim]:
         near[piece.edges[bad]] = True
         grown, free = less, movable & (distance(piece, near, 3) <= 3)
         if misfit[grown.whole].max() < 1e-3:  # steps of all vertices come to the end that those of some do not
-            fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
+            fit = problem.fit(z, core.scale, grown.whole, 0.0, NEWTON)
             if fit.misfit <= EXACT:
                 return fit, grown
     for _ in range(4):
-        fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
+        fit = problem.fit(z, core.scale, grown.whole, 0.0, NEWTON)
         if fit.misfit <= EXACT:
             return fit, grown
-        less = _less(problem, grown, fit, 0.25, keep=keep)
+        less = peeled(problem, grown, fit, 0.25, keep=keep)
         if less is None:
             break
         grown = less

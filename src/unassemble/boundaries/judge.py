@@ -57,7 +57,8 @@ def determined_by(
     held[jacobian.indices[whole[row]]] = True
     data = jacobian.data * (size[jacobian.indices] * whole[row])[:, None, None]
     scaled = sp.bsr_array((data, jacobian.indices, jacobian.indptr), shape=jacobian.shape)
-    basis = np.linalg.qr(np.where(whole[:, None], slopes, 0.0))[0]
+    slopes = np.where(whole[:, None], slopes, 0.0)
+    basis = np.linalg.qr(slopes[:, slopes.any(axis=0)])[0]
     try:
         checked, free = _Linearised(scaled, basis, whole, held).judged()
     except GeometryError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 
@@ -24,12 +25,25 @@ from ..scalar.placement import Placement
 from ..tolerances import ALIKE, CERTIFIED
 from ..topology import Piece, Topology, local_numbering, surfaces
 from ..words import count_of
-from .inside import InsideMesh, fit_inside
+from .inside import InsideMesh, fit_inside, unknowns
 from .judge import node_status
+
+Given = tuple[Piece, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]  # as `fit_inside` takes them
+Meshes = Sequence[InsideMesh | None]
+
+
+def one_factor(given: Sequence[Given], scale: float | None) -> Meshes:
+    """Meshes of pieces that have one factor c each."""
+    return [fit_inside(*own, scale) for own in given]
 
 
 def recover_partial(
-    matrix: OperatorMatrix, whole: NDArray[np.bool_] | None, placement: Placement, clock: Clock, options: ScalarOptions
+    matrix: OperatorMatrix,
+    whole: NDArray[np.bool_] | None,
+    placement: Placement,
+    clock: Clock,
+    options: ScalarOptions,
+    fitted: Callable[[Sequence[Given], float | None], Meshes] = one_factor,
 ) -> PlanarMesh | None:
     """The mesh of the 3-cycles of a matrix, fitted to entries that are those of its triangles and no others.
 
@@ -42,6 +56,8 @@ def recover_partial(
     placement : Placement
     clock : Clock
     options : ScalarOptions
+    fitted : callable
+        Meshes of pieces, None for those that have none.
 
     Returns
     -------
@@ -57,13 +73,12 @@ def recover_partial(
     stretch = placement.tensor.root_determinant if placement.tensor else 1.0
     scale = None if options.scale is None else options.scale * stretch
     with clock("inside"):
-        given = [_given(piece, matrix, whole) for piece in topology.pieces]
-        meshes = [
-            fit_inside(
-                piece, -matrix.entries[piece.edge_rows], own, ~own if whole is None else np.zeros_like(own), scale
-            )
-            for piece, own in zip(topology.pieces, given, strict=True)
-        ]
+        given: list[Given] = []
+        for piece in topology.pieces:
+            own = _given(piece, matrix, whole)
+            shared = ~own if whole is None else np.zeros_like(own)
+            given.append((piece, -matrix.entries[piece.edge_rows], own, shared))
+        meshes = fitted(given, scale)
     meshes = [mesh if mesh is not None and mesh.exact else None for mesh in meshes]  # others have no positions
     if not any(mesh is not None and mesh.determined.any() for mesh in meshes):
         return None
@@ -81,6 +96,16 @@ def recover_partial(
         return replace(found, standard_deviations=placed.deviations(matrix, placement, known_scale=scale is not None))
 
 
+def distinct(scale: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Factors that are not the same but for rounding, in ascending order, and which of them each one is."""
+    order = np.argsort(scale)
+    ends = scale[order]
+    new = np.append(True, np.diff(ends) > CERTIFIED * np.abs(ends[1:]))
+    label = np.empty(len(scale), dtype=np.int64)
+    label[order] = np.cumsum(new) - 1
+    return ends[new], label
+
+
 def _given(piece: Piece, matrix: OperatorMatrix, whole: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
     """(e,) entries of a piece that are whole if all of its triangles are there."""
     if whole is not None:
@@ -94,16 +119,16 @@ def _nothing_gone(piece: Piece, matrix: OperatorMatrix, mesh: InsideMesh, scale:
     weights = -matrix.entries[piece.edge_rows]
     others = ~mesh.given & mesh.determined[piece.stencil].all(axis=0)
     if others.any():
-        found = mesh.z, mesh.scale
+        z, factor = mesh.z, mesh.factor
     else:
         try:
             whole = positions(piece, weights, scale=scale, sharp=False)
         except (GeometryError, SolverError):
             return False
-        others, found = ~mesh.given, (whole.z, whole.scale)
+        others, z, factor = ~mesh.given, whole.z, np.full(len(piece.triangles), whole.scale)
     with np.errstate(all="ignore"):
-        misfit = np.abs(weights / found[1] - edge_weights(piece, found[0]))[others]
-    return bool((misfit <= ALIKE).all())
+        misfit = np.abs(weights - edge_weights(piece, z, factor))[others]
+    return bool((misfit <= ALIKE * np.abs(factor[piece.facing[others, 0] // 3])).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,23 +139,28 @@ class _Placed:
     meshes: list[InsideMesh]
     positions: list[NDArray[np.complex128]]
     mesh: JoinedMesh
+    factor: NDArray[np.float64]  # (m,) c of each triangle
+    region: NDArray[np.int64] | None  # (m,) where there are several in a piece; `mesh.scale` is that of regions then
     status: NDArray[np.int8]  # (n,) as in :class:`..recovery.Recovery`
     notes: list[str]
 
     @classmethod
-    def of(cls, topology: Topology, meshes: list[InsideMesh | None], placement: Placement, stretch: float) -> _Placed:
+    def of(cls, topology: Topology, meshes: Meshes, placement: Placement, stretch: float) -> _Placed:
         """Placed by anchors, or in the canonical frame of each."""
         found = [(piece, mesh) for piece, mesh in zip(topology.pieces, meshes, strict=True) if mesh is not None]
         topology = Topology(topology.n_vertices, topology.edges, tuple(piece for piece, _ in found), topology.method)
         parts = [(piece.vertices, mesh.determined) for piece, mesh in found]
         placement, said = placement.upon(topology.n_vertices, parts)
         placed = [placement.apply(piece, mesh.z) for piece, mesh in found]
-        scales = np.array([mesh.scale for _, mesh in found])
+        factor = np.concatenate([mesh.factor for _, mesh in found]) / stretch
+        scale, region = np.array([mesh.scale[0] for _, mesh in found]) / stretch, None
+        if any(len(mesh.scale) > 1 for _, mesh in found):
+            scale, region = distinct(factor)
         positions = [z for z, _ in placed]
-        joined = JoinedMesh.of(topology, positions, scales / stretch)
+        joined = JoinedMesh.of(topology, positions, scale)
         notes = [*piece_notes([some for _, some in placed]), *placement.unused(topology), *topology_notes(topology)]
         status = node_status(joined.component, parts)
-        return cls(topology, [mesh for _, mesh in found], positions, joined, status, [*said, *notes])
+        return cls(topology, [mesh for _, mesh in found], positions, joined, factor, region, status, [*said, *notes])
 
     def deviations(self, matrix: OperatorMatrix, placement: Placement, *, known_scale: bool) -> NDArray[np.float64]:
         """(n, 2) standard deviations, by what entries leave of each other; in several pieces those of the first."""
@@ -140,11 +170,11 @@ class _Placed:
             drawn, stretch = (tensor.to_laplacian(z), tensor.root) if tensor else (z, None)
             known, used = mesh.determined, mesh.entries
             result[piece.vertices] = np.nan
-            spare = int(used.sum()) - 2 * int(known.sum()) + (4 if known_scale else 3)
+            spare = int(used.sum()) - unknowns(known, 0 if known_scale else 1)
             if spare <= 0:
                 continue
             own = edge_weights(piece, mesh.z)
-            misfit = -matrix.entries[piece.edge_rows] / mesh.scale - own
+            misfit = -matrix.entries[piece.edge_rows] / mesh.scale[0] - own
             sigma = float(np.linalg.norm(misfit[used])) / np.sqrt(spare)
             jacobian = WeightJacobian(piece, drawn, np.where(used, 1.0, np.inf))
             pins = np.append(np.flatnonzero(~known), np.flatnonzero(known)[distant_pair(drawn[known])])
@@ -163,23 +193,21 @@ class _Judged:
     backward_error: float  # as in :class:`..recovery.Recovery`, of these entries
     entries: int  # their number
     spare: int  # what is left of it, in the piece where least is, beyond unknowns
-    nothing_gone: bool  # whether the matrix has the mesh's diagonal: then entries that do not fit are wrong ones
+    wrong: bool  # whether the matrix has the mesh's diagonal: then entries that do not fit are wrong ones
 
     @classmethod
     def of(cls, matrix: OperatorMatrix, placed: _Placed, placement: Placement, *, known_scale: bool) -> _Judged:
         """Assembled again from points and triangles."""
         mesh = placed.mesh
-        factor = mesh.scale[mesh.triangle_piece]
-        found = certify(
-            matrix.edges, matrix.entries, np.nan_to_num(mesh.points), mesh.triangles, factor, placement.coefficients
-        )
+        points = np.nan_to_num(mesh.points)
+        found = certify(matrix.edges, matrix.entries, points, mesh.triangles, placed.factor, placement.coefficients)
         rows, spare = [], []
         for piece, inside in zip(placed.topology.pieces, placed.meshes, strict=True):
             if inside.determined.any():
                 among = inside.given & inside.determined[piece.stencil].all(axis=0)  # fitted or not
                 rows.append(piece.edge_rows[among])
-                unknowns = 2 * max(int(inside.determined.sum()), 2) - (4 if known_scale else 3)  # one has no entry
-                spare.append(int(inside.entries.sum()) - unknowns)
+                factors = 0 if known_scale else len(inside.scale)
+                spare.append(int(inside.entries.sum()) - unknowns(inside.determined, factors))
         pairs = matrix.edges[np.concatenate(rows)]
         key = found.pairs @ [matrix.n, 1]
         misfit = found.misfits[np.searchsorted(key, pairs @ [matrix.n, 1])]
@@ -188,13 +216,14 @@ class _Judged:
         for end in found.pairs.T:
             sums += np.bincount(end, found.differences, matrix.n)
         gone = (np.abs(sums) > CERTIFIED * matrix.row_size) | (placed.status > 0)
-        return cls(np.inf if flipped else float(misfit.max(initial=0.0)), len(pairs), min(spare), not gone.any())
+        error = np.inf if flipped else float(misfit.max(initial=0.0))
+        return cls(error, len(pairs), min(spare), len(pairs) < len(matrix.edges) and not gone.any())
 
 
 def _report(
     matrix: OperatorMatrix, placed: _Placed, judged: _Judged, placement: Placement, clock: Clock
 ) -> PlanarMesh | None:
-    if not (judged.backward_error <= CERTIFIED and judged.spare > 0) or judged.nothing_gone:
+    if not (judged.backward_error <= CERTIFIED and judged.spare > 0) or judged.wrong:
         return None
     known, mesh, topology = int((placed.status == 0).sum()), placed.mesh, placed.topology
     notes = [*matrix.warnings, *placed.notes]
@@ -203,16 +232,18 @@ def _report(
             f"{count_of(k, 'position is', 'positions are')} plausible and no more (`node_status` 2): next to unknowns "
             "that were taken out, or that other terms share, entries do not determine them"
         )
+    told = "" if placed.region is None else f", with a factor for each of {len(mesh.scale)} regions,"
     return PlanarMesh(
-        **mesh.fields(),
+        **mesh.fields(triangulate=placed.region is not None),
         points=mesh.points,
+        region=placed.region,
         hinges=topology.hinges,
         node_status=placed.status,
         status="certified",
         uniqueness="searched",
         reason=(
             f"{known:,} of {matrix.n:,} points are determined by {judged.entries:,} whole entries, which the operator "
-            f"re-assembled on them gives back to {judged.backward_error:.1e} (relative)"
+            f"re-assembled on them{told} gives back to {judged.backward_error:.1e} (relative)"
         ),
         operator=placement.operator,
         backward_error=judged.backward_error,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csgraph
 
 from ..topology import Piece
-from .fit import System, WholeEntries, first_flips
+from .fit import Scale, System, WholeEntries, first_flips
 from .shape import ShapePrior
 
 
@@ -26,6 +26,7 @@ class Patch:
     piece: Piece
     vertices: NDArray[np.int64]  # (k,) of the whole piece
     edges: NDArray[np.int64]  # (e,)
+    triangles: NDArray[np.int64]  # (m,)
     free: NDArray[np.bool_]  # (k,) vertices that move
 
     @classmethod
@@ -46,7 +47,7 @@ class Patch:
             vertices, edges, ends, triangles.reshape(-1, 3), opposite.reshape(-1, 3), facing,
             np.empty((0, 2), np.int64), np.zeros(1, np.int64),
         )  # fmt: skip
-        return cls(part, vertices, edges, free[vertices])
+        return cls(part, vertices, edges, chosen, free[vertices])
 
 
 def distance(piece: Piece, vertices: NDArray[np.bool_], most: int) -> NDArray[np.int64]:
@@ -78,7 +79,7 @@ def spread(piece: Piece, values: NDArray, most: np.ufunc, rounds: int) -> NDArra
 
 
 def fit_near(
-    problem: WholeEntries, z: NDArray, scale: float, whole: NDArray[np.bool_], free: NDArray[np.bool_],
+    problem: WholeEntries, z: NDArray, scale: Scale, whole: NDArray[np.bool_], free: NDArray[np.bool_],
     schedule: Sequence[tuple[float, int]], rng: np.random.Generator | None = None,
 ) -> NDArray[np.complex128]:  # fmt: skip
     """Positions of which some, (n,) bool, are improved; the others, and c, stay.
@@ -87,7 +88,9 @@ def fit_near(
     has random triangles.
     """
     patch = Patch.about(problem.piece, free)
-    part = WholeEntries(patch.piece, problem.weights[patch.edges], problem.guessed[patch.edges], scale, patch.free)
+    region = None if problem.region is None else problem.region[patch.triangles]
+    given, guessed = problem.weights[patch.edges], problem.guessed[patch.edges]
+    part = WholeEntries(patch.piece, given, guessed, scale, patch.free, region)
     moved = z.copy()
     try:
         for mu, steps in schedule:
@@ -98,7 +101,7 @@ def fit_near(
 
 
 def fit_anew(
-    problem: WholeEntries, z: NDArray, scale: float, whole: NDArray[np.bool_], places: NDArray[np.bool_],
+    problem: WholeEntries, z: NDArray, scale: Scale, whole: NDArray[np.bool_], places: NDArray[np.bool_],
     rng: np.random.Generator,
 ) -> NDArray[np.complex128]:  # fmt: skip
     """Positions about places that do not fit, (n,) bool, from random triangles at the rim; what is no better stays.

@@ -3,7 +3,9 @@
 Changing triangle t to a region with another factor adds a column b_t to the linearised problem, with entries at its
 three sides. Displacements and factors take up what they can: with the projection P from their columns, the changes are
 those numbers between 0 and 1 that make |P (r - sum_t a_t b_t)| least, r the misfit; about 0 where nothing changes, and
-about 1 where something does. All that is wrong shows at once, as far as it is small.
+about 1 where something does. All that is wrong shows at once, as far as it is small. Beside a rim, which takes up much
+of anything, too many do, and changes are first made one by one, of all of b_t: always the one that takes most off the
+squares of what is left of the misfit, 2 r'P b_t - |P b_t|^2, as long as any does.
 """
 
 from __future__ import annotations
@@ -24,16 +26,19 @@ from ..planar.cotangent import halves
 from .guess import corners_of
 
 
-def exchanges(problem: WholeEntries, z: NDArray[np.complex128], scale: NDArray) -> Iterator[NDArray[np.int64]]:
+def exchanges(
+    problem: WholeEntries, z: NDArray[np.complex128], scale: NDArray, whole: NDArray[np.bool_]
+) -> Iterator[NDArray[np.int64]]:
     """Regions (m,) of which some triangles are another's, the likeliest first.
 
-    At positions z (n,) and factors (k,) all entries are fitted, as far as they go.
+    At positions z (n,) and factors (k,) whole entries, (e,) bool, are fitted, as far as they go.
     """
-    piece, region, misfit = problem.piece, problem.region, problem.misfits(z, scale)
-    triangle, other = _beside(problem)
+    piece, region, misfit = problem.piece, problem.region, np.where(whole, problem.misfits(z, scale), 0.0)
+    triangle, other = _beside(problem, whole)
     half = halves(piece, z)[triangle]
     sides = piece.opposite[triangle]
     column = half * (scale[other] - scale[region[triangle]])[:, None] / problem.unit(scale)[sides]
+    column = np.where(whole[sides], column, 0.0)
     score = np.nan_to_num((column * misfit[sides]).sum(axis=1) / np.sqrt((column**2).sum(axis=1)), nan=-np.inf)
     hot = np.abs(misfit[sides]).max(axis=1)
 
@@ -41,13 +46,17 @@ def exchanges(problem: WholeEntries, z: NDArray[np.complex128], scale: NDArray) 
     def shares(only: bool) -> tuple[NDArray[np.int64], _Shares]:
         order = np.argsort(-(score if only else hot))[:300]
         order = order[score[order] > 0] if only else order
-        return order, _Shares.of(problem, z, scale, misfit, column[order], sides[order])
+        return order, _Shares.of(problem, z, scale, misfit, whole, column[order], sides[order])
 
     def exchanged(which: NDArray[np.int64]) -> NDArray[np.int64]:
         new = region.copy()
         new[triangle[which]] = other[which]
         return new
 
+    if not whole.all():
+        order, found = shares(False)
+        for several in (found.greedy[:1], found.greedy):
+            yield exchanged(order[several])
     # above which number triangles change, and whether only those are candidates that entries speak for by themselves
     for least, only in ((0.5, True), (0.5, False), (0.25, True), (0.9, True)):
         order, found = shares(only)
@@ -62,13 +71,13 @@ def exchanges(problem: WholeEntries, z: NDArray[np.complex128], scale: NDArray) 
             yield exchanged(one)
 
 
-def _beside(problem: WholeEntries) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Triangles, and regions other than theirs that they share a vertex with."""
+def _beside(problem: WholeEntries, whole: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Triangles with a whole entry, and regions other than theirs that they share a vertex with."""
     piece, region, m = problem.piece, problem.region, len(problem.piece.triangles)
     corners = corners_of(piece)
     kinds = sp.csr_array((np.ones(m), region, np.arange(m + 1)), shape=(m, int(region.max()) + 1))
     triangle, other = sp.coo_array(corners @ (corners.T @ kinds)).coords
-    change = other != region[triangle]
+    change = (other != region[triangle]) & whole[piece.opposite[triangle]].any(axis=1)
     return triangle[change], other[change]
 
 
@@ -79,19 +88,22 @@ class _Shares:
     between: NDArray[np.float64]  # (k,) numbers between 0 and 1 of all columns together
     along: NDArray[np.float64]  # (k,) products of what is left of each column with the misfit
     square: NDArray[np.float64]  # (k,) and with itself
+    greedy: NDArray[np.int64]  # those that, as a whole and after the ones before, take most off
 
     @classmethod
     def of(
-        cls, problem: WholeEntries, z: NDArray, scale: NDArray, misfit: NDArray, column: NDArray, sides: NDArray
-    ) -> _Shares:
+        cls, problem: WholeEntries, z: NDArray, scale: NDArray, misfit: NDArray, whole: NDArray, column: NDArray,
+        sides: NDArray,
+    ) -> _Shares:  # fmt: skip
         """Of columns with entries (k, 3) at sides (k, 3)."""
         count = len(column)
-        none = cls(np.zeros(count), np.zeros(count), np.zeros(count))
+        nothing = np.zeros(count)
+        none = cls(nothing, nothing, nothing, np.zeros(0, np.int64))
         if not count:
             return none
-        whole = np.ones(len(misfit), dtype=bool)
         added = sp.csr_array((column.ravel(), sides.ravel(), np.arange(0, 3 * count + 1, 3)), (count, len(misfit)))
-        system = System(problem, z, scale, whole, ShapePrior.of(problem.piece, ~whole), 0.0, misfit, np.zeros(0))
+        no_prior = ShapePrior(np.empty((3, 0), dtype=np.int64))
+        system = System(problem, z, scale, whole, no_prior, 0.0, misfit, np.zeros(0))
         matrix = system.damped(1e-10)
         try:
             factor = problem.analysed(matrix)
@@ -101,7 +113,7 @@ class _Shares:
             return none
         pulled = sp.csr_array((system.jacobian_transposed @ added.T).T)
         response = factor.solve(system.slope)
-        along = added @ problem.slopes(z, scale) - pulled @ response
+        along = added @ (whole[:, None] * problem.slopes(z, scale)) - pulled @ response
         gram = (added @ added.T).toarray()
         for first in range(0, count, 32):
             some = slice(first, first + 32)
@@ -114,4 +126,10 @@ class _Shares:
             return none
         root, right = np.sqrt(np.maximum(value, 1e-8 * value.max())), added @ misfit
         between = lsq_linear((vector * root).T, (vector / root).T @ right, bounds=(0, 1)).x
-        return cls(between, right, gram.diagonal())
+        square, left = gram.diagonal(), right
+        greedy = np.zeros(0, dtype=np.int64)
+        while (gain := 2 * left - square).max() > 0:
+            greedy = np.append(greedy, gain.argmax())
+            left = left - gram[greedy[-1]]
+            left[greedy[-1]] = -np.inf
+        return cls(between, right, square, greedy)

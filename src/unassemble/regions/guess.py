@@ -37,11 +37,19 @@ def uneven(matrix: OperatorMatrix) -> bool:
     return len(_valleys(size)) > 0
 
 
-def guessed_regions(piece: Piece, weights: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Regions (m,) of triangles, edge-connected, and their factors (k,), from -A_ij (e,)."""
-    share = weights / (piece.inner + 1.0)
+def guessed_regions(
+    piece: Piece, weights: NDArray, given: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Regions (m,) of triangles, edge-connected, and their factors (k,), from -A_ij (e,), if anything of it is given.
+
+    What a side lacks is taken for the mean of the other two.
+    """
+    share = np.where(given, weights / (piece.inner + 1.0), 0.0)
+    sides, lacking = share[piece.opposite], ~given[piece.opposite]
+    mean = sides.sum(axis=1, keepdims=True) / np.maximum((~lacking).sum(axis=1, keepdims=True), 1)
+    sides = np.where(lacking, mean, sides)
     unit = np.abs(share).max() + np.finfo(float).tiny
-    a, b, c = share[piece.opposite].T / unit
+    a, b, c = sides.T / unit
     own = np.log(unit) + np.log(2 * np.sqrt(np.maximum(a * b + b * c + c * a, 1e-12)))
     corners = corners_of(piece)
     touching = sp.csr_array(corners @ corners.T)

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..boundaries.embedding import areas, relaxed, tutte
+from ..boundaries.first import guessed
 from ..boundaries.patch import distance
 from ..errors import GeometryError, SolverError
 from ..planar.conformal import ConformalOptions, conformal_map
@@ -12,28 +13,29 @@ from ..topology import Piece
 
 
 def started(
-    piece: Piece, weights: NDArray, region: NDArray[np.int64], scale: NDArray
+    piece: Piece, weights: NDArray, whole: NDArray[np.bool_], region: NDArray[np.int64], scale: NDArray
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
     """Positions (n,) in which no triangle is turned over, and factors (k,), from what these are about.
 
-    `weights` (e,) are -A_ij, `region` (m,) those of triangles.
+    `weights` (e,) are -A_ij, or about that where they are not `whole`, (e,) bool; `region` (m,) those of triangles.
     """
     one, other = region[piece.facing // 3].T
-    alike = (one == other) | ~piece.inner
+    alike = whole & ((one == other) | ~piece.inner)
     best, fewest, factors = None, len(piece.triangles) / 4, scale
     for _ in range(5):  # each with the factors that fit the one before
         unit = np.where(piece.inner, (factors[one] + factors[other]) / 2, factors[one])
         try:
             found = conformal_map(
-                piece, weights / unit, scale=None, sharp=False, options=ConformalOptions(max_factorisations=2)
-            )
+                piece, guessed(piece, weights / unit, whole, 1.0), scale=None, sharp=False,
+                options=ConformalOptions(max_factorisations=2),
+            )  # fmt: skip
         except (GeometryError, SolverError):
             break
         area = areas(piece, found.z)
         z = (found.z if area.sum() > 0 else np.conj(found.z)) / np.sqrt(np.abs(area).mean())
         upright = areas(piece, z) > 0
-        whole = alike & upright[piece.facing // 3].all(axis=1)
-        new = _fitted(edge_weights(piece, z), weights, np.where(whole, one, -1), factors)
+        drawn = alike & upright[piece.facing // 3].all(axis=1)
+        new = _fitted(edge_weights(piece, z), weights, np.where(drawn, one, -1), factors)
         change = np.abs(new / factors - 1).max()
         if (~upright).sum() < fewest:
             best, fewest, scale = z, (~upright).sum(), new
