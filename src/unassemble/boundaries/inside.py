@@ -18,6 +18,7 @@ from .rim import Rim
 _log = logging.getLogger(__name__)
 
 
+_MOST = 0.99  # of the entries, that are enough
 _ROUNDS = 8  # fits with fewer vertices at the rim each
 
 # Steps of all vertices that start near: smooth displacements are stiff only in the fourth power of their length, so
@@ -71,11 +72,14 @@ def fit_inside(
 
 def finished(problem: WholeEntries, fit: Fit, rim: Rim, unit: float) -> InsideMesh:
     """A fit with what fits of the vertices taken off, and its verdict; c was in this unit."""
-    exact, before = fit.misfit <= EXACT, 0
+    exact = fit.misfit <= EXACT
     if exact:
-        while before < rim.whole.sum() and not rim.left.all():  # from a larger core to one larger still
+        enough = _MOST * np.count_nonzero(replace(rim, left=np.ones_like(rim.left)).whole)
+        before, held = 0, rim.inside
+        while before < rim.whole.sum() < enough:  # from a larger core to one larger still
             before = rim.whole.sum()
-            fit, rim = _grown(problem, fit, rim)
+            fit, rim = _grown(problem, fit, rim, held)
+            held = held if rim.whole.sum() >= enough else determined(problem, fit.z, fit.scale, rim.whole)[0]
         last = FitOptions(last_steps=1, trials=1, damping=1e-15)  # what is left is rounding after one step more
         fit = problem.fit(fit.z, fit.scale, rim.whole, 0.0, last)
     known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(rim.whole)
@@ -167,13 +171,12 @@ def _tried(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> Fit:
     return fit
 
 
-def _grown(problem: WholeEntries, core: Fit, rim: Rim) -> tuple[Fit, Rim]:
-    """A core that fits, and what fits of the vertices outside of it: by themselves first, then with the core.
+def _grown(problem: WholeEntries, core: Fit, rim: Rim, held: NDArray[np.bool_]) -> tuple[Fit, Rim]:
+    """A core that fits, and what fits of the other vertices: by themselves first, then with those that are held.
 
-    What the core determines stays where it is. All else moves, inside the core too: what fits there is one of many.
+    Best held, (n,) bool, are those that the core determines: what fits elsewhere in it is one of many.
     """
-    piece, z = problem.piece, core.z
-    movable = ~determined(problem, z, core.scale, rim.whole)[0]
+    piece, z, movable = problem.piece, core.z, ~held
     keep = np.logical_not(movable[piece.triangles].any(axis=1))
     folded = np.zeros(piece.n_vertices, dtype=bool)
     folded[piece.triangles[areas(piece, z) <= 0]] = True
