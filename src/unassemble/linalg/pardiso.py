@@ -122,6 +122,9 @@ class PardisoFactorisation:
             seen[matrix.indices[filled]] = seen[np.repeat(np.arange(matrix.n), np.diff(matrix.indptr))[filled]] = True
             if not seen.all():
                 raise SolverError(f"row {int(np.argmin(seen))} of a matrix to be factorised vanishes beside the others")
+        old = self._matrix
+        if not (np.array_equal(matrix.indptr, old.indptr) and np.array_equal(matrix.indices, old.indices)):
+            raise ValueError("the pattern is not the one that was analysed")  # PARDISO would write beyond its memory
         self._matrix = matrix
         self._call(_Phase.FACTORISE)
 

@@ -128,11 +128,11 @@ def _exchanged(problem: WholeEntries, rim: Rim, scale: NDArray) -> Fit:
 
     region = problem.region
     best = anew(region, scale)
-    seen, failed = {region.tobytes()}, 0
+    seen, failed, last = {region.tobytes()}, 0, best.misfit
     reached: list[tuple[float, int, NDArray[np.int64], Fit, Iterator[NDArray[np.int64]]]] = [
         (best.misfit, 0, region, best, exchanges(problem, best.z, best.scale, whole))
     ]
-    while best.misfit > EXACT and reached and failed < 40:
+    while best.misfit > EXACT and reached and failed < 24:
         _, _, problem.region, here, others = reached[0]
         other = next(others, None)
         if other is None:
@@ -144,7 +144,7 @@ def _exchanged(problem: WholeEntries, rim: Rim, scale: NDArray) -> Fit:
             if found.misfit > EXACT:  # from where wrong regions have bent the mesh, or from a start of its own
                 again = anew(other, here.scale)
                 found = again if again.misfit < found.misfit else found
-            failed = 0 if found.misfit < 0.98 * best.misfit else failed + 1
+            failed, last = (0, found.misfit) if found.misfit < 0.7 * last else (failed + 1, last)
             if found.misfit < best.misfit:
                 best, region = found, other
                 _log.debug("%d exchanges: misfit %.1e", len(seen), best.misfit)
