@@ -89,7 +89,7 @@ class ScalarReadings:
         replaced, incomplete = self.matrix.replaced is not None, self.matrix.incomplete_rows.any()
         spread = uneven(self.matrix)
         if replaced or not self.matrix.adds_up.all():  # else nothing was taken out
-            partial = [self._partial_regions, self._partial] if spread else [self._partial, self._partial_regions]
+            partial = [self._partial_regions, self._partial] if spread else [self._partial]
             order += [(1 if replaced or incomplete else 3, reading) for reading in partial]
             order.append((0, self._without_boundary_terms))
             order.append((1 if self.crowded else 3, self._partial_elements))

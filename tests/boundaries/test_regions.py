@@ -154,3 +154,11 @@ def test_a_coefficient_that_varies_everywhere_is_not_explained():
         return (1 + 4 * w.x[0]) * dot(grad(u), grad(v))
 
     assert not certified(shuffled(form.assemble(Basis(jittered(3), ElementTriP1())), jittered(3).p.T)[0])
+
+
+def test_error_bars_are_said_to_be_missing():
+    matrix, _ = materials(jittered(3), (1.0, 5.0))
+    found = recover(matrix, standard_deviations=True)
+    assert found.certified
+    assert found.standard_deviations is None
+    assert any("standard deviations" in note for note in found.warnings)

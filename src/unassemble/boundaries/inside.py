@@ -193,7 +193,7 @@ def _grown(problem: WholeEntries, core: Fit, rim: Rim, held: NDArray[np.bool_]) 
         if not bad.any():
             break
         less = grown.peeled(np.where(bad, relative, 0.0), 0.0, keep=keep)
-        if less is None:
+        if less is None or not less.whole.any():
             return core, rim
         near = np.zeros(piece.n_vertices, dtype=bool)
         near[piece.edges[bad]] = True

@@ -92,6 +92,9 @@ def recover_partial(
     found = _report(matrix, placed, judged, placement, clock)
     if found is None or not options.standard_deviations:
         return found
+    if placed.region is not None:
+        said = "standard deviations are not computed where the coefficient has several values"
+        return replace(found, warnings=(*found.warnings, said))
     with clock("deviations"):
         return replace(found, standard_deviations=placed.deviations(matrix, placement, known_scale=scale is not None))
 

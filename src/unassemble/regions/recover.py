@@ -54,10 +54,12 @@ def _with_regions(given: Sequence[Given], _: float | None) -> list[InsideMesh | 
     guesses = [guessed_regions(one[0], own, there) for one, own, there in zip(given, halved, known, strict=True)]
     if all(len(scale) == 1 or _uniform(*one[:3]) for one, (_, scale) in zip(given, guesses, strict=True)):
         return [None] * len(given)
-    return [
+    found = [
         fit_inside(*one) if len(guess[1]) == 1 else _fitted(one[0], own, there, one[2], *guess)
         for one, own, there, guess in zip(given, halved, known, guesses, strict=True)
     ]
+    whole = all(one[2].all() for one in given)  # then nothing explains why pieces should have no mesh
+    return [None] * len(given) if whole and any(one is None for one in found) else found
 
 
 def _uniform(piece: Piece, weights: NDArray, whole: NDArray[np.bool_]) -> bool:
