@@ -118,7 +118,7 @@ class ScalarReadings:
             return None
         return recover_without_boundary_terms(self.matrix, self._plain, self.options.scale)
 
-    @property
+    @cached_property
     def _given(self) -> tuple[OperatorMatrix, NDArray[np.bool_] | None]:
         """The matrix with what entries it lacks, and those that are whole, where rows were replaced."""
         matrix = with_boundary_edges(with_diagonals(self.matrix))

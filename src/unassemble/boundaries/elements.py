@@ -29,7 +29,7 @@ from ..topology import Topology
 from ..topology.keys import contains, distinct, pair_keys
 from ..words import count_of
 from .guessed import FittedPart, fitted_part
-from .judge import node_status
+from .judge import node_status, unknowns
 
 _MOST = 3  # sets of cells, the likeliest ones
 
@@ -103,10 +103,8 @@ def _report(
         pairs = np.concatenate([fit.part.rows[fit.judged] for fit in fits])
         key, wanted = found.pairs @ [matrix.n, 1], pair_keys(matrix.n, *pairs.T)
         error = float(found.misfits[np.searchsorted(key, wanted)].max(initial=0.0))
-        few = 3 if options.scale is None else 4
-        spare = min(
-            int((fit.used & fit.judged).sum()) - 2 * int(fit.known.sum()) + few for fit in fits if fit.known.any()
-        )
+        free = 1 if options.scale is None else 0
+        spare = min(int((fit.used & fit.judged).sum()) - unknowns(fit.known, free) for fit in fits if fit.known.any())
         claimed = np.concatenate([(status[some] == 0).all(axis=1) for some in mesh.blocks.values()])
     if claimed[found.flipped].any() or not (error <= CERTIFIED and spare > 0):
         return None

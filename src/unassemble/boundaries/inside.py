@@ -11,7 +11,7 @@ from ..topology import Piece
 from .embedding import areas
 from .first import first_fits
 from .fit import EXACT, Fit, FitOptions, WholeEntries
-from .judge import determined
+from .judge import determined, unknowns
 from .patch import distance, fit_anew, fit_near, nearest
 from .rim import Rim
 
@@ -23,7 +23,7 @@ _ROUNDS = 8  # fits with fewer vertices at the rim each
 
 # Steps of all vertices that start near: smooth displacements are stiff only in the fourth power of their length, so
 # that any damping would hold them.
-NEWTON = FitOptions(steps=1, last_steps=8, damping=1e-15, exact=EXACT, near=0.05, shortest=1.0)
+_NEWTON = FitOptions(steps=1, last_steps=8, damping=1e-15, exact=EXACT, near=0.05, shortest=1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,23 +44,32 @@ class InsideMesh:
         return self.scale[self.region]
 
 
-def fit_inside(
-    piece: Piece, weights: NDArray, given: NDArray[np.bool_], shared: NDArray[np.bool_], scale: float | None = None
-) -> InsideMesh | None:
-    """A mesh that fits whole entries; None where there are too few.
+@dataclass(frozen=True, eq=False)
+class PieceEntries:
+    """What a matrix says of a piece."""
 
-    Given are -A_ij (e,), entries (e,) bool that are those of the piece's triangles and of no others, those with another
-    triangle besides, which is gone, so that half of them is a guess, and c where it is known.
-    """
-    rim = Rim.of(piece, given)
+    piece: Piece
+    weights: NDArray[np.float64]  # (e,) -A_ij
+    whole: NDArray[np.bool_]  # (e,) entries that are those of the piece's triangles and of no others
+    shared: NDArray[np.bool_]  # (e,) those with another triangle besides, which is gone
+
+    @property
+    def halved(self) -> NDArray[np.float64]:
+        """(e,) weights, of which half is a guess where they are shared."""
+        return np.where(self.shared, self.weights / 2, self.weights)
+
+
+def fit_inside(given: PieceEntries, scale: float | None = None) -> InsideMesh | None:
+    """A mesh that fits whole entries, with c where it is known; None where there are too few."""
+    piece, weights, whole = given.piece, given.weights, given.whole
+    rim = Rim.of(piece, whole)
     unit = float(np.median(np.abs(weights[rim.whole]))) if rim.whole.any() else 0.0
     if not unit:
         return None
     unit *= 1 if weights[rim.whole].sum() > 0 else -1
-    weights = weights / unit
-    halved = np.where(shared, weights / 2, weights)
-    likely = shared & (halved > 0) & (halved < 3.0)  # others have terms of another kind
-    problem = WholeEntries(piece, halved, given | likely, None if scale is None else scale / unit)
+    halved = given.halved / unit
+    likely = given.shared & (halved > 0) & (halved < 3.0)  # others have terms of another kind
+    problem = WholeEntries(piece, halved, whole | likely, None if scale is None else scale / unit)
     try:
         core = _core(problem, rim)
         if core is None:
@@ -77,9 +86,10 @@ def finished(problem: WholeEntries, fit: Fit, rim: Rim, unit: float) -> InsideMe
         enough = _MOST * np.count_nonzero(replace(rim, left=np.ones_like(rim.left)).whole)
         before, held = 0, rim.inside
         while before < rim.whole.sum() < enough:  # from a larger core to one larger still
+            if before:
+                held = determined(problem, fit.z, fit.scale, rim.whole)[0]
             before = rim.whole.sum()
             fit, rim = _grown(problem, fit, rim, held)
-            held = held if rim.whole.sum() >= enough else determined(problem, fit.z, fit.scale, rim.whole)[0]
         last = FitOptions(last_steps=1, trials=1, damping=1e-15)  # what is left is rounding after one step more
         fit = problem.fit(fit.z, fit.scale, rim.whole, 0.0, last)
     known, entries = np.zeros(len(fit.z), dtype=bool), np.zeros_like(rim.whole)
@@ -92,15 +102,10 @@ def finished(problem: WholeEntries, fit: Fit, rim: Rim, unit: float) -> InsideMe
     return InsideMesh(fit.z, scale, region, rim.given, entries, exact, known)
 
 
-def unknowns(known: NDArray[np.bool_], factors: int) -> int:
-    """Coordinates of determined vertices, of which one has no entry, and factors, less a similarity."""
-    return 2 * max(int(known.sum()), 2) - 4 + factors
-
-
 def _core(problem: WholeEntries, rim: Rim) -> tuple[Fit, Rim] | None:
     """A fit of all entries that some rim has whole, or else the last one; None where there is no drawing."""
     found = None
-    for again, (fit, near) in enumerate(first_fits(problem, rim, NEWTON)):
+    for again, (fit, near) in enumerate(first_fits(problem, rim, _NEWTON)):
         # What comes to a bad end with one part of the largest misfit for peaks often does not with another. A small
         # mesh loses more of its rim where that is taken off as a whole, and is peeled a few times before.
         found = shrunk(problem, rim, fit, 0 if near else 3, 0.35 if again else 0.25)
@@ -115,10 +120,10 @@ def _bare(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> tuple[Fit,
     for _ in range(_ROUNDS):
         if bare.whole.sum() <= 2.3 * bare.inside.sum():  # two to a vertex determine, far inside there are three
             return None
-        found = problem.fit(found.z, found.scale, bare.whole, 0.0, NEWTON)
+        found = problem.fit(found.z, found.scale, bare.whole, 0.0, _NEWTON)
         if found.misfit <= EXACT:
             break
-        less = peeled(problem, bare, found, peaks)
+        less = _less(problem, bare, found, peaks)
         if less is None:
             return None
         bare = less
@@ -140,16 +145,14 @@ def shrunk(problem: WholeEntries, rim: Rim, fit: Fit, patience: int, peaks: floa
             return bare
         if fit.misfit <= EXACT:
             break
-        less = peeled(problem, rim, fit, peaks)
+        less = _less(problem, rim, fit, peaks)
         if less is None or not (less := less.pruned()).whole.any():
             break
         rim, fit = less, problem.faded(fit.z, fit.scale, less.whole, (0.03, 1e-3, 0.0))
     return fit, rim
 
 
-def peeled(
-    problem: WholeEntries, rim: Rim, fit: Fit, peaks: float, keep: NDArray[np.bool_] | None = None
-) -> Rim | None:
+def _less(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float, keep: NDArray[np.bool_] | None = None) -> Rim | None:
     """Without vertices of the rim next to peaks of misfit."""
     misfit = np.abs(problem.misfits(fit.z, fit.scale))
     return rim.peeled(misfit, peaks * float(misfit[rim.whole].max(initial=0.0)), keep)
@@ -166,7 +169,7 @@ def _tried(problem: WholeEntries, rim: Rim, fit: Fit, peaks: float) -> Fit:
         if 2 * turn >= tries and 2 * fit.misfit > first:
             break
         z = fit_anew(problem, fit.z, fit.scale, rim.whole, places, rng)
-        found = problem.fit(z, fit.scale, rim.whole, 0.0, NEWTON)
+        found = problem.fit(z, fit.scale, rim.whole, 0.0, _NEWTON)
         fit = found if found.misfit < fit.misfit else fit
     return fit
 
@@ -199,14 +202,14 @@ def _grown(problem: WholeEntries, core: Fit, rim: Rim, held: NDArray[np.bool_]) 
         near[piece.edges[bad]] = True
         grown, free = less, movable & (distance(piece, near, 3) <= 3)
         if misfit[grown.whole].max() < 1e-3:  # steps of all vertices come to the end that those of some do not
-            fit = problem.fit(z, core.scale, grown.whole, 0.0, NEWTON)
+            fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
             if fit.misfit <= EXACT:
                 return fit, grown
     for _ in range(4):
-        fit = problem.fit(z, core.scale, grown.whole, 0.0, NEWTON)
+        fit = problem.fit(z, core.scale, grown.whole, 0.0, _NEWTON)
         if fit.misfit <= EXACT:
             return fit, grown
-        less = peeled(problem, grown, fit, 0.25, keep=keep)
+        less = _less(problem, grown, fit, 0.25, keep=keep)
         if less is None:
             break
         grown = less

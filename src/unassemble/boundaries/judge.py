@@ -72,6 +72,11 @@ def determined_by(
     return vertices, checked & ~loose
 
 
+def unknowns(known: NDArray[np.bool_], factors: int) -> int:
+    """Coordinates of determined vertices, of which one has no entry, and factors, less a similarity."""
+    return 2 * max(int(known.sum()), 2) - 4 + factors
+
+
 def node_status(component: NDArray[np.int64], parts: Sequence[tuple[NDArray, NDArray]]) -> NDArray[np.int8]:
     """(n,) as in :class:`..recovery.Recovery`: what the piece says of a row whose component, (n,), it is in.
 

@@ -25,16 +25,15 @@ from ..scalar.placement import Placement
 from ..tolerances import ALIKE, CERTIFIED
 from ..topology import Piece, Topology, local_numbering, surfaces
 from ..words import count_of
-from .inside import InsideMesh, fit_inside, unknowns
-from .judge import node_status
+from .inside import InsideMesh, PieceEntries, fit_inside
+from .judge import node_status, unknowns
 
-Given = tuple[Piece, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]  # as `fit_inside` takes them
 Meshes = Sequence[InsideMesh | None]
 
 
-def one_factor(given: Sequence[Given], scale: float | None) -> Meshes:
+def _one_factor(given: Sequence[PieceEntries], scale: float | None) -> Meshes:
     """Meshes of pieces that have one factor c each."""
-    return [fit_inside(*own, scale) for own in given]
+    return [fit_inside(own, scale) for own in given]
 
 
 def recover_partial(
@@ -43,7 +42,7 @@ def recover_partial(
     placement: Placement,
     clock: Clock,
     options: ScalarOptions,
-    fitted: Callable[[Sequence[Given], float | None], Meshes] = one_factor,
+    fitted: Callable[[Sequence[PieceEntries], float | None], Meshes] = _one_factor,
 ) -> PlanarMesh | None:
     """The mesh of the 3-cycles of a matrix, fitted to entries that are those of its triangles and no others.
 
@@ -73,11 +72,11 @@ def recover_partial(
     stretch = placement.tensor.root_determinant if placement.tensor else 1.0
     scale = None if options.scale is None else options.scale * stretch
     with clock("inside"):
-        given: list[Given] = []
+        given: list[PieceEntries] = []
         for piece in topology.pieces:
             own = _given(piece, matrix, whole)
             shared = ~own if whole is None else np.zeros_like(own)
-            given.append((piece, -matrix.entries[piece.edge_rows], own, shared))
+            given.append(PieceEntries(piece, -matrix.entries[piece.edge_rows], own, shared))
         meshes = fitted(given, scale)
     meshes = [mesh if mesh is not None and mesh.exact else None for mesh in meshes]  # others have no positions
     if not any(mesh is not None and mesh.determined.any() for mesh in meshes):

@@ -55,7 +55,8 @@ def exchanges(
 
     if not whole.all():
         order, found = shares(False)
-        for several in (found.greedy[:1], found.greedy):
+        greedy = found.greedy
+        for several in (greedy[:1], greedy):
             yield exchanged(order[several])
     # above which number triangles change, and whether only those are candidates that entries speak for by themselves
     for least, only in ((0.5, True), (0.5, False), (0.25, True), (0.9, True)):
@@ -87,8 +88,22 @@ class _Shares:
 
     between: NDArray[np.float64]  # (k,) numbers between 0 and 1 of all columns together
     along: NDArray[np.float64]  # (k,) products of what is left of each column with the misfit
-    square: NDArray[np.float64]  # (k,) and with itself
-    greedy: NDArray[np.int64]  # those that, as a whole and after the ones before, take most off
+    gram: NDArray[np.float64]  # (k, k) and with what is left of all columns
+
+    @property
+    def square(self) -> NDArray[np.float64]:
+        """(k,) squares of what is left of each column."""
+        return np.diagonal(self.gram)
+
+    @property
+    def greedy(self) -> NDArray[np.int64]:
+        """Columns that, as a whole and after the ones before, take most off."""
+        left, chosen = self.along.copy(), list[int]()
+        while (gain := 2 * left - self.square).max(initial=0.0) > 0:
+            chosen.append(int(gain.argmax()))
+            left -= self.gram[chosen[-1]]
+            left[chosen[-1]] = -np.inf
+        return np.array(chosen, dtype=np.int64)
 
     @classmethod
     def of(
@@ -97,8 +112,7 @@ class _Shares:
     ) -> _Shares:  # fmt: skip
         """Of columns with entries (k, 3) at sides (k, 3)."""
         count = len(column)
-        nothing = np.zeros(count)
-        none = cls(nothing, nothing, nothing, np.zeros(0, np.int64))
+        none = cls(np.zeros(count), np.zeros(count), np.zeros((count, count)))
         if not count:
             return none
         added = sp.csr_array((column.ravel(), sides.ravel(), np.arange(0, 3 * count + 1, 3)), (count, len(misfit)))
@@ -126,10 +140,4 @@ class _Shares:
             return none
         root, right = np.sqrt(np.maximum(value, 1e-8 * value.max())), added @ misfit
         between = lsq_linear((vector * root).T, (vector / root).T @ right, bounds=(0, 1)).x
-        square, left = gram.diagonal(), right
-        greedy = np.zeros(0, dtype=np.int64)
-        while (gain := 2 * left - square).max() > 0:
-            greedy = np.append(greedy, gain.argmax())
-            left = left - gram[greedy[-1]]
-            left[greedy[-1]] = -np.inf
-        return cls(between, right, square, greedy)
+        return cls(between, right, gram)

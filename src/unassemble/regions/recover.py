@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..boundaries import recover_partial
 from ..boundaries.fit import EXACT, Fit, FitOptions, WholeEntries
-from ..boundaries.inside import InsideMesh, finished, fit_inside, shrunk
-from ..boundaries.partial import Given, distinct
+from ..boundaries.inside import InsideMesh, PieceEntries, finished, fit_inside, shrunk
+from ..boundaries.partial import distinct
 from ..boundaries.rim import Rim
 from ..budget import SAMPLE
 from ..clock import Clock
@@ -22,7 +22,6 @@ from ..planar.conformal import conformal_map
 from ..planar.cotangent import edge_weights
 from ..recovery import PlanarMesh
 from ..scalar.placement import Placement
-from ..topology import Piece
 from .exchange import exchanges
 from .guess import guessed_regions
 from .start import started
@@ -47,25 +46,24 @@ def recover_regions(
         return recover_partial(matrix, whole, placement, clock, options, _with_regions)
 
 
-def _with_regions(given: Sequence[Given], _: float | None) -> list[InsideMesh | None]:
+def _with_regions(given: Sequence[PieceEntries], _: float | None) -> list[InsideMesh | None]:
     """Meshes of pieces, of which some have regions; else none."""
-    halved = [np.where(shared, weights / 2, weights) for _, weights, _, shared in given]
-    known = [whole | shared for _, _, whole, shared in given]
-    guesses = [guessed_regions(one[0], own, there) for one, own, there in zip(given, halved, known, strict=True)]
-    if all(len(scale) == 1 or _uniform(*one[:3]) for one, (_, scale) in zip(given, guesses, strict=True)):
+    guesses = [guessed_regions(own.piece, own.halved, own.whole | own.shared) for own in given]
+    if all(len(scale) == 1 or _uniform(own) for own, (_, scale) in zip(given, guesses, strict=True)):
         return [None] * len(given)
     found = [
-        fit_inside(*one) if len(guess[1]) == 1 else _fitted(one[0], own, there, one[2], *guess)
-        for one, own, there, guess in zip(given, halved, known, guesses, strict=True)
+        fit_inside(own) if len(scale) == 1 else _fitted(own, region, scale)
+        for own, (region, scale) in zip(given, guesses, strict=True)
     ]
-    whole = all(one[2].all() for one in given)  # then nothing explains why pieces should have no mesh
+    whole = all(own.whole.all() for own in given)  # then nothing explains why pieces should have no mesh
     return [None] * len(given) if whole and any(one is None for one in found) else found
 
 
-def _uniform(piece: Piece, weights: NDArray, whole: NDArray[np.bool_]) -> bool:
+def _uniform(given: PieceEntries) -> bool:
     """Whether all entries are whole, and one factor comes near them, at the conformal map."""
-    if not whole.all():
+    if not given.whole.all():
         return False
+    piece, weights = given.piece, given.weights
     try:
         found = conformal_map(piece, weights, scale=None, sharp=False)
     except (GeometryError, SolverError):
@@ -74,23 +72,16 @@ def _uniform(piece: Piece, weights: NDArray, whole: NDArray[np.bool_]) -> bool:
     return bool(np.sqrt(np.mean(misfit**2)) < 1e-3)  # entries may have errors
 
 
-def _fitted(
-    piece: Piece,
-    weights: NDArray,
-    likely: NDArray[np.bool_],
-    given: NDArray[np.bool_],
-    region: NDArray[np.int64],
-    scale: NDArray,
-) -> InsideMesh | None:
-    """Entries of a piece fitted that are `given`, (e,) bool; None where that comes to no end.
+def _fitted(given: PieceEntries, region: NDArray[np.int64], scale: NDArray) -> InsideMesh | None:
+    """Whole entries of a piece fitted from regions (m,) and their factors (k,); None where that comes to no end.
 
-    Others are guesses, if they are `likely`. What rims do not fit where no exchange is left is taken off.
+    What rims do not fit where no exchange is left is taken off.
     """
     unit = float(np.median(scale))
-    weights = weights / unit
-    likely = likely & (weights > 0)
-    problem = WholeEntries(piece, weights, given | likely, region=region)
-    rim, scale = Rim.of(piece, given), scale / unit
+    weights = given.halved / unit
+    likely = given.shared & (weights > 0)
+    problem = WholeEntries(given.piece, weights, given.whole | likely, region=region)
+    rim, scale = Rim.of(given.piece, given.whole), scale / unit
     try:
         if not rim.whole.any():
             return None
