@@ -37,6 +37,19 @@ def first_fits(problem: WholeEntries, rim: Rim, newton: FitOptions) -> Iterator[
             yield problem.faded(first.z, first.scale, rim.whole, fading[1:]), False
 
 
+def starts(problem: WholeEntries, rim: Rim) -> Iterator[NDArray[np.complex128]]:
+    """Drawings without crossings to start from."""
+    given = np.where(problem.guessed, problem.weights, 0.5)
+    weights = guessed(problem.piece, given, rim.given, estimate_scale(problem.piece, given))
+    conformal = _conformal(problem, weights)
+    if _upright(problem.piece, conformal):
+        yield conformal
+    for loop in np.argsort(-np.diff(problem.piece.loop_offsets), kind="stable")[:4].tolist():
+        drawing = tutte(problem.piece, loop)
+        if _upright(problem.piece, drawing):
+            yield drawing
+
+
 def guessed(piece: Piece, given: NDArray[np.float64], whole: NDArray[np.bool_], c: float) -> NDArray[np.float64]:
     """(e,) weights, guessed where they are not whole, from what is given there, and c.
 

@@ -1,0 +1,252 @@
+"""Lengths of edges from whole entries, and a rim such that the mesh is flat.
+
+With the lengths of edges that have no whole entry the others are those of a convex problem (:mod:`..metric.program`):
+least of w . u - 2 sum of areas over squared lengths u of the edges with entries w. So entries are given exactly, from any
+start, and what is left to find is the rim: 2 pi less the angles at vertices inside is brought to zero by Gauss-Newton
+steps along the metrics with these entries, one sparse saddle point problem each. Along these the curvature is nearly
+linear, where positions that have to fit entries creep along narrow valleys.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..errors import SolverError
+from ..linalg import Factorisation, UpperTriangle, factorisation
+from ..metric.heron import angles, areas_cotangents, blocks_of, heron, longest_step, summed
+from ..planar.conformal import conformal_map
+from ..planar.frame import fit_similarity
+from ..topology.pieces import planar_pieces
+from .fit import Fit, FitOptions, WholeEntries
+from .patch import nearest
+from .rim import Rim
+
+_log = logging.getLogger(__name__)
+
+_FADING = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
+_AGAIN = _FADING[2:]
+_FLAT = 1e-11  # radians that are rounding
+_STEPS, _LAST, _TRIALS, _ROUNDS = 5, 15, 7, 8
+
+
+@dataclass(frozen=True, eq=False)
+class _Metric:
+    """Squared lengths with whole entries, and what they leave."""
+
+    u: NDArray[np.float64]  # (e,)
+    scale: float
+    weights: NDArray[np.float64]  # (e,) halves of cotangents
+    curvature: NDArray[np.float64]  # (inner vertices,) 2 pi less the sum of angles
+    bulge: NDArray[np.float64]  # (p,) of the prior
+    hessian: sp.csr_array  # (e, e) of areas, by log u
+    turn: sp.csr_array  # (inner vertices, e) of the curvature, by log u
+
+    @property
+    def bent(self) -> float:
+        """Root mean square of the curvature."""
+        return float(np.linalg.norm(self.curvature)) / np.sqrt(max(len(self.curvature), 1))
+
+    def cost(self, mu: float) -> float:
+        return float(self.curvature @ self.curvature + mu**2 * (self.bulge @ self.bulge))
+
+
+def fit_lengths(
+    problem: WholeEntries, rim: Rim, z: NDArray[np.complex128], newton: FitOptions
+) -> tuple[Fit, Rim] | None:
+    """A fit of whole entries by way of lengths, and its rim; None where no flat metric is found.
+
+    Positions z (n,) are those to start from. Where the rim comes to no flat metric, it is peeled next to peaks of the
+    curvature.
+    """
+    piece, fading = rim.piece, _FADING
+    scale = problem.best_scale(z, rim.whole)
+    u = np.abs(z[piece.edges[:, 1]] - z[piece.edges[:, 0]]) ** 2
+    for _ in range(_ROUNDS):
+        lengths = Lengths(rim, problem.weights)
+        try:
+            here = lengths.convex(u[lengths.edges], scale)
+            if here is None or not len(lengths.inside):
+                return None
+            here = lengths.flat(here, fading, free_scale=problem.known_scale is None)
+        except SolverError:
+            return None
+        finally:
+            lengths.release()
+        u[lengths.edges], scale, fading = here.u, here.scale, _AGAIN
+        if here.bent <= _FLAT:
+            laid = _laid_out(rim, lengths.edges, here.weights, z)
+            return None if laid is None else (problem.fit(laid[0], scale, laid[1].whole, 0.0, newton), laid[1])
+        hot = np.zeros(piece.n_vertices)
+        hot[lengths.inside] = np.abs(here.curvature)
+        less = rim.peeled(hot[piece.edges].max(axis=1), 0.25 * float(hot.max()))
+        if less is None or not (rim := less.pruned()).whole.any():
+            return None
+    return None
+
+
+def _laid_out(
+    rim: Rim, edges: NDArray[np.int64], weights: NDArray[np.float64], z: NDArray[np.complex128]
+) -> tuple[NDArray[np.complex128], Rim] | None:
+    """Positions (n,) of the largest part that is joined by edges, others as in z beside it; and the rim of this part."""
+    piece = rim.piece
+    local = np.full(len(piece.edges), -1)
+    local[edges] = np.arange(len(edges))
+    parts = planar_pieces(
+        piece.n_vertices, piece.edges[edges], piece.triangles[rim.left], local[piece.opposite[rim.left]]
+    )
+    if not parts:
+        return None
+    part = max(parts, key=lambda one: one.n_vertices)
+    flat = conformal_map(part, weights[part.edge_rows], scale=1.0, sharp=False).z
+    here = part.vertices
+    similarity = min((fit_similarity(flat, z[here], mirror=mirror) for mirror in (False, True)), key=lambda one: one[1])
+    inside = np.zeros(piece.n_vertices, dtype=bool)
+    inside[here] = True
+    found = z.copy()
+    found[here] = similarity[0](flat)
+    _, label = nearest(piece, np.where(inside, np.arange(len(inside)), -1), len(inside))
+    found = np.where(inside, found, z + (found - z)[label])
+    own = np.zeros(len(piece.edges), dtype=bool)
+    own[edges[part.edge_rows]] = True
+    return found, replace(rim, left=rim.left & own[piece.opposite].all(axis=1))
+
+
+class Lengths:
+    """The problem on the triangles that a rim leaves."""
+
+    def __init__(self, rim: Rim, weights: NDArray[np.float64]):
+        piece = rim.piece
+        self.edges, sides = np.unique(piece.opposite[rim.left], return_inverse=True)
+        self.sides, self.triangles = sides.reshape(-1, 3), piece.triangles[rim.left]
+        self.given, self.whole = weights[self.edges], rim.whole[self.edges]
+        count = np.bincount(self.triangles.ravel(), minlength=piece.n_vertices)
+        around = np.bincount(piece.triangles.ravel(), minlength=piece.n_vertices)
+        around[piece.boundary.ravel()] = 0
+        self.inside = np.flatnonzero((count > 0) & (count == around))
+        self._number = np.full(piece.n_vertices, -1)
+        self._number[self.inside] = np.arange(len(self.inside))
+        owner, place = np.nonzero(~self.whole[self.sides])
+        ends = np.stack([self.sides[owner, (place + turn) % 3] for turn in (0, 1, 2)], axis=1)
+        share = np.tile([1.0, -0.5, -0.5], (len(ends), 1))
+        row = np.repeat(np.arange(len(ends)), 3)
+        self.prior = sp.csr_array((share.ravel(), (row, ends.ravel())), shape=(len(ends), len(self.edges)))
+        self._convex: Factorisation | None = None
+        self.factorised = 0
+
+    def release(self) -> None:
+        """Give the memory of the factor back."""
+        if self._convex is not None:
+            self._convex.release()
+        self._convex = None
+
+    def at(self, u: NDArray, scale: float) -> _Metric | None:
+        """A metric with its derivatives; None where some triangle has no area."""
+        own = u[self.sides]
+        if not (u > 0).all() or not (heron(own) > 1e-14 * own.max(axis=1) ** 2).all():
+            return None
+        area, cotangents = areas_cotangents(own)
+        ones = np.ones(len(area))
+        hessian = self._assembled(-2 * blocks_of(own, area, cotangents, ones, -ones))
+        # An angle, by the logarithms of squared lengths: of the sides at it minus half a cotangent of the third angle,
+        # and of the one that faces it what makes the sum zero.
+        total = cotangents.sum(axis=1)
+        turn = (cotangents[:, :, None] + cotangents[:, None, :] - total[:, None, None]) / 2
+        corner = np.arange(3)
+        turn[:, corner, corner] = (total[:, None] - cotangents) / 2
+        row = np.repeat(self._number[self.triangles], 3, axis=1).ravel()
+        column = np.tile(self.sides, (1, 3)).ravel()
+        some = row >= 0
+        turned = sp.csr_array(
+            (-turn.ravel()[some], (row[some], column[some])), shape=(len(self.inside), len(self.edges))
+        )
+        total = np.bincount(self.triangles.ravel(), angles(own).ravel(), len(self._number))[self.inside]
+        weights = summed(self.sides, cotangents / 2, len(u))
+        return _Metric(u, scale, weights, 2 * np.pi - total, self.prior @ np.log(u), hessian, turned)
+
+    def _assembled(self, blocks: NDArray) -> sp.csr_array:
+        row, column = np.repeat(self.sides, 3, axis=1).ravel(), np.tile(self.sides, (1, 3)).ravel()
+        return sp.csr_array((blocks.ravel(), (row, column)), shape=(len(self.edges), len(self.edges)))
+
+    def convex(self, u: NDArray, scale: float) -> _Metric | None:
+        """With whole entries, lengths of other edges given; None where there is none."""
+        free = np.flatnonzero(self.whole)
+        wanted = self.given / scale
+        for _ in range(60):
+            here = self.at(u, scale)
+            if here is None:
+                return None
+            rest = (here.weights - wanted)[free]
+            if np.abs(rest).max(initial=0.0) < 1e-11:
+                return here
+            matrix = UpperTriangle.of(sp.csr_array(-here.hessian[free][:, free]))
+            self._convex = self._convex or factorisation(matrix, definite=True)
+            self._convex.factorise(matrix)
+            self.factorised += 1
+            move = np.zeros(len(u))
+            move[free] = self._convex.solve(np.ascontiguousarray(rest * u[free]))
+            step = min(1.0, 0.95 * longest_step(u[self.sides], (u * move)[self.sides]), 0.9 / max(-move.min(), 1e-300))
+            u = u * (1 + step * move)
+        return None
+
+    def flat(self, here: _Metric, mus: Sequence[float], *, free_scale: bool) -> _Metric:
+        """The metric that comes nearest to a flat one, with less and less of a prior for the rim."""
+        for mu in mus:
+            damping, cost = 1e-8, here.cost(mu)
+            for _ in range(_STEPS if mu else _LAST):
+                before = cost
+                for _ in range(_TRIALS):
+                    found = self._tried(here, mu, damping, free_scale=free_scale)
+                    if found is not None and found.cost(mu) < cost:
+                        here, cost, damping = found, found.cost(mu), damping / 10
+                        break
+                    damping = max(10 * damping, 1e-7)
+                if cost <= _FLAT**2 * len(self.inside) or cost > (1 - 1e-3 * (mu > 0)) * before:
+                    break
+            _log.debug("mu %.0e: curvature %.1e after %d factorisations", mu, here.bent, self.factorised)
+            if here.bent <= _FLAT:
+                break
+        return here
+
+    def _tried(self, here: _Metric, mu: float, damping: float, *, free_scale: bool) -> _Metric | None:
+        move, more = self._towards_flat(here, mu, damping, free_scale=free_scale)
+        share = min(1.0, 1.5 / max(float(np.abs(move[~self.whole]).max(initial=0.0)), 1e-300))
+        scale = here.scale * float(np.exp(np.clip(share * more, -1, 1)))
+        with np.errstate(all="ignore"):
+            for some in (True, ~self.whole):
+                found = self.convex(here.u * np.exp(np.where(some, share * move, 0.0)), scale)
+                if found is not None:
+                    return found
+        return None
+
+    def _towards_flat(self, here: _Metric, mu: float, damping: float, *, free_scale: bool) -> tuple[NDArray, float]:
+        """A Gauss-Newton step of log u and log c along the metrics with whole entries.
+
+        The matrix of the saddle point is that of a problem in which entries have a little room, which needs no pivots;
+        a few corrections close it.
+        """
+        e, free = len(self.edges), np.flatnonzero(self.whole)
+        slope = self.given[free] / here.scale if free_scale else np.zeros(len(free))
+        rows = sp.hstack([sp.diags_array(1 / here.u[free]) @ here.hessian[free], sp.csr_array(slope[:, None])])
+        square = here.turn.T @ here.turn + mu**2 * (self.prior.T @ self.prior)
+        own = np.append(np.where(self.whole, 1e-12, damping), 1e-12 if free_scale else 1.0)
+        square = sp.block_diag([square, sp.csr_array((1, 1))]) + sp.diags_array(own)
+        room = np.append(np.zeros(e + 1), np.full(len(free), 1e-6))
+        matrix = sp.csr_array(sp.block_array([[square, rows.T], [rows, None]]))
+        upper = UpperTriangle.of(sp.csr_array(matrix - sp.diags_array(room)))
+        solver = factorisation(upper)
+        solver.factorise(upper)
+        self.factorised += 1
+        right = np.zeros(len(room))
+        right[:e] = -(here.turn.T @ here.curvature) - mu**2 * (self.prior.T @ here.bulge)
+        right[e + 1 :] = self.given[free] / here.scale - here.weights[free]
+        x = np.zeros(len(room))
+        for _ in range(6):
+            x += solver.solve(right - matrix @ x)
+        solver.release()
+        return x[:e], float(x[e])
