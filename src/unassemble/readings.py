@@ -16,6 +16,7 @@ from .boundaries import (
     with_boundary_edges,
     with_diagonals,
 )
+from .budget import Budget
 from .clock import Clock
 from .conforming.recover import recover_conforming, shown_cells
 from .conforming.roles import Cells
@@ -24,7 +25,7 @@ from .further_terms import less_mass, recover_elements_with_terms, recover_with_
 from .matrix import OperatorMatrix
 from .options import ScalarOptions
 from .recovery import PlanarMesh
-from .regions import recover_regions, uneven
+from .regions import exchange_budget, recover_regions, uneven
 from .scalar import recover_scalar
 from .scalar.placement import Placement
 from .tolerances import CERTIFIED, LITTLE
@@ -124,11 +125,15 @@ class ScalarReadings:
         matrix = with_boundary_edges(with_diagonals(self.matrix))
         return matrix, None if matrix.replaced is None else np.asarray(~matrix.replaced[matrix.edges].all(axis=1))
 
+    @cached_property
+    def _exchanges(self) -> Budget:
+        return exchange_budget(self.matrix.n)
+
     def _partial(self) -> PlanarMesh | None:
         return recover_partial(*self._given, self.placement, self.clock, self.options)
 
     def _partial_regions(self) -> PlanarMesh | None:
-        return recover_regions(*self._given, self.placement, self.clock, self.options)
+        return recover_regions(*self._given, self.placement, self.clock, self.options, self._exchanges)
 
     def _partial_elements(self) -> PlanarMesh | None:
         return recover_partial_elements(self.matrix, self.placement, self.clock, self.options)
@@ -136,7 +141,7 @@ class ScalarReadings:
     def _regions(self) -> PlanarMesh | None:
         matrix = with_diagonals(self.matrix, everywhere=True)
         every = np.ones(len(matrix.edges), dtype=bool)
-        return recover_regions(matrix, every, self.placement, self.clock, self.options)
+        return recover_regions(matrix, every, self.placement, self.clock, self.options, self._exchanges)
 
     def _linear(self) -> PlanarMesh:
         return recover_with_terms(self.matrix, self._plain, self.clock, self.placement.coefficients)

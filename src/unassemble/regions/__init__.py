@@ -6,6 +6,6 @@ fit decide the last ones.
 """
 
 from .guess import uneven
-from .recover import recover_regions
+from .recover import exchange_budget, recover_regions
 
-__all__ = ["recover_regions", "uneven"]
+__all__ = ["exchange_budget", "recover_regions", "uneven"]

@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from heapq import heappop, heappush
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..boundaries.fit import EXACT, Fit, FitOptions, WholeEntries
 from ..boundaries.inside import InsideMesh, PieceEntries, finished, fit_inside, shrunk
 from ..boundaries.partial import distinct
 from ..boundaries.rim import Rim
-from ..budget import SAMPLE
+from ..budget import SAMPLE, Budget
 from ..clock import Clock
 from ..errors import GeometryError, SolverError
 from ..matrix import OperatorMatrix
@@ -33,30 +34,37 @@ _FIRST = FitOptions(last_steps=40, damping=1e-3)  # of the fit from a start
 _NEXT = FitOptions(last_steps=15, damping=1e-6)  # and of those after exchanges
 
 
+def exchange_budget(n: int) -> Budget:
+    """For trials of exchanges in all pieces of a matrix of n rows, in vertices that are fitted."""
+    return Budget(13.0 * max(n, 1000))
+
+
 def recover_regions(
-    matrix: OperatorMatrix, whole: NDArray[np.bool_] | None, placement: Placement, clock: Clock, options: ScalarOptions
-) -> PlanarMesh | None:
-    """The mesh of the 3-cycles of a matrix, with a factor for each region.
+    matrix: OperatorMatrix, whole: NDArray[np.bool_] | None, placement: Placement, clock: Clock, options: ScalarOptions,
+    budget: Budget,
+) -> PlanarMesh | None:  # fmt: skip
+    """The mesh of the 3-cycles of a matrix, with a factor for each region, as far as a budget of exchanges goes.
 
     As :func:`..boundaries.recover_partial`; None where entries show one region only, too.
     """
     if options.scale is not None:
         return None
     with np.errstate(all="ignore"):  # flat triangles, which no fit takes
-        return recover_partial(matrix, whole, placement, clock, options, _with_regions)
+        return recover_partial(matrix, whole, placement, clock, options, partial(_with_regions, budget))
 
 
-def _with_regions(given: Sequence[PieceEntries], _: float | None) -> list[InsideMesh | None]:
+def _with_regions(budget: Budget, given: Sequence[PieceEntries], _: float | None) -> list[InsideMesh | None]:
     """Meshes of pieces, of which some have regions; else none."""
     guesses = [guessed_regions(own.piece, own.halved, own.whole | own.shared) for own in given]
     if all(len(scale) == 1 or _uniform(own) for own, (_, scale) in zip(given, guesses, strict=True)):
         return [None] * len(given)
-    found = [
-        fit_inside(own) if len(scale) == 1 else _fitted(own, region, scale)
-        for own, (region, scale) in zip(given, guesses, strict=True)
-    ]
     whole = all(own.whole.all() for own in given)  # then nothing explains why pieces should have no mesh
-    return [None] * len(given) if whole and any(one is None for one in found) else found
+    found: list[InsideMesh | None] = []
+    for own, (region, scale) in zip(given, guesses, strict=True):
+        found.append(fit_inside(own) if len(scale) == 1 else _fitted(own, region, scale, budget))
+        if whole and found[-1] is None:
+            return [None] * len(given)
+    return found
 
 
 def _uniform(given: PieceEntries) -> bool:
@@ -72,7 +80,7 @@ def _uniform(given: PieceEntries) -> bool:
     return bool(np.sqrt(np.mean(misfit**2)) < 1e-3)  # entries may have errors
 
 
-def _fitted(given: PieceEntries, region: NDArray[np.int64], scale: NDArray) -> InsideMesh | None:
+def _fitted(given: PieceEntries, region: NDArray[np.int64], scale: NDArray, budget: Budget) -> InsideMesh | None:
     """Whole entries of a piece fitted from regions (m,) and their factors (k,); None where that comes to no end.
 
     What rims do not fit where no exchange is left is taken off.
@@ -85,7 +93,7 @@ def _fitted(given: PieceEntries, region: NDArray[np.int64], scale: NDArray) -> I
     try:
         if not rim.whole.any():
             return None
-        fit = _exchanged(problem, rim, scale)
+        fit = _exchanged(problem, rim, scale, budget)
         if fit.misfit > EXACT:
             fit, rim = shrunk(problem, rim, fit, 3, 0.25)
         if not fit.misfit <= EXACT:
@@ -98,7 +106,7 @@ def _fitted(given: PieceEntries, region: NDArray[np.int64], scale: NDArray) -> I
         problem.release()
 
 
-def _exchanged(problem: WholeEntries, rim: Rim, scale: NDArray) -> Fit:
+def _exchanged(problem: WholeEntries, rim: Rim, scale: NDArray, budget: Budget) -> Fit:
     """A fit of the entries that a rim has whole, triangles exchanged where they do not fit; the problem has its region.
 
     With several triangles wrong, one that is put right may well leave more of a misfit than before: the least misfit of
@@ -133,6 +141,8 @@ def _exchanged(problem: WholeEntries, rim: Rim, scale: NDArray) -> Fit:
                 break
             heappop(reached)
         elif other.tobytes() not in seen:
+            if not budget.take(piece.n_vertices + 50):
+                break
             found = fit(other, here.z, here.scale)
             if found.misfit > EXACT:  # from where wrong regions have bent the mesh, or from a start of its own
                 again = anew(other, here.scale)
