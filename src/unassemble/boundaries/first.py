@@ -25,9 +25,7 @@ def first_fits(problem: WholeEntries, rim: Rim, newton: FitOptions) -> Iterator[
 
     Steps `newton` are those of all vertices of a large mesh.
     """
-    given = np.where(problem.guessed, problem.weights, 0.5)
-    weights = guessed(problem.piece, given, rim.given, estimate_scale(problem.piece, given))
-    conformal = _conformal(problem, weights)
+    conformal = nearest_conformal(problem, rim)
     fit = _settled(problem, rim, conformal, newton)
     if fit is not None:
         yield fit, True
@@ -37,17 +35,10 @@ def first_fits(problem: WholeEntries, rim: Rim, newton: FitOptions) -> Iterator[
             yield problem.faded(first.z, first.scale, rim.whole, fading[1:]), False
 
 
-def starts(problem: WholeEntries, rim: Rim) -> Iterator[NDArray[np.complex128]]:
-    """Drawings without crossings to start from."""
+def nearest_conformal(problem: WholeEntries, rim: Rim) -> NDArray[np.complex128]:
+    """(n,) the conformal map of entries that are whole or guessed; 0 where there is none."""
     given = np.where(problem.guessed, problem.weights, 0.5)
-    weights = guessed(problem.piece, given, rim.given, estimate_scale(problem.piece, given))
-    conformal = _conformal(problem, weights)
-    if _upright(problem.piece, conformal):
-        yield conformal
-    for loop in np.argsort(-np.diff(problem.piece.loop_offsets), kind="stable")[:4].tolist():
-        drawing = tutte(problem.piece, loop)
-        if _upright(problem.piece, drawing):
-            yield drawing
+    return _conformal(problem, guessed(problem.piece, given, rim.given, estimate_scale(problem.piece, given)))
 
 
 def guessed(piece: Piece, given: NDArray[np.float64], whole: NDArray[np.bool_], c: float) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..topology import Piece
-from .first import first_fits, starts
+from .first import first_fits, nearest_conformal
 from .fit import EXACT, Fit, FitOptions, WholeEntries
 from .grow import grow
 from .judge import determined, unknowns
@@ -103,9 +103,7 @@ def _core(problem: WholeEntries, rim: Rim) -> tuple[Fit, Rim] | None:
     """A fit of all entries that some rim has whole, or else the last one; None where there is no drawing."""
     found = None
     if os.environ.get("LEN") == "first":
-        for z in starts(problem, rim):
-            found = fit_lengths(problem, rim, z, _NEWTON)
-            break
+        found = fit_lengths(problem, rim, nearest_conformal(problem, rim), _NEWTON)
         if found is not None and found[0].misfit <= EXACT:
             return found
     for again, (fit, near) in enumerate(first_fits(problem, rim, _NEWTON)):
@@ -115,11 +113,9 @@ def _core(problem: WholeEntries, rim: Rim) -> tuple[Fit, Rim] | None:
         if found[0].misfit <= EXACT:
             return found
         if again == 0 and os.environ.get("LEN") == "after":
-            for z in starts(problem, rim):
-                better = fit_lengths(problem, rim, z, _NEWTON)
-                if better is not None and better[0].misfit <= EXACT:
-                    return better
-                break
+            better = fit_lengths(problem, rim, nearest_conformal(problem, rim), _NEWTON)
+            if better is not None and better[0].misfit <= EXACT:
+                return better
     return found
 
 

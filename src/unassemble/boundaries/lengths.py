@@ -22,6 +22,7 @@ from ..linalg import Factorisation, UpperTriangle, factorisation
 from ..metric.heron import angles, areas_cotangents, blocks_of, heron, longest_step, summed
 from ..planar.conformal import conformal_map
 from ..planar.frame import fit_similarity
+from ..planar.polish import polish
 from ..topology.pieces import planar_pieces
 from .fit import Fit, FitOptions, WholeEntries
 from .patch import nearest
@@ -31,8 +32,10 @@ _log = logging.getLogger(__name__)
 
 _FADING = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
 _AGAIN = _FADING[2:]
+_FITS = 1e-14, 1e-10  # of entries, that is rounding, and that may be where it does not fall
 _FLAT = 1e-11  # radians that are rounding
-_STEPS, _LAST, _TRIALS, _ROUNDS = 5, 15, 7, 8
+_HELPS = 0.95  # as much as less of a prior has to leave of the curvature
+_STEPS, _LAST, _TRIALS, _ROUNDS = 5, 15, 4, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +70,8 @@ def fit_lengths(
     piece, fading = rim.piece, _FADING
     scale = problem.best_scale(z, rim.whole)
     u = np.abs(z[piece.edges[:, 1]] - z[piece.edges[:, 0]]) ** 2
+    if not (heron(u[piece.opposite]) > 0).all():
+        u = np.ones(len(u))
     for _ in range(_ROUNDS):
         lengths = Lengths(rim, problem.weights)
         try:
@@ -103,7 +108,7 @@ def _laid_out(
     if not parts:
         return None
     part = max(parts, key=lambda one: one.n_vertices)
-    flat = conformal_map(part, weights[part.edge_rows], scale=1.0, sharp=False).z
+    flat = polish(part, weights[part.edge_rows], conformal_map(part, weights[part.edge_rows], scale=1.0).z, scale=1.0).z
     here = part.vertices
     similarity = min((fit_similarity(flat, z[here], mirror=mirror) for mirror in (False, True)), key=lambda one: one[1])
     inside = np.zeros(piece.n_vertices, dtype=bool)
@@ -176,14 +181,16 @@ class Lengths:
     def convex(self, u: NDArray, scale: float) -> _Metric | None:
         """With whole entries, lengths of other edges given; None where there is none."""
         free = np.flatnonzero(self.whole)
-        wanted = self.given / scale
+        wanted, last = self.given / scale, np.inf
         for _ in range(60):
             here = self.at(u, scale)
             if here is None:
                 return None
             rest = (here.weights - wanted)[free]
-            if np.abs(rest).max(initial=0.0) < 1e-11:
+            size = float(np.abs(rest).max(initial=0.0))
+            if size < _FITS[0] or (size < _FITS[1] and size > last / 2):
                 return here
+            last = size
             matrix = UpperTriangle.of(sp.csr_array(-here.hessian[free][:, free]))
             self._convex = self._convex or factorisation(matrix, definite=True)
             self._convex.factorise(matrix)
@@ -195,7 +202,8 @@ class Lengths:
         return None
 
     def flat(self, here: _Metric, mus: Sequence[float], *, free_scale: bool) -> _Metric:
-        """The metric that comes nearest to a flat one, with less and less of a prior for the rim."""
+        """The metric that comes nearest to a flat one, with less and less of a prior for the rim while that helps."""
+        last = np.inf
         for mu in mus:
             damping, cost = 1e-8, here.cost(mu)
             for _ in range(_STEPS if mu else _LAST):
@@ -206,11 +214,12 @@ class Lengths:
                         here, cost, damping = found, found.cost(mu), damping / 10
                         break
                     damping = max(10 * damping, 1e-7)
-                if cost <= _FLAT**2 * len(self.inside) or cost > (1 - 1e-3 * (mu > 0)) * before:
+                if cost <= _FLAT**2 * len(self.inside) or cost > (1 - 1e-3) * before:
                     break
             _log.debug("mu %.0e: curvature %.1e after %d factorisations", mu, here.bent, self.factorised)
-            if here.bent <= _FLAT:
+            if not _FLAT < here.bent < _HELPS * last:
                 break
+            last = here.bent
         return here
 
     def _tried(self, here: _Metric, mu: float, damping: float, *, free_scale: bool) -> _Metric | None:
