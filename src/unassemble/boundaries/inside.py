@@ -1,7 +1,6 @@
 """The mesh of a piece of which some entries are whole, and what of it they determine."""
 
 import logging
-import os
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -102,20 +101,16 @@ def finished(problem: WholeEntries, fit: Fit, rim: Rim, unit: float) -> InsideMe
 def _core(problem: WholeEntries, rim: Rim) -> tuple[Fit, Rim] | None:
     """A fit of all entries that some rim has whole, or else the last one; None where there is no drawing."""
     found = None
-    if os.environ.get("LEN") == "first":
-        found = fit_lengths(problem, rim, nearest_conformal(problem, rim), _NEWTON)
-        if found is not None and found[0].misfit <= EXACT:
-            return found
     for again, (fit, near) in enumerate(first_fits(problem, rim, _NEWTON)):
         # What comes to a bad end with one part of the largest misfit for peaks often does not with another. A small
         # mesh loses more of its rim where that is taken off as a whole, and is peeled a few times before.
         found = shrunk(problem, rim, fit, 0 if near else 3, 0.35 if again else 0.25)
         if found[0].misfit <= EXACT:
             return found
-        if again == 0 and os.environ.get("LEN") == "after":
-            better = fit_lengths(problem, rim, nearest_conformal(problem, rim), _NEWTON)
-            if better is not None and better[0].misfit <= EXACT:
-                return better
+        if not again:
+            flat = fit_lengths(problem, rim, nearest_conformal(problem, rim), _NEWTON)
+            if flat is not None and flat[0].misfit <= EXACT:
+                return flat
     return found
 
 

@@ -1,10 +1,11 @@
 """Lengths of edges from whole entries, and a rim such that the mesh is flat.
 
-With the lengths of edges that have no whole entry the others are those of a convex problem (:mod:`..metric.program`):
-least of w . u - 2 sum of areas over squared lengths u of the edges with entries w. So entries are given exactly, from any
-start, and what is left to find is the rim: 2 pi less the angles at vertices inside is brought to zero by Gauss-Newton
-steps along the metrics with these entries, one sparse saddle point problem each. Along these the curvature is nearly
-linear, where positions that have to fit entries creep along narrow valleys.
+Where the lengths of edges without a whole entry are given, all others follow from a convex problem, as those of a whole
+surface do (:mod:`..metric.program`): the least w . u - 2 sum of areas over squared lengths u of the edges with entries w.
+So entries are met exactly, from any start, and what is left to find is the rim: curvatures inside, 2 pi less the angles
+at a vertex, are brought to zero by Gauss-Newton steps along the metrics with these entries, a sparse saddle point
+problem each. Positions that have to fit entries creep along narrow valleys, maps that are nearly conformal; curvatures
+do not, since a conformal factor changes them at the rim only.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..errors import SolverError
+from ..errors import GeometryError, SolverError
 from ..linalg import Factorisation, UpperTriangle, factorisation
 from ..metric.heron import angles, areas_cotangents, blocks_of, heron, longest_step, summed
 from ..planar.conformal import conformal_map
@@ -31,11 +32,12 @@ from .rim import Rim
 _log = logging.getLogger(__name__)
 
 _FADING = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 0.0)
-_AGAIN = _FADING[2:]
+_AGAIN = _FADING[2:]  # from a metric that is nearly flat
 _FITS = 1e-14, 1e-10  # of entries, that is rounding, and that may be where it does not fall
 _FLAT = 1e-11  # radians that are rounding
 _HELPS = 0.95  # as much as less of a prior has to leave of the curvature
-_STEPS, _LAST, _TRIALS, _ROUNDS = 5, 15, 4, 8
+_STEPS, _LAST, _TRIALS = 5, 15, 4
+_MOST = 400  # factorisations, more than the meshes that come back this way need
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,26 +69,33 @@ def fit_lengths(
     Positions z (n,) are those to start from. Where the rim comes to no flat metric, it is peeled next to peaks of the
     curvature.
     """
-    piece, fading = rim.piece, _FADING
+    piece, fading = rim.piece, list(_FADING)
     scale = problem.best_scale(z, rim.whole)
     u = np.abs(z[piece.edges[:, 1]] - z[piece.edges[:, 0]]) ** 2
     if not (heron(u[piece.opposite]) > 0).all():
         u = np.ones(len(u))
-    for _ in range(_ROUNDS):
-        lengths = Lengths(rim, problem.weights)
+    if not scale > 0:
+        return None
+    left = _MOST
+    while left > 0:
+        lengths = _Lengths(rim, problem.weights, left)
         try:
             here = lengths.convex(u[lengths.edges], scale)
             if here is None or not len(lengths.inside):
                 return None
             here = lengths.flat(here, fading, free_scale=problem.known_scale is None)
-        except SolverError:
+            if here.bent <= _FLAT:
+                found = _laid_out(rim, lengths.edges, here.weights, z)
+                return (
+                    None
+                    if found is None
+                    else (problem.fit(found[0], here.scale, found[1].whole, 0.0, newton), found[1])
+                )
+        except (GeometryError, SolverError):
             return None
         finally:
             lengths.release()
-        u[lengths.edges], scale, fading = here.u, here.scale, _AGAIN
-        if here.bent <= _FLAT:
-            laid = _laid_out(rim, lengths.edges, here.weights, z)
-            return None if laid is None else (problem.fit(laid[0], scale, laid[1].whole, 0.0, newton), laid[1])
+        u[lengths.edges], scale, fading, left = here.u, here.scale, list(_AGAIN), lengths.left
         hot = np.zeros(piece.n_vertices)
         hot[lengths.inside] = np.abs(here.curvature)
         less = rim.peeled(hot[piece.edges].max(axis=1), 0.25 * float(hot.max()))
@@ -98,7 +107,7 @@ def fit_lengths(
 def _laid_out(
     rim: Rim, edges: NDArray[np.int64], weights: NDArray[np.float64], z: NDArray[np.complex128]
 ) -> tuple[NDArray[np.complex128], Rim] | None:
-    """Positions (n,) of the largest part that is joined by edges, others as in z beside it; and the rim of this part."""
+    """Positions (n,) of the largest part that edges join, others beside it as in z; and the rim of this part."""
     piece = rim.piece
     local = np.full(len(piece.edges), -1)
     local[edges] = np.arange(len(edges))
@@ -122,10 +131,10 @@ def _laid_out(
     return found, replace(rim, left=rim.left & own[piece.opposite].all(axis=1))
 
 
-class Lengths:
-    """The problem on the triangles that a rim leaves."""
+class _Lengths:
+    """The problem on the triangles that a rim leaves, for so many factorisations."""
 
-    def __init__(self, rim: Rim, weights: NDArray[np.float64]):
+    def __init__(self, rim: Rim, weights: NDArray[np.float64], most: int):
         piece = rim.piece
         self.edges, sides = np.unique(piece.opposite[rim.left], return_inverse=True)
         self.sides, self.triangles = sides.reshape(-1, 3), piece.triangles[rim.left]
@@ -142,7 +151,7 @@ class Lengths:
         row = np.repeat(np.arange(len(ends)), 3)
         self.prior = sp.csr_array((share.ravel(), (row, ends.ravel())), shape=(len(ends), len(self.edges)))
         self._convex: Factorisation | None = None
-        self.factorised = 0
+        self.left = most
 
     def release(self) -> None:
         """Give the memory of the factor back."""
@@ -157,26 +166,22 @@ class Lengths:
             return None
         area, cotangents = areas_cotangents(own)
         ones = np.ones(len(area))
-        hessian = self._assembled(-2 * blocks_of(own, area, cotangents, ones, -ones))
+        blocks = -2 * blocks_of(own, area, cotangents, ones, -ones)
         # An angle, by the logarithms of squared lengths: of the sides at it minus half a cotangent of the third angle,
         # and of the one that faces it what makes the sum zero.
         total = cotangents.sum(axis=1)
         turn = (cotangents[:, :, None] + cotangents[:, None, :] - total[:, None, None]) / 2
         corner = np.arange(3)
         turn[:, corner, corner] = (total[:, None] - cotangents) / 2
+        size, row, column = len(u), np.repeat(self.sides, 3, axis=1).ravel(), np.tile(self.sides, (1, 3)).ravel()
+        hessian = sp.csr_array((blocks.ravel(), (row, column)), shape=(size, size))
         row = np.repeat(self._number[self.triangles], 3, axis=1).ravel()
-        column = np.tile(self.sides, (1, 3)).ravel()
         some = row >= 0
-        turned = sp.csr_array(
-            (-turn.ravel()[some], (row[some], column[some])), shape=(len(self.inside), len(self.edges))
-        )
+        turned = sp.csr_array((-turn.ravel()[some], (row[some], column[some])), shape=(len(self.inside), size))
         total = np.bincount(self.triangles.ravel(), angles(own).ravel(), len(self._number))[self.inside]
+        curvature = np.asarray(2 * np.pi - total, dtype=np.float64)
         weights = summed(self.sides, cotangents / 2, len(u))
-        return _Metric(u, scale, weights, 2 * np.pi - total, self.prior @ np.log(u), hessian, turned)
-
-    def _assembled(self, blocks: NDArray) -> sp.csr_array:
-        row, column = np.repeat(self.sides, 3, axis=1).ravel(), np.tile(self.sides, (1, 3)).ravel()
-        return sp.csr_array((blocks.ravel(), (row, column)), shape=(len(self.edges), len(self.edges)))
+        return _Metric(u, scale, weights, curvature, self.prior @ np.log(u), hessian, turned)
 
     def convex(self, u: NDArray, scale: float) -> _Metric | None:
         """With whole entries, lengths of other edges given; None where there is none."""
@@ -194,7 +199,7 @@ class Lengths:
             matrix = UpperTriangle.of(sp.csr_array(-here.hessian[free][:, free]))
             self._convex = self._convex or factorisation(matrix, definite=True)
             self._convex.factorise(matrix)
-            self.factorised += 1
+            self.left -= 1
             move = np.zeros(len(u))
             move[free] = self._convex.solve(np.ascontiguousarray(rest * u[free]))
             step = min(1.0, 0.95 * longest_step(u[self.sides], (u * move)[self.sides]), 0.9 / max(-move.min(), 1e-300))
@@ -214,10 +219,10 @@ class Lengths:
                         here, cost, damping = found, found.cost(mu), damping / 10
                         break
                     damping = max(10 * damping, 1e-7)
-                if cost <= _FLAT**2 * len(self.inside) or cost > (1 - 1e-3) * before:
+                if self.left <= 0 or cost <= _FLAT**2 * len(self.inside) or cost > (1 - 1e-3) * before:
                     break
-            _log.debug("mu %.0e: curvature %.1e after %d factorisations", mu, here.bent, self.factorised)
-            if not _FLAT < here.bent < _HELPS * last:
+            _log.debug("mu %.0e: curvature %.1e, %d factorisations left", mu, here.bent, self.left)
+            if self.left <= 0 or not _FLAT < here.bent < _HELPS * last:
                 break
             last = here.bent
         return here
@@ -250,7 +255,7 @@ class Lengths:
         upper = UpperTriangle.of(sp.csr_array(matrix - sp.diags_array(room)))
         solver = factorisation(upper)
         solver.factorise(upper)
-        self.factorised += 1
+        self.left -= 1
         right = np.zeros(len(room))
         right[:e] = -(here.turn.T @ here.curvature) - mu**2 * (self.prior.T @ here.bulge)
         right[e + 1 :] = self.given[free] / here.scale - here.weights[free]
