@@ -6,8 +6,8 @@ around what is known already, the clearest first, and what is known grows. Which
 since all their entries add up to zero, whatever their directions; so it is known too when all is right.
 
 Translations are not in equilibrium next to supports, and rows next to edges in which planes of rollers meet hold all
-entries of one direction only. Their directions are spread once more from those that sums prove, if all sums become
-less: with the right ones most of them vanish.
+entries of one direction only. All rows together do tell: with the right directions most sums vanish, and what many
+zeros make least is the sum of absolute values. Stiffness against a change of volume does not matter for it.
 """
 
 from collections.abc import Iterator
@@ -17,6 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..budget import REFINEMENTS
 from ..linalg import solved
 from ..tolerances import CANCELLED, NEARLY_ALL, SMALL
 from .constants import adding_up, proven_directions, row_sizes, with_penalty, without_penalties
@@ -137,9 +138,10 @@ class _Body:
 def with_least_sums(
     matrix: sp.csr_array, group: NDArray[np.int64], direction: NDArray[np.int64], d: int
 ) -> NDArray[np.int64]:
-    """Spread the directions that no sum proves anew from those that are proven, as long as all sums become less.
+    """Choose the directions that no sum proves such that all sums together become less, until none changes.
 
-    Rows of one `group` couple to the same unknowns.
+    They are changed one by one, from those given, and from those with which translations are in equilibrium where the
+    others are proven. Rows of one `group` couple to the same unknowns.
     """
     told, size = without_penalties(matrix), row_sizes(matrix)
     scaled = sp.csr_array(sp.diags_array(1 / np.where(size > 0, size, np.inf)) @ told)
@@ -152,6 +154,27 @@ def with_least_sums(
         if not unnamed.any() or unnamed.all():  # if all rows had one direction, sums would be least
             return direction
         other = spread_directions(matrix, group, d, np.where(unnamed, -1, direction))
+        other = min((_one_by_one(scaled, one, np.flatnonzero(unnamed), d) for one in (direction, other)), key=total)
         if total(other) >= (1 - CANCELLED) * total(direction):
             return direction
         direction = other
+
+
+def _one_by_one(
+    scaled: sp.csr_array, direction: NDArray[np.int64], rows: NDArray[np.int64], d: int
+) -> NDArray[np.int64]:
+    """Directions of which those of some rows were changed one by one as long as absolute sums became less."""
+    columns, sums = sp.csc_array(scaled), scaled @ np.eye(d)[direction]
+    for _ in range(REFINEMENTS):
+        before, direction = direction, direction.copy()
+        for row in rows.tolist():
+            here = slice(columns.indptr[row], columns.indptr[row + 1])
+            near, entry = columns.indices[here], columns.data[here]
+            sums[near, direction[row]] -= entry
+            more = np.abs(sums[near] + entry[:, None]).sum(axis=0) - np.abs(sums[near]).sum(axis=0)
+            more[direction[row]] -= CANCELLED  # what changes nothing stays as it is
+            direction[row] = more.argmin()
+            sums[near, direction[row]] += entry
+        if np.array_equal(before, direction):
+            break
+    return direction
