@@ -13,11 +13,12 @@ import logging
 import numpy as np
 from numpy.typing import NDArray
 
-from ..linalg import UpperTriangle, factorisation, upper_from_edges
+from ..linalg import UpperTriangle, factorisation
 from ..tolerances import SINGULAR
 from ..topology import Piece
-from .cotangent import corner_gradients
+from .cotangent import corner_gradients, corner_sides, cotangent
 from .normal import Jacobian, WeightJacobian
+from .pencil import ConformalPencil
 
 _log = logging.getLogger(__name__)
 
@@ -84,23 +85,12 @@ def _weighted_energy(piece: Piece, z: NDArray, spread: NDArray) -> UpperTriangle
     L_t and T_t are the triangle's Laplacian and signed area; a_t makes the trace of its term that of its share of J'J
     for complex-linear displacements.
     """
-    at = z[piece.triangles]
-    u, w = at[:, [1, 2, 0]] - at, at[:, [2, 0, 1]] - at
-    at_u, at_w = corner_gradients(u, w)
-    product = np.conj(u) * w
-    cotangent = product.real / product.imag
-    trace = cotangent.sum(axis=1) / 2
+    u, w = corner_sides(piece.triangles, z)
+    at_u, at_w, cotangents = *corner_gradients(u, w), cotangent(u, w)
     gradients = np.abs(at_u) ** 2 + np.abs(at_w) ** 2 + np.abs(at_u + at_w) ** 2
-    weight = (gradients / spread[piece.opposite] ** 2).sum(axis=1) / 2 / trace
-    # Each corner contributes to the edge that faces it, run through from tail to head.
-    share = (weight[:, None] * cotangent / 4).ravel()
-    # The similarity itself, which is projected out, would make the energy singular.
-    area = weight * (1 - SINGULAR) / 4
-    left, right = piece.facing.T
-    real = share[left] + np.where(piece.inner, share[right], 0)
-    turn = area[left // 3] - np.where(piece.inner, area[right // 3], 0)
-    upwards = piece.stencil[0] < piece.stencil[1]
-    off_diagonal = -real + 1j * np.where(upwards, turn, -turn)
-    diagonal = np.bincount(piece.edges.ravel(), np.repeat(real, 2), piece.n_vertices)
-    kept = piece.edges[:, 1] < piece.n_vertices - 1
-    return upper_from_edges(piece.n_vertices - 1, piece.edges[kept], off_diagonal[kept], diagonal[:-1])
+    weight = (gradients / spread[piece.opposite] ** 2).sum(axis=1) / cotangents.sum(axis=1)
+    one, other = weight[piece.facing // 3].T
+    strength = one - np.where(piece.inner, other, 0)  # each triangle runs along its edges, counter-clockwise
+    weights = np.bincount(piece.opposite.ravel(), (weight[:, None] * cotangents / 2).ravel(), len(piece.edges))
+    pencil = ConformalPencil(piece.n_vertices, piece.edges, piece.stencil[:2].T, weights, strength)
+    return pencil.matrix(1 - SINGULAR)  # the similarity itself, which is projected out, would make it singular

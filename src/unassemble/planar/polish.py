@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..errors import SolverError
 from ..tolerances import LAST_DIGITS, ROUNDED
 from ..topology import Piece
+from .cotangent import areas
 from .iterative import IterativeNormalEquations
 from .normal import Jacobian, NormalEquations, WeightJacobian, distant_pair
 from .problem import Cotangents, Model, Problem, downhill
@@ -147,9 +148,8 @@ def polish(
 
 def signed_areas(piece: Piece, z: NDArray) -> NDArray[np.float64]:
     """Twice the area of each triangle (m,), positive for the orientation that prevails."""
-    a, b, c = z[piece.triangles].T
-    areas = (np.conj(b - a) * (c - a)).imag
-    return areas if areas.sum() >= 0 else -areas
+    signed = areas(piece, z)
+    return signed if signed.sum() >= 0 else -signed
 
 
 def count_flipped(piece: Piece, z: NDArray) -> int:
