@@ -17,34 +17,29 @@ from ..linalg import UpperTriangle, factorisation
 from ..tolerances import SINGULAR
 from ..topology import Piece
 from .cotangent import corner_gradients, corner_sides, cotangent
-from .normal import Jacobian, WeightJacobian
+from .normal import Jacobian, NormalEquations, WeightJacobian
 from .pencil import ConformalPencil
 
 _log = logging.getLogger(__name__)
 
 
-class IterativeNormalEquations:
-    """Steps as of :class:`~unassemble.planar.polish.GaussNewton`, in linear memory.
+class IterativeNormalEquations(NormalEquations):
+    """The same in linear memory, of triangles counter-clockwise; solutions have no component along similarities."""
 
-    Solutions have no component along similarities.
+    def __init__(self, jacobian: WeightJacobian):
+        self.renew(jacobian)
 
-    Where the scale is fitted as well, `weights` (e,) is the direction in which it moves the weights. The solution is
-    then the best displacement together with the best scale, for misfits that have no component along this direction.
-
-    `z` (n,): the positions of the Jacobian, triangles counter-clockwise.
-    """
-
-    def __init__(self, piece: Piece, jacobian: WeightJacobian, z: NDArray, weights: NDArray | None):
-        self._forward = jacobian.matrix.tocsr()
-        self._scaling = None if weights is None else weights / np.linalg.norm(weights)
+    def renew(self, jacobian: Jacobian) -> None:
+        """For other positions."""
+        assert isinstance(jacobian, WeightJacobian)
+        self._forward, z = jacobian.matrix.tocsr(), jacobian.z
         self._gauge = np.linalg.qr(np.column_stack([np.ones(len(z)), z - z.mean()]))[0]
-        energy = _weighted_energy(piece, z, jacobian.spread)
+        energy = _weighted_energy(jacobian.piece, z, jacobian.spread)
         self._factor = factorisation(energy)
         self._factor.factorise(energy)
 
-    def __call__(self, jacobian: Jacobian, misfit: NDArray) -> NDArray:
-        """Displacement d (n,) complex; the best scale has left nothing of w in the misfit."""
-        rhs = jacobian.transpose(misfit)
+    def solve(self, rhs: NDArray) -> NDArray:
+        """Displacement d (n,) complex with J'J d = rhs."""
         x = np.zeros_like(rhs)
         residual = self._project(rhs)
         direction = y = self._precondition(residual)
@@ -62,15 +57,8 @@ class IterativeNormalEquations:
         _log.debug("normal equations: %d iterations, reduction %.1e", iterations, np.sqrt(size / first) if first else 0)
         return x
 
-    def release(self) -> None:
-        """Give the memory of the factor back."""
-        self._factor.release()
-
     def _apply(self, d: NDArray) -> NDArray:
-        change = self._forward @ d.view(np.float64)
-        if self._scaling is not None:
-            change -= self._scaling * (self._scaling @ change)
-        return (self._forward.T @ change).view(np.complex128)
+        return (self._forward.T @ (self._forward @ d.view(np.float64))).view(np.complex128)
 
     def _precondition(self, residual: NDArray) -> NDArray:
         return self._project(np.append(self._factor.solve(residual[:-1]), 0))

@@ -53,10 +53,8 @@ def lacking_term(
         jacobian = WeightJacobian(piece, z, spread)
         equations = NormalEquations(jacobian, distant_pair(z))
         both = np.column_stack([weights / scale / spread - fitted, terms, fitted])
-        moves = equations.solve(np.column_stack([jacobian.transpose(column) for column in both.T]))
+        both -= jacobian.forward(equations.fitted(jacobian, both))  # what displacements cannot explain of these
         equations.release()
-        # What displacements cannot explain of these changes of the weights.
-        both -= np.column_stack([jacobian.forward(np.ascontiguousarray(move)) for move in moves.T])
     except SolverError:
         return None
     if free_scale and (size := float(np.linalg.norm(both[:, -1]))) > 0:  # less what a change of scale explains
