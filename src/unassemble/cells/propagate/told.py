@@ -13,7 +13,7 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tolerances import AGREED, ALIKE, LAST_DIGITS, SIGMAS
+from ...tolerances import AGREED, ALIKE, LAST_DIGITS, SIGMAS
 
 _MOST_SCALES = 8
 """Factors that are tried: inner triangles of a lattice agree as well, in a wrong one."""
