@@ -75,9 +75,10 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         misfits = residuals(nodal, solution.valid, solution.points)
         error = float(np.abs(misfits).max()) if len(misfits) else float("nan")
         near = not error >= max(ALIKE, rounding.spread if rounding else 0.0)  # NaN where only elements can tell
-        ratio = _lame_ratio(nodal, solution) if near else None
+        alike = near and not any(solution.freedoms)  # boundary terms go with the points
+        ratio = lame_ratio(nodal, solution.valid, solution.points) if alike else None
     found = Cells()
-    if (cells or solution.straight or solution.hanging is not None) and near:
+    if (cells or solution.hanging is not None) and near:
         with request.clock("cells"):
             found = recognise_cells(nodal, solution.points, ratio)
     status, reason = verdict(nodal, solution, error, found, numbering)
@@ -121,6 +122,9 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
     lame, scale = _in_units(shown, component, factor, nodal.dim)
     if np.isnan(factor).any():
         notes.append("the sign of the scale is free: with a mesh its point reflection fits the matrix as well")
+    exchangeable = len(nodal.indices) == nodal.n**2 and numbering.kind != "given"
+    if exchangeable:  # of a rectangle, say, rows along y with those of opposite corners: those of its mirror image
+        notes.append("all nodes are coupled, as those of one element: which rows are of one node may be another choice")
     guessed = guessed_directions(numbering, loose)
     return Body(
         **_cell_fields(shown),
@@ -129,7 +133,7 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         scale=scale,
         node_status=loose.astype(np.int8),
         status=status,
-        uniqueness="searched" if status == "certified" else None,
+        uniqueness=("ambiguous" if exchangeable else "searched") if status == "certified" else None,
         reason=reason.text,
         advice=reason.advice,
         operator="elasticity",
@@ -152,22 +156,6 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         lame=lame,
         evidence=solution.evidence,
     )
-
-
-def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
-    """The number lambda / mu as boundary terms have it, and as the elements that told axes do; None if they differ.
-
-    None too where more than translation and scale is free, since boundary terms go with the points.
-    """
-    if any(solution.freedoms):
-        return None
-    told = list(solution.straight)
-    if len(solution.straight) < len(solution.evidence):
-        read = lame_ratio(nodal, solution.valid, solution.points)
-        if read is None:
-            return None
-        told.append(read)
-    return told[0] if np.ptp([poisson_ratio(one) for one in told]) < ALIKE else None
 
 
 def _flat(points: NDArray[np.float64], component: NDArray[np.int64]) -> bool:
