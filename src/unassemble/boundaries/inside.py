@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..planar.cotangent import weight_roundings
+from ..planar.cotangent import areas, weight_roundings
 from ..topology import Piece
-from .embedding import areas
 from .first import first_fits
 from .fit import EXACT, Fit, FitOptions, WholeEntries
 from .judge import determined, unknowns
