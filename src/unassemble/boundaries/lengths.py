@@ -1,11 +1,11 @@
 """Lengths of edges from whole entries, and a rim such that the mesh is flat.
 
-Where the lengths of edges without a whole entry are given, all others follow from a convex problem, as those of a whole
-surface do (:mod:`..metric.program`): the least w . u - 2 sum of areas over squared lengths u of the edges with entries w.
-So entries are met exactly, from any start, and what is left to find is the rim: curvatures inside, 2 pi less the angles
-at a vertex, are brought to zero by Gauss-Newton steps along the metrics with these entries, a sparse saddle point
-problem each. Positions that have to fit entries creep along narrow valleys, maps that are nearly conformal; curvatures
-do not, since a conformal factor changes them at the rim only.
+Where the lengths of edges without a whole entry are given, all others follow from a convex problem, as those of a
+whole surface do (:mod:`..metric.program`): the least w . u - 2 sum of areas over squared lengths u of the edges with
+entries w. So entries are met exactly, from any start, and what is left to find is the rim: curvatures inside, 2 pi less
+the angles at a vertex, are brought to zero by Gauss-Newton steps along the metrics with these entries, a sparse saddle
+point problem each. Such metrics differ by conformal factors, and curvature is nearly linear in the logarithm of one,
+where positions that have to fit entries creep along narrow, bent valleys.
 """
 
 from __future__ import annotations
