@@ -110,6 +110,8 @@ def polish(
             factorisations += 1
         move = system(jacobian, fit.misfit)
         previous, length = length, float(np.abs(move).max())
+        if not length < 1 / ROUNDED:  # of a singular system: nowhere
+            break
         slow = length > options.contraction * previous
         if slow and length > options.rounding and not fresh:
             if factorisations == options.max_factorisations:
