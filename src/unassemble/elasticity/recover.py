@@ -75,10 +75,9 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         misfits = residuals(nodal, solution.valid, solution.points)
         error = float(np.abs(misfits).max()) if len(misfits) else float("nan")
         near = not error >= max(ALIKE, rounding.spread if rounding else 0.0)  # NaN where only elements can tell
-        alike = near and not any(solution.freedoms)  # boundary terms go with the points
-        ratio = lame_ratio(nodal, solution.valid, solution.points) if alike else None
+        ratio = _lame_ratio(nodal, solution) if near else None
     found = Cells()
-    if (cells or solution.hanging is not None) and near:
+    if (cells or solution.straight or solution.hanging is not None) and near:
         with request.clock("cells"):
             found = recognise_cells(nodal, solution.points, ratio)
     status, reason = verdict(nodal, solution, error, found, numbering)
@@ -156,6 +155,22 @@ def _described(nodal: NodalMatrix, numbering: Numbering, solution: Solution, req
         lame=lame,
         evidence=solution.evidence,
     )
+
+
+def _lame_ratio(nodal: NodalMatrix, solution: Solution) -> float | None:
+    """The number lambda / mu as boundary terms have it, and as the elements that told axes do; None if they differ.
+
+    None too where more than translation and scale is free, since boundary terms go with the points.
+    """
+    if any(solution.freedoms):
+        return None
+    told = list(solution.straight)
+    if len(solution.straight) < len(solution.evidence):
+        read = lame_ratio(nodal, solution.valid, solution.points)
+        if read is None:
+            return None
+        told.append(read)
+    return told[0] if np.ptp([poisson_ratio(one) for one in told]) < ALIKE else None
 
 
 def _flat(points: NDArray[np.float64], component: NDArray[np.int64]) -> bool:
